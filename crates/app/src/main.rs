@@ -1,0 +1,2 @@
+//! The `isoclay` program.
+fn main() {}

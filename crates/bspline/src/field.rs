@@ -1,0 +1,135 @@
+use glam::{DAffine3, DMat3, DVec3};
+
+use crate::Interval;
+
+/// An axis-aligned box in world coordinates, ends included.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aabb {
+    /// Corner of smallest coordinates.
+    pub min: DVec3,
+    /// Corner of largest coordinates.
+    pub max: DVec3,
+}
+
+impl Aabb {
+    /// Box from its two corners.
+    pub fn new(min: DVec3, max: DVec3) -> Self {
+        debug_assert!(min.cmple(max).all(), "box corners out of order: {min} {max}");
+        Self { min, max }
+    }
+
+    /// Middle of the box.
+    pub fn center(&self) -> DVec3 {
+        (self.min + self.max) * 0.5
+    }
+
+    /// Edge lengths.
+    pub fn size(&self) -> DVec3 {
+        self.max - self.min
+    }
+
+    /// Smallest axis-aligned box round the image of this box; sound up to the rounding of `map`.
+    pub fn transformed(&self, map: &DAffine3) -> Self {
+        let center = map.transform_point3(self.center());
+        let half = self.size() * 0.5;
+        let m = map.matrix3;
+        let reach = m.x_axis.abs() * half.x + m.y_axis.abs() * half.y + m.z_axis.abs() * half.z;
+        let slack = (center.abs() + reach) * (8.0 * f64::EPSILON);
+        Self { min: center - reach - slack, max: center + reach + slack }
+    }
+}
+
+/// Value, gradient and Hessian of a field at one point, in world units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Jet {
+    /// `f(x)`.
+    pub value: f64,
+    /// `∇f(x)`.
+    pub gradient: DVec3,
+    /// `∇²f(x)`, symmetric.
+    pub hessian: DMat3,
+}
+
+/// A regular grid of cells laid over space, along which a field is sampled and meshed.
+///
+/// Node `(i, j, k)` lies at `world_from_grid · (i, j, k)`; nodes run from `0` to `cells` inclusive on each axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Frame {
+    /// Grid coordinates (one unit per cell) to world.
+    pub world_from_grid: DAffine3,
+    /// Cells on each axis.
+    pub cells: [u32; 3],
+}
+
+impl Frame {
+    /// A grid of `cells` cells that fills `b`.
+    pub fn over(b: &Aabb, cells: [u32; 3]) -> Self {
+        let step = b.size() / DVec3::new(cells[0] as f64, cells[1] as f64, cells[2] as f64);
+        Self { world_from_grid: DAffine3 { matrix3: DMat3::from_diagonal(step), translation: b.min }, cells }
+    }
+
+    /// World position of node `(i, j, k)`.
+    pub fn node(&self, ijk: [i64; 3]) -> DVec3 {
+        self.world_from_grid.transform_point3(DVec3::new(ijk[0] as f64, ijk[1] as f64, ijk[2] as f64))
+    }
+
+    /// World box round the cells from node `lo` to node `hi`.
+    pub fn world_box(&self, lo: [i64; 3], hi: [i64; 3]) -> Aabb {
+        let v = |a: [i64; 3]| DVec3::new(a[0] as f64, a[1] as f64, a[2] as f64);
+        Aabb { min: v(lo), max: v(hi) }.transformed(&self.world_from_grid)
+    }
+}
+
+/// A scalar density over all of space: `f > c` is inside the solid, `f < c` outside, and the outward
+/// normal is `-∇f/|∇f|`.
+///
+/// The defaults of the batch methods are the plain loops; an implementation overrides them only to be faster,
+/// never to answer differently.
+pub trait Field: Send + Sync {
+    /// `f(p)`.
+    fn value(&self, p: DVec3) -> f64;
+
+    /// `f(p)` and `∇f(p)`.
+    fn value_gradient(&self, p: DVec3) -> (f64, DVec3);
+
+    /// Value, gradient and Hessian.
+    fn jet(&self, p: DVec3) -> Jet;
+
+    /// An interval that holds `f` everywhere in `b`: never too small, possibly too large.
+    fn bounds(&self, b: &Aabb) -> Interval;
+
+    /// [`Field::value_gradient`] of many points, in order.
+    ///
+    /// # Panics
+    /// If the lengths differ.
+    fn values_gradients(&self, points: &[DVec3], out: &mut [(f64, DVec3)]) {
+        assert_eq!(points.len(), out.len(), "one output slot per point");
+        for (p, o) in points.iter().zip(out) {
+            *o = self.value_gradient(*p);
+        }
+    }
+
+    /// Values at the nodes `lo .. lo + count` of `frame`, last axis fastest, into `out`.
+    ///
+    /// The value of a node does not depend, to the bit, on the block it was asked with.
+    ///
+    /// # Panics
+    /// If `out` is not `count[0]·count[1]·count[2]` long.
+    fn frame_values(&self, frame: &Frame, lo: [i64; 3], count: [usize; 3], out: &mut [f64]) {
+        assert_eq!(out.len(), count.iter().product::<usize>(), "one output slot per node");
+        let mut slot = out.iter_mut();
+        for i in 0..count[0] as i64 {
+            for j in 0..count[1] as i64 {
+                for k in 0..count[2] as i64 {
+                    *slot.next().expect("length checked above") =
+                        self.value(frame.node([lo[0] + i, lo[1] + j, lo[2] + k]));
+                }
+            }
+        }
+    }
+
+    /// [`Field::bounds`] over the cells of `frame` from node `lo` to node `hi`.
+    fn frame_bounds(&self, frame: &Frame, lo: [i64; 3], hi: [i64; 3]) -> Interval {
+        self.bounds(&frame.world_box(lo, hi))
+    }
+}

@@ -1,0 +1,17 @@
+//! Fields made of trivariate B-splines: what a field is and how to ask it.
+//!
+//! A field `f` is a scalar density over space; the solid it stands for is `{ x : f(x) > c }`, the outward
+//! normal `-∇f/|∇f|`. Every field answers value, gradient, Hessian, and a sound interval over a box
+//! ([`Field`]).
+//!
+//! Index order is `(x, y, z)` with `z` fastest in memory, everywhere in this crate.
+
+mod field;
+pub mod hierarchical;
+mod interval;
+mod real;
+
+pub use field::{Aabb, Field, Frame, Jet};
+pub use hierarchical::HierarchicalSpline;
+pub use interval::Interval;
+pub use real::Real;

@@ -1,0 +1,1 @@
+//! Density dynamics of implicit solids: springs, matter, integrators, constraints. Not built yet.

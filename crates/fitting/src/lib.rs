@@ -1,0 +1,10 @@
+//! Samples in, field out.
+
+pub mod budget;
+pub mod report;
+
+pub use budget::{Cancel, Control, Progress};
+pub use report::{FitReport, Leaf, StopReason};
+
+mod error;
+pub use error::FitError;

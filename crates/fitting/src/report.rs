@@ -1,0 +1,65 @@
+/// Why a leaf was not split further.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum StopReason {
+    /// The rms residual is below the tolerance.
+    Tolerance = 0,
+    /// The depth limit was reached with the residual still above the tolerance.
+    Depth = 1,
+    /// A child would hold too few samples, or none.
+    NoData = 2,
+    /// The spacing would fall below what the noise justifies.
+    Noise = 3,
+    /// The coefficient budget was spent.
+    Budget = 4,
+    /// The memory ceiling was reached.
+    Memory = 5,
+}
+
+/// A dyadic cell that was not split, with its own error.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Leaf {
+    /// Level of the cell.
+    pub level: u8,
+    /// Place of the cell on its level.
+    pub cell: [u32; 3],
+    /// Samples in the cell; 0 is the stored fact that there is no data here.
+    pub sample_count: u32,
+    /// Root of the mean square residual, in the tolerance's unit (clouds: world length; volumes: density).
+    pub rms: f32,
+    /// Largest absolute residual, same unit.
+    pub max: f32,
+    /// Why the cell was not split.
+    pub reason: StopReason,
+}
+
+/// What a fit says of itself. Residuals are first measured by the fit; `isoclay check` measures them again.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FitReport {
+    /// Samples given.
+    pub input_count: usize,
+    /// Samples used (finite, with a usable normal, not merged).
+    pub used_count: usize,
+    /// Active functions.
+    pub coefficients: usize,
+    /// Finest level with an active function; level 0 is the coarsest.
+    pub depth: usize,
+    /// Root mean square residual (clouds: Newton distance; volumes: density).
+    pub rms: f64,
+    /// 95th percentile of the absolute residuals.
+    pub p95: f64,
+    /// Largest absolute residual.
+    pub max: f64,
+    /// Sound bound on `|f(x_k) - d_k|` over all samples: residual plus the rounding of its evaluation.
+    pub bound: f64,
+    /// Estimated standard deviation of the noise, if any was found; same unit as `rms`.
+    pub noise: Option<f64>,
+    /// Tolerance aimed at, same unit.
+    pub tolerance: f64,
+    /// Smoothing weight used (see `docs/fitting.md`).
+    pub smoothing: f64,
+    /// Leaves in a fixed order.
+    pub leaves: Vec<Leaf>,
+    /// Repairs and doubts, each a sentence with its figures.
+    pub notes: Vec<String>,
+}

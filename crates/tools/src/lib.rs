@@ -1,0 +1,1 @@
+//! What a hand can do to a field: force tools, geometric tools, painting, haptics. Not built yet.
