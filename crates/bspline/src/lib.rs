@@ -6,10 +6,12 @@
 //!
 //! Index order is `(x, y, z)` with `z` fastest in memory, everywhere in this crate.
 
+pub mod cubic;
 mod field;
 pub mod hierarchical;
 mod interval;
 mod real;
+pub mod restrict;
 
 pub use field::{Aabb, Field, Frame, Jet};
 pub use hierarchical::HierarchicalSpline;
