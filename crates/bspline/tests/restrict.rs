@@ -29,7 +29,7 @@ fn apply<T: Real>(axis: &RestrictedAxis<T>, c: &[f64]) -> Vec<f64> {
     (0..axis.count())
         .map(|r| {
             let (start, w) = axis.row(r);
-            w.iter().zip(&c[start..]).map(|(&w, c)| w.to_f64() * c).sum()
+            w.iter().zip(&c[start..]).map(|(&w, c)| w.as_f64() * c).sum()
         })
         .collect()
 }
@@ -191,8 +191,8 @@ fn everything_gives_the_interior_coefficients_back() {
 fn weights_law<T: Real>(tolerance: f64) {
     for i in 0..=64 {
         let t = T::from_f64(i as f64 / 64.0);
-        let x = t.to_f64();
-        let sum = |w: [T; 4]| w.iter().map(|&w| w.to_f64()).sum::<f64>();
+        let x = t.as_f64();
+        let sum = |w: [T; 4]| w.iter().map(|&w| w.as_f64()).sum::<f64>();
         assert!((sum(cubic::values(t)) - 1.0).abs() < tolerance);
         assert!(sum(cubic::first(t)).abs() < tolerance);
         assert!(sum(cubic::second(t)).abs() < tolerance);
@@ -203,7 +203,7 @@ fn weights_law<T: Real>(tolerance: f64) {
         assert_eq!(cubic::values(t), mirrored);
         // Reproduction of x³ = Σ w_j (j-2)(j-1)j and of its derivatives.
         let c: [f64; 4] = std::array::from_fn(|j| (j as f64 - 2.0) * (j as f64 - 1.0) * j as f64);
-        let apply = |w: [T; 4]| w.iter().zip(c).map(|(&w, c)| w.to_f64() * c).sum::<f64>();
+        let apply = |w: [T; 4]| w.iter().zip(c).map(|(&w, c)| w.as_f64() * c).sum::<f64>();
         assert!((apply(cubic::values(t)) - x * x * x).abs() < 6.0 * tolerance);
         assert!((apply(cubic::first(t)) - 3.0 * x * x).abs() < 6.0 * tolerance);
         assert!((apply(cubic::second(t)) - 6.0 * x).abs() < 6.0 * tolerance);
