@@ -5,9 +5,8 @@ use std::ops::Range;
 use glam::DVec3;
 
 use super::brick::{BRICK, Brick, HALO, HALO_LEN, NONE};
-use super::kernel;
 use super::spline::HierarchicalSpline;
-use crate::{Field, Frame, Real};
+use crate::{Field, Frame, Real, cubic};
 
 /// [`Field::frame_values`]. Frames that are turned against the lattice fall back to single points.
 pub(super) fn frame_values<T: Real>(
@@ -154,7 +153,7 @@ impl<T: Real> Block<'_, T> {
         }
     }
 
-    /// `Σ_c w_c Σ_b w_b Σ_a w_a C_abc` in the order of [`kernel::value`], so with its bits.
+    /// `Σ_c w_c Σ_b w_b Σ_a w_a C_abc` in the order of `kernel::value`, so with its bits.
     fn evaluate(&mut self, level: usize, brick: &Brick<T>, ranges: [Range<usize>; 3]) {
         let shift = self.spline.level_count() - 1 - level;
         let scale = (1u64 << level) as f64;
@@ -165,7 +164,7 @@ impl<T: Real> Block<'_, T> {
             nodes.extend(ranges[a].clone().map(|i| {
                 let cell = axis.cell[i] >> shift;
                 let t = T::from_f64(axis.clamped[i] * scale - cell as f64);
-                (cell as usize % BRICK, kernel::weights(t))
+                (cell as usize % BRICK, cubic::values(t))
             }));
         }
         let (counts, offsets) = (

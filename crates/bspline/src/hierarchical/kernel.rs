@@ -2,42 +2,7 @@
 
 use super::brick::{HALO, HALO_LEN};
 use crate::Real;
-
-/// The four uniform cubic B-splines over a cell at `t` in `[0, 1]`.
-#[inline(always)]
-pub(crate) fn weights<T: Real>(t: T) -> [T; 4] {
-    let (sixth, one) = (T::from_f64(1.0 / 6.0), T::one());
-    let (half, two_thirds) = (T::from_f64(0.5), T::from_f64(2.0 / 3.0));
-    let s = one - t;
-    [
-        s * s * s * sixth,
-        two_thirds - t * t * (one - t * half),
-        two_thirds - s * s * (one - s * half),
-        t * t * t * sixth,
-    ]
-}
-
-/// Their first derivatives by `t`.
-#[inline(always)]
-pub(crate) fn slopes<T: Real>(t: T) -> [T; 4] {
-    let (half, one) = (T::from_f64(0.5), T::one());
-    let (two, three_halves) = (T::from_f64(2.0), T::from_f64(1.5));
-    let s = one - t;
-    [
-        -(s * s) * half,
-        t * (three_halves * t - two),
-        s * (two - three_halves * s),
-        t * t * half,
-    ]
-}
-
-/// Their second derivatives by `t`.
-#[inline(always)]
-pub(crate) fn curvatures<T: Real>(t: T) -> [T; 4] {
-    let (one, two, three) = (T::one(), T::from_f64(2.0), T::from_f64(3.0));
-    let s = one - t;
-    [s, three * t - two, three * s - two, t]
-}
+use crate::cubic::{first, second as curvatures, values};
 
 #[inline(always)]
 fn row<T: Real>(totals: &[T; HALO_LEN], cell: [usize; 3], a: usize, b: usize) -> &[T; 4] {
@@ -60,7 +25,7 @@ fn add<T: Real>(acc: &mut [T; 4], w: T, v: &[T; 4]) {
 /// Value at `t` in `cell` (each `0..8`) of a brick: `Σ_c w_c Σ_b w_b Σ_a w_a C_abc`, x summed first.
 #[inline]
 pub(crate) fn value<T: Real>(totals: &[T; HALO_LEN], cell: [usize; 3], t: [T; 3]) -> T {
-    let (wx, wy, wz) = (weights(t[0]), weights(t[1]), weights(t[2]));
+    let (wx, wy, wz) = (values(t[0]), values(t[1]), values(t[2]));
     let mut plane = [T::zero(); 4];
     for b in 0..4 {
         let mut line = [T::zero(); 4];
@@ -75,8 +40,8 @@ pub(crate) fn value<T: Real>(totals: &[T; HALO_LEN], cell: [usize; 3], t: [T; 3]
 /// Value and gradient by cell coordinates; the value has the same bits as [`value`].
 #[inline]
 pub(crate) fn value_gradient<T: Real>(totals: &[T; HALO_LEN], cell: [usize; 3], t: [T; 3]) -> (T, [T; 3]) {
-    let (wx, wy, wz) = (weights(t[0]), weights(t[1]), weights(t[2]));
-    let (dx, dy, dz) = (slopes(t[0]), slopes(t[1]), slopes(t[2]));
+    let (wx, wy, wz) = (values(t[0]), values(t[1]), values(t[2]));
+    let (dx, dy, dz) = (first(t[0]), first(t[1]), first(t[2]));
     let (mut plane, mut plane_dx, mut plane_dy) = ([T::zero(); 4], [T::zero(); 4], [T::zero(); 4]);
     for b in 0..4 {
         let (mut line, mut line_dx) = ([T::zero(); 4], [T::zero(); 4]);
@@ -97,8 +62,8 @@ pub(crate) fn value_gradient<T: Real>(totals: &[T; HALO_LEN], cell: [usize; 3], 
 
 /// Second derivatives by cell coordinates: `xx, yy, zz, xy, xz, yz`.
 pub(crate) fn second<T: Real>(totals: &[T; HALO_LEN], cell: [usize; 3], t: [T; 3]) -> [T; 6] {
-    let w = t.map(weights);
-    let d = t.map(slopes);
+    let w = t.map(values);
+    let d = t.map(first);
     let k = t.map(curvatures);
     let sum = |wx: &[T; 4], wy: &[T; 4], wz: &[T; 4]| {
         let mut plane = [T::zero(); 4];

@@ -11,4 +11,5 @@ mod spline;
 
 pub use brick::{BRICK, BRICK_LEN, BrickKey, Corrections, HALO, HALO_LEN};
 pub use lattice::Lattice;
+pub use prolong::refine_block;
 pub use spline::{HierarchicalSpline, LevelCorrections};
