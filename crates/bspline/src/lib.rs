@@ -9,6 +9,7 @@
 mod field;
 pub mod hierarchical;
 mod interval;
+pub mod polygonize;
 mod real;
 
 pub use field::{Aabb, Field, Frame, Jet};
