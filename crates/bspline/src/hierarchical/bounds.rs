@@ -63,29 +63,38 @@ fn visit<T: Real>(spline: &HierarchicalSpline<T>, level: usize, index: usize, b:
     let width = BRICK as f64 / (1u64 << level) as f64;
     let corner = DVec3::from_array(brick.key.0.map(|k| k as f64 * width));
     let end = (corner + width).min(spline.lattice().extent());
-    if b.min.cmple(corner).all() && b.max.cmpge(end).all() {
+    let Some(part) = shared(b, corner, end) else {
+        return;
+    };
+    if part.min == corner && part.max == end {
         return hull.add([least, most]);
     }
     if !brick.has_children() {
-        return hull.add(local_hull(brick, level, b));
+        return hull.add(local_hull(brick, level, &part));
     }
     for octant in 0..8usize {
-        let low = corner
-            + DVec3::from_array(std::array::from_fn(|a| {
-                (octant >> (2 - a) & 1) as f64 * width / 2.0
-            }));
-        let part = Aabb {
-            min: b.min.max(low),
-            max: b.max.min((low + width / 2.0).min(end)),
-        };
-        if !part.min.cmple(part.max).all() {
+        if let child @ 0..NONE = brick.children[octant] {
+            visit(spline, level + 1, child as usize, b, hull);
             continue;
         }
-        match brick.children[octant] {
-            NONE => hull.add(local_hull(brick, level, &part)),
-            child => visit(spline, level + 1, child as usize, &part, hull),
+        let half = |a: usize| (octant >> (2 - a) & 1) as f64 * width / 2.0;
+        let low = corner + DVec3::from_array(std::array::from_fn(half));
+        if let Some(part) = shared(b, low, (low + width / 2.0).min(end)) {
+            hull.add(local_hull(brick, level, &part));
         }
     }
+}
+
+/// The part of `b` between `low` and `high`. None where they share just a face, which the brick on its other side
+/// covers as well (the field is continuous), unless `b` is no thicker than that itself.
+fn shared(b: &Aabb, low: DVec3, high: DVec3) -> Option<Aabb> {
+    let part = Aabb {
+        min: b.min.max(low),
+        max: b.max.min(high),
+    };
+    let thick =
+        (0..3).all(|a| part.min[a] < part.max[a] || (part.min[a] == part.max[a] && b.min[a] == b.max[a]));
+    thick.then_some(part)
 }
 
 /// Range of the brick's coefficients after restriction to its part of `b`.
