@@ -70,7 +70,9 @@ pub(super) fn finish(raw: RawCloud, budget: &mut Budget) -> Result<PointCloud, F
         }
         if from_faces {
             // The sum of a sheet and its back cancels up to rounding; what is left of it points nowhere.
-            sums.iter_mut().filter(|n| n.length_squared() < CANCELLED * CANCELLED).for_each(|n| *n = DVec3::ZERO);
+            sums.iter_mut()
+                .filter(|n| n.length_squared() < CANCELLED * CANCELLED)
+                .for_each(|n| *n = DVec3::ZERO);
             normals = Some(sums);
         }
         cloud.normal_source = match (from_faces, &corner_normals) {
@@ -300,10 +302,19 @@ mod tests {
 
     #[test]
     fn faces_back_to_back_give_a_zero_normal_and_no_rounding_noise() {
-        let positions =
-            vec![DVec3::ZERO, DVec3::new(0.3, 0.1, 0.7), DVec3::new(0.9, 0.2, 0.1), DVec3::new(0.11, 1.7, 0.3)];
+        let positions = vec![
+            DVec3::ZERO,
+            DVec3::new(0.3, 0.1, 0.7),
+            DVec3::new(0.9, 0.2, 0.1),
+            DVec3::new(0.11, 1.7, 0.3),
+        ];
         let triangles = vec![[0, 1, 2], [2, 1, 0], [0, 2, 3], [3, 2, 0], [1, 0, 3], [0, 1, 3]];
-        let cloud = clean(RawCloud { positions, triangles, face_count: 6, ..Default::default() });
+        let cloud = clean(RawCloud {
+            positions,
+            triangles,
+            face_count: 6,
+            ..Default::default()
+        });
         assert_eq!(cloud.zero_normals, 4);
     }
 

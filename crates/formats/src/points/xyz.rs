@@ -170,9 +170,17 @@ mod tests {
             c.notes
         );
         let c = read("1 2 3 0 0 -2\n4 5 6 12 0 0\n").unwrap();
-        assert_eq!(c.normals.unwrap(), [DVec3::NEG_Z, DVec3::X], "of any length, as some programs write them");
+        assert_eq!(
+            c.normals.unwrap(),
+            [DVec3::NEG_Z, DVec3::X],
+            "of any length, as some programs write them"
+        );
         let c = read("1 2 3 -812 90 7 9\n4 5 6 1 0 0 9\n").unwrap();
-        assert!(c.normals.is_none() && c.notes[0].contains("line 1"), "{:?}", c.notes);
+        assert!(
+            c.normals.is_none() && c.notes[0].contains("line 1"),
+            "{:?}",
+            c.notes
+        );
         let c = read("1 2 3 0 0 0\n4 5 6 0 0 0\n").unwrap();
         assert_eq!((c.zero_normals, c.normals.unwrap().len()), (2, 2));
     }

@@ -72,7 +72,10 @@ fn sample(encoding: &str) -> Vec<u8> {
 fn all_encodings_types_and_orders_give_the_same_cloud() {
     let clouds = ["ascii", "binary_little_endian", "binary_big_endian"].map(|e| read(&sample(e)).unwrap());
     assert_eq!(clouds[0].positions[3], DVec3::new(3.1, 900_000.0, -303.0));
-    assert_eq!(clouds[0].normals.as_ref().unwrap()[..], [DVec3::Z, DVec3::Z, DVec3::ZERO, DVec3::NEG_Z]);
+    assert_eq!(
+        clouds[0].normals.as_ref().unwrap()[..],
+        [DVec3::Z, DVec3::Z, DVec3::ZERO, DVec3::NEG_Z]
+    );
     assert_eq!((clouds[0].zero_normals, clouds[0].face_count), (1, 2));
     assert_eq!(clouds[0].normal_source, NormalSource::Stored);
     assert_eq!(clouds[0], clouds[1]);
@@ -145,11 +148,22 @@ fn a_header_that_promises_1e11_points_allocates_nothing() {
     let promise = 100_000_000_000;
     for (file, whole) in [
         (ascii(promise, "", SQUARE), 600_000_000_000u64),
-        (String::from_utf8(ascii(promise, "", SQUARE)).unwrap().replace("ascii", "binary_big_endian").into(), 12 * promise),
-        (ascii(4, &FACES.replace('1', "100000000000"), SQUARE), 200_000_000_000),
+        (
+            String::from_utf8(ascii(promise, "", SQUARE))
+                .unwrap()
+                .replace("ascii", "binary_big_endian")
+                .into(),
+            12 * promise,
+        ),
+        (
+            ascii(4, &FACES.replace('1', "100000000000"), SQUARE),
+            200_000_000_000,
+        ),
     ] {
         match read(&file).unwrap_err() {
-            Fault::Truncated { needed, found, .. } => assert!(needed == whole && found < 100, "{needed} {found}"),
+            Fault::Truncated { needed, found, .. } => {
+                assert!(needed == whole && found < 100, "{needed} {found}")
+            }
             e => panic!("{e}"),
         }
     }
@@ -164,14 +178,26 @@ fn a_header_that_promises_1e11_points_allocates_nothing() {
 #[test]
 fn content_faults_name_place_value_and_remedy() {
     for (file, part) in [
-        (ascii(4, FACES, &format!("{SQUARE}3 0 1 4\n")), "face 0: vertex index 4 with 4 vertices"),
+        (
+            ascii(4, FACES, &format!("{SQUARE}3 0 1 4\n")),
+            "face 0: vertex index 4 with 4 vertices",
+        ),
         (ascii(4, FACES, &format!("{SQUARE}3 0 1 -1\n")), "vertex index -1"),
-        (ascii(4, FACES, &format!("{SQUARE}3 0 1 1.5\n")), "vertex index 1.5"),
-        (ascii(4, FACES, &format!("{SQUARE}-3 0 1 2\n")), "a list has \"-3\" entries"),
+        (
+            ascii(4, FACES, &format!("{SQUARE}3 0 1 1.5\n")),
+            "vertex index 1.5",
+        ),
+        (
+            ascii(4, FACES, &format!("{SQUARE}-3 0 1 2\n")),
+            "a list has \"-3\" entries",
+        ),
         (ascii(1, "", "0 0 here\n"), "line 8: \"here\" is not a number"),
         (ascii(2, "", "0 0 0\nnan 0 0\nx"), ""),
         (ascii(0, "", ""), "0 of 0"),
-        (b"ply\nformat ascii 1.0\nelement point 1\nend_header\n".to_vec(), "[point]"),
+        (
+            b"ply\nformat ascii 1.0\nelement point 1\nend_header\n".to_vec(),
+            "[point]",
+        ),
         (
             b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n".to_vec(),
             "[x]; a point cloud needs x, y and z",
@@ -188,7 +214,10 @@ fn content_faults_name_place_value_and_remedy() {
 fn nan_points_take_their_faces_with_them() {
     let body = "0 0 0\n1 0 0\n1 1 0\nnan 1 0\n3 0 1 2\n3 0 2 3\n";
     let c = read(&ascii(4, &FACES.replace("face 1", "face 2"), body)).unwrap();
-    assert_eq!((c.positions.len(), c.invalid_dropped, c.unused_vertices), (3, 1, 0));
+    assert_eq!(
+        (c.positions.len(), c.invalid_dropped, c.unused_vertices),
+        (3, 1, 0)
+    );
     assert!(c.notes[0].contains("1 of 4 points"), "{:?}", c.notes);
 }
 
@@ -199,13 +228,20 @@ fn the_ceiling_holds_for_points_and_for_faces() {
     let file = ascii(1000, normals, &body);
     assert!(matches!(
         parse_ply(&file, &ReadLimits { max_bytes: 47_999 }),
-        Err(Fault::Limit { what: "points", needed: 48_000, .. })
+        Err(Fault::Limit {
+            what: "points",
+            needed: 48_000,
+            ..
+        })
     ));
     assert!(parse_ply(&file, &ReadLimits { max_bytes: 48_000 }).is_ok());
     let corners = "0 ".repeat(5000);
     let file = ascii(4, FACES, &format!("{SQUARE}5000 {corners}"));
     assert!(matches!(
         parse_ply(&file, &ReadLimits { max_bytes: 20_000 }),
-        Err(Fault::Limit { what: "triangles of the faces", .. })
+        Err(Fault::Limit {
+            what: "triangles of the faces",
+            ..
+        })
     ));
 }
