@@ -14,6 +14,7 @@ pub mod hierarchical;
 mod interval;
 pub mod knots;
 pub mod primitives;
+pub mod polygonize;
 mod real;
 pub mod restrict;
 

@@ -1,7 +1,8 @@
 //! Samples in, field out.
 
-pub mod budget;
-pub mod report;
+mod budget;
+pub mod points;
+mod report;
 
 pub use budget::{Cancel, Control, Progress};
 pub use report::{FitReport, Leaf, StopReason};
