@@ -6,7 +6,7 @@
 //! at consecutive triples of knots [Ramshaw 1987; The NURBS Book §5.2]. Their hull exceeds the range of the
 //! function by a share that falls with the square of the box, and is exact for linear functions.
 
-use crate::Real;
+use crate::{Interval, Real};
 
 /// Cells that one call covers.
 pub const CELLS: usize = 8;
@@ -202,4 +202,31 @@ fn range_of_rows<T: Real>(
         .iter()
         .fold(high[0], |m, c| if *c > m { *c } else { m });
     (least, most)
+}
+
+/// Bounds of a brick's spline on a box, whose values are computed in `T` to within
+/// `evaluation_error · max |c|` over the coefficients that the box reads.
+///
+/// [`restricted_range`] widened by that and by the rounding of the restriction itself. The hull's own size must not
+/// stand for `max |c|`: near the zero set the control coefficients of a small box are small, and the rounding is
+/// not.
+pub fn restricted_bounds<T: Real>(
+    coefficients: &[T; COEFFICIENTS * COEFFICIENTS * COEFFICIENTS],
+    axes: &[RestrictedAxis<T>; 3],
+    evaluation_error: f64,
+) -> Interval {
+    let (lo, hi) = restricted_range(coefficients, axes);
+    let [rx, ry, rz] = [axes[0].reads(), axes[1].reads(), axes[2].reads()];
+    let mut largest = T::zero();
+    for x in rx {
+        for y in ry.clone() {
+            let row = (x * COEFFICIENTS + y) * COEFFICIENTS;
+            for c in &coefficients[row + rz.start..row + rz.end] {
+                let c = c.abs();
+                largest = if c > largest { c } else { largest };
+            }
+        }
+    }
+    let error = 3.0 * RestrictedAxis::<T>::axis_error() + evaluation_error;
+    Interval::new(lo.as_f64(), hi.as_f64()).widened(error * largest.as_f64())
 }
