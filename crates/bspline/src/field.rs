@@ -35,7 +35,10 @@ impl Aabb {
         let m = map.matrix3;
         let reach = m.x_axis.abs() * half.x + m.y_axis.abs() * half.y + m.z_axis.abs() * half.z;
         let slack = (center.abs() + reach) * (8.0 * f64::EPSILON);
-        Self { min: center - reach - slack, max: center + reach + slack }
+        Self {
+            min: center - reach - slack,
+            max: center + reach + slack,
+        }
     }
 }
 
@@ -65,18 +68,29 @@ impl Frame {
     /// A grid of `cells` cells that fills `b`.
     pub fn over(b: &Aabb, cells: [u32; 3]) -> Self {
         let step = b.size() / DVec3::new(cells[0] as f64, cells[1] as f64, cells[2] as f64);
-        Self { world_from_grid: DAffine3 { matrix3: DMat3::from_diagonal(step), translation: b.min }, cells }
+        Self {
+            world_from_grid: DAffine3 {
+                matrix3: DMat3::from_diagonal(step),
+                translation: b.min,
+            },
+            cells,
+        }
     }
 
     /// World position of node `(i, j, k)`.
     pub fn node(&self, ijk: [i64; 3]) -> DVec3 {
-        self.world_from_grid.transform_point3(DVec3::new(ijk[0] as f64, ijk[1] as f64, ijk[2] as f64))
+        self.world_from_grid
+            .transform_point3(DVec3::new(ijk[0] as f64, ijk[1] as f64, ijk[2] as f64))
     }
 
     /// World box round the cells from node `lo` to node `hi`.
     pub fn world_box(&self, lo: [i64; 3], hi: [i64; 3]) -> Aabb {
         let v = |a: [i64; 3]| DVec3::new(a[0] as f64, a[1] as f64, a[2] as f64);
-        Aabb { min: v(lo), max: v(hi) }.transformed(&self.world_from_grid)
+        Aabb {
+            min: v(lo),
+            max: v(hi),
+        }
+        .transformed(&self.world_from_grid)
     }
 }
 
@@ -116,7 +130,11 @@ pub trait Field: Send + Sync {
     /// # Panics
     /// If `out` is not `count[0]·count[1]·count[2]` long.
     fn frame_values(&self, frame: &Frame, lo: [i64; 3], count: [usize; 3], out: &mut [f64]) {
-        assert_eq!(out.len(), count.iter().product::<usize>(), "one output slot per node");
+        assert_eq!(
+            out.len(),
+            count.iter().product::<usize>(),
+            "one output slot per node"
+        );
         let mut slot = out.iter_mut();
         for i in 0..count[0] as i64 {
             for j in 0..count[1] as i64 {

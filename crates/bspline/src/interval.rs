@@ -11,7 +11,10 @@ pub struct Interval {
 
 impl Interval {
     /// The whole line: the bound that is always sound.
-    pub const EVERYTHING: Self = Self { lo: f64::NEG_INFINITY, hi: f64::INFINITY };
+    pub const EVERYTHING: Self = Self {
+        lo: f64::NEG_INFINITY,
+        hi: f64::INFINITY,
+    };
 
     /// `[lo, hi]`.
     ///
@@ -39,48 +42,76 @@ impl Interval {
 
     /// Smallest interval holding both.
     pub fn hull(self, other: Self) -> Self {
-        Self { lo: self.lo.min(other.lo), hi: self.hi.max(other.hi) }
+        Self {
+            lo: self.lo.min(other.lo),
+            hi: self.hi.max(other.hi),
+        }
     }
 
     /// `{ min(a, b) }`.
     pub fn min(self, other: Self) -> Self {
-        Self { lo: self.lo.min(other.lo), hi: self.hi.min(other.hi) }
+        Self {
+            lo: self.lo.min(other.lo),
+            hi: self.hi.min(other.hi),
+        }
     }
 
     /// `{ max(a, b) }`.
     pub fn max(self, other: Self) -> Self {
-        Self { lo: self.lo.max(other.lo), hi: self.hi.max(other.hi) }
+        Self {
+            lo: self.lo.max(other.lo),
+            hi: self.hi.max(other.hi),
+        }
     }
 
     /// Widened by `by >= 0` on both sides, rounded outward.
     pub fn widened(self, by: f64) -> Self {
-        Self { lo: (self.lo - by).next_down(), hi: (self.hi + by).next_up() }
+        Self {
+            lo: (self.lo - by).next_down(),
+            hi: (self.hi + by).next_up(),
+        }
     }
 
     /// `{ x² }`.
     pub fn square(self) -> Self {
         let (a, b) = (self.lo.abs(), self.hi.abs());
         let (small, large) = (a.min(b), a.max(b));
-        let lo = if self.contains(0.0) { 0.0 } else { (small * small).next_down().max(0.0) };
-        Self { lo, hi: (large * large).next_up() }
+        let lo = if self.contains(0.0) {
+            0.0
+        } else {
+            (small * small).next_down().max(0.0)
+        };
+        Self {
+            lo,
+            hi: (large * large).next_up(),
+        }
     }
 
     /// `{ √x }` of the non-negative part.
     pub fn sqrt(self) -> Self {
-        Self { lo: self.lo.max(0.0).sqrt().next_down().max(0.0), hi: self.hi.max(0.0).sqrt().next_up() }
+        Self {
+            lo: self.lo.max(0.0).sqrt().next_down().max(0.0),
+            hi: self.hi.max(0.0).sqrt().next_up(),
+        }
     }
 
     /// `{ |x| }`.
     pub fn abs(self) -> Self {
         let (a, b) = (self.lo.abs(), self.hi.abs());
-        Self { lo: if self.contains(0.0) { 0.0 } else { a.min(b) }, hi: a.max(b) }
+        Self {
+            lo: if self.contains(0.0) { 0.0 } else { a.min(b) },
+            hi: a.max(b),
+        }
     }
 }
 
 impl Add for Interval {
     type Output = Self;
     fn add(self, o: Self) -> Self {
-        Self { lo: (self.lo + o.lo).next_down(), hi: (self.hi + o.hi).next_up() }
+        Self {
+            lo: (self.lo + o.lo).next_down(),
+            hi: (self.hi + o.hi).next_up(),
+        }
     }
 }
 
@@ -94,7 +125,10 @@ impl Sub for Interval {
 impl Neg for Interval {
     type Output = Self;
     fn neg(self) -> Self {
-        Self { lo: -self.hi, hi: -self.lo }
+        Self {
+            lo: -self.hi,
+            hi: -self.lo,
+        }
     }
 }
 
@@ -103,10 +137,17 @@ impl Mul for Interval {
     fn mul(self, o: Self) -> Self {
         // 0·∞ is 0 here: the factor 0 is exact, the infinite end only a missing bound.
         let times = |a: f64, b: f64| if a == 0.0 || b == 0.0 { 0.0 } else { a * b };
-        let p =
-            [times(self.lo, o.lo), times(self.lo, o.hi), times(self.hi, o.lo), times(self.hi, o.hi)];
+        let p = [
+            times(self.lo, o.lo),
+            times(self.lo, o.hi),
+            times(self.hi, o.lo),
+            times(self.hi, o.hi),
+        ];
         let lo = p.iter().copied().fold(f64::INFINITY, f64::min);
         let hi = p.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        Self { lo: lo.next_down(), hi: hi.next_up() }
+        Self {
+            lo: lo.next_down(),
+            hi: hi.next_up(),
+        }
     }
 }

@@ -6,6 +6,7 @@
 //!
 //! Index order is `(x, y, z)` with `z` fastest in memory, everywhere in this crate.
 
+pub mod cubic;
 mod field;
 pub mod hierarchical;
 mod interval;

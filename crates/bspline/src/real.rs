@@ -18,7 +18,9 @@ pub trait Real:
     /// Nearest value of this type.
     fn from_f64(x: f64) -> Self;
     /// Exact conversion.
-    fn to_f64(self) -> f64;
+    fn as_f64(self) -> f64;
+    /// Appends the little-endian bytes of the value.
+    fn extend_le_bytes(self, bytes: &mut Vec<u8>);
 }
 
 impl Real for f32 {
@@ -30,8 +32,11 @@ impl Real for f32 {
         x as f32
     }
     #[inline(always)]
-    fn to_f64(self) -> f64 {
+    fn as_f64(self) -> f64 {
         self as f64
+    }
+    fn extend_le_bytes(self, bytes: &mut Vec<u8>) {
+        bytes.extend(self.to_le_bytes());
     }
 }
 
@@ -44,7 +49,10 @@ impl Real for f64 {
         x
     }
     #[inline(always)]
-    fn to_f64(self) -> f64 {
+    fn as_f64(self) -> f64 {
         self
+    }
+    fn extend_le_bytes(self, bytes: &mut Vec<u8>) {
+        bytes.extend(self.to_le_bytes());
     }
 }

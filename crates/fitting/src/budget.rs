@@ -41,7 +41,11 @@ pub struct Control {
 
 impl Default for Control {
     fn default() -> Self {
-        Self { on_progress: Box::new(|_| ()), cancel: Cancel::new(), memory_limit: None }
+        Self {
+            on_progress: Box::new(|_| ()),
+            cancel: Cancel::new(),
+            memory_limit: None,
+        }
     }
 }
 

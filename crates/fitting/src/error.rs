@@ -5,7 +5,9 @@ pub enum FitError {
     #[error("cancelled")]
     Cancelled,
     /// The work would hold more memory than allowed.
-    #[error("the fit needs about {needed} bytes, the ceiling is {limit}; raise --memory or lower --max-depth")]
+    #[error(
+        "the fit needs about {needed} bytes, the ceiling is {limit}; raise --memory or lower --max-depth"
+    )]
     MemoryLimit {
         /// Bytes the work would hold at once.
         needed: u64,

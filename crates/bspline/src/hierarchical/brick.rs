@@ -23,6 +23,11 @@ impl BrickKey {
     pub fn parent(self) -> Self {
         Self(self.0.map(|b| b >> 1))
     }
+
+    /// Which half of its parent the brick is, on each axis.
+    pub(crate) fn octant(self) -> [usize; 3] {
+        self.0.map(|b| (b & 1) as usize)
+    }
 }
 
 /// The active functions of one brick and their coefficients. Inactive slots are zero.
@@ -37,7 +42,10 @@ pub struct Corrections<T> {
 impl<T: Real> Corrections<T> {
     /// No function active.
     pub fn empty() -> Self {
-        Self { mask: [0; BRICK], values: Box::new([T::zero(); BRICK_LEN]) }
+        Self {
+            mask: [0; BRICK],
+            values: Box::new([T::zero(); BRICK_LEN]),
+        }
     }
 
     /// Makes slot `(x, y, z)` active with coefficient `c`.
@@ -55,17 +63,35 @@ impl<T: Real> Corrections<T> {
     pub fn is_active(&self, slot: usize) -> bool {
         self.mask[slot / 64] >> (slot % 64) & 1 == 1
     }
+
+    /// Whether the support of an active function reaches into the brick `back` bricks behind on each axis
+    /// (0 or 1): the functions in slots 0, 1 and 2 do.
+    pub(crate) fn reaches(&self, back: [usize; 3]) -> bool {
+        const Y_LOW: u64 = 0x00ff_ffff;
+        const Z_LOW: u64 = 0x0707_0707_0707_0707;
+        let planes = if back[0] == 1 { 3 } else { BRICK };
+        let rows = if back[1] == 1 { Y_LOW } else { !0 } & if back[2] == 1 { Z_LOW } else { !0 };
+        self.mask[..planes].iter().any(|w| w & rows != 0)
+    }
 }
 
-/// One brick of a level: what is stored, what is evaluated, what lies below.
+/// What evaluation reads of one brick, and what lies below it.
 #[derive(Clone, Debug)]
 pub(crate) struct Brick<T> {
+    pub key: BrickKey,
     /// `C_ℓ` = prolonged `C_{ℓ-1}` + corrections, functions `8b-1 ..= 8b+9` on each axis.
     pub totals: Arc<[T; HALO_LEN]>,
-    /// The brick's own active functions; `None` where it has none.
-    pub corrections: Option<Arc<Corrections<T>>>,
-    /// Smallest and largest of `totals`.
+    /// Least and largest coefficient that the evaluation of any point of the brick reads, here or below.
     pub hull: [T; 2],
-    /// Indices of the eight bricks of the next level, octant `4x + 2y + z`; `u32::MAX` where there is none.
+    /// Indices of the eight bricks of the next level, octant `4x + 2y + z`; [`NONE`] where there is none.
     pub children: [u32; 8],
+}
+
+/// No child.
+pub(crate) const NONE: u32 = u32::MAX;
+
+impl<T> Brick<T> {
+    pub fn has_children(&self) -> bool {
+        self.children.iter().any(|&c| c != NONE)
+    }
 }

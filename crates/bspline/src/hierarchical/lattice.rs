@@ -22,7 +22,11 @@ impl Lattice {
 
     /// World box round the lattice's own box.
     pub fn world_box(&self) -> Aabb {
-        Aabb { min: DVec3::ZERO, max: self.extent() }.transformed(&self.world_from_lattice)
+        Aabb {
+            min: DVec3::ZERO,
+            max: self.extent(),
+        }
+        .transformed(&self.world_from_lattice)
     }
 
     /// Cells of `level` on each axis.

@@ -1,66 +1,278 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use rustc_hash::FxHashMap;
+use glam::{DAffine3, DMat3, DVec3};
+use sha2::{Digest, Sha256};
 
-use super::brick::Brick;
-use super::{BrickKey, Corrections, Lattice};
-use crate::Real;
+use super::brick::{BRICK, Brick, HALO_LEN, NONE};
+use super::build::build_levels;
+use super::{BrickKey, Corrections, Lattice, bounds, grid, kernel};
+use crate::{Aabb, Field, Frame, Interval, Jet, Real};
 
 /// The stored part of a level: bricks with active functions, in key order.
 pub type LevelCorrections<T> = BTreeMap<BrickKey, Arc<Corrections<T>>>;
 
 /// A field of dyadic cubic B-splines, C² everywhere inside its box.
 ///
-/// Outside the box, `f(clamp x) - g·|x - clamp x|` (world distance, `g` the `slope`).
+/// Each level stores corrections to the prolonged coarser level, and the totals of the two, so that a point
+/// is evaluated from the 64 coefficients of one level however deep the hierarchy is.
+/// Outside the box, `f(clamp x) - g·|x - clamp x|` (clamped in lattice coordinates, world distance, `g` the
+/// [slope](Self::slope)).
 #[derive(Clone, Debug)]
 pub struct HierarchicalSpline<T> {
     lattice: Lattice,
+    lattice_from_world: DAffine3,
     slope: f64,
-    levels: Vec<Level<T>>,
+    corrections: Vec<LevelCorrections<T>>,
+    pub(super) levels: Vec<Vec<Brick<T>>>,
 }
 
-#[derive(Clone, Debug)]
-struct Level<T> {
-    bricks: Vec<(BrickKey, Brick<T>)>,
-    index: FxHashMap<BrickKey, u32>,
+/// A point of the box, found: which brick evaluates it, which cell of that brick, where in the cell.
+pub(super) struct Place<'a, T> {
+    pub brick: &'a Brick<T>,
+    pub level: usize,
+    pub cell: [usize; 3],
+    pub t: [T; 3],
 }
 
 impl<T: Real> HierarchicalSpline<T> {
-    /// Builds the totals of every level from the stored corrections.
-    pub fn from_corrections(_lattice: Lattice, _slope: f64, _levels: Vec<LevelCorrections<T>>) -> Self {
-        unimplemented!()
+    /// Builds the totals of every level from the stored corrections, coarsest level first.
+    ///
+    /// `slope > 0` is the fall of the field per world length outside the box.
+    ///
+    /// # Panics
+    /// If `levels` is empty, the box has no cells, or the lattice's map cannot be inverted.
+    pub fn from_corrections(lattice: Lattice, slope: f64, levels: Vec<LevelCorrections<T>>) -> Self {
+        assert!(!levels.is_empty(), "a hierarchy has at least one level");
+        assert!(
+            lattice.cells.iter().all(|&n| n > 0),
+            "a box has at least one cell on each axis"
+        );
+        let lattice_from_world = lattice.world_from_lattice.inverse();
+        assert!(
+            lattice_from_world.is_finite(),
+            "the map from lattice to world can be inverted"
+        );
+        let bricks = build_levels(&lattice, &levels);
+        Self {
+            lattice,
+            lattice_from_world,
+            slope,
+            corrections: levels,
+            levels: bricks,
+        }
     }
+
     /// Bricks of `level` that hold active functions, in key order.
-    pub fn corrections(&self, _level: usize) -> impl Iterator<Item = (BrickKey, &Arc<Corrections<T>>)> {
-        std::iter::empty()
+    pub fn corrections(&self, level: usize) -> &LevelCorrections<T> {
+        &self.corrections[level]
     }
+
     /// Grids the field stands on.
     pub fn lattice(&self) -> &Lattice {
         &self.lattice
     }
+
+    /// World to lattice coordinates.
+    pub fn lattice_from_world(&self) -> &DAffine3 {
+        &self.lattice_from_world
+    }
+
     /// Fall of the field per world length outside the box, `> 0`.
     pub fn slope(&self) -> f64 {
         self.slope
     }
+
     /// Number of levels, at least 1.
     pub fn level_count(&self) -> usize {
         self.levels.len()
     }
+
     /// Active functions over all levels.
     pub fn coefficient_count(&self) -> usize {
-        0
+        self.corrections
+            .iter()
+            .flat_map(|l| l.values())
+            .map(|c| c.count())
+            .sum()
     }
-    /// Bricks over all levels.
+
+    /// Bricks of totals over all levels.
     pub fn brick_count(&self) -> usize {
-        0
+        self.levels.iter().map(Vec::len).sum()
     }
+
     /// Bytes of the totals that evaluation reads.
     pub fn totals_bytes(&self) -> usize {
-        0
+        self.brick_count() * HALO_LEN * size_of::<T>()
     }
-    /// SHA-256 of the canonical form (see `docs/format.md`).
+
+    /// SHA-256 of what the field is: precision, box, map, slope, and the corrections of every level. Neither
+    /// time, compression nor provenance enter (`docs/format.md`).
     pub fn sha256(&self) -> [u8; 32] {
-        [0; 32]
+        let mut hash = Sha256::new();
+        hash.update(b"isoclay-field-1");
+        hash.update(T::NAME);
+        for n in self.lattice.cells {
+            hash.update(n.to_le_bytes());
+        }
+        for x in self.lattice.world_from_lattice.to_cols_array() {
+            hash.update(x.to_le_bytes());
+        }
+        hash.update(self.slope.to_le_bytes());
+        hash.update((self.corrections.len() as u32).to_le_bytes());
+        let mut bytes = Vec::new();
+        for level in &self.corrections {
+            hash.update((level.len() as u32).to_le_bytes());
+            for (key, c) in level {
+                bytes.clear();
+                key.0.iter().for_each(|k| bytes.extend(k.to_le_bytes()));
+                c.mask.iter().for_each(|m| bytes.extend(m.to_le_bytes()));
+                for slot in (0..c.values.len()).filter(|&s| c.is_active(s)) {
+                    // Adding +0 turns -0 into +0: both are the same field.
+                    (c.values[slot] + T::zero()).extend_le_bytes(&mut bytes);
+                }
+                hash.update(&bytes);
+            }
+        }
+        hash.finalize().into()
+    }
+
+    /// Where lattice point `q`, inside the box, is evaluated: in the finest brick that covers it.
+    #[inline]
+    pub(super) fn place(&self, q: DVec3) -> Place<'_, T> {
+        let finest = self.levels.len() - 1;
+        let limit = self.lattice.cells_at(finest);
+        let scaled = q * (1u64 << finest) as f64;
+        let cell: [u32; 3] = std::array::from_fn(|a| (scaled[a] as u32).min(limit[a] - 1));
+        let (brick, level) = self.brick_of(cell);
+        let shift = finest - level;
+        let scale = (1u64 << level) as f64;
+        Place {
+            brick,
+            level,
+            cell: cell.map(|c| (c >> shift) as usize % BRICK),
+            t: std::array::from_fn(|a| T::from_f64(q[a] * scale - (cell[a] >> shift) as f64)),
+        }
+    }
+
+    /// The finest brick over a cell of the finest level, and its level.
+    #[inline]
+    fn brick_of(&self, cell: [u32; 3]) -> (&Brick<T>, usize) {
+        let finest = self.levels.len() - 1;
+        let counts = self.lattice.cells.map(|n| n.div_ceil(BRICK as u32));
+        let b: [u32; 3] = cell.map(|c| c >> (finest + 3));
+        let mut brick = &self.levels[0][((b[0] * counts[1] + b[1]) * counts[2] + b[2]) as usize];
+        for level in 1..=finest {
+            let o = cell.map(|c| c >> (finest - level + 3) & 1);
+            let child = brick.children[(4 * o[0] + 2 * o[1] + o[2]) as usize];
+            if child == NONE {
+                return (brick, level - 1);
+            }
+            brick = &self.levels[level][child as usize];
+        }
+        (brick, finest)
+    }
+
+    /// Lattice coordinates of `p`, clamped to the box, and the clamped-off part in world units.
+    #[inline]
+    pub(super) fn clamp(&self, p: DVec3) -> (DVec3, DVec3) {
+        let q = self.lattice_from_world.transform_point3(p);
+        let inside = q.clamp(DVec3::ZERO, self.lattice.extent());
+        (
+            inside,
+            self.lattice.world_from_lattice.transform_vector3(q - inside),
+        )
+    }
+
+    /// Gradient by cell coordinates of `level` to gradient by world coordinates.
+    #[inline]
+    pub(super) fn world_gradient(&self, level: usize, g: [T; 3]) -> DVec3 {
+        let scale = (1u64 << level) as f64;
+        let g = DVec3::new(g[0].as_f64(), g[1].as_f64(), g[2].as_f64()) * scale;
+        self.lattice_from_world.matrix3.transpose() * g
+    }
+
+    /// Adds the linear fall outside the box to what was found at the clamped point.
+    #[inline]
+    fn extend_outside(&self, inside: (f64, DVec3), q: DVec3, beyond: DVec3) -> (f64, DVec3) {
+        let distance = beyond.length();
+        if distance == 0.0 {
+            return inside;
+        }
+        // The clamped point follows x only along the axes that are not clamped.
+        let free = DMat3::from_diagonal(DVec3::from_array(std::array::from_fn(|a| {
+            f64::from(q[a] > 0.0 && q[a] < self.lattice.extent()[a])
+        })));
+        let follow = self.lattice.world_from_lattice.matrix3 * free * self.lattice_from_world.matrix3;
+        let direction = beyond / distance;
+        let away = (DMat3::IDENTITY - follow).transpose() * direction;
+        (
+            inside.0 - self.slope * distance,
+            follow.transpose() * inside.1 - self.slope * away,
+        )
+    }
+}
+
+impl<T: Real> Field for HierarchicalSpline<T> {
+    fn value(&self, p: DVec3) -> f64 {
+        let (q, beyond) = self.clamp(p);
+        let at = self.place(q);
+        kernel::value(&at.brick.totals, at.cell, at.t).as_f64() - self.slope * beyond.length()
+    }
+
+    fn value_gradient(&self, p: DVec3) -> (f64, DVec3) {
+        let (q, beyond) = self.clamp(p);
+        let at = self.place(q);
+        let (v, g) = kernel::value_gradient(&at.brick.totals, at.cell, at.t);
+        self.extend_outside((v.as_f64(), self.world_gradient(at.level, g)), q, beyond)
+    }
+
+    /// Inside the box; outside, the Hessian of the extension along the box's faces is left out and 0 is
+    /// returned for it.
+    fn jet(&self, p: DVec3) -> Jet {
+        let (value, gradient) = self.value_gradient(p);
+        let (q, beyond) = self.clamp(p);
+        if beyond != DVec3::ZERO {
+            return Jet {
+                value,
+                gradient,
+                hessian: DMat3::ZERO,
+            };
+        }
+        let at = self.place(q);
+        let s = kernel::second(&at.brick.totals, at.cell, at.t).map(T::as_f64);
+        let h = DMat3::from_cols(
+            DVec3::new(s[0], s[3], s[4]),
+            DVec3::new(s[3], s[1], s[5]),
+            DVec3::new(s[4], s[5], s[2]),
+        );
+        let m = self.lattice_from_world.matrix3 * (1u64 << at.level) as f64;
+        Jet {
+            value,
+            gradient,
+            hessian: m.transpose() * h * m,
+        }
+    }
+
+    fn bounds(&self, b: &Aabb) -> Interval {
+        bounds::over_lattice_box(self, &b.transformed(&self.lattice_from_world))
+    }
+
+    fn frame_values(&self, frame: &Frame, lo: [i64; 3], count: [usize; 3], out: &mut [f64]) {
+        grid::frame_values(self, frame, lo, count, out);
+    }
+
+    fn frame_bounds(&self, frame: &Frame, lo: [i64; 3], hi: [i64; 3]) -> Interval {
+        let v = |a: [i64; 3]| DVec3::new(a[0] as f64, a[1] as f64, a[2] as f64);
+        let lattice_from_grid = self.lattice_from_world * frame.world_from_grid;
+        bounds::over_lattice_box(
+            self,
+            &Aabb {
+                min: v(lo),
+                max: v(hi),
+            }
+            .transformed(&lattice_from_grid),
+        )
     }
 }

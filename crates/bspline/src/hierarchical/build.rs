@@ -1,0 +1,132 @@
+use std::sync::Arc;
+
+use rayon::prelude::*;
+use rustc_hash::FxHashMap;
+
+use super::brick::{BRICK, Brick, HALO, HALO_LEN, NONE};
+use super::prolong::prolong;
+use super::spline::LevelCorrections;
+use super::{BrickKey, Lattice};
+use crate::Real;
+
+/// Bricks of every level, in key order, with totals and children.
+pub(crate) fn build_levels<T: Real>(
+    lattice: &Lattice,
+    corrections: &[LevelCorrections<T>],
+) -> Vec<Vec<Brick<T>>> {
+    let keys = needed_keys(lattice, corrections);
+    let mut levels: Vec<Vec<Brick<T>>> = Vec::with_capacity(keys.len());
+    for (level, keys) in keys.iter().enumerate() {
+        let parents = levels.last_mut();
+        let parent_index: FxHashMap<BrickKey, u32> = parents
+            .as_ref()
+            .map(|p| p.iter().enumerate().map(|(i, b)| (b.key, i as u32)).collect())
+            .unwrap_or_default();
+        let make = |key: &BrickKey| {
+            let mut totals = Arc::new([T::zero(); HALO_LEN]);
+            let slots = Arc::get_mut(&mut totals).expect("just made");
+            if let Some(parents) = parents.as_deref() {
+                let parent = &parents[parent_index[&key.parent()] as usize];
+                prolong(&parent.totals, key.octant(), slots);
+            }
+            add_corrections(&corrections[level], *key, slots);
+            let hull = min_max(totals.as_slice());
+            Brick {
+                key: *key,
+                totals,
+                hull,
+                children: [NONE; 8],
+            }
+        };
+        let bricks: Vec<Brick<T>> = keys.par_iter().with_min_len(64).map(make).collect();
+        if let Some(parents) = levels.last_mut() {
+            for (i, brick) in bricks.iter().enumerate() {
+                let o = brick.key.octant();
+                let parent = parent_index[&brick.key.parent()] as usize;
+                parents[parent].children[4 * o[0] + 2 * o[1] + o[2]] = i as u32;
+            }
+        }
+        levels.push(bricks);
+    }
+    gather_hulls(&mut levels);
+    levels
+}
+
+/// Least and largest value.
+fn min_max<T: Real>(values: &[T]) -> [T; 2] {
+    // Comparisons as written here turn into vector instructions; `Float::min` does not.
+    values
+        .iter()
+        .fold([T::infinity(), T::neg_infinity()], |[lo, hi], &v| {
+            [if v < lo { v } else { lo }, if v > hi { v } else { hi }]
+        })
+}
+
+/// From the finest level up: a brick's hull covers its children's, and its own where a child is missing.
+fn gather_hulls<T: Real>(levels: &mut [Vec<Brick<T>>]) {
+    for level in (1..levels.len()).rev() {
+        let (coarser, finer) = levels.split_at_mut(level);
+        for brick in coarser[level - 1].iter_mut().filter(|b| b.has_children()) {
+            if brick.children.iter().all(|&c| c != NONE) {
+                brick.hull = [T::infinity(), T::neg_infinity()];
+            }
+            for &child in brick.children.iter().filter(|&&c| c != NONE) {
+                let below = finer[0][child as usize].hull;
+                brick.hull = [brick.hull[0].min(below[0]), brick.hull[1].max(below[1])];
+            }
+        }
+    }
+}
+
+/// Level 0 whole; on finer levels every brick that the support of an active function touches, and the
+/// parents of all bricks below.
+fn needed_keys<T: Real>(lattice: &Lattice, corrections: &[LevelCorrections<T>]) -> Vec<Vec<BrickKey>> {
+    let brick_counts = |level| lattice.cells_at(level).map(|n| n.div_ceil(BRICK as u32));
+    let mut keys: Vec<Vec<BrickKey>> = vec![Vec::new(); corrections.len()];
+    for level in (1..corrections.len()).rev() {
+        let limit = brick_counts(level);
+        let mut needed: Vec<BrickKey> = Vec::new();
+        for (key, active) in &corrections[level] {
+            for octant in 0..8usize {
+                let back = [octant >> 2, octant >> 1 & 1, octant & 1];
+                if (0..3).all(|a| key.0[a] as usize >= back[a]) && active.reaches(back) {
+                    let k = std::array::from_fn(|a| key.0[a] - back[a] as u32);
+                    if (0..3).all(|a| k[a] < limit[a]) {
+                        needed.push(BrickKey(k));
+                    }
+                }
+            }
+        }
+        if let Some(finer) = keys.get(level + 1) {
+            needed.extend(finer.iter().map(|k| k.parent()));
+        }
+        needed.sort_unstable();
+        needed.dedup();
+        keys[level] = needed;
+    }
+    let [nx, ny, nz] = brick_counts(0);
+    keys[0] = (0..nx)
+        .flat_map(|x| (0..ny).flat_map(move |y| (0..nz).map(move |z| BrickKey([x, y, z]))))
+        .collect();
+    keys
+}
+
+/// Adds to a brick's 11³ totals its own corrections and the first three layers of its upper neighbours.
+fn add_corrections<T: Real>(level: &LevelCorrections<T>, key: BrickKey, totals: &mut [T; HALO_LEN]) {
+    for octant in 0..8usize {
+        let ahead = [octant >> 2, octant >> 1 & 1, octant & 1];
+        let Some(c) = level.get(&BrickKey(std::array::from_fn(|a| key.0[a] + ahead[a] as u32))) else {
+            continue;
+        };
+        let count = ahead.map(|a| if a == 1 { HALO - BRICK } else { BRICK });
+        for x in 0..count[0] {
+            for y in 0..count[1] {
+                let source = (x * BRICK + y) * BRICK;
+                let target = ((x + ahead[0] * BRICK) * HALO + y + ahead[1] * BRICK) * HALO + ahead[2] * BRICK;
+                for z in 0..count[2] {
+                    totals[target + z] += c.values[source + z];
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,255 @@
+//! Values at the nodes of a grid that lies along the lattice: tensor products, brick by brick.
+
+use std::ops::Range;
+
+use glam::DVec3;
+
+use super::brick::{BRICK, Brick, HALO, HALO_LEN, NONE};
+use super::spline::HierarchicalSpline;
+use crate::{Field, Frame, Real, cubic};
+
+/// [`Field::frame_values`]. Frames that are turned against the lattice fall back to single points.
+pub(super) fn frame_values<T: Real>(
+    spline: &HierarchicalSpline<T>,
+    frame: &Frame,
+    lo: [i64; 3],
+    count: [usize; 3],
+    out: &mut [f64],
+) {
+    assert_eq!(
+        out.len(),
+        count.iter().product::<usize>(),
+        "one output slot per node"
+    );
+    if out.is_empty() {
+        return;
+    }
+    let Some(axes) = aligned_axes(spline, frame, lo, count) else {
+        let mut slot = out.iter_mut();
+        for i in 0..count[0] as i64 {
+            for j in 0..count[1] as i64 {
+                for k in 0..count[2] as i64 {
+                    let p = frame.node([lo[0] + i, lo[1] + j, lo[2] + k]);
+                    *slot.next().expect("length checked above") = spline.value(p);
+                }
+            }
+        }
+        return;
+    };
+    let mut block = Block {
+        spline,
+        axes: &axes,
+        out,
+        scratch: Scratch::default(),
+    };
+    block.visit_roots();
+    if axes.iter().any(|a| a.leaves_box) {
+        block.fall_outside();
+    }
+}
+
+/// The nodes of one axis.
+struct Axis {
+    /// Lattice coordinates, clamped to the box.
+    clamped: Vec<f64>,
+    /// What was clamped off.
+    beyond: Vec<f64>,
+    /// Cell of the finest level.
+    cell: Vec<u32>,
+    leaves_box: bool,
+}
+
+fn aligned_axes<T: Real>(
+    spline: &HierarchicalSpline<T>,
+    frame: &Frame,
+    lo: [i64; 3],
+    count: [usize; 3],
+) -> Option<[Axis; 3]> {
+    let map = *spline.lattice_from_world() * frame.world_from_grid;
+    let m = map.matrix3;
+    let step = DVec3::new(m.x_axis.x, m.y_axis.y, m.z_axis.z);
+    let turned = [
+        m.x_axis.y, m.x_axis.z, m.y_axis.x, m.y_axis.z, m.z_axis.x, m.z_axis.y,
+    ];
+    if step.min_element() <= 0.0 || turned.iter().any(|x| x.abs() > 1e-12 * step.min_element()) {
+        return None;
+    }
+    let finest = spline.level_count() - 1;
+    let limit = spline.lattice().cells_at(finest);
+    let extent = spline.lattice().extent();
+    Some(std::array::from_fn(|a| {
+        let q: Vec<f64> = (0..count[a] as i64)
+            .map(|i| map.translation[a] + step[a] * (lo[a] + i) as f64)
+            .collect();
+        let clamped: Vec<f64> = q.iter().map(|q| q.clamp(0.0, extent[a])).collect();
+        let scale = (1u64 << finest) as f64;
+        Axis {
+            cell: clamped
+                .iter()
+                .map(|q| ((q * scale) as u32).min(limit[a] - 1))
+                .collect(),
+            beyond: q.iter().zip(&clamped).map(|(q, c)| q - c).collect(),
+            leaves_box: q != clamped,
+            clamped,
+        }
+    }))
+}
+
+struct Block<'a, T> {
+    spline: &'a HierarchicalSpline<T>,
+    axes: &'a [Axis; 3],
+    out: &'a mut [f64],
+    scratch: Scratch<T>,
+}
+
+/// Node positions and weights within the brick at hand, and partial sums.
+#[derive(Default)]
+struct Scratch<T> {
+    nodes: [Vec<(usize, [T; 4])>; 3],
+    plane: Vec<T>,
+    row: Vec<T>,
+}
+
+impl<T: Real> Block<'_, T> {
+    fn visit_roots(&mut self) {
+        let finest = self.spline.level_count() - 1;
+        let runs = self.axes.each_ref().map(|axis| runs_by(&axis.cell, finest + 3));
+        let counts = self.spline.lattice().cells.map(|n| n.div_ceil(BRICK as u32));
+        for (bx, x) in &runs[0] {
+            for (by, y) in &runs[1] {
+                for (bz, z) in &runs[2] {
+                    let root = (bx * counts[1] + by) * counts[2] + bz;
+                    self.visit(0, root as usize, [x.clone(), y.clone(), z.clone()]);
+                }
+            }
+        }
+    }
+
+    /// Evaluates the nodes `ranges`, all of which lie in brick `index` of `level`.
+    fn visit(&mut self, level: usize, index: usize, ranges: [Range<usize>; 3]) {
+        let spline = self.spline;
+        let brick = &spline.levels[level][index];
+        if !brick.has_children() {
+            return self.evaluate(level, brick, ranges);
+        }
+        let finest = spline.level_count() - 1;
+        let shift = finest - level - 1 + 3;
+        let middle: [usize; 3] = std::array::from_fn(|a| {
+            let cells = &self.axes[a].cell[ranges[a].clone()];
+            ranges[a].start + cells.partition_point(|c| c >> shift & 1 == 0)
+        });
+        for octant in 0..8usize {
+            let half: [Range<usize>; 3] = std::array::from_fn(|a| match octant >> (2 - a) & 1 {
+                0 => ranges[a].start..middle[a],
+                _ => middle[a]..ranges[a].end,
+            });
+            if half.iter().any(Range::is_empty) {
+                continue;
+            }
+            match brick.children[octant] {
+                NONE => self.evaluate(level, brick, half),
+                child => self.visit(level + 1, child as usize, half),
+            }
+        }
+    }
+
+    /// `Σ_c w_c Σ_b w_b Σ_a w_a C_abc` in the order of `kernel::value`, so with its bits.
+    fn evaluate(&mut self, level: usize, brick: &Brick<T>, ranges: [Range<usize>; 3]) {
+        let shift = self.spline.level_count() - 1 - level;
+        let scale = (1u64 << level) as f64;
+        for a in 0..3 {
+            let axis = &self.axes[a];
+            let nodes = &mut self.scratch.nodes[a];
+            nodes.clear();
+            nodes.extend(ranges[a].clone().map(|i| {
+                let cell = axis.cell[i] >> shift;
+                let t = T::from_f64(axis.clamped[i] * scale - cell as f64);
+                (cell as usize % BRICK, cubic::values(t))
+            }));
+        }
+        let (counts, offsets) = (
+            self.axes.each_ref().map(|a| a.cell.len()),
+            ranges.map(|r| r.start),
+        );
+        let (out, scratch) = (&mut *self.out, &mut self.scratch);
+        let totals: &[T; HALO_LEN] = &brick.totals;
+        pulp::Arch::new().dispatch(
+            #[inline(always)]
+            || tensor(totals, scratch, counts, offsets, out),
+        );
+    }
+
+    fn fall_outside(&mut self) {
+        let map = self.spline.lattice().world_from_lattice.matrix3;
+        let slope = self.spline.slope();
+        let [x, y, z] = self.axes;
+        let mut slot = self.out.iter_mut();
+        for dx in &x.beyond {
+            for dy in &y.beyond {
+                for dz in &z.beyond {
+                    let value = slot.next().expect("one slot per node");
+                    *value -= slope * (map * DVec3::new(*dx, *dy, *dz)).length();
+                }
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn tensor<T: Real>(
+    totals: &[T; HALO_LEN],
+    scratch: &mut Scratch<T>,
+    counts: [usize; 3],
+    offsets: [usize; 3],
+    out: &mut [f64],
+) {
+    let Scratch {
+        nodes: [xs, ys, zs],
+        plane,
+        row,
+    } = scratch;
+    let span = |nodes: &[(usize, [T; 4])]| (nodes[0].0, nodes[nodes.len() - 1].0 + 4);
+    let ((y0, y1), (z0, z1)) = (span(ys), span(zs));
+    let width = z1 - z0;
+    plane.clear();
+    plane.resize((y1 - y0) * width, T::zero());
+    row.clear();
+    row.resize(width, T::zero());
+    for (i, (cell, w)) in xs.iter().enumerate() {
+        for y in y0..y1 {
+            let line = &mut plane[(y - y0) * width..][..width];
+            let at = |a: usize| &totals[((cell + a) * HALO + y) * HALO + z0..][..width];
+            blend(w, [at(0), at(1), at(2), at(3)], line);
+        }
+        for (j, (cell, w)) in ys.iter().enumerate() {
+            let at = |b: usize| &plane[(cell + b - y0) * width..][..width];
+            blend(w, [at(0), at(1), at(2), at(3)], row);
+            let start = ((offsets[0] + i) * counts[1] + offsets[1] + j) * counts[2] + offsets[2];
+            for ((cell, w), value) in zs.iter().zip(&mut out[start..start + zs.len()]) {
+                let v = &row[cell - z0..cell - z0 + 4];
+                *value = ((w[0] * v[0] + w[1] * v[1]) + (w[2] * v[2] + w[3] * v[3])).as_f64();
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn blend<T: Real>(w: &[T; 4], rows: [&[T]; 4], target: &mut [T]) {
+    let n = target.len();
+    let [a, b, c, d] = rows.map(|r| &r[..n]);
+    for z in 0..n {
+        target[z] = ((w[0] * a[z] + w[1] * b[z]) + w[2] * c[z]) + w[3] * d[z];
+    }
+}
+
+/// Runs of equal `cell >> shift`, with their index ranges.
+fn runs_by(cells: &[u32], shift: usize) -> Vec<(u32, Range<usize>)> {
+    let mut runs: Vec<(u32, Range<usize>)> = Vec::new();
+    for (i, c) in cells.iter().enumerate() {
+        match runs.last_mut() {
+            Some((b, range)) if *b == c >> shift => range.end = i + 1,
+            _ => runs.push((c >> shift, i..i + 1)),
+        }
+    }
+    runs
+}

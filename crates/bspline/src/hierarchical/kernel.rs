@@ -1,0 +1,87 @@
+//! One cell of one brick, evaluated: no branches, no lookup.
+
+use super::brick::{HALO, HALO_LEN};
+use crate::Real;
+use crate::cubic::{first, second as curvatures, values};
+
+#[inline(always)]
+fn row<T: Real>(totals: &[T; HALO_LEN], cell: [usize; 3], a: usize, b: usize) -> &[T; 4] {
+    let start = ((cell[0] + a) * HALO + cell[1] + b) * HALO + cell[2];
+    totals[start..start + 4].try_into().expect("four of a row")
+}
+
+#[inline(always)]
+fn dot<T: Real>(w: &[T; 4], v: &[T; 4]) -> T {
+    (w[0] * v[0] + w[1] * v[1]) + (w[2] * v[2] + w[3] * v[3])
+}
+
+#[inline(always)]
+fn add<T: Real>(acc: &mut [T; 4], w: T, v: &[T; 4]) {
+    for c in 0..4 {
+        acc[c] += w * v[c];
+    }
+}
+
+/// Value at `t` in `cell` (each `0..8`) of a brick: `Σ_c w_c Σ_b w_b Σ_a w_a C_abc`, x summed first.
+#[inline]
+pub(crate) fn value<T: Real>(totals: &[T; HALO_LEN], cell: [usize; 3], t: [T; 3]) -> T {
+    let (wx, wy, wz) = (values(t[0]), values(t[1]), values(t[2]));
+    let mut plane = [T::zero(); 4];
+    for b in 0..4 {
+        let mut line = [T::zero(); 4];
+        for a in 0..4 {
+            add(&mut line, wx[a], row(totals, cell, a, b));
+        }
+        add(&mut plane, wy[b], &line);
+    }
+    dot(&wz, &plane)
+}
+
+/// Value and gradient by cell coordinates; the value has the same bits as [`value`].
+#[inline]
+pub(crate) fn value_gradient<T: Real>(totals: &[T; HALO_LEN], cell: [usize; 3], t: [T; 3]) -> (T, [T; 3]) {
+    let (wx, wy, wz) = (values(t[0]), values(t[1]), values(t[2]));
+    let (dx, dy, dz) = (first(t[0]), first(t[1]), first(t[2]));
+    let (mut plane, mut plane_dx, mut plane_dy) = ([T::zero(); 4], [T::zero(); 4], [T::zero(); 4]);
+    for b in 0..4 {
+        let (mut line, mut line_dx) = ([T::zero(); 4], [T::zero(); 4]);
+        for a in 0..4 {
+            let r = row(totals, cell, a, b);
+            add(&mut line, wx[a], r);
+            add(&mut line_dx, dx[a], r);
+        }
+        add(&mut plane, wy[b], &line);
+        add(&mut plane_dx, wy[b], &line_dx);
+        add(&mut plane_dy, dy[b], &line);
+    }
+    (
+        dot(&wz, &plane),
+        [dot(&wz, &plane_dx), dot(&wz, &plane_dy), dot(&dz, &plane)],
+    )
+}
+
+/// Second derivatives by cell coordinates: `xx, yy, zz, xy, xz, yz`.
+pub(crate) fn second<T: Real>(totals: &[T; HALO_LEN], cell: [usize; 3], t: [T; 3]) -> [T; 6] {
+    let w = t.map(values);
+    let d = t.map(first);
+    let k = t.map(curvatures);
+    let sum = |wx: &[T; 4], wy: &[T; 4], wz: &[T; 4]| {
+        let mut plane = [T::zero(); 4];
+        for b in 0..4 {
+            let mut line = [T::zero(); 4];
+            for a in 0..4 {
+                add(&mut line, wx[a], row(totals, cell, a, b));
+            }
+            add(&mut plane, wy[b], &line);
+        }
+        dot(wz, &plane)
+    };
+    [
+        sum(&k[0], &w[1], &w[2]),
+        sum(&w[0], &k[1], &w[2]),
+        sum(&w[0], &w[1], &k[2]),
+        sum(&d[0], &d[1], &w[2]),
+        sum(&d[0], &w[1], &d[2]),
+        sum(&w[0], &d[1], &d[2]),
+    ]
+}

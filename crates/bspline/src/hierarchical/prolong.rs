@@ -1,0 +1,96 @@
+use super::brick::{HALO, HALO_LEN};
+use crate::Real;
+
+/// Refines a block of `SPAN³` coefficients to the `OUT³` of the next level that it determines, `SPAN = OUT/2 + 2`
+/// for even `OUT`, `(OUT + 3)/2` for odd.
+///
+/// Two-scale relation of the uniform cubic B-spline, axis by axis: function `2k` of the finer level takes
+/// `(C_{k-1} + 6 C_k + C_{k+1})/8`, function `2k+1` takes `(C_k + C_{k+1})/2`. The first output is an odd
+/// function; it takes the first two inputs. `work` needs `SPAN²·OUT + SPAN·OUT²` slots.
+///
+/// # Panics
+/// If a slice is too short.
+pub fn refine_block<T: Real, const SPAN: usize, const OUT: usize>(
+    source: &[T],
+    work: &mut [T],
+    target: &mut [T],
+) {
+    let (along_z, along_y) = work.split_at_mut(SPAN * SPAN * OUT);
+    for line in 0..SPAN * SPAN {
+        refine_line(
+            &source[line * SPAN..(line + 1) * SPAN],
+            &mut along_z[line * OUT..(line + 1) * OUT],
+        );
+    }
+    for x in 0..SPAN {
+        for j in 0..OUT {
+            let start = (x * OUT + j) * OUT;
+            refine_rows(
+                along_z,
+                (x * SPAN + j / 2) * OUT,
+                OUT,
+                j,
+                &mut along_y[start..start + OUT],
+            );
+        }
+    }
+    let plane = OUT * OUT;
+    for i in 0..OUT {
+        refine_rows(
+            along_y,
+            i / 2 * plane,
+            plane,
+            i,
+            &mut target[i * plane..(i + 1) * plane],
+        );
+    }
+}
+
+/// Totals of a child brick from its parent's, before the child's own corrections. A parent's 11 coefficients
+/// hold all that either half needs, so no neighbour is read. `octant` is the child's half on each axis.
+pub(crate) fn prolong<T: Real>(parent: &[T; HALO_LEN], octant: [usize; 3], child: &mut [T; HALO_LEN]) {
+    const SPAN: usize = HALO / 2 + 2;
+    let mut source = [T::zero(); SPAN * SPAN * SPAN];
+    for x in 0..SPAN {
+        for y in 0..SPAN {
+            let row = ((x + 4 * octant[0]) * HALO + y + 4 * octant[1]) * HALO + 4 * octant[2];
+            source[(x * SPAN + y) * SPAN..][..SPAN].copy_from_slice(&parent[row..row + SPAN]);
+        }
+    }
+    let mut work = [T::zero(); SPAN * SPAN * HALO + SPAN * HALO * HALO];
+    refine_block::<T, SPAN, HALO>(&source, &mut work, child);
+}
+
+#[inline(always)]
+fn refine_line<T: Real>(source: &[T], target: &mut [T]) {
+    let (half, eighth, six) = (T::from_f64(0.5), T::from_f64(0.125), T::from_f64(6.0));
+    for j in 0..target.len() {
+        let p = j / 2;
+        target[j] = if j % 2 == 0 {
+            (source[p] + source[p + 1]) * half
+        } else {
+            (source[p] + six * source[p + 1] + source[p + 2]) * eighth
+        };
+    }
+}
+
+/// The same rule for whole rows: `target` is child row `j`, `source[start..]` its first parent row, `stride` apart.
+#[inline(always)]
+fn refine_rows<T: Real>(source: &[T], start: usize, stride: usize, j: usize, target: &mut [T]) {
+    let (half, eighth, six) = (T::from_f64(0.5), T::from_f64(0.125), T::from_f64(6.0));
+    let n = target.len();
+    let (a, b) = (
+        &source[start..start + n],
+        &source[start + stride..start + stride + n],
+    );
+    if j.is_multiple_of(2) {
+        for z in 0..n {
+            target[z] = (a[z] + b[z]) * half;
+        }
+    } else {
+        let c = &source[start + 2 * stride..start + 2 * stride + n];
+        for z in 0..n {
+            target[z] = (a[z] + six * b[z] + c[z]) * eighth;
+        }
+    }
+}

@@ -1,0 +1,265 @@
+//! The laws of [`HierarchicalSpline`].
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use bspline::hierarchical::{BrickKey, Corrections, Lattice, LevelCorrections};
+use bspline::{Aabb, Field, Frame, HierarchicalSpline, Real};
+use glam::{DAffine3, DMat3, DVec3};
+use proptest::prelude::*;
+
+/// A small seeded generator: tests need the same numbers everywhere.
+struct Lcg(u64);
+
+impl Lcg {
+    fn next(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+    fn point(&mut self, lo: DVec3, hi: DVec3) -> DVec3 {
+        lo + DVec3::new(self.next(), self.next(), self.next()) * (hi - lo)
+    }
+}
+
+fn oblique() -> DAffine3 {
+    DAffine3 {
+        matrix3: DMat3::from_cols(
+            DVec3::new(1.5, 0.2, 0.0),
+            DVec3::new(-0.3, 0.8, 0.1),
+            DVec3::new(0.1, 0.0, -1.1),
+        ),
+        translation: DVec3::new(10.0, -20.0, 5.0),
+    }
+}
+
+fn set<T: Real>(level: &mut BTreeMap<BrickKey, Corrections<T>>, s: [u32; 3], c: f64) {
+    let key = BrickKey(s.map(|s| s / 8));
+    let brick = level.entry(key).or_insert_with(Corrections::empty);
+    brick.set(s.map(|s| (s % 8) as usize), T::from_f64(c));
+}
+
+/// Level 0 full, two finer levels with random functions in random places.
+fn random_spline<T: Real>(seed: u64, map: DAffine3, cells: [u32; 3]) -> HierarchicalSpline<T> {
+    let mut rng = Lcg(seed);
+    let lattice = Lattice {
+        world_from_lattice: map,
+        cells,
+    };
+    let mut levels: Vec<LevelCorrections<T>> = Vec::new();
+    for level in 0..3usize {
+        let n = lattice.cells_at(level);
+        let mut bricks = BTreeMap::new();
+        if level == 0 {
+            for x in 0..n[0] + 3 {
+                for y in 0..n[1] + 3 {
+                    for z in 0..n[2] + 3 {
+                        set(&mut bricks, [x, y, z], 2.0 * rng.next() - 1.0);
+                    }
+                }
+            }
+        } else {
+            for _ in 0..200 / level {
+                let s = n.map(|n| (rng.next() * (n + 3) as f64) as u32);
+                set(&mut bricks, s, (2.0 * rng.next() - 1.0) * 0.5);
+            }
+        }
+        levels.push(bricks.into_iter().map(|(k, c)| (k, Arc::new(c))).collect());
+    }
+    HierarchicalSpline::from_corrections(lattice, 1.0, levels)
+}
+
+/// One cubic B-spline centred on 0 with unit knots.
+fn bump(x: f64) -> f64 {
+    let a = x.abs();
+    match a {
+        a if a < 1.0 => (4.0 - 6.0 * a * a + 3.0 * a * a * a) / 6.0,
+        a if a < 2.0 => (2.0 - a).powi(3) / 6.0,
+        _ => 0.0,
+    }
+}
+
+/// The definition: the sum over all active functions of all levels.
+fn definition<T: Real>(f: &HierarchicalSpline<T>, p: DVec3) -> f64 {
+    let q = f.lattice_from_world().transform_point3(p);
+    let mut sum = 0.0;
+    for level in 0..f.level_count() {
+        let scaled = q * (1u64 << level) as f64;
+        for (key, c) in f.corrections(level) {
+            for slot in (0..512).filter(|&s| c.is_active(s)) {
+                let s = [slot / 64, slot / 8 % 8, slot % 8];
+                let b: f64 = (0..3)
+                    .map(|a| bump(scaled[a] - (8.0 * key.0[a] as f64 + s[a] as f64 - 1.0)))
+                    .product();
+                sum += c.values[slot].as_f64() * b;
+            }
+        }
+    }
+    sum
+}
+
+#[test]
+fn totals_evaluate_to_the_sum_of_all_levels() {
+    let f = random_spline::<f64>(1, oblique(), [5, 9, 3]);
+    let mut rng = Lcg(2);
+    for _ in 0..2000 {
+        let p = f
+            .lattice()
+            .world_from_lattice
+            .transform_point3(rng.point(DVec3::ZERO, f.lattice().extent()));
+        assert!((f.value(p) - definition(&f, p)).abs() < 1e-13, "at {p}");
+    }
+}
+
+#[test]
+fn gradient_and_hessian_match_central_differences() {
+    let f = random_spline::<f64>(3, oblique(), [5, 4, 3]);
+    let mut rng = Lcg(4);
+    let d = 1e-4;
+    for _ in 0..500 {
+        let q = rng.point(DVec3::splat(0.05), f.lattice().extent() - 0.05);
+        let p = f.lattice().world_from_lattice.transform_point3(q);
+        let jet = f.jet(p);
+        for a in 0..3 {
+            let e = DVec3::AXES[a] * d;
+            let ((v1, g1), (v0, g0)) = (f.value_gradient(p + e), f.value_gradient(p - e));
+            assert!(((v1 - v0) / (2.0 * d) - jet.gradient[a]).abs() < 1e-5);
+            // The third derivative jumps at knots: first order in d there, with constant max|C|/h³.
+            assert!(
+                ((g1 - g0) / (2.0 * d) - jet.hessian.col(a)).length() < 1e-1,
+                "{p}"
+            );
+        }
+    }
+}
+
+#[test]
+fn gradient_outside_the_box_matches_differences() {
+    let f = random_spline::<f64>(5, oblique(), [4, 4, 4]);
+    let mut rng = Lcg(6);
+    let d = 1e-6;
+    for _ in 0..500 {
+        let q = rng.point(DVec3::splat(-3.0), f.lattice().extent() + 3.0);
+        let p = f.lattice().world_from_lattice.transform_point3(q);
+        let (_, g) = f.value_gradient(p);
+        for a in 0..3 {
+            let e = DVec3::AXES[a] * d;
+            let slope = (f.value(p + e) - f.value(p - e)) / (2.0 * d);
+            assert!((slope - g[a]).abs() < 1e-4, "{q} {slope} {}", g[a]);
+        }
+    }
+}
+
+#[test]
+fn second_derivatives_do_not_jump_across_level_borders() {
+    let f = random_spline::<f64>(7, DAffine3::IDENTITY, [4, 4, 4]);
+    let mut rng = Lcg(8);
+    // Finest spacing 1/4, max|C| about 2: the bound of 1e-9·max|C|/h².
+    let tolerance = 1e-9 * 2.0 * 16.0;
+    for _ in 0..3000 {
+        let mut q = rng.point(DVec3::ZERO, f.lattice().extent());
+        let axis = (rng.next() * 3.0) as usize;
+        q[axis] = (rng.next() * 14.0 + 1.0).floor() / 4.0;
+        let e = DVec3::AXES[axis] * 1e-13;
+        let (below, above) = (f.jet(q - e), f.jet(q + e));
+        assert!((below.value - above.value).abs() < 1e-11);
+        let jump = below.hessian - above.hessian;
+        for c in 0..3 {
+            assert!(jump.col(c).abs().max_element() < tolerance, "jump {jump} at {q}");
+        }
+    }
+}
+
+#[test]
+fn nodes_of_a_frame_have_the_bits_of_single_points_in_any_block() {
+    let f = random_spline::<f32>(9, DAffine3::IDENTITY, [5, 6, 7]);
+    // A power of two per cell, so that a node's coordinates are the same on both ways.
+    let frame = Frame {
+        world_from_grid: DAffine3::from_scale(DVec3::splat(0.125)),
+        cells: [40, 48, 56],
+    };
+    for (lo, count) in [
+        ([-3, 5, 2], [9, 9, 9]),
+        ([30, 40, 50], [14, 12, 9]),
+        ([0, 0, 0], [41, 3, 57]),
+    ] {
+        let mut out = vec![0.0; count.iter().product()];
+        f.frame_values(&frame, lo, count, &mut out);
+        let mut slot = out.iter();
+        for i in 0..count[0] as i64 {
+            for j in 0..count[1] as i64 {
+                for k in 0..count[2] as i64 {
+                    let p = frame.node([lo[0] + i, lo[1] + j, lo[2] + k]);
+                    assert_eq!(slot.next().unwrap().to_bits(), f.value(p).to_bits(), "{p}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn bricks_follow_the_functions_not_the_box() {
+    let lattice = Lattice {
+        world_from_lattice: DAffine3::IDENTITY,
+        cells: [8, 8, 8],
+    };
+    let mut levels = vec![BTreeMap::new(); 5];
+    let mut level = BTreeMap::new();
+    set::<f32>(&mut level, [68, 68, 68], 1.0);
+    levels[4] = level.into_iter().map(|(k, c)| (k, Arc::new(c))).collect();
+    let f = HierarchicalSpline::from_corrections(lattice, 1.0, levels);
+    // One function in the middle of a brick: that brick and its three coarser covers, and the root.
+    assert_eq!(f.brick_count(), 5);
+    assert_eq!(f.coefficient_count(), 1);
+}
+
+#[test]
+fn hash_covers_the_field_and_nothing_else() {
+    let f = random_spline::<f64>(11, oblique(), [5, 4, 3]);
+    assert_eq!(
+        f.sha256(),
+        random_spline::<f64>(11, oblique(), [5, 4, 3]).sha256()
+    );
+    assert_ne!(
+        f.sha256(),
+        random_spline::<f64>(12, oblique(), [5, 4, 3]).sha256()
+    );
+    let rebuilt = HierarchicalSpline::from_corrections(
+        *f.lattice(),
+        f.slope(),
+        (0..f.level_count()).map(|l| f.corrections(l).clone()).collect(),
+    );
+    assert_eq!(f.sha256(), rebuilt.sha256());
+    let steeper = HierarchicalSpline::from_corrections(
+        *f.lattice(),
+        2.0 * f.slope(),
+        (0..f.level_count()).map(|l| f.corrections(l).clone()).collect(),
+    );
+    assert_ne!(f.sha256(), steeper.sha256());
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn bounds_hold_the_field(seed in 0u64..1000, turned in any::<bool>()) {
+        let map = if turned { oblique() } else { DAffine3::from_scale(DVec3::new(1.0, 2.0, 0.5)) };
+        let f = random_spline::<f32>(seed, map, [5, 4, 9]);
+        let region = f.lattice().world_box();
+        let (lo, hi) = (region.min - 1.0, region.max + 1.0);
+        let mut rng = Lcg(seed + 1);
+        for _ in 0..100 {
+            let (a, b) = (rng.point(lo, hi), rng.point(lo, hi));
+            let small = rng.next().powi(3);
+            let b = a + (b - a) * small;
+            let bx = Aabb::new(a.min(b), a.max(b));
+            let bound = f.bounds(&bx);
+            for _ in 0..20 {
+                let p = rng.point(bx.min, bx.max);
+                prop_assert!(bound.contains(f.value(p)), "{} outside {bound:?}", f.value(p));
+            }
+        }
+    }
+}
