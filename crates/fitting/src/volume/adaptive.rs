@@ -1,164 +1,280 @@
-//! EXPERIMENT
+//! The adaptive fit: which functions of which level are worth their place, solved jointly.
+//!
+//! Level 0 is fitted by exact least squares. Of each finer level the functions of largest energy
+//! `c²‖B‖²` are kept, `c` being the exact least-squares coefficients of the residual; then all kept functions of
+//! all levels are solved jointly. Exchanges follow: with the functions now known to work together, those of
+//! least energy give way to those that the new residual asks for.
 
 use bspline::Real;
 
 use super::active::ActiveSet;
 use super::detail::{DetailLayout, interpolation, least_squares};
 use super::domain::{Domain, Samples};
-use super::joint::{Fit, solve_jointly};
+use super::joint::{Fit, Problem, solve_jointly};
 use super::residual::{correlations, residual};
 use super::select::{Cutoff, largest};
 use crate::{Control, FitError};
 
-fn env(name: &str, default: f64) -> f64 {
-    std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
+/// Iterations of the first joint solve, of that after an exchange, and of the last.
+///
+/// On a head of 7.1 M voxels at 0.96 M coefficients: rms 1.61 with 20 iterations and no exchange (0.7 s), 1.52 with
+/// one exchange (1.2 s), 1.48 with two (1.5 s), 1.46 with three (2.1 s). Fewer iterations between exchanges lose more than
+/// they save (5: 1.57): coefficients that have not settled say little about who should go.
+const ITERATIONS: [usize; 3] = [15, 12, 20];
+/// Exchanges between the first and the last joint solve.
+const EXCHANGES: usize = 2;
+/// Share of the free budget that goes to each level but the last at first. Exchanges correct it: 0.4 to 0.6 end
+/// within 2 %.
+const FIRST_SHARE: f64 = 0.5;
+/// Weight of a score for each level above the finest. A coarse function competes with the eight finer ones that
+/// can do its work; of 0.4, 0.5, 0.65, 0.8, 1 the middle is best over budgets of 4 to 20 % of the voxels (1: 2.5 %
+/// higher rms).
+const COARSER_WEIGHT: f64 = 0.65;
+/// Largest share of the functions that one exchange replaces.
+const EXCHANGE_LIMIT: f64 = 0.2;
+
+/// A fit under way: the residual belongs to the coefficients at every call.
+pub(crate) struct Adaptive<'a, T> {
+    pub problem: Problem<'a, T>,
+    pub fit: Fit<T>,
+    /// `d - f` at all samples, padding included.
+    pub residual: Vec<T>,
+    /// As long as `residual`.
+    scratch: Vec<T>,
+    /// Finest level that may be used.
+    depth: usize,
 }
 
-fn rms<T: Real>(r: &[T]) -> f64 {
-    (r.iter().map(|&v| v.to_f64() * v.to_f64()).sum::<f64>() / r.len() as f64).sqrt()
+/// Scores of the functions of levels `1 ..= depth`.
+pub(crate) struct Scores<T> {
+    /// Entry `ℓ - 1` belongs to level `ℓ`.
+    pub levels: Vec<Vec<T>>,
+    pub layouts: Vec<DetailLayout>,
 }
 
-/// EXPERIMENT
-pub fn experiment<T: Real>(dims: [usize; 3], values: &[f32], count: usize) -> Result<(), FitError> {
-    let control = &mut Control::default();
-    let t0 = cpu();
-    let lap = |what: &str| eprintln!("  {:7.3} s  {what}", cpu() - t0);
-    let domain = Domain::<T>::new(dims, 3);
-    let samples = Samples { values, dims, scale: T::one() };
-    let mut fit = Fit::new(&domain);
-    let n: usize = domain.padded().iter().product();
-    let mut r = vec![T::zero(); n];
-    residual(&domain, &samples, &fit.active, &fit.coefficients, &mut r);
-    lap("copy");
-    let none = ActiveSet::empty(domain.functions(2));
-    let mut corr = correlations(&domain, &r, &none);
-    lap("correlations");
-    let mut c0 = std::mem::take(&mut corr[0]);
-    least_squares(&domain, 0, &mut c0);
-    fit.coefficients[0] = c0;
-    lap("level 0 lsq");
-    residual(&domain, &samples, &fit.active, &fit.coefficients, &mut r);
-    lap("residual");
-    eprintln!("level 0: {} rms {:.4}", fit.count(), rms(&r));
-    let mut corr = correlations(&domain, &r, &none);
-    lap("corr");
-    let chosen = count - fit.count();
-    // level 1
-    let l1 = DetailLayout::of_level(&domain, 1);
-    let mut c1 = std::mem::take(&mut corr[1]);
-    least_squares(&domain, 1, &mut c1);
-    let mut s1 = c1.clone();
-    l1.score(&domain, &mut s1);
-    lap("level 1 detail");
-    let mut scratch = r.clone();
-    let share = env("SHARE", 0.4);
-    let cut1 = if share > 0.0 {
-        largest(&[&s1], (share * chosen as f64) as usize)
-    } else {
-        // one tau: decomposition with full level 1
-        let mut full = fit.clone();
-        full.active[1] = ActiveSet::full(domain.functions(1));
-        full.coefficients[1] = c1.clone();
-        residual(&domain, &samples, &full.active, &full.coefficients, &mut scratch);
-        eprintln!("level 1 full: rms {:.4}", rms(&scratch));
-        interpolation(&domain, &mut scratch);
-        DetailLayout::of_level(&domain, 2).score(&domain, &mut scratch);
-        // weight of level 1 scores
-        let w = T::from_f64(env("W1", 1.0));
-        s1.iter_mut().for_each(|s| *s *= w);
-        largest(&[&s1, &scratch], chosen)
-    };
-    fit.set_active(1, l1.select(&domain, &s1, cut1, 0));
-    let set = fit.active[1].clone();
-    l1.for_each_active(&set, |p, i| fit.coefficients[1][p] = c1[i]);
-    lap("level 1 select");
-    residual(&domain, &samples, &fit.active, &fit.coefficients, &mut r);
-    eprintln!("level 1: {} rms {:.4}", fit.count(), rms(&r));
-    let its = env("IT1", 5.0) as usize;
-    solve_jointly(&domain, &samples, &mut fit, &mut r, its, control, ("", 0.0, 1.0))?;
-    eprintln!("joint 1: {} rms {:.4}", fit.count(), rms(&r));
-    lap("joint 1");
-    let l2 = DetailLayout::of_level(&domain, 2);
-    scratch.copy_from_slice(&r);
-    interpolation(&domain, &mut scratch);
-    lap("prefilter");
-    let c2 = scratch.clone();
-    l2.score(&domain, &mut scratch);
-    let cut2 = largest(&[&scratch], count - fit.count());
-    lap("largest");
-    fit.set_active(2, l2.select(&domain, &scratch, cut2, 0));
-    lap("select");
-    if env("INIT2", 1.0) > 0.0 {
-        let set = fit.active[2].clone();
-        l2.for_each_active(&set, |p, i| fit.coefficients[2][p] = c2[i]);
-        residual(&domain, &samples, &fit.active, &fit.coefficients, &mut r);
+impl<T: Real> Scores<T> {
+    fn lists(&self) -> Vec<&[T]> {
+        self.levels.iter().map(Vec::as_slice).collect()
     }
-    eprintln!("level 2: {} rms {:.4}", fit.count(), rms(&r));
-    let its = env("IT2", 20.0) as usize;
-    let t = cpu();
-    solve_jointly(&domain, &samples, &mut fit, &mut r, its, control, ("", 0.0, 1.0))?;
-    eprintln!("joint: {} rms {:.4}; {:.4} s per it", fit.count(), rms(&r), (cpu() - t) / its as f64);
-    lap("joint 2");
-    for _ in 0..env("EXCH", 0.0) as usize {
-        let corr = correlations(&domain, &r, &none);
-        let mut c1 = corr.into_iter().nth(1).unwrap();
-        least_squares(&domain, 1, &mut c1);
-        // total detail = residual detail for inactive, own coefficient for active
-        let own = env("OWN", 1.0);
-        let a1 = fit.active[1].clone();
-        if own > 0.0 {
-            l1.for_each_active(&a1, |p, i| c1[i] = fit.coefficients[1][p]);
+}
+
+impl<'a, T: Real> Adaptive<'a, T> {
+    /// Fits level 0 to the samples; functions of levels up to `depth` may follow.
+    pub fn new(problem: Problem<'a, T>, depth: usize) -> Self {
+        let len = problem.domain.padded().iter().product();
+        Self::with_buffers(problem, depth, vec![T::zero(); len], vec![T::zero(); len])
+    }
+
+    fn with_buffers(problem: Problem<'a, T>, depth: usize, mut r: Vec<T>, scratch: Vec<T>) -> Self {
+        let domain = problem.domain;
+        let mut fit = Fit::new(domain);
+        residual(domain, &problem.samples, &fit.active, &fit.coefficients, &mut r);
+        let mut base = correlations(domain, &r, &fit.active[domain.finest()]).swap_remove(0);
+        least_squares(domain, 0, &mut base);
+        fit.coefficients[0] = base;
+        let mut this = Self { problem, fit, residual: r, scratch, depth };
+        this.update_residual();
+        this
+    }
+
+    pub fn domain(&self) -> &'a Domain<T> {
+        self.problem.domain
+    }
+
+    pub fn samples(&self) -> Samples<'a, T> {
+        self.problem.samples
+    }
+
+    pub fn depth(&self) -> usize {
+        self.depth
+    }
+
+    /// Back to level 0 by exact least squares.
+    pub fn restart(&mut self) {
+        let scratch = std::mem::take(&mut self.scratch);
+        let residual = std::mem::take(&mut self.residual);
+        *self = Self::with_buffers(self.problem, self.depth, residual, scratch);
+    }
+
+    fn update_residual(&mut self) {
+        let (domain, samples) = (self.problem.domain, &self.problem.samples);
+        residual(domain, samples, &self.fit.active, &self.fit.coefficients, &mut self.residual);
+    }
+
+    /// Joint least squares.
+    pub fn solve(
+        &mut self,
+        iterations: usize,
+        control: &mut Control,
+        span: (f64, f64),
+    ) -> Result<(), FitError> {
+        solve_jointly(&self.problem, &mut self.fit, &mut self.residual, iterations, control, span)
+    }
+
+    /// Least-squares coefficients of the residual on `level`, all its functions taken.
+    pub fn detail(&mut self, level: usize) -> Vec<T> {
+        let domain = self.domain();
+        if level == domain.finest() {
+            let mut c = std::mem::take(&mut self.scratch);
+            c.copy_from_slice(&self.residual);
+            interpolation(domain, &mut c);
+            c
+        } else {
+            let none = ActiveSet::empty(domain.functions(domain.finest()));
+            let mut c = correlations(domain, &self.residual, &none).swap_remove(level);
+            least_squares(domain, level, &mut c);
+            c
         }
-        l1.score(&domain, &mut c1);
-        let mut c2 = r.clone();
-        interpolation(&domain, &mut c2);
-        let a2 = fit.active[2].clone();
-        l2.for_each_active(&a2, |p, i| c2[i] = fit.coefficients[2][p]);
-        l2.score(&domain, &mut c2);
-        let w = T::from_f64(env("WX", 1.0));
-        c1.iter_mut().for_each(|s| *s *= w);
-        // threshold such that 15 % of the active fall below
-        let frac = env("FRAC", 0.15);
-        let active_total = a1.len() + a2.len();
-        let mut act: Vec<(f32, usize)> = Vec::new();
-        l1.for_each_active(&a1, |_, i| act.push((c1[i].to_f64() as f32, i)));
-        l2.for_each_active(&a2, |_, i| act.push((c2[i].to_f64() as f32, c1.len() + i)));
-        let drop = (frac * active_total as f64) as usize;
-        let free = largest(&[&c1, &c2], active_total);
-        // natural exchange: count of active below the free cutoff
-        let natural = act.iter().filter(|(s, i)| !free.keeps(T::from_f64(*s as f64), *i)).count();
-        eprintln!("natural exchange {} of {} (limit {drop})", natural, active_total);
-        let cut = if natural <= drop { free } else {
-            act.select_nth_unstable_by(drop, |a, b| a.0.total_cmp(&b.0));
-            // boost actives above the drop line to infinity
-            for &(s, i) in &act[drop..] {
-                let _ = s;
-                if i < c1.len() { c1[i] = T::from_f64(1e30) } else { let j = i - c1.len(); c2[j] = T::from_f64(1e30) }
-            }
-            for &(_, i) in &act[..drop] {
-                if i < c1.len() { c1[i] = T::zero() } else { let j = i - c1.len(); c2[j] = T::zero() }
-            }
-            largest(&[&c1, &c2], active_total)
-        };
-        let n1 = c1.len();
-        fit.set_active(1, l1.select(&domain, &c1, cut, 0));
-        fit.set_active(2, l2.select(&domain, &c2, cut, n1));
-        lap("exchange");
-        residual(&domain, &samples, &fit.active, &fit.coefficients, &mut r);
-        eprintln!("exchanged: {} + {} rms {:.4}", fit.active[1].len(), fit.active[2].len(), rms(&r));
-        solve_jointly(&domain, &samples, &mut fit, &mut r, env("IT3", 15.0) as usize, control, ("", 0.0, 1.0))?;
-        eprintln!("joint: {} rms {:.4} max {:.2}", fit.count(), rms(&r), r.iter().fold(0.0, |m: f64, &v| m.max(v.to_f64().abs())));
-        lap("joint 3");
     }
-    let _ = Cutoff::above(0.0);
-    eprintln!("share of level 1: {:.3}", fit.active[1].len() as f64 / chosen as f64);
-    Ok(())
+
+    /// Gives a [`Self::detail`] back.
+    pub fn recycle(&mut self, level: usize, c: Vec<T>) {
+        if level == self.domain().finest() {
+            self.scratch = c;
+        }
+    }
+
+    /// Weight of the scores of `level`, see [`COARSER_WEIGHT`].
+    pub fn level_weight(&self, level: usize) -> f64 {
+        COARSER_WEIGHT.powi((self.depth - level) as i32)
+    }
+
+    /// Takes functions of `level`, none active so far, with their least-squares coefficients as start.
+    pub fn grow(&mut self, level: usize, choose: impl Fn(&[T]) -> Cutoff) {
+        let domain = self.domain();
+        let layout = DetailLayout::of_level(domain, level);
+        let coefficients = self.detail(level);
+        let mut scores = coefficients.clone();
+        layout.score(domain, T::one(), &mut scores);
+        let set = layout.select(domain, &scores, choose(&scores), 0);
+        drop(scores);
+        let mut start = vec![T::zero(); set.len()];
+        layout.for_each_active(&set, |packed, entry| start[packed] = coefficients[entry]);
+        self.recycle(level, coefficients);
+        self.fit.active[level] = set;
+        self.fit.coefficients[level] = start;
+        self.update_residual();
+    }
+
+    /// Square roots of energies: for active functions of what they carry, for others of what the residual would
+    /// have them carry, weighted by level.
+    pub fn scores(&mut self) -> Scores<T> {
+        let domain = self.domain();
+        let none = ActiveSet::empty(domain.functions(domain.finest()));
+        let mut dense =
+            if self.depth > 0 { correlations(domain, &self.residual, &none) } else { Vec::new() };
+        let layouts: Vec<DetailLayout> =
+            (1..=self.depth).map(|level| DetailLayout::of_level(domain, level)).collect();
+        let mut levels = Vec::with_capacity(self.depth);
+        for &layout in &layouts {
+            let level = layout.level;
+            let mut c = if level == domain.finest() {
+                self.detail(level)
+            } else {
+                let mut c = std::mem::take(&mut dense[level]);
+                least_squares(domain, level, &mut c);
+                c
+            };
+            let own = &self.fit.coefficients[level];
+            layout.for_each_active(&self.fit.active[level], |packed, entry| c[entry] = own[packed]);
+            layout.score(domain, T::from_f64(self.level_weight(level)), &mut c);
+            levels.push(c);
+        }
+        Scores { levels, layouts }
+    }
+
+    /// Makes the functions whose score is kept the active ones.
+    pub fn activate(&mut self, scores: Scores<T>, cutoff: Cutoff) {
+        let mut offset = 0;
+        for (layout, list) in scores.layouts.iter().zip(scores.levels) {
+            let set = layout.select(self.domain(), &list, cutoff, offset);
+            offset += list.len();
+            self.fit.set_active(layout.level, set);
+            self.recycle(layout.level, list);
+        }
+        self.update_residual();
+    }
+
+    /// Gives a [`Self::scores`] back unused.
+    pub fn discard(&mut self, scores: Scores<T>) {
+        for (layout, list) in scores.layouts.iter().zip(scores.levels) {
+            self.recycle(layout.level, list);
+        }
+    }
+
+    /// Replaces functions of little energy by as many that would carry more, at most a share of
+    /// [`EXCHANGE_LIMIT`].
+    fn exchange(&mut self, floor: f64) {
+        let mut scores = self.scores();
+        let count: usize = self.fit.active[1..].iter().map(ActiveSet::len).sum();
+        let limit = (EXCHANGE_LIMIT * count as f64) as usize;
+        let mut cutoff = largest(&scores.lists(), count);
+        let mut own = self.own_scores(&scores);
+        let leaving = own.iter().zip(1..).filter(|&(&(s, i), _)| !cutoff.keeps(s, i)).count();
+        if leaving > limit {
+            // Those that stay are out of the competition: an infinite score; those that leave have none.
+            own.sort_unstable_by(|a, b| {
+                a.0.partial_cmp(&b.0).expect("scores are numbers").then(b.1.cmp(&a.1))
+            });
+            for (rank, &(_, index)) in own.iter().enumerate() {
+                *entry(&mut scores.levels, index) = if rank < limit { T::zero() } else { T::infinity() };
+            }
+            cutoff = largest(&scores.lists(), count);
+        }
+        self.activate(scores, cutoff.at_least(floor));
+    }
+
+    /// Score and index (counted through all levels) of every active function above level 0.
+    fn own_scores(&self, scores: &Scores<T>) -> Vec<(T, usize)> {
+        let mut own = Vec::new();
+        let mut offset = 0;
+        for (layout, list) in scores.layouts.iter().zip(&scores.levels) {
+            layout
+                .for_each_active(&self.fit.active[layout.level], |_, i| own.push((list[i], offset + i)));
+            offset += list.len();
+        }
+        own
+    }
+
+    /// Spends `budget` coefficients, or fewer if the rest would carry nothing above `floor`.
+    pub fn spend(
+        &mut self,
+        budget: usize,
+        floor: f64,
+        control: &mut Control,
+        span: (f64, f64),
+    ) -> Result<(), FitError> {
+        let at = |share: f64| span.0 + (span.1 - span.0) * share;
+        for level in 1..=self.depth {
+            control.step("choosing functions", at(0.05 * level as f64))?;
+            let free = budget.saturating_sub(self.fit.count());
+            let share = if level < self.depth { FIRST_SHARE } else { 1.0 };
+            let wanted = (free as f64 * share) as usize;
+            self.grow(level, |scores| largest(&[scores], wanted).at_least(floor));
+        }
+        if self.depth == 0 {
+            return self.solve(ITERATIONS[0], control, (at(0.1), at(1.0)));
+        }
+        let [first, between, last] = ITERATIONS;
+        self.solve(first, control, (at(0.15), at(0.4)))?;
+        for round in 0..EXCHANGES {
+            let from = 0.4 + 0.3 * round as f64;
+            control.step("exchanging functions", at(from))?;
+            self.exchange(floor);
+            let iterations = if round + 1 == EXCHANGES { last } else { between };
+            self.solve(iterations, control, (at(from + 0.05), at(from + 0.3)))?;
+        }
+        Ok(())
+    }
 }
 
-fn cpu() -> f64 {
-    let s = std::fs::read_to_string("/proc/self/schedstat").unwrap();
-    let _ = s;
-    let s = std::fs::read_to_string("/proc/self/stat").unwrap();
-    let f: Vec<&str> = s.rsplit(')').next().unwrap().split_whitespace().collect();
-    (f[11].parse::<f64>().unwrap() + f[12].parse::<f64>().unwrap()) / 100.0
+/// The entry of an index counted through all lists.
+fn entry<T>(lists: &mut [Vec<T>], mut index: usize) -> &mut T {
+    for list in lists {
+        if index < list.len() {
+            return &mut list[index];
+        }
+        index -= list.len();
+    }
+    unreachable!("index {index} beyond all lists");
 }

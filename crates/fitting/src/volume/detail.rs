@@ -59,14 +59,14 @@ impl DetailLayout {
         std::array::from_fn(|a| of(&domain.axes[a], self.size[a]))
     }
 
-    /// Turns coefficients into scores `|c| ‖B‖`, the square root of the energy a function carries; 0 where a
-    /// function may not carry detail.
-    pub fn score<T: Real>(self, domain: &Domain<T>, coefficients: &mut [T]) {
+    /// Turns coefficients into scores `weight |c| ‖B‖`, for weight 1 the square root of the energy a function
+    /// carries; 0 where a function may not carry detail.
+    pub fn score<T: Real>(self, domain: &Domain<T>, weight: T, coefficients: &mut [T]) {
         let [nx, ny, _] = self.size;
         let norms = self.norms(domain);
         coefficients.par_chunks_mut(nx * ny).enumerate().for_each(|(z, plane)| {
             for (y, row) in plane.chunks_mut(nx).enumerate() {
-                let yz = norms[1][y] * norms[2][z];
+                let yz = weight * (norms[1][y] * norms[2][z]);
                 for (c, &n) in row.iter_mut().zip(&norms[0]) {
                     *c = c.abs() * (yz * n);
                 }
@@ -76,7 +76,7 @@ impl DetailLayout {
 
     /// Function index (dense, in the level's own size) of an entry.
     #[inline(always)]
-    fn function(self, functions: [usize; 3], x: usize, y: usize, z: usize) -> usize {
+    pub fn function(self, functions: [usize; 3], x: usize, y: usize, z: usize) -> usize {
         ((z + self.first) * functions[1] + y + self.first) * functions[0] + x + self.first
     }
 

@@ -6,8 +6,11 @@ use super::axis::Axis;
 use super::rows::{FiveTaps, Phases};
 
 /// Planes of the finest level that one task works on. Fixed, so that no result depends on the thread count;
-/// 46 planes cost 9 % of repeated halo work, and a volume of 181 planes gives four tasks.
-pub(crate) const SLAB: usize = 46;
+/// 48 planes cost 8 % of repeated halo work, and a volume of 181 planes gives four tasks. A multiple of
+/// [`LEAF`], so that the leaves of two tasks do not share voxels.
+pub(crate) const SLAB: usize = 48;
+/// Voxels along a leaf, the cell that residuals are reported of.
+pub(crate) const LEAF: usize = 4;
 
 /// Grids of a volume fit: axes, filters of the finest level.
 #[derive(Clone, Debug)]

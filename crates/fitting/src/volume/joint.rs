@@ -46,22 +46,32 @@ impl<T: Real> Fit<T> {
     }
 }
 
-/// Minimizes `Σ_k w_k (f(k) - d_k)²` over the coefficients of `fit` by `iterations` steps of conjugate gradients,
-/// preconditioned by the diagonal `‖B‖²` of the generating system (all levels side by side).
+/// What is to be fitted.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Problem<'a, T> {
+    pub domain: &'a Domain<T>,
+    pub samples: Samples<'a, T>,
+    /// Weight `μ` of the ridge `μ Σ c²‖B‖²` over the functions above level 0; 0 for none.
+    pub ridge: f64,
+}
+
+/// Minimizes `Σ_k w_k (f(k) - d_k)² + μ Σ c²‖B‖²` over the coefficients of `fit` by at most `iterations` steps of
+/// conjugate gradients, preconditioned by the diagonal of the generating system (all levels side by side).
 ///
 /// Functions that several levels can express make the system singular but consistent; conjugate gradients do
-/// not mind. The residual norm at the samples falls in every step. `r` holds the residual of the start and, on
-/// return, that of the result.
+/// not mind. The energy falls in every step. `r` holds the residual of the start and, on return, that
+/// of the result. Progress goes from `span.0` to `span.1`.
 pub(crate) fn solve_jointly<T: Real>(
-    domain: &Domain<T>,
-    samples: &Samples<T>,
+    problem: &Problem<T>,
     fit: &mut Fit<T>,
     r: &mut [T],
     iterations: usize,
     control: &mut Control,
-    stage: (&'static str, f64, f64),
+    span: (f64, f64),
 ) -> Result<(), FitError> {
-    let inverse_diagonal = inverse_diagonal(domain, &fit.active);
+    let domain = problem.domain;
+    let norms = squared_norms(domain, &fit.active);
+    let ridge = |level: usize| T::from_f64(if level == 0 { 0.0 } else { problem.ridge });
     let finest = domain.finest();
     let dense = correlations(domain, r, &fit.active[finest]);
     let mut gradient: Packed<T> = dense
@@ -69,20 +79,26 @@ pub(crate) fn solve_jointly<T: Real>(
         .enumerate()
         .map(|(level, g)| if level == finest { g } else { fit.active[level].gather(&g) })
         .collect();
+    if problem.ridge > 0.0 {
+        add_ridge(&mut gradient, &norms, &fit.coefficients, |level| -ridge(level));
+    }
     let mut z: Packed<T> = gradient.clone();
-    precondition(&gradient, &inverse_diagonal, &mut z);
+    let scale = |level: usize| T::one() / (T::one() + ridge(level));
+    precondition(&gradient, &norms, &mut z, scale);
     let mut p = z.clone();
     let mut q = z.clone();
     let mut rho = dot(&gradient, &z);
     let start = rho;
     for iteration in 0..iterations {
-        let (name, from, to) = stage;
-        control.step(name, from + (to - from) * iteration as f64 / iterations as f64)?;
+        control.step("solving jointly", span.0 + (span.1 - span.0) * iteration as f64 / iterations as f64)?;
         // Below this the direction is rounding noise of the storage type.
-        if rho <= start * T::UNIT_ROUND_OFF * T::UNIT_ROUND_OFF || rho == 0.0 {
+        if rho <= start * T::UNIT_ROUND_OFF * T::UNIT_ROUND_OFF {
             break;
         }
         apply_normal_matrix(domain, &fit.active, &p, &mut q);
+        if problem.ridge > 0.0 {
+            add_ridge(&mut q, &norms, &p, ridge);
+        }
         let curvature = dot(&p, &q);
         if curvature <= 0.0 {
             break;
@@ -90,7 +106,7 @@ pub(crate) fn solve_jointly<T: Real>(
         let alpha = T::from_f64(rho / curvature);
         axpy(&mut fit.coefficients, alpha, &p);
         axpy(&mut gradient, -alpha, &q);
-        precondition(&gradient, &inverse_diagonal, &mut z);
+        precondition(&gradient, &norms, &mut z, scale);
         let next = dot(&gradient, &z);
         let beta = T::from_f64(next / rho);
         rho = next;
@@ -98,18 +114,19 @@ pub(crate) fn solve_jointly<T: Real>(
             p.par_iter_mut().with_min_len(DOT_CHUNK).zip(z).for_each(|(p, &z)| *p = z + beta * *p);
         }
     }
-    residual(domain, samples, &fit.active, &fit.coefficients, r);
+    residual(domain, &problem.samples, &fit.active, &fit.coefficients, r);
     Ok(())
 }
 
-/// `1/‖B‖²` of every active function.
-fn inverse_diagonal<T: Real>(domain: &Domain<T>, active: &[ActiveSet]) -> Packed<T> {
+/// `‖B‖²` of every active function.
+fn squared_norms<T: Real>(domain: &Domain<T>, active: &[ActiveSet]) -> Packed<T> {
     active
         .iter()
         .enumerate()
         .map(|(level, set)| {
+            let square = |n: &f64| T::from_f64(n * n);
             let [nx, ny, nz] =
-                domain.axes.map(|a| a.norms(level).iter().map(|n| T::from_f64(1.0 / (n * n))).collect::<Vec<_>>());
+                domain.axes.map(|a| a.norms(level).iter().map(square).collect::<Vec<_>>());
             let mut out = Vec::with_capacity(set.len());
             for (z, &nz) in nz.iter().enumerate() {
                 for (y, &ny) in ny.iter().enumerate() {
@@ -122,9 +139,19 @@ fn inverse_diagonal<T: Real>(domain: &Domain<T>, active: &[ActiveSet]) -> Packed
         .collect()
 }
 
-fn precondition<T: Real>(g: &Packed<T>, inverse_diagonal: &Packed<T>, z: &mut Packed<T>) {
-    for ((z, g), d) in z.iter_mut().zip(g).zip(inverse_diagonal) {
-        z.par_iter_mut().with_min_len(DOT_CHUNK).zip(g).zip(d).for_each(|((z, &g), &d)| *z = g * d);
+/// `z = scale g / ‖B‖²`.
+fn precondition<T: Real>(g: &Packed<T>, norms: &Packed<T>, z: &mut Packed<T>, scale: impl Fn(usize) -> T) {
+    for (level, ((z, g), n)) in z.iter_mut().zip(g).zip(norms).enumerate() {
+        let scale = scale(level);
+        z.par_iter_mut().with_min_len(DOT_CHUNK).zip(g).zip(n).for_each(|((z, &g), &n)| *z = scale * g / n);
+    }
+}
+
+/// `y += weight ‖B‖² x`.
+fn add_ridge<T: Real>(y: &mut Packed<T>, norms: &Packed<T>, x: &Packed<T>, weight: impl Fn(usize) -> T) {
+    for (level, ((y, x), n)) in y.iter_mut().zip(x).zip(norms).enumerate() {
+        let weight = weight(level);
+        y.par_iter_mut().with_min_len(DOT_CHUNK).zip(x).zip(n).for_each(|((y, &x), &n)| *y += weight * n * x);
     }
 }
 
@@ -150,10 +177,10 @@ fn dot_chunk<T: Real>(a: &[T], b: &[T]) -> f64 {
     let mut lanes = [0.0_f64; DOT_LANES];
     let (a_chunks, b_chunks) = (a.chunks_exact(DOT_LANES), b.chunks_exact(DOT_LANES));
     let tail: f64 =
-        a_chunks.remainder().iter().zip(b_chunks.remainder()).map(|(&x, &y)| x.to_f64() * y.to_f64()).sum();
+        a_chunks.remainder().iter().zip(b_chunks.remainder()).map(|(&x, &y)| x.as_f64() * y.as_f64()).sum();
     for (a, b) in a_chunks.zip(b_chunks) {
         for l in 0..DOT_LANES {
-            lanes[l] += a[l].to_f64() * b[l].to_f64();
+            lanes[l] += a[l].as_f64() * b[l].as_f64();
         }
     }
     lanes.iter().sum::<f64>() + tail

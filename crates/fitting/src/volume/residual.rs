@@ -1,5 +1,7 @@
 //! Residuals at the samples, and their correlation with the functions of every level.
 
+use std::ops::Range;
+
 use bspline::Real;
 use pulp::Arch;
 use rayon::prelude::*;
@@ -24,18 +26,23 @@ pub(crate) fn residual<T: Real>(
     out.par_chunks_mut(nx * ny * SLAB).enumerate().for_each(|(i, slab)| {
         Arch::new().dispatch(|| {
             let rows = TotalRows::new(domain, finest, coarse, &active[finest], &packed[finest]);
-            residual_slab(domain, samples, rows, i * SLAB, slab);
+            let planes = i * SLAB..i * SLAB + slab.len() / (nx * ny);
+            let mut targets = slab.chunks_mut(nx);
+            residual_slab(domain, samples, rows, planes, |_, _, row| {
+                targets.next().expect("as many rows as asked for").copy_from_slice(row);
+            });
         });
     });
 }
 
+/// Hands rows `(y, z, d - f)` of the sample planes `planes` to `emit`, in order of z then y.
 #[inline(always)]
-fn residual_slab<T: Real>(
+pub(crate) fn residual_slab<T: Real>(
     domain: &Domain<T>,
     samples: &Samples<T>,
     mut totals: TotalRows<T>,
-    z0: usize,
-    out: &mut [T],
+    planes: Range<usize>,
+    mut emit: impl FnMut(usize, usize, &[T]),
 ) {
     let [nx, ny, _] = domain.padded();
     let phases = domain.phases(domain.finest());
@@ -44,10 +51,11 @@ fn residual_slab<T: Real>(
     let mut total = vec![T::zero(); width];
     let mut value = vec![T::zero(); width];
     let mut natural = vec![T::zero(); nx];
+    let mut data = vec![T::zero(); nx];
     let mut rows: [Vec<T>; 3] = std::array::from_fn(|_| vec![T::zero(); width]);
     let mut ring: [Vec<T>; 3] = std::array::from_fn(|_| vec![T::zero(); width * ny]);
     // Sample plane k lies under the function planes k, k+1, k+2; rows alike.
-    for s in z0..z0 + out.len() / (nx * ny) + 2 {
+    for s in planes.start..planes.end + 2 {
         totals.start_plane(s);
         let plane = &mut ring[s % 3];
         for t in 0..ny + 2 {
@@ -59,19 +67,20 @@ fn residual_slab<T: Real>(
                 one_four_one(a, b, c, &mut plane[k * width..(k + 1) * width]);
             }
         }
-        if s < z0 + 2 {
+        if s < planes.start + 2 {
             continue;
         }
         let z = s - 2;
         let [a, b, c] = [z % 3, (z + 1) % 3, s % 3].map(|j| &ring[j][..]);
-        for (y, row) in out[(z - z0) * nx * ny..].chunks_mut(nx).take(ny).enumerate() {
+        for y in 0..ny {
             let at = y * width..(y + 1) * width;
             one_four_one(&a[at.clone()], &b[at.clone()], &c[at], &mut value);
             phases.join(&value, &mut natural);
-            samples.row(y, z, row);
-            for (d, &f) in row.iter_mut().zip(&natural) {
+            samples.row(y, z, &mut data);
+            for (d, &f) in data.iter_mut().zip(&natural) {
                 *d -= f * scale;
             }
+            emit(y, z, &data);
         }
     }
 }

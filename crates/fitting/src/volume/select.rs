@@ -22,10 +22,16 @@ impl Cutoff {
         Self { key: key(threshold as f32), before: 0 }
     }
 
+    /// This cutoff, but nothing at or below `threshold`.
+    pub fn at_least(self, threshold: f64) -> Self {
+        let floor = Self::above(threshold);
+        if floor.key >= self.key { floor } else { self }
+    }
+
     /// Whether the score at `index`, counted through all lists, is kept.
     #[inline(always)]
     pub fn keeps<T: Real>(&self, score: T, index: usize) -> bool {
-        let k = key(score.to_f64() as f32);
+        let k = key(score.as_f64() as f32);
         k > 0 && (k > self.key || k == self.key && index < self.before)
     }
 }
@@ -46,7 +52,7 @@ pub(crate) fn largest<T: Real>(lists: &[&[T]], count: usize) -> Cutoff {
             .map(|chunk| {
                 let mut h = vec![0_u32; BINS];
                 for &s in chunk {
-                    h[(key(s.to_f64() as f32) >> DROPPED_BITS) as usize] += 1;
+                    h[(key(s.as_f64() as f32) >> DROPPED_BITS) as usize] += 1;
                 }
                 h
             })
@@ -76,7 +82,7 @@ pub(crate) fn largest<T: Real>(lists: &[&[T]], count: usize) -> Cutoff {
     let mut offset = 0;
     for list in lists {
         members.extend(list.iter().enumerate().filter_map(|(i, &s)| {
-            let k = key(s.to_f64() as f32);
+            let k = key(s.as_f64() as f32);
             (k >> DROPPED_BITS == bin).then_some((k, offset + i))
         }));
         offset += list.len();
