@@ -13,8 +13,8 @@ mod field;
 pub mod hierarchical;
 mod interval;
 pub mod knots;
-pub mod primitives;
 pub mod polygonize;
+pub mod primitives;
 mod real;
 pub mod restrict;
 
