@@ -143,36 +143,65 @@ pub fn restricted_range<T: Real>(
     coefficients: &[T; COEFFICIENTS * COEFFICIENTS * COEFFICIENTS],
     axes: &[RestrictedAxis<T>; 3],
 ) -> (T, T) {
+    pulp::Arch::new().dispatch(
+        #[inline(always)]
+        || range_of_rows(coefficients, axes),
+    )
+}
+
+#[inline(always)]
+fn range_of_rows<T: Real>(
+    coefficients: &[T; COEFFICIENTS * COEFFICIENTS * COEFFICIENTS],
+    axes: &[RestrictedAxis<T>; 3],
+) -> (T, T) {
     const N: usize = COEFFICIENTS;
     let [ax, ay, az] = axes;
     let (ry, rz) = (ay.reads(), az.reads());
-    let mut range = (T::infinity(), T::neg_infinity());
+    // Lanes are rows of y; those beyond `ay.count` are computed with the rest and left out in the end.
+    let (mut low, mut high) = ([T::infinity(); N], [T::neg_infinity(); N]);
+    let mut plane = [[T::zero(); N]; N];
+    let mut turned = [[T::zero(); N]; N];
     for i in 0..ax.count {
         let (x0, wx) = ax.row(i);
-        let mut plane = [[T::zero(); N]; N];
         for y in ry.clone() {
-            let line = |x: usize| &coefficients[((x0 + x) * N + y) * N..][..N];
+            let line = |x: usize| -> &[T; N] {
+                coefficients[((x0 + x) * N + y) * N..][..N]
+                    .try_into()
+                    .expect("a row of 11")
+            };
             let (l0, l1, l2, l3) = (line(0), line(1), line(2), line(3));
-            for z in rz.clone() {
+            for z in 0..N {
                 plane[y][z] = (wx[0] * l0[z] + wx[1] * l1[z]) + (wx[2] * l2[z] + wx[3] * l3[z]);
             }
         }
         for j in 0..ay.count {
             let (y0, wy) = ay.row(j);
             let mut line = [T::zero(); N];
-            for z in rz.clone() {
+            for z in 0..N {
                 line[z] = (wy[0] * plane[y0][z] + wy[1] * plane[y0 + 1][z])
                     + (wy[2] * plane[y0 + 2][z] + wy[3] * plane[y0 + 3][z]);
             }
-            for k in 0..az.count {
-                let (z0, wz) = az.row(k);
-                let c =
-                    (wz[0] * line[z0] + wz[1] * line[z0 + 1]) + (wz[2] * line[z0 + 2] + wz[3] * line[z0 + 3]);
-                range = (range.0.min(c), range.1.max(c));
+            for z in rz.clone() {
+                turned[z][j] = line[z];
+            }
+        }
+        for k in 0..az.count {
+            let (z0, wz) = az.row(k);
+            for j in 0..N {
+                let c = (wz[0] * turned[z0][j] + wz[1] * turned[z0 + 1][j])
+                    + (wz[2] * turned[z0 + 2][j] + wz[3] * turned[z0 + 3][j]);
+                low[j] = if c < low[j] { c } else { low[j] };
+                high[j] = if c > high[j] { c } else { high[j] };
             }
         }
     }
-    range
+    let least = low[..ay.count]
+        .iter()
+        .fold(low[0], |m, c| if *c < m { *c } else { m });
+    let most = high[..ay.count]
+        .iter()
+        .fold(high[0], |m, c| if *c > m { *c } else { m });
+    (least, most)
 }
 
 /// Bounds of a brick's spline on a box, whose values are computed in `T` to within

@@ -275,15 +275,6 @@ impl<T: Real> Field for HierarchicalSpline<T> {
     }
 
     fn frame_bounds(&self, frame: &Frame, lo: [i64; 3], hi: [i64; 3]) -> Interval {
-        let v = |a: [i64; 3]| DVec3::new(a[0] as f64, a[1] as f64, a[2] as f64);
-        let lattice_from_grid = self.lattice_from_world * frame.world_from_grid;
-        bounds::over_lattice_box(
-            self,
-            &Aabb {
-                min: v(lo),
-                max: v(hi),
-            }
-            .transformed(&lattice_from_grid),
-        )
+        bounds::over_lattice_box(self, &grid::lattice_box(self, frame, lo, hi))
     }
 }
