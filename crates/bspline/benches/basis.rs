@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use bspline::basis::Basis;
 use bspline::primitives::{Capsule, Cuboid, Cylinder, Gyroid, Sphere, Torus};
-use bspline::restrict::{RestrictedAxis, restricted_bounds};
+use bspline::restrict::{RestrictedAxis, restricted_range};
 use bspline::{Aabb, Csg, Field, Frame, KnotVector, cubic};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::{DVec3, dvec3};
@@ -58,7 +58,7 @@ fn bounds(c: &mut Criterion) {
         group.bench_function(format!("restricted-{name}"), |bench| {
             bench.iter(|| {
                 let axes = [RestrictedAxis::<f32>::new(black_box(a), b); 3];
-                restricted_bounds(&brick, &axes, 4e-6)
+                restricted_range(&brick, &axes)
             });
         });
     }
