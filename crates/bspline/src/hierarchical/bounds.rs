@@ -6,6 +6,13 @@ use super::brick::{BRICK, Brick, HALO, NONE};
 use super::spline::HierarchicalSpline;
 use crate::{Aabb, Interval, Real};
 
+/// Part of a cell that a box may reach over a knot plane without reading the cells beyond.
+///
+/// There the one function that the cells on this side do not read has weight `t³/6 <= 2e-28`, far below the
+/// rounding allowed for. Boxes laid along the knots, as a mesher asks for, keep to their cells this way, though
+/// mapping them to the lattice widens them by a rounding.
+const SLIVER: f64 = 1e-9;
+
 /// Interval of the field over a box given in lattice coordinates.
 pub(super) fn over_lattice_box<T: Real>(spline: &HierarchicalSpline<T>, b: &Aabb) -> Interval {
     if !(b.min.is_finite() && b.max.is_finite()) {
@@ -23,7 +30,8 @@ pub(super) fn over_lattice_box<T: Real>(spline: &HierarchicalSpline<T>, b: &Aabb
     let counts = spline.lattice().cells.map(|n| n.div_ceil(BRICK as u32));
     let range = |a: usize| {
         let brick = |q: f64| (q as u32 / BRICK as u32).min(counts[a] - 1);
-        brick(inside.min[a])..=brick(inside.max[a])
+        let first = brick(inside.min[a] + SLIVER);
+        first..=brick(inside.max[a] - SLIVER).max(first)
     };
     for x in range(0) {
         for y in range(1) {
@@ -73,7 +81,9 @@ fn visit<T: Real>(spline: &HierarchicalSpline<T>, level: usize, index: usize, b:
             min: b.min.max(low),
             max: b.max.min((low + width / 2.0).min(end)),
         };
-        if !part.min.cmple(part.max).all() {
+        let sliver = DVec3::splat(SLIVER * width / BRICK as f64);
+        let thin = (part.max - part.min).cmple(sliver) & (b.max - b.min).cmpgt(2.0 * sliver);
+        if thin.any() || !part.min.cmple(part.max).all() {
             continue;
         }
         match brick.children[octant] {
@@ -87,17 +97,20 @@ fn visit<T: Real>(spline: &HierarchicalSpline<T>, level: usize, index: usize, b:
 fn local_hull<T: Real>(brick: &Brick<T>, level: usize, b: &Aabb) -> [f64; 2] {
     let scale = (1u64 << level) as f64;
     let range = |a: usize| {
-        let first = (BRICK as u32 * brick.key.0[a]) as f64;
-        let cell = |q: f64| (q * scale - first).clamp(0.0, BRICK as f64 - 1.0) as usize;
-        cell(b.min[a])..cell(b.max[a]) + 4
+        let origin = (BRICK as u32 * brick.key.0[a]) as f64;
+        let cell = |q: f64| q.clamp(0.0, BRICK as f64 - 1.0) as usize;
+        let first = cell(b.min[a] * scale - origin + SLIVER);
+        let last = cell(b.max[a] * scale - origin - SLIVER).max(first);
+        first..last + 4
     };
+    // Comparisons as written here turn into vector instructions; `Float::min` does not.
     let (mut lo, mut hi) = (T::infinity(), T::neg_infinity());
     for x in range(0) {
         for y in range(1) {
             let row = (x * HALO + y) * HALO;
-            for c in &brick.totals[row + range(2).start..row + range(2).end] {
-                lo = lo.min(*c);
-                hi = hi.max(*c);
+            for &c in &brick.totals[row + range(2).start..row + range(2).end] {
+                lo = if c < lo { c } else { lo };
+                hi = if c > hi { c } else { hi };
             }
         }
     }
