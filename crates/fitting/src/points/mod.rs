@@ -57,33 +57,27 @@ pub fn fit_points<T: Real>(
     let mut plan = Plan::new(&samples, options, tolerance, noise);
     control.step("fitting coarse levels", 0.05)?;
     let base = coarse::solve(&samples, plan.beta);
-        eprintln!("coarse {:?}", t0.elapsed());
-    }
     if let Some(sigma) = noise {
         let mu = cross_validation::choose::<T>(&samples, &base, &plan, sigma, control)?;
         plan.smoothing = Smoothing::Halving(mu);
     }
-    let mut repairs = 0;
+    let mut rounds = 0;
     let (cascade, field) = loop {
         let cascade = cascade::run::<T>(&samples, &base, &plan, control)?;
         control.step("building the field", 0.9)?;
         let field = cascade::assemble(&samples, &base, &cascade.levels);
         let conditions = far_field::conditions(&field, &samples);
-        if conditions.is_empty() || repairs == REPAIR_ROUNDS {
+        if conditions.is_empty() || rounds == REPAIR_ROUNDS {
             break (cascade, field);
         }
-        repairs += 1;
-        let (count, rounds) = (conditions.len(), repairs);
+        rounds += 1;
         samples = samples.with_sign_conditions(&conditions);
         samples.notes.push(format!(
-            "{count} cells with a sign that no sample speaks for were turned (round {rounds})"
+            "{} cells whose sign no sample speaks for were turned over (round {rounds})",
+            conditions.len()
         ));
     };
-        eprintln!("cascade {:?} {:?}", t0.elapsed(), cascade.iterations);
-    }
     control.step("measuring", 0.95)?;
     let report = residual::report(&field, &samples, &cascade, cloud.positions.len(), &plan, noise);
-        eprintln!("report {:?}", t0.elapsed());
-    }
     Ok((field, report))
 }
