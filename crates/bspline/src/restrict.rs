@@ -6,7 +6,7 @@
 //! at consecutive triples of knots [Ramshaw 1987; The NURBS Book §5.2]. Their hull exceeds the range of the
 //! function by a share that falls with the square of the box, and is exact for linear functions.
 
-use crate::{Interval, Real};
+use crate::Real;
 
 /// Cells that one call covers.
 pub const CELLS: usize = 8;
@@ -127,8 +127,9 @@ impl<T: Real> RestrictedAxis<T> {
     ///
     /// A weight is made of three factors (a difference and a quotient each), their products and two sums, so
     /// it is right to 13 units of `f64`; rounding it to `T` and the sum of four products add 5 units of `T`.
-    /// Over three axes the errors add up: widen a hull by `3·axis_error()·max |c|`. The rounding of `a` and
-    /// `b` themselves, and of the spline's own evaluation, is the caller's.
+    /// Over three axes the errors add up: widen a hull by `3·axis_error()·max |c|`, the largest of the coefficients
+    /// that the box reads, not of the hull: near the zero set the coefficients of a small box are small, and the
+    /// rounding is not. The rounding of `a` and `b`, and of the spline's own evaluation, is the caller's.
     pub fn axis_error() -> f64 {
         // 2 % on top for the products of errors that are left out above.
         1.02 * (5.0 * T::UNIT_ROUND_OFF + 13.0 * f64::UNIT_ROUND_OFF)
@@ -202,31 +203,4 @@ fn range_of_rows<T: Real>(
         .iter()
         .fold(high[0], |m, c| if *c > m { *c } else { m });
     (least, most)
-}
-
-/// Bounds of a brick's spline on a box, whose values are computed in `T` to within
-/// `evaluation_error · max |c|` over the coefficients that the box reads.
-///
-/// [`restricted_range`] widened by that and by the rounding of the restriction itself. The hull's own size must not
-/// stand for `max |c|`: near the zero set the control coefficients of a small box are small, and the rounding is
-/// not.
-pub fn restricted_bounds<T: Real>(
-    coefficients: &[T; COEFFICIENTS * COEFFICIENTS * COEFFICIENTS],
-    axes: &[RestrictedAxis<T>; 3],
-    evaluation_error: f64,
-) -> Interval {
-    let (lo, hi) = restricted_range(coefficients, axes);
-    let [rx, ry, rz] = [axes[0].reads(), axes[1].reads(), axes[2].reads()];
-    let mut largest = T::zero();
-    for x in rx {
-        for y in ry.clone() {
-            let row = (x * COEFFICIENTS + y) * COEFFICIENTS;
-            for c in &coefficients[row + rz.start..row + rz.end] {
-                let c = c.abs();
-                largest = if c > largest { c } else { largest };
-            }
-        }
-    }
-    let error = 3.0 * RestrictedAxis::<T>::axis_error() + evaluation_error;
-    Interval::new(lo.as_f64(), hi.as_f64()).widened(error * largest.as_f64())
 }

@@ -5,6 +5,7 @@
 //! cancel in, a ceiling on memory.
 
 mod budget;
+mod components;
 mod error;
 mod lines;
 pub mod points;
@@ -13,5 +14,6 @@ mod report;
 pub mod volume;
 
 pub use budget::{Cancel, Control, Progress};
+pub use components::{UnsupportedComponent, unsupported_components};
 pub use error::FitError;
 pub use report::{FitReport, Leaf, StopReason};
