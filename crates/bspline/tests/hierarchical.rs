@@ -63,7 +63,7 @@ fn random_spline<T: Real>(seed: u64, map: DAffine3, cells: [u32; 3]) -> Hierarch
                 }
             }
         } else {
-            for _ in 0..200 / level {
+            for _ in 0..300 - 100 * level {
                 let s = n.map(|n| (rng.next() * (n + 3) as f64) as u32);
                 set(&mut bricks, s, (2.0 * rng.next() - 1.0) * 0.5);
             }
