@@ -1,6 +1,7 @@
 //! Samples in, field out.
 
 pub mod budget;
+pub mod phantoms;
 pub mod report;
 
 pub use budget::{Cancel, Control, Progress};

@@ -1,0 +1,7 @@
+//! Test objects of known shape, seeded: the truth that fits are held against.
+
+mod cloud;
+mod random;
+
+pub use cloud::{CloudOptions, SampledCloud, sample_cloud};
+pub use random::SplitMix64;
