@@ -1,2 +1,9 @@
-//! The `isoclay` program.
-fn main() {}
+//! The `isoclay` program: scans in, solids out.
+
+mod cli;
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    cli::main()
+}

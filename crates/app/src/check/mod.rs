@@ -1,0 +1,11 @@
+//! Errors of a field measured again, without anything the fit knew of itself.
+
+mod color;
+mod leaves;
+mod projection;
+mod residual;
+
+pub use color::viridis;
+pub use leaves::{LeafAudit, LeafIndex, audit_leaves};
+pub use projection::{Projected, project_points};
+pub use residual::{ErrorStatistics, voxel_residuals};
