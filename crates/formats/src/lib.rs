@@ -1,1 +1,44 @@
-//! Files in and out.
+//! Files in and out: point clouds, volumes, meshes, and the native file of a fitted field.
+//!
+//! # What is read and written
+//! | what | read | written |
+//! | --- | --- | --- |
+//! | points | PLY (ascii, binary of both endians), XYZ, OBJ; each also gzipped | PLY with colours |
+//! | volumes | NIfTI-1 and NIfTI-2 single files, gzipped or not | NIfTI-1, gzipped or not |
+//! | meshes | | PLY, STL, OBJ |
+//! | fields | the native file, `docs/format.md` | the same |
+//!
+//! # Conventions
+//! Coordinates are `f64` in world space: for images RAS, in millimetres where the file names its unit, otherwise
+//! in the file's own unit, which the result records ([`Unit::Unknown`]). A volume keeps the order of its file:
+//! `values[x + nx·(y + ny·z)]`, **x fastest**; a field keeps the order of `bspline`, z fastest.
+//!
+//! Every reader takes [`ReadLimits`] and holds no more bytes than those allow, whatever a header promises.
+//! Every writer goes through [`atomic`]: a target is either the old file or the whole new one.
+//!
+//! ```
+//! use formats::{ReadLimits, points};
+//! let ply = b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
+//!             property float z\nend_header\n1 2 3\n";
+//! let cloud = points::parse_ply(ply, &ReadLimits::default()).unwrap();
+//! assert_eq!(cloud.positions[0].to_array(), [1.0, 2.0, 3.0]);
+//! ```
+//!
+//! # What it cannot do
+//! No NIfTI header/image pairs, no RGB or complex voxels, no time series, no textures or materials of OBJ.
+
+pub mod atomic;
+mod detect;
+mod error;
+pub mod field;
+mod input;
+mod limits;
+pub mod meshes;
+pub mod points;
+mod unit;
+pub mod volumes;
+
+pub use detect::{Kind, detect};
+pub use error::{Fault, FormatError};
+pub use limits::ReadLimits;
+pub use unit::Unit;

@@ -1,0 +1,126 @@
+//! What a file is: by its content where that tells, otherwise by its name.
+
+use std::fmt;
+use std::io::Read;
+use std::path::Path;
+
+use crate::input::{self, read_fault};
+use crate::{Fault, FormatError, field, volumes};
+
+/// What a file holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Points, for [`crate::points::read`].
+    Cloud(PointFormat),
+    /// A volume, for [`crate::volumes::read`].
+    Volume,
+    /// A fitted field, for [`crate::field::load`].
+    Field,
+}
+
+/// Formats of point clouds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PointFormat {
+    /// Polygon file format.
+    Ply,
+    /// A point a line.
+    Xyz,
+    /// Wavefront OBJ.
+    Obj,
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Cloud(PointFormat::Ply) => "point cloud (PLY)",
+            Self::Cloud(PointFormat::Xyz) => "point cloud (XYZ)",
+            Self::Cloud(PointFormat::Obj) => "point cloud (OBJ)",
+            Self::Volume => "volume (NIfTI)",
+            Self::Field => "field",
+        })
+    }
+}
+
+pub(crate) const CLOUDS: &str = "point clouds .ply .obj .xyz .txt .asc .csv .pts, each also .gz";
+const SUPPORTED: &str = "point clouds .ply .obj .xyz .txt .asc .csv .pts and volumes .nii, each also .gz, \
+                         and fields .iclay";
+
+/// Bytes that are enough to know every content that can be known.
+const LOOK: usize = 400;
+
+/// Tells what `path` holds, inflating gzip as needed. Reads a few hundred bytes.
+///
+/// # Errors
+/// [`Fault::UnknownKind`] with what is supported; [`Fault::Empty`]; [`Fault::Directory`]; I/O.
+pub fn detect(path: &Path) -> Result<Kind, FormatError> {
+    let look = || {
+        let mut input = input::open(path)?;
+        let mut head = Vec::with_capacity(LOOK);
+        (&mut input.source).take(LOOK as u64).read_to_end(&mut head).map_err(read_fault)?;
+        kind_of(&head, path)
+    };
+    look().map_err(|fault| fault.at(path))
+}
+
+/// Kind of a content that starts with `head`, in a file called `path`.
+pub(crate) fn kind_of(head: &[u8], path: &Path) -> Result<Kind, Fault> {
+    if head.is_empty() {
+        return Err(Fault::Empty);
+    }
+    if head.starts_with(b"ply\n") || head.starts_with(b"ply\r") || head.starts_with(b"ply ") {
+        return Ok(Kind::Cloud(PointFormat::Ply));
+    }
+    if head.starts_with(&field::MAGIC) {
+        return Ok(Kind::Field);
+    }
+    if volumes::looks_like_nifti(head) {
+        return Ok(Kind::Volume);
+    }
+    let extension = extension(path);
+    match extension.as_str() {
+        "ply" => Ok(Kind::Cloud(PointFormat::Ply)),
+        "xyz" | "txt" | "asc" | "csv" | "pts" => Ok(Kind::Cloud(PointFormat::Xyz)),
+        "obj" => Ok(Kind::Cloud(PointFormat::Obj)),
+        "nii" => Ok(Kind::Volume),
+        "iclay" => Ok(Kind::Field),
+        "" => Err(Fault::UnknownKind {
+            found: "a name without an extension".into(),
+            purpose: "input",
+            supported: SUPPORTED,
+        }),
+        other => {
+            Err(Fault::UnknownKind { found: format!(".{other}"), purpose: "input", supported: SUPPORTED })
+        }
+    }
+}
+
+/// Extension in lower case, the one before `.gz` if there is one.
+pub(crate) fn extension(path: &Path) -> String {
+    let name = path.file_name().map(|n| n.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    let name = name.strip_suffix(".gz").unwrap_or(&name);
+    name.rsplit_once('.').map(|(_, e)| e.to_owned()).unwrap_or_default()
+}
+
+/// Whether a name ends in `.gz`.
+pub(crate) fn is_gz_name(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn content_wins_over_the_name_and_the_name_over_nothing() {
+        let kind = |head: &[u8], name: &str| kind_of(head, Path::new(name));
+        assert_eq!(kind(b"ply\nformat", "scan.obj").unwrap(), Kind::Cloud(PointFormat::Ply));
+        assert_eq!(kind(&field::MAGIC, "x").unwrap(), Kind::Field);
+        assert_eq!(kind(b"v 1 2 3", "a.OBJ.gz").unwrap(), Kind::Cloud(PointFormat::Obj));
+        assert_eq!(kind(b"1 2 3", "a.b.csv").unwrap(), Kind::Cloud(PointFormat::Xyz));
+        assert!(matches!(kind(b"", "a.ply"), Err(Fault::Empty)));
+        for name in ["scan.las", "scan", "scan.gz"] {
+            let e = kind(b"LASF", name).unwrap_err().to_string();
+            assert!(e.contains(".ply") && e.contains(".nii") && e.contains(".iclay"), "{e}");
+        }
+    }
+}

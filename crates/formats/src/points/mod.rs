@@ -1,0 +1,121 @@
+//! Point clouds in: PLY, XYZ and OBJ, with the normals that a fit needs.
+
+mod normals;
+mod obj;
+mod ply;
+mod text;
+mod xyz;
+
+use std::path::Path;
+
+use glam::DVec3;
+
+pub use obj::parse_obj;
+pub use ply::parse_ply;
+pub use xyz::parse_xyz;
+
+use crate::detect::{self, Kind, PointFormat};
+use crate::limits::Budget;
+use crate::{Fault, FormatError, ReadLimits, Unit, input};
+
+/// Points of a scan, in the file's own unit unless a unit was stated.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PointCloud {
+    /// Finite positions, in file order.
+    pub positions: Vec<DVec3>,
+    /// One outward normal a point, of unit length, or exactly zero where the file gives none that can be used.
+    pub normals: Option<Vec<DVec3>>,
+    /// Where the normals come from.
+    pub normal_source: NormalSource,
+    /// Unit of the positions. No point format names one.
+    pub unit: Unit,
+    /// Points in the file, kept or not.
+    pub file_count: usize,
+    /// Faces in the file; 0 if it has none.
+    pub face_count: usize,
+    /// Faces of fewer than three different corners or of no area; they were left out.
+    pub degenerate_faces: usize,
+    /// Vertices that no face of any area uses, in a file that has faces; they were left out.
+    pub unused_vertices: usize,
+    /// Points with a coordinate that is NaN or infinite; they and their faces were left out.
+    pub invalid_dropped: usize,
+    /// Kept points whose normal is zero, not finite, or cancelled out between faces.
+    pub zero_normals: usize,
+    /// Repairs and doubts, each a sentence with its figures.
+    pub notes: Vec<String>,
+}
+
+/// Origin of the normals of a [`PointCloud`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum NormalSource {
+    /// There are none.
+    #[default]
+    None,
+    /// Stored with the points.
+    Stored,
+    /// Angle-weighted from the faces.
+    Faces,
+}
+
+impl PointCloud {
+    /// States the unit of the file and converts positions to millimetres.
+    ///
+    /// # Errors
+    /// [`Fault::Value`] if `stated` is [`Unit::Unknown`] or the cloud already is in a known unit.
+    pub fn to_mm(&mut self, stated: Unit) -> Result<(), Fault> {
+        let (Unit::Unknown, Some(scale)) = (self.unit, stated.in_mm()) else {
+            return Err(Fault::Value {
+                what: "the unit",
+                value: format!("stated as {stated} for a cloud in {}", self.unit),
+                remedy: "state um, mm, cm or m, once",
+            });
+        };
+        for p in &mut self.positions {
+            *p *= scale;
+        }
+        self.unit = Unit::Millimetre;
+        Ok(())
+    }
+}
+
+/// Reads a cloud; the format is told by content first, then by name, and `.gz` by its content.
+///
+/// # Errors
+/// Every [`Fault`] of reading: see the parsers of the single formats.
+pub fn read(path: &Path, limits: &ReadLimits) -> Result<PointCloud, FormatError> {
+    read_faulty(path, limits).map_err(|fault| fault.at(path))
+}
+
+fn read_faulty(path: &Path, limits: &ReadLimits) -> Result<PointCloud, Fault> {
+    let mut budget = Budget::new(limits);
+    let bytes = input::open(path)?.read_all(&mut budget)?;
+    match detect::kind_of(&bytes, path)? {
+        Kind::Cloud(PointFormat::Ply) => ply::parse(&bytes, &mut budget),
+        Kind::Cloud(PointFormat::Xyz) => xyz::parse(&bytes, &mut budget),
+        Kind::Cloud(PointFormat::Obj) => obj::parse(&bytes, &mut budget),
+        other => Err(Fault::UnknownKind {
+            found: format!("a {other}"),
+            purpose: "point cloud",
+            supported: detect::CLOUDS,
+        }),
+    }
+}
+
+/// What the parsers hand to [`normals::finish`].
+#[derive(Debug, Default)]
+struct RawCloud {
+    positions: Vec<DVec3>,
+    /// As stored, of any length, finite or not.
+    normals: Option<Vec<DVec3>>,
+    /// Fans of the faces; indices are below `positions.len()`.
+    triangles: Vec<[u32; 3]>,
+    /// For each triangle the normal of each corner, [`NO_NORMAL`] where it has none.
+    corner_normals: Option<(Vec<[u32; 3]>, Vec<DVec3>)>,
+    face_count: usize,
+    /// Faces of fewer than three corners, never made into triangles.
+    short_faces: usize,
+    notes: Vec<String>,
+}
+
+/// Marks a corner of a face without a normal of its own.
+const NO_NORMAL: u32 = u32::MAX;

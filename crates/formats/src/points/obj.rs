@@ -1,0 +1,221 @@
+//! OBJ in: `v`, `vn` and `f`; everything else is skipped.
+
+use glam::DVec3;
+
+use super::text::{Lines, integer, number};
+use super::{NO_NORMAL, PointCloud, RawCloud, normals};
+use crate::error::excerpt;
+use crate::limits::{Budget, Counted};
+use crate::{Fault, ReadLimits};
+
+/// Reads the text of an OBJ file.
+///
+/// Faces may have any number of corners and negative (relative) indices, and a line may go on after `\`. Normals:
+/// from the corners (`v//vn`) where the faces name them, otherwise angle-weighted from the faces; without faces
+/// the `vn` lines pair with the `v` lines if there are as many.
+///
+/// # Errors
+/// A [`Fault`] with the line for a word that is no number or an index beyond the vertices or normals.
+pub fn parse_obj(bytes: &[u8], limits: &ReadLimits) -> Result<PointCloud, Fault> {
+    parse(bytes, &mut Budget::new(limits))
+}
+
+const INDEX_REMEDY: &str = "indices count from 1, or from -1 backwards, and stay within what the file defines";
+
+pub(super) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<PointCloud, Fault> {
+    if bytes.is_empty() {
+        return Err(Fault::Empty);
+    }
+    let mut positions = Counted::new("points");
+    let mut vertex_normals = Counted::new("normals");
+    let mut triangles = Counted::new("triangles of the faces");
+    let mut corner_normals = Counted::new("normals of corners");
+    let mut names_normals = false;
+    // Largest index that no vertex or normal so far has: faces may stand before what they name.
+    let mut furthest = [(0u32, 0u64); 2];
+    let mut raw = RawCloud::default();
+    let mut corners: Vec<[u32; 2]> = Vec::new();
+    let mut joined = Vec::new();
+    let mut lines = Lines::new(bytes);
+    while let Some(mut text) = lines.next() {
+        let line = lines.line;
+        if text.ends_with(b"\\") {
+            joined.clear();
+            loop {
+                let goes_on = text.ends_with(b"\\");
+                joined.extend_from_slice(text.strip_suffix(b"\\").unwrap_or(text));
+                joined.push(b' ');
+                match (goes_on, goes_on.then(|| lines.next()).flatten()) {
+                    (true, Some(next)) => text = next,
+                    _ => break,
+                }
+            }
+            text = &joined;
+        }
+        let mut words = text.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty());
+        match words.next() {
+            Some(b"v") => positions.push(three(words, line)?, budget)?,
+            Some(b"vn") => vertex_normals.push(three(words, line)?, budget)?,
+            Some(b"f") => {
+                corners.clear();
+                let defined = [positions.items.len(), vertex_normals.items.len()];
+                for word in words {
+                    let corner = corner(word, defined, line)?;
+                    for i in 0..2 {
+                        if corner[i] != NO_NORMAL && corner[i] >= furthest[i].0 {
+                            furthest[i] = (corner[i] + 1, line);
+                        }
+                    }
+                    corners.push(corner);
+                }
+                raw.face_count += 1;
+                raw.short_faces += usize::from(corners.len() < 3);
+                for i in 2..corners.len() {
+                    let fan = [corners[0], corners[i - 1], corners[i]];
+                    triangles.push(fan.map(|c| c[0]), budget)?;
+                    if !names_normals && fan.iter().any(|c| c[1] != NO_NORMAL) {
+                        names_normals = true;
+                        for _ in corner_normals.items.len()..triangles.items.len() - 1 {
+                            corner_normals.push([NO_NORMAL; 3], budget)?;
+                        }
+                    }
+                    if names_normals {
+                        corner_normals.push(fan.map(|c| c[1]), budget)?;
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+    for (i, defined) in [positions.items.len(), vertex_normals.items.len()].into_iter().enumerate() {
+        let (needed, line) = furthest[i];
+        if needed as usize > defined {
+            let what = ["vertex", "normal"][i];
+            return Err(Fault::line(
+                line,
+                format!("{what} {needed} is named, the file has {defined}"),
+                INDEX_REMEDY,
+            ));
+        }
+    }
+    if positions.items.is_empty() {
+        return Err(Fault::Value {
+            what: "the number of vertices",
+            value: "0".into(),
+            remedy: "an OBJ file holds a line \"v x y z\" for each; is this one?",
+        });
+    }
+    if raw.face_count == 0 && !vertex_normals.items.is_empty() {
+        if vertex_normals.items.len() == positions.items.len() {
+            raw.normals = Some(std::mem::take(&mut vertex_normals.items));
+        } else {
+            raw.notes.push(format!(
+                "{} normals for {} vertices and no faces to pair them; the normals were skipped",
+                vertex_normals.items.len(),
+                positions.items.len()
+            ));
+        }
+    }
+    if names_normals {
+        raw.corner_normals = Some((corner_normals.items, vertex_normals.items));
+    }
+    raw.positions = positions.items;
+    raw.triangles = triangles.items;
+    normals::finish(raw, budget)
+}
+
+fn three<'a>(words: impl Iterator<Item = &'a [u8]>, line: u64) -> Result<DVec3, Fault> {
+    let mut v = [0.0; 3];
+    let mut found = 0;
+    for (slot, word) in v.iter_mut().zip(words) {
+        *slot = number(word, line)?;
+        found += 1;
+    }
+    if found < 3 {
+        return Err(Fault::line(
+            line,
+            format!("{found} coordinates"),
+            "a \"v\" or \"vn\" line holds three numbers",
+        ));
+    }
+    Ok(v.into())
+}
+
+/// Vertex and normal of a corner `v`, `v/t`, `v//n` or `v/t/n`, counted from 0.
+fn corner(word: &[u8], defined: [usize; 2], line: u64) -> Result<[u32; 2], Fault> {
+    let mut parts = word.split(|c| *c == b'/');
+    let vertex = index(parts.next().unwrap_or(b""), defined[0]);
+    let normal = match (parts.next(), parts.next()) {
+        (_, None | Some(b"")) => Some(NO_NORMAL),
+        (_, Some(n)) => index(n, defined[1]),
+    };
+    match (vertex, normal) {
+        (Some(v), Some(n)) => Ok([v, n]),
+        _ => Err(Fault::line(line, format!("cannot use the corner {}", excerpt(word)), INDEX_REMEDY)),
+    }
+}
+
+fn index(word: &[u8], defined: usize) -> Option<u32> {
+    let from_zero = match integer(word)? {
+        0 => return None,
+        n if n > 0 => n - 1,
+        n => defined as i64 + n,
+    };
+    u32::try_from(from_zero).ok().filter(|n| *n < NO_NORMAL)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::points::NormalSource;
+
+    fn read(text: &str) -> Result<PointCloud, Fault> {
+        parse_obj(text.as_bytes(), &ReadLimits::default())
+    }
+
+    const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+
+    #[test]
+    fn quads_negative_and_forward_indices_give_the_same_cloud() {
+        let plain = read(&format!("{SQUARE}f 1 2 3 4\n")).unwrap();
+        assert_eq!(plain.normals.as_ref().unwrap(), &[DVec3::Z; 4]);
+        for text in [
+            format!("{SQUARE}f -4 -3 -2 -1\n"),
+            format!("f 1/1 2/1 3/2 4/9\n{SQUARE}"),
+            format!("o thing\n{SQUARE}s off\nf 1 2 \\\n3 4\n"),
+            format!("{SQUARE}f 1// 2// 3// 4//"),
+        ] {
+            assert_eq!(read(&text).unwrap(), plain, "{text}");
+        }
+    }
+
+    #[test]
+    fn normals_of_corners_win_over_faces_and_pair_up_without_faces() {
+        let c = read(&format!("{SQUARE}vn 1 0 0\nf 1//1 2//1 3//-1\nf 1 3 4\n")).unwrap();
+        let n = c.normals.unwrap();
+        assert_eq!(c.normal_source, NormalSource::Stored);
+        assert_eq!((n[1], n[3]), (DVec3::X, DVec3::Z));
+        let c = read("v 0 0 0 1 0 0\nvn 0 0 2\n").unwrap();
+        assert_eq!(c.normals.unwrap(), [DVec3::Z]);
+        let c = read("v 0 0 0\nv 1 0 0\nvn 0 0 2\n").unwrap();
+        assert!(c.normals.is_none() && c.notes[0].contains("1 normals for 2 vertices"));
+    }
+
+    #[test]
+    fn faults_name_the_line_and_the_word() {
+        for (text, part) in [
+            ("v 0 0\n", "line 1: 2 coordinates"),
+            ("v 0 0 zero\n", "line 1: \"zero\" is not a number"),
+            ("v 0 0 0\nf 1 2 3\n", "line 2: vertex 3 is named, the file has 1"),
+            ("v 0 0 0\nf 1//1 1//1 1//1\n", "line 2: normal 1 is named, the file has 0"),
+            ("v 0 0 0\nf 0 1 1\n", "corner \"0\""),
+            ("v 0 0 0\nf -2 1 1\n", "corner \"-2\""),
+            ("v 0 0 0\nf 1.5 1 1\n", "corner \"1.5\""),
+            ("v 0 0 0\nf 4294967296 1 1\n", "corner \"4294967296\""),
+            ("# nothing\n", "number of vertices is 0"),
+        ] {
+            let e = read(text).unwrap_err().to_string();
+            assert!(e.contains(part), "{text:?}: {e}");
+        }
+    }
+}

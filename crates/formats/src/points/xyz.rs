@@ -1,0 +1,187 @@
+//! XYZ in: a point a line, columns apart by blanks, commas or semicolons.
+
+use glam::DVec3;
+
+use super::text::{Lines, integer, number};
+use super::{PointCloud, RawCloud, normals};
+use crate::error::excerpt;
+use crate::limits::{Budget, Counted};
+use crate::{Fault, ReadLimits};
+
+/// How far the length of a stored normal may be from 1 to be taken for a normal and not, say, a colour.
+/// Three printed decimals leave an error below 0.001; 0.05 also takes two.
+const UNIT_LENGTH_SLACK: f64 = 0.05;
+
+/// Reads the text of an XYZ file: three columns, or six and more with the normal in columns 4 to 6.
+///
+/// Empty lines and those that start with `#` or `//` are skipped; so is a first line that holds one whole number
+/// (the count) or the names of the columns. Columns 4 to 6 are normals if each is of length 1 or 0 or not finite;
+/// otherwise (colours, say) they are skipped, with a note.
+///
+/// # Errors
+/// A [`Fault`] with the line for a word that is no number or a line with another number of columns.
+pub fn parse_xyz(bytes: &[u8], limits: &ReadLimits) -> Result<PointCloud, Fault> {
+    parse(bytes, &mut Budget::new(limits))
+}
+
+pub(super) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<PointCloud, Fault> {
+    let mut notes = Vec::new();
+    let mut positions = Counted::new("points");
+    let mut normals = Counted::new("normals");
+    let mut columns = 0;
+    let mut promised = None;
+    let mut not_a_normal = None;
+    let mut is_first = true;
+    let mut lines = Lines::new(bytes);
+    while let Some(text) = lines.next() {
+        let text = text.trim_ascii();
+        if text.is_empty() || text.starts_with(b"#") || text.starts_with(b"//") {
+            continue;
+        }
+        let line = lines.line;
+        if std::mem::take(&mut is_first) {
+            if let Some(n) = integer(text) {
+                promised = Some(n);
+                continue;
+            }
+            if is_column_names(text) {
+                notes.push(format!("line {line}: column names {} were skipped", excerpt(text)));
+                continue;
+            }
+        }
+        let mut row = [0.0; 6];
+        let mut found = 0;
+        for word in text.split(|c| matches!(c, b' ' | b'\t' | b',' | b';')).filter(|w| !w.is_empty()) {
+            if found < 6 {
+                row[found] = number(word, line)?;
+            }
+            found += 1;
+        }
+        if columns == 0 {
+            columns = found;
+        }
+        if found != columns || matches!(found, 0..3) {
+            return Err(Fault::line(
+                line,
+                format!("{found} columns, {} expected", columns.max(3)),
+                "every line holds x y z, or x y z nx ny nz",
+            ));
+        }
+        positions.push(DVec3::new(row[0], row[1], row[2]), budget)?;
+        if columns >= 6 && not_a_normal.is_none() {
+            let n = DVec3::new(row[3], row[4], row[5]);
+            let length = n.length();
+            if length == 0.0 || !length.is_finite() || (length - 1.0).abs() <= UNIT_LENGTH_SLACK {
+                normals.push(n, budget)?;
+            } else {
+                not_a_normal = Some(line);
+            }
+        }
+    }
+    let found = positions.items.len();
+    if found == 0 {
+        return Err(Fault::Value {
+            what: "the number of points",
+            value: "0".into(),
+            remedy: "a file of points holds a line x y z for each",
+        });
+    }
+    if let Some(n) = promised.filter(|n| *n != found as i64) {
+        notes.push(format!("the first line promises {n} points, {found} are there; all were read"));
+    }
+    match columns {
+        3 => {}
+        4 | 5 => notes.push(format!("{columns} columns: those after the third were skipped")),
+        _ => {
+            if let Some(line) = not_a_normal {
+                notes.push(format!(
+                    "columns 4 to 6 are no unit normals (line {line}); skipped as colours or the like"
+                ));
+            }
+        }
+    }
+    let stored = columns >= 6 && not_a_normal.is_none();
+    let raw = RawCloud {
+        positions: positions.items,
+        normals: stored.then_some(normals.items),
+        notes,
+        ..Default::default()
+    };
+    normals::finish(raw, budget)
+}
+
+/// Whether a line holds words only, as `X,Y,Z` does.
+fn is_column_names(text: &[u8]) -> bool {
+    let mut words = text.split(|c| matches!(c, b' ' | b'\t' | b',' | b';')).filter(|w| !w.is_empty());
+    words.clone().count() >= 3
+        && words.all(|w| {
+            w.iter().any(u8::is_ascii_alphabetic)
+                && w.is_ascii()
+                && w.iter().all(u8::is_ascii_graphic)
+                && fast_float2::parse::<f64, _>(w).is_err()
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<PointCloud, Fault> {
+        parse_xyz(text.as_bytes(), &ReadLimits::default())
+    }
+
+    #[test]
+    fn blanks_commas_comments_count_and_names_are_all_read() {
+        for text in [
+            "1 2 3\n4 5 6\n",
+            "\u{feff}1,2,3\r\n4, 5, 6\r\n",
+            "# made by hand\n2\n1\t2\t3\n// between\n\n4 5 6",
+            "X;Y;Z\n1;2;3\n4;5;6\n",
+            "1 2 3 255 0 7\n4 5 6 1 1 1\n",
+            "1 2 3 .5\n4 5 6 .5\n",
+        ] {
+            let c = read(text).unwrap();
+            assert_eq!(c.positions, [DVec3::new(1., 2., 3.), DVec3::new(4., 5., 6.)], "{text:?}");
+            assert_eq!(c.normals, None, "{text:?}");
+        }
+    }
+
+    #[test]
+    fn six_columns_of_unit_length_are_normals_and_others_are_not() {
+        let c = read("1 2 3 0 0 1\n4 5 6 0 0.6 0.8\n").unwrap();
+        assert_eq!(c.normals.unwrap()[1], DVec3::new(0., 0.6, 0.8).normalize());
+        let c = read("1 2 3 0 0 1\n4 5 6 12 0 0\n").unwrap();
+        assert!(c.normals.is_none() && c.notes[0].contains("line 2"), "{:?}", c.notes);
+        let c = read("1 2 3 0 0 0\n4 5 6 0 0 0\n").unwrap();
+        assert_eq!((c.zero_normals, c.normals.unwrap().len()), (2, 2));
+    }
+
+    #[test]
+    fn faults_name_the_line() {
+        for (text, part) in [
+            ("1 2 3\n4 5\n", "line 2: 2 columns, 3 expected"),
+            ("1 2\n", "line 1: 2 columns"),
+            ("1 2 3\n1 2 x\n", "line 2: \"x\" is not a number"),
+            ("# nothing\n", "number of points is 0"),
+            ("5\n", "number of points is 0"),
+            ("nan nan nan\n", "0 of 1"),
+        ] {
+            let e = read(text).unwrap_err().to_string();
+            assert!(e.contains(part), "{text:?}: {e}");
+        }
+    }
+
+    #[test]
+    fn a_wrong_count_is_noted_and_nan_points_are_counted() {
+        let c = read("7\n1 2 3\nnan 0 0\n").unwrap();
+        assert_eq!((c.positions.len(), c.invalid_dropped), (1, 1));
+        assert!(c.notes[0].contains("promises 7"));
+    }
+
+    #[test]
+    fn text_that_would_outgrow_the_ceiling_is_refused() {
+        let text = "1 2 3\n".repeat(10_000);
+        let e = parse_xyz(text.as_bytes(), &ReadLimits { max_bytes: 100_000 }).unwrap_err();
+        assert!(matches!(e, Fault::Limit { limit: 100_000, .. }));
+    }
+}

@@ -1,0 +1,74 @@
+use std::fmt;
+
+/// Types of voxels that are read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs, reason = "the names are the types")]
+pub enum VoxelType {
+    U8,
+    I8,
+    U16,
+    I16,
+    U32,
+    I32,
+    U64,
+    I64,
+    F32,
+    F64,
+}
+
+impl VoxelType {
+    const CODES: [(i16, Self); 10] = [
+        (2, Self::U8),
+        (256, Self::I8),
+        (512, Self::U16),
+        (4, Self::I16),
+        (768, Self::U32),
+        (8, Self::I32),
+        (1280, Self::U64),
+        (1024, Self::I64),
+        (16, Self::F32),
+        (64, Self::F64),
+    ];
+
+    /// Type of a NIfTI `datatype` code.
+    pub(super) fn from_code(code: i16) -> Option<Self> {
+        Self::CODES.iter().find(|(c, _)| *c == code).map(|(_, t)| *t)
+    }
+
+    /// NIfTI `datatype` code.
+    pub(super) fn code(self) -> i16 {
+        Self::CODES.iter().find(|(_, t)| *t == self).expect("every type is listed").0
+    }
+
+    /// Bytes of a voxel.
+    pub fn size(self) -> usize {
+        match self {
+            Self::U8 | Self::I8 => 1,
+            Self::U16 | Self::I16 => 2,
+            Self::U32 | Self::I32 | Self::F32 => 4,
+            Self::U64 | Self::I64 | Self::F64 => 8,
+        }
+    }
+
+    /// Whether `f32` may have to round a value of this type.
+    pub fn exceeds_f32(self) -> bool {
+        matches!(self, Self::U32 | Self::I32 | Self::U64 | Self::I64 | Self::F64)
+    }
+}
+
+impl fmt::Display for VoxelType {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::U8 => "uint8",
+            Self::I8 => "int8",
+            Self::U16 => "uint16",
+            Self::I16 => "int16",
+            Self::U32 => "uint32",
+            Self::I32 => "int32",
+            Self::U64 => "uint64",
+            Self::I64 => "int64",
+            Self::F32 => "float32",
+            Self::F64 => "float64",
+        })
+    }
+}
