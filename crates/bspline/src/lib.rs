@@ -10,6 +10,7 @@ pub mod cubic;
 mod field;
 pub mod hierarchical;
 mod interval;
+pub mod polygonize;
 mod real;
 
 pub use field::{Aabb, Field, Frame, Jet};
