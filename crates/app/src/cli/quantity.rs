@@ -1,37 +1,6 @@
 use std::str::FromStr;
 
-use clap::ValueEnum;
-
-/// Length that one unit of a file's coordinates stands for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Unit {
-    /// Millimetres.
-    Mm,
-    /// Centimetres.
-    Cm,
-    /// Metres.
-    M,
-}
-
-impl Unit {
-    /// Millimetres in one unit.
-    pub fn in_mm(self) -> f64 {
-        match self {
-            Self::Mm => 1.0,
-            Self::Cm => 10.0,
-            Self::M => 1000.0,
-        }
-    }
-
-    /// As it is written on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Mm => "mm",
-            Self::Cm => "cm",
-            Self::M => "m",
-        }
-    }
-}
+use formats::Unit;
 
 /// A tolerance as the user wrote it: `T`, `Tmm` or `T%`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,16 +18,15 @@ impl Tolerance {
     ///
     /// # Errors
     /// A sentence with the remedy, if millimetres are asked of a file whose unit nobody knows.
-    pub fn length(self, diagonal: f64, unit: Option<Unit>) -> Result<f64, String> {
-        match (self, unit) {
+    pub fn length(self, diagonal: f64, unit: Unit) -> Result<f64, String> {
+        match (self, unit.in_mm()) {
             (Self::Plain(t), _) => Ok(t),
             (Self::Percent(t), _) => Ok(t * 0.01 * diagonal),
-            (Self::Mm(t), Some(unit)) => Ok(t / unit.in_mm()),
+            (Self::Mm(t), Some(mm)) => Ok(t / mm),
             (Self::Mm(t), None) => Err(format!(
                 "--tolerance {t}mm needs the unit of the coordinates, which the file does not tell; \
-                 give --unit mm, cm or m, or a tolerance in the file's own unit ({t}) or in per cent of the \
-                 diagonal ({}%)",
-                0.01
+                 give --unit mm, cm or m to fit, or a tolerance in the file's own unit ({t}) or in per cent of \
+                 the diagonal (0.01%)"
             )),
         }
     }
@@ -213,11 +181,11 @@ mod tests {
 
     #[test]
     fn tolerance_becomes_a_length_of_the_file() {
-        assert_eq!(Tolerance::Plain(0.2).length(10.0, None), Ok(0.2));
-        assert_eq!(Tolerance::Percent(1.0).length(250.0, None), Ok(2.5));
-        assert_eq!(Tolerance::Mm(2.0).length(1.0, Some(Unit::M)), Ok(0.002));
-        assert_eq!(Tolerance::Mm(2.0).length(1.0, Some(Unit::Cm)), Ok(0.2));
-        assert!(Tolerance::Mm(2.0).length(1.0, None).unwrap_err().contains("--unit"));
+        assert_eq!(Tolerance::Plain(0.2).length(10.0, Unit::Unknown), Ok(0.2));
+        assert_eq!(Tolerance::Percent(1.0).length(250.0, Unit::Unknown), Ok(2.5));
+        assert_eq!(Tolerance::Mm(2.0).length(1.0, Unit::Metre), Ok(0.002));
+        assert_eq!(Tolerance::Mm(2.0).length(1.0, Unit::Centimetre), Ok(0.2));
+        assert!(Tolerance::Mm(2.0).length(1.0, Unit::Unknown).unwrap_err().contains("--unit"));
     }
 
     #[test]
