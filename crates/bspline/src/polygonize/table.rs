@@ -89,7 +89,11 @@ fn face_corners(face: usize) -> [usize; 4] {
     let bit = |axis: usize, on: usize| on << (2 - axis % 3);
     let corner = |u: usize, v: usize| bit(axis, side) | bit(axis + 1, u) | bit(axis + 2, v);
     let order = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)];
-    if side == 1 { order } else { [order[0], order[3], order[2], order[1]] }
+    if side == 1 {
+        order
+    } else {
+        [order[0], order[3], order[2], order[1]]
+    }
 }
 
 /// The directed segments of a case on one face: each from the edge where the walk round the face enters a run
@@ -101,7 +105,10 @@ fn face_segments(case: usize, face: usize) -> Vec<[Edge; 2]> {
     let mut segments = Vec::new();
     for start in 0..4 {
         if !inside(start + 3) && inside(start) {
-            let last = (start..start + 4).take_while(|&i| inside(i)).last().expect("the run has a first corner");
+            let last = (start..start + 4)
+                .take_while(|&i| inside(i))
+                .last()
+                .expect("the run has a first corner");
             segments.push([edge(start + 3), edge(last)]);
         }
     }
@@ -238,13 +245,22 @@ mod tests {
             for (&[a, b], &count) in &sides {
                 assert_eq!(count, 1, "case {case}: side {a}{b} twice in one direction");
                 if border.contains(&[a, b]) {
-                    assert!(!sides.contains_key(&[b, a]), "case {case}: border side {a}{b} used inside");
+                    assert!(
+                        !sides.contains_key(&[b, a]),
+                        "case {case}: border side {a}{b} used inside"
+                    );
                 } else {
-                    assert!(sides.contains_key(&[b, a]), "case {case}: side {a}{b} is open inside the cell");
+                    assert!(
+                        sides.contains_key(&[b, a]),
+                        "case {case}: side {a}{b} is open inside the cell"
+                    );
                     assert!(!share_face(a, b), "case {case}: diagonal {a}{b} lies in a face");
                 }
             }
-            assert!(border.iter().all(|s| sides.contains_key(s)), "case {case}: a face segment has no triangle");
+            assert!(
+                border.iter().all(|s| sides.contains_key(s)),
+                "case {case}: a face segment has no triangle"
+            );
         }
     }
 
@@ -269,8 +285,10 @@ mod tests {
                     if !agrees {
                         continue;
                     }
-                    let mut a: Vec<[Edge; 2]> =
-                        face_segments(case, mine).iter().map(|&[p, q]| [across(q), across(p)]).collect();
+                    let mut a: Vec<[Edge; 2]> = face_segments(case, mine)
+                        .iter()
+                        .map(|&[p, q]| [across(q), across(p)])
+                        .collect();
                     let mut b = face_segments(other, theirs);
                     a.sort();
                     b.sort();
@@ -310,8 +328,15 @@ mod tests {
                 p[axis] = 0.5;
                 p
             });
-            let c = glam::DVec3::new((corner >> 2) as f64, (corner >> 1 & 1) as f64, (corner & 1) as f64);
-            assert!((p[1] - p[0]).cross(p[2] - p[0]).dot(p[0] - c) > 0.0, "corner {corner}");
+            let c = glam::DVec3::new(
+                (corner >> 2) as f64,
+                (corner >> 1 & 1) as f64,
+                (corner & 1) as f64,
+            );
+            assert!(
+                (p[1] - p[0]).cross(p[2] - p[0]).dot(p[0] - c) > 0.0,
+                "corner {corner}"
+            );
         }
     }
 
@@ -319,6 +344,9 @@ mod tests {
     fn table_is_small() {
         let most = (0..256).map(|c| CaseTable::get().count(c)).max();
         assert_eq!(most, Some(5));
-        assert_eq!(CaseTable::get().triangles(0).len() + CaseTable::get().triangles(255).len(), 0);
+        assert_eq!(
+            CaseTable::get().triangles(0).len() + CaseTable::get().triangles(255).len(),
+            0
+        );
     }
 }
