@@ -1,6 +1,8 @@
 //! The `isoclay` program: scans in, solids out.
 
+mod check;
 mod cli;
+mod picture;
 
 use std::process::ExitCode;
 

@@ -66,12 +66,7 @@ pub fn run(args: &Args) -> Outcome {
         })?,
     };
     if mesh.triangles.is_empty() {
-        return Err(Failure::input(format!(
-            "{}: the surface f = {} does not meet the box; choose another --iso{}",
-            args.field.display(),
-            options.iso,
-            open.range_hint()
-        )));
+        return Err(open.no_surface(&args.field, options.iso));
     }
     interrupt::check(&cancel)?;
     bar.show("writing", 0.99);

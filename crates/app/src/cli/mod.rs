@@ -7,6 +7,7 @@ mod check;
 mod cost;
 mod eval;
 mod failure;
+mod field;
 mod fit;
 mod info;
 mod input;
