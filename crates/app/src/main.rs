@@ -1,5 +1,6 @@
 //! The `isoclay` program: scans in, solids out.
 
+mod charts;
 mod check;
 mod cli;
 mod picture;

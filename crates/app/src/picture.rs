@@ -68,16 +68,29 @@ pub fn draw(scene: &Scene, view: &View) -> Vec<u8> {
                 sum += rows[y * SAMPLES + s / SAMPLES][x * SAMPLES + s % SAMPLES];
             }
             let linear = sum / (SAMPLES * SAMPLES) as f64;
-            bytes.extend(linear.to_array().map(|c| (c.clamp(0.0, 1.0).powf(1.0 / 2.2) * 255.0 + 0.5) as u8));
+            bytes.extend(
+                linear
+                    .to_array()
+                    .map(|c| (c.clamp(0.0, 1.0).powf(1.0 / 2.2) * 255.0 + 0.5) as u8),
+            );
         }
     }
     bytes
 }
 
 /// Linear colours of one row of samples.
-fn shade_row(s: &Scene, camera: &DepthMap, sun: &DepthMap, sky: &[DepthMap], up: DVec3, y: usize) -> Vec<DVec3> {
+fn shade_row(
+    s: &Scene,
+    camera: &DepthMap,
+    sun: &DepthMap,
+    sky: &[DepthMap],
+    up: DVec3,
+    y: usize,
+) -> Vec<DVec3> {
     let width = camera.size[0];
-    let hits: Vec<usize> = (0..width).filter(|x| camera.triangle[y * width + x] != u32::MAX).collect();
+    let hits: Vec<usize> = (0..width)
+        .filter(|x| camera.triangle[y * width + x] != u32::MAX)
+        .collect();
     let points: Vec<DVec3> = hits.iter().map(|&x| camera.point(x, y)).collect();
     let mut jets = vec![(0.0, DVec3::ZERO); points.len()];
     s.field.values_gradients(&points, &mut jets);
@@ -90,7 +103,11 @@ fn shade_row(s: &Scene, camera: &DepthMap, sun: &DepthMap, sky: &[DepthMap], up:
         let n = if smooth.dot(flat) > 0.5 { smooth } else { flat };
         let n = if n.dot(camera.axes.row(2)) < -0.2 { -n } else { n };
         let (mut light, mut all) = (0.0, 0.0);
-        for d in sky.iter().skip((x % SAMPLES) * SAMPLES + y % SAMPLES).step_by(SAMPLES * SAMPLES) {
+        for d in sky
+            .iter()
+            .skip((x % SAMPLES) * SAMPLES + y % SAMPLES)
+            .step_by(SAMPLES * SAMPLES)
+        {
             let toward = d.axes.row(2);
             let weight = n.dot(toward).max(0.0);
             all += weight;
@@ -106,7 +123,11 @@ fn shade_row(s: &Scene, camera: &DepthMap, sun: &DepthMap, sky: &[DepthMap], up:
 fn axes(toward: DVec3, up: DVec3) -> DMat3 {
     let back = toward.normalize();
     let side = up.cross(back);
-    let right = if side.length() > 1e-6 { side.normalize() } else { back.any_orthonormal_vector() };
+    let right = if side.length() > 1e-6 {
+        side.normalize()
+    } else {
+        back.any_orthonormal_vector()
+    };
     DMat3::from_cols(right, back.cross(right), back).transpose()
 }
 
@@ -135,7 +156,9 @@ struct DepthMap {
 impl DepthMap {
     fn draw(scene: &Scene, axes: DMat3, size: [usize; 2]) -> Self {
         let seen = scene.positions.iter().map(|&p| axes * p);
-        let (lo, hi) = seen.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), q| (l.min(q), h.max(q)));
+        let (lo, hi) = seen.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), q| {
+            (l.min(q), h.max(q))
+        });
         let extent = (hi - lo).max(DVec3::splat(f64::MIN_POSITIVE));
         let scale = (0.92 * size[0] as f64 / extent.x).min(0.92 * size[1] as f64 / extent.y);
         let mut map = Self {
@@ -177,8 +200,11 @@ impl DepthMap {
             return;
         }
         let (lo, hi) = (a.min(b).min(c), a.max(b).max(c));
-        for y in lo.y.ceil().max(0.0) as usize..(hi.y.floor() + 1.0).clamp(0.0, self.size[1] as f64) as usize {
-            for x in lo.x.ceil().max(0.0) as usize..(hi.x.floor() + 1.0).clamp(0.0, self.size[0] as f64) as usize {
+        for y in lo.y.ceil().max(0.0) as usize..(hi.y.floor() + 1.0).clamp(0.0, self.size[1] as f64) as usize
+        {
+            for x in
+                lo.x.ceil().max(0.0) as usize..(hi.x.floor() + 1.0).clamp(0.0, self.size[0] as f64) as usize
+            {
                 let p = DVec3::new(x as f64, y as f64, 0.0);
                 let u = (b - p).truncate().perp_dot((c - p).truncate()) / area;
                 let v = (c - p).truncate().perp_dot((a - p).truncate()) / area;

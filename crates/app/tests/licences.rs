@@ -8,14 +8,26 @@ use std::process::Command;
 use serde_json::Value;
 
 fn workspace() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("crates/app lies two levels down")
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .ancestors()
+        .nth(2)
+        .expect("crates/app lies two levels down")
 }
 
 /// The entries of `allow = [...]`.
 fn allowed() -> BTreeSet<String> {
     let text = std::fs::read_to_string(workspace().join("deny.toml")).unwrap();
-    let list = text.split_once("allow = [").expect("deny.toml has an allow list").1.split_once(']').unwrap().0;
-    list.split(',').map(|e| e.trim().trim_matches('"').to_string()).filter(|e| !e.is_empty()).collect()
+    let list = text
+        .split_once("allow = [")
+        .expect("deny.toml has an allow list")
+        .1
+        .split_once(']')
+        .unwrap()
+        .0;
+    list.split(',')
+        .map(|e| e.trim().trim_matches('"').to_string())
+        .filter(|e| !e.is_empty())
+        .collect()
 }
 
 /// Whether an SPDX expression can be met by allowed licences. `/` is the old way to write OR.
@@ -75,7 +87,14 @@ fn expressions_are_read_as_spdx_says() {
 #[test]
 fn every_dependency_has_an_allowed_licence_and_source() {
     let out = Command::new(env!("CARGO"))
-        .args(["metadata", "--format-version", "1", "--locked", "--filter-platform", "x86_64-unknown-linux-gnu"])
+        .args([
+            "metadata",
+            "--format-version",
+            "1",
+            "--locked",
+            "--filter-platform",
+            "x86_64-unknown-linux-gnu",
+        ])
         .current_dir(workspace())
         .output()
         .unwrap();
@@ -90,7 +109,10 @@ fn every_dependency_has_an_allowed_licence_and_source() {
     let allowed = allowed();
     let mut bad = Vec::new();
     let packages = metadata["packages"].as_array().unwrap();
-    for p in packages.iter().filter(|p| nodes.contains(p["id"].as_str().unwrap())) {
+    for p in packages
+        .iter()
+        .filter(|p| nodes.contains(p["id"].as_str().unwrap()))
+    {
         let name = format!("{} {}", p["name"], p["version"]);
         match p["license"].as_str() {
             Some(l) if is_met(l, &allowed) => {}

@@ -4,14 +4,29 @@ use formats::FormatError;
 use glam::DVec3;
 
 /// Edges of a box between corners numbered `4x + 2y + z`.
-const EDGES: [[u32; 2]; 12] =
-    [[0, 1], [2, 3], [4, 5], [6, 7], [0, 2], [1, 3], [4, 6], [5, 7], [0, 4], [1, 5], [2, 6], [3, 7]];
+const EDGES: [[u32; 2]; 12] = [
+    [0, 1],
+    [2, 3],
+    [4, 5],
+    [6, 7],
+    [0, 2],
+    [1, 3],
+    [4, 6],
+    [5, 7],
+    [0, 4],
+    [1, 5],
+    [2, 6],
+    [3, 7],
+];
 
 /// Writes boxes as coloured wire frames: binary PLY with vertices and edges.
 ///
 /// # Errors
 /// I/O.
-pub fn write_boxes(path: &Path, boxes: impl Iterator<Item = ([DVec3; 8], [u8; 3])>) -> Result<(), FormatError> {
+pub fn write_boxes(
+    path: &Path,
+    boxes: impl Iterator<Item = ([DVec3; 8], [u8; 3])>,
+) -> Result<(), FormatError> {
     let boxes: Vec<_> = boxes.collect();
     formats::atomic::replace(path, |out| {
         write!(

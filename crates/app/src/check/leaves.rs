@@ -16,11 +16,20 @@ pub struct LeafIndex<'a> {
 impl<'a> LeafIndex<'a> {
     /// Index over `leaves`, cells of `lattice`.
     pub fn new(lattice: &Lattice, leaves: &'a [Leaf]) -> Self {
-        let of_cell = leaves.iter().zip(0..).map(|(l, i)| ((l.level, l.cell), i)).collect();
+        let of_cell = leaves
+            .iter()
+            .zip(0..)
+            .map(|(l, i)| ((l.level, l.cell), i))
+            .collect();
         let mut levels: Vec<u8> = leaves.iter().map(|l| l.level).collect();
         levels.sort_unstable();
         levels.dedup();
-        Self { leaves, lattice: *lattice, of_cell, levels }
+        Self {
+            leaves,
+            lattice: *lattice,
+            of_cell,
+            levels,
+        }
     }
 
     /// Leaf of the lattice point `q`; the box is closed on all sides.
@@ -39,7 +48,9 @@ impl<'a> LeafIndex<'a> {
         let scale = 1.0 / (1u64 << leaf.level) as f64;
         std::array::from_fn(|c| {
             let at = [c >> 2, c >> 1 & 1, c & 1];
-            let q = DVec3::from_array(std::array::from_fn(|a| (leaf.cell[a] as usize + at[a]) as f64 * scale));
+            let q = DVec3::from_array(std::array::from_fn(|a| {
+                (leaf.cell[a] as usize + at[a]) as f64 * scale
+            }));
             self.lattice.world_from_lattice.transform_point3(q)
         })
     }
@@ -82,9 +93,16 @@ pub fn audit_leaves(
             sums[i].1 += error * error;
         }
     }
-    let mut audit = LeafAudit { leaves: index.leaves.len(), ..Default::default() };
+    let mut audit = LeafAudit {
+        leaves: index.leaves.len(),
+        ..Default::default()
+    };
     for (leaf, (count, sum)) in index.leaves.iter().zip(sums) {
-        let rms = if count == 0 { 0.0 } else { (sum / count as f64).sqrt() };
+        let rms = if count == 0 {
+            0.0
+        } else {
+            (sum / count as f64).sqrt()
+        };
         audit.rms.push(rms);
         audit.with_samples += usize::from(count > 0);
         if rms <= tolerance {
@@ -108,12 +126,22 @@ mod tests {
     use glam::DAffine3;
 
     fn leaf(level: u8, cell: [u32; 3], reason: StopReason) -> Leaf {
-        Leaf { level, cell, sample_count: 0, rms: 0.0, max: 0.0, reason }
+        Leaf {
+            level,
+            cell,
+            sample_count: 0,
+            rms: 0.0,
+            max: 0.0,
+            reason,
+        }
     }
 
     #[test]
     fn points_fall_into_their_leaf_and_errors_are_gathered_there() {
-        let lattice = Lattice { world_from_lattice: DAffine3::IDENTITY, cells: [2, 1, 1] };
+        let lattice = Lattice {
+            world_from_lattice: DAffine3::IDENTITY,
+            cells: [2, 1, 1],
+        };
         let leaves = [
             leaf(0, [0, 0, 0], StopReason::NoData),
             leaf(1, [2, 0, 0], StopReason::Tolerance),
@@ -123,11 +151,27 @@ mod tests {
         let at = |x, y, z| DVec3::new(x, y, z);
         assert_eq!(index.find(at(0.9, 0.9, 0.9)), Some(0));
         assert_eq!(index.find(at(1.1, 0.1, 0.4)), Some(1));
-        assert_eq!(index.find(at(2.0, 1.0, 1.0)), Some(2), "the far corner belongs to the last cell");
+        assert_eq!(
+            index.find(at(2.0, 1.0, 1.0)),
+            Some(2),
+            "the far corner belongs to the last cell"
+        );
         assert_eq!(index.find(at(1.1, 0.9, 0.4)), None);
-        let samples = [(at(0.5, 0.5, 0.5), 3.0), (at(0.6, 0.5, 0.5), -4.0), (at(1.9, 0.9, 0.9), 0.1)];
+        let samples = [
+            (at(0.5, 0.5, 0.5), 3.0),
+            (at(0.6, 0.5, 0.5), -4.0),
+            (at(1.9, 0.9, 0.9), 0.1),
+        ];
         let audit = audit_leaves(&index, samples.into_iter(), 1.0);
-        assert_eq!((audit.leaves, audit.with_samples, audit.over_tolerance, audit.without_data), (3, 2, 1, 1));
+        assert_eq!(
+            (
+                audit.leaves,
+                audit.with_samples,
+                audit.over_tolerance,
+                audit.without_data
+            ),
+            (3, 2, 1, 1)
+        );
         assert_eq!(audit.rms[0], 12.5f64.sqrt());
         assert_eq!(index.corners(1)[7], at(1.5, 0.5, 0.5));
     }

@@ -9,5 +9,5 @@ mod residual;
 pub use boxes::write_boxes;
 pub use color::viridis;
 pub use leaves::{LeafAudit, LeafIndex, audit_leaves};
-pub use projection::{Projected, project_points};
+pub use projection::project_points;
 pub use residual::{ErrorStatistics, voxel_residuals};

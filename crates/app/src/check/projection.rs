@@ -20,13 +20,22 @@ const SLIDES: usize = 8;
 ///
 /// `spacing` is the finest knot spacing: no step is longer. Steps below `1e-6·spacing` count as arrived.
 pub fn project_points(field: &dyn Field, points: &[DVec3], spacing: f64) -> Vec<Projected> {
-    points.par_iter().with_min_len(256).map(|&p| project(field, p, spacing)).collect()
+    points
+        .par_iter()
+        .with_min_len(256)
+        .map(|&p| project(field, p, spacing))
+        .collect()
 }
 
 fn project(field: &dyn Field, p: DVec3, spacing: f64) -> Projected {
     let (mut foot, mut normal) = match newton(field, p, spacing) {
         Ok(hit) => hit,
-        Err((x, estimate)) => return Projected { distance: p.distance(x) + estimate, converged: false },
+        Err((x, estimate)) => {
+            return Projected {
+                distance: p.distance(x) + estimate,
+                converged: false,
+            };
+        }
     };
     // Hartmann (1999): step in the tangent plane below `p`, then back to the surface.
     let mut distance = p.distance(foot);
@@ -36,14 +45,19 @@ fn project(field: &dyn Field, p: DVec3, spacing: f64) -> Projected {
         if across.length() <= 1e-3 * distance.max(1e-6 * spacing) {
             break;
         }
-        let Ok((next, n)) = newton(field, foot + across, spacing) else { break };
+        let Ok((next, n)) = newton(field, foot + across, spacing) else {
+            break;
+        };
         let closer = p.distance(next);
         if closer >= distance {
             break;
         }
         (foot, normal, distance) = (next, n, closer);
     }
-    Projected { distance, converged: true }
+    Projected {
+        distance,
+        converged: true,
+    }
 }
 
 /// Follows the gradient to the surface: foot and unit gradient, or where it got lost and how far is left by first
@@ -85,7 +99,11 @@ mod tests {
         }
         fn jet(&self, p: DVec3) -> Jet {
             let (value, gradient) = self.value_gradient(p);
-            Jet { value, gradient, hessian: DMat3::from_diagonal(DVec3::new(-0.5, -2.0, -2.0)) }
+            Jet {
+                value,
+                gradient,
+                hessian: DMat3::from_diagonal(DVec3::new(-0.5, -2.0, -2.0)),
+            }
         }
         fn bounds(&self, _: &Aabb) -> Interval {
             Interval::EVERYTHING
@@ -98,16 +116,23 @@ mod tests {
             let (a, t) = (0.0314 * i as f64, 0.6 * ((i * 37 % 100) as f64 / 100.0 - 0.5));
             let s = DVec3::new(2.0 * a.cos(), 0.6 * a.sin(), 0.8 * a.sin());
             let n = DVec3::new(0.5 * s.x, 2.0 * s.y, 2.0 * s.z).normalize();
-            let [found] = project_points(&Ellipsoid, &[s + n * t], 0.1)[..] else { unreachable!() };
+            let [found] = project_points(&Ellipsoid, &[s + n * t], 0.1)[..] else {
+                unreachable!()
+            };
             assert!(found.converged);
             // The tangent offset left is 1e-3 of the distance, which enters the distance squared.
-            assert!((found.distance - t.abs()).abs() <= 1e-5 * t.abs() + 1e-7, "{found:?} against {t}");
+            assert!(
+                (found.distance - t.abs()).abs() <= 1e-5 * t.abs() + 1e-7,
+                "{found:?} against {t}"
+            );
         }
     }
 
     #[test]
     fn a_point_where_the_gradient_vanishes_is_reported() {
-        let [found] = project_points(&Ellipsoid, &[DVec3::ZERO], 0.1)[..] else { unreachable!() };
+        let [found] = project_points(&Ellipsoid, &[DVec3::ZERO], 0.1)[..] else {
+            unreachable!()
+        };
         assert!(!found.converged);
         assert!(found.distance.is_finite());
     }

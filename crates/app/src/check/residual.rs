@@ -28,7 +28,12 @@ impl ErrorStatistics {
             let k = ((share * n as f64).ceil() as usize).clamp(1, n) - 1;
             *errors.select_nth_unstable_by(k, f64::total_cmp).1
         };
-        Self { rms, p95: rank(0.95), p99: rank(0.99), max: rank(1.0) }
+        Self {
+            rms,
+            p95: rank(0.95),
+            p99: rank(0.99),
+            max: rank(1.0),
+        }
     }
 }
 
@@ -77,7 +82,11 @@ mod tests {
         }
         fn jet(&self, p: DVec3) -> Jet {
             let (value, gradient) = self.value_gradient(p);
-            Jet { value, gradient, hessian: DMat3::ZERO }
+            Jet {
+                value,
+                gradient,
+                hessian: DMat3::ZERO,
+            }
         }
         fn bounds(&self, _: &Aabb) -> Interval {
             Interval::EVERYTHING
@@ -86,7 +95,10 @@ mod tests {
 
     #[test]
     fn percentiles_are_nearest_ranks() {
-        let mut errors: Vec<f64> = (1..=100).rev().map(|i| if i % 2 == 0 { i as f64 } else { -(i as f64) }).collect();
+        let mut errors: Vec<f64> = (1..=100)
+            .rev()
+            .map(|i| if i % 2 == 0 { i as f64 } else { -(i as f64) })
+            .collect();
         let s = ErrorStatistics::of(&mut errors);
         assert_eq!((s.p95, s.p99, s.max), (95.0, 99.0, 100.0));
         assert!((s.rms - (338350.0f64 / 100.0).sqrt()).abs() < 1e-12);

@@ -14,7 +14,10 @@ use super::input::{self, Input, writing};
 use super::sample::voxel_frame;
 use super::summary::Summary;
 use super::{interrupt, set_threads};
-use crate::check::{ErrorStatistics, LeafAudit, LeafIndex, audit_leaves, project_points, viridis, voxel_residuals, write_boxes};
+use crate::check::{
+    ErrorStatistics, LeafAudit, LeafIndex, audit_leaves, project_points, viridis, voxel_residuals,
+    write_boxes,
+};
 
 /// Arguments of `isoclay check`.
 #[derive(clap::Args)]
@@ -54,7 +57,10 @@ pub fn run(args: &Args) -> Outcome {
     let cancel = Cancel::new();
     interrupt::cancel_on_interrupt(&cancel)?;
     if let Some(d) = args.output.as_ref().filter(|d| d.exists() && !d.is_dir()) {
-        return Err(Failure::usage(format!("-o {}: is no directory; name another", d.display())));
+        return Err(Failure::usage(format!(
+            "-o {}: is no directory; name another",
+            d.display()
+        )));
     }
     let open = OpenField::load(&args.field)?;
     let leaves = &open.report().leaves;
@@ -65,7 +71,10 @@ pub fn run(args: &Args) -> Outcome {
     };
     interrupt::check(&cancel)?;
     if measured.count == 0 {
-        return Err(Failure::input(format!("{}: there is no sample to measure at", args.input.display())));
+        return Err(Failure::input(format!(
+            "{}: there is no sample to measure at",
+            args.input.display()
+        )));
     }
     if let Some(directory) = &args.output {
         write_report(directory, args, &open, &index, &measured)?;
@@ -73,7 +82,10 @@ pub fn run(args: &Args) -> Outcome {
     let (s, audit) = (&measured.statistics, &measured.audit);
     let mut notes = Vec::new();
     if audit.claimed_below > 0 {
-        notes.push(format!("{} leaves are above the tolerance although the fit calls them below", audit.claimed_below));
+        notes.push(format!(
+            "{} leaves are above the tolerance although the fit calls them below",
+            audit.claimed_below
+        ));
     }
     Summary {
         input_count: Some(measured.count),
@@ -103,7 +115,11 @@ fn measure_cloud(open: &OpenField, index: &LeafIndex, cloud: &PointCloud) -> Mea
     let projected = project_points(open.field(), &cloud.positions, spacing);
     let errors: Vec<f64> = projected.iter().map(|p| p.distance).collect();
     let lattice_from_world = open.lattice().world_from_lattice.inverse();
-    let samples = cloud.positions.iter().map(|&p| lattice_from_world.transform_point3(p)).zip(errors.iter().copied());
+    let samples = cloud
+        .positions
+        .iter()
+        .map(|&p| lattice_from_world.transform_point3(p))
+        .zip(errors.iter().copied());
     let audit = audit_leaves(index, samples, open.report().tolerance);
     Measured {
         statistics: ErrorStatistics::of(&mut errors.clone()),
@@ -125,16 +141,24 @@ fn measure_volume(open: &OpenField, index: &LeafIndex, volume: &Volume) -> Measu
     let [nx, ny, _] = header.dims;
     let lattice_from_voxel = open.lattice().world_from_lattice.inverse() * header.world_from_voxel;
     let voxel = |i: usize| DVec3::new((i % nx) as f64, (i / nx % ny) as f64, (i / nx / ny) as f64);
-    let samples = errors.iter().enumerate().map(|(i, &e)| (lattice_from_voxel.transform_point3(voxel(i)), e));
+    let samples = errors
+        .iter()
+        .enumerate()
+        .map(|(i, &e)| (lattice_from_voxel.transform_point3(voxel(i)), e));
     let audit = audit_leaves(index, samples, open.report().tolerance);
     let mut worst: Vec<usize> = (0..errors.len()).collect();
     let kept = SHOWN_VOXELS.min(worst.len());
     if kept < worst.len() {
-        worst.select_nth_unstable_by(kept, |&a, &b| errors[b].abs().total_cmp(&errors[a].abs()).then(a.cmp(&b)));
+        worst.select_nth_unstable_by(kept, |&a, &b| {
+            errors[b].abs().total_cmp(&errors[a].abs()).then(a.cmp(&b))
+        });
         worst.truncate(kept);
     }
     Measured {
-        positions: worst.iter().map(|&i| header.world_from_voxel.transform_point3(voxel(i))).collect(),
+        positions: worst
+            .iter()
+            .map(|&i| header.world_from_voxel.transform_point3(voxel(i)))
+            .collect(),
         count: errors.len(),
         unprojected: None,
         unit: "density".into(),
@@ -157,16 +181,30 @@ fn write_report(
         .or_limit()?;
     let full_scale = measured.statistics.p99.max(f64::MIN_POSITIVE);
     let colors: Vec<[u8; 3]> = measured.errors.iter().map(|e| viridis(e / full_scale)).collect();
-    formats::meshes::save_points(&directory.join("error.ply"), &measured.positions, None, Some(&colors))
-        .map_err(writing)?;
+    formats::meshes::save_points(
+        &directory.join("error.ply"),
+        &measured.positions,
+        None,
+        Some(&colors),
+    )
+    .map_err(writing)?;
 
     let (report, audit) = (open.report(), &measured.audit);
     let finest = report.leaves.iter().map(|l| l.level).max().unwrap_or(0).max(1);
-    let boxes = report.leaves.iter().zip(&audit.rms).enumerate().filter_map(|(i, (leaf, &rms))| {
-        let refused = rms > report.tolerance && leaf.reason == StopReason::NoData;
-        let color = if refused { [230, 0, 0] } else { viridis(f64::from(leaf.level) / f64::from(finest)) };
-        (leaf.sample_count > 0 || refused).then(|| (index.corners(i), color))
-    });
+    let boxes = report
+        .leaves
+        .iter()
+        .zip(&audit.rms)
+        .enumerate()
+        .filter_map(|(i, (leaf, &rms))| {
+            let refused = rms > report.tolerance && leaf.reason == StopReason::NoData;
+            let color = if refused {
+                [230, 0, 0]
+            } else {
+                viridis(f64::from(leaf.level) / f64::from(finest))
+            };
+            (leaf.sample_count > 0 || refused).then(|| (index.corners(i), color))
+        });
     write_boxes(&directory.join("octree.ply"), boxes).map_err(writing)?;
 
     let text = json!({

@@ -66,7 +66,11 @@ fn read_points(path: &Path) -> Outcome<PointCloud> {
     let cloud = if path == Path::new("-") {
         let mut bytes = Vec::new();
         let ceiling = limits(None);
-        io::stdin().lock().take(ceiling.max_bytes).read_to_end(&mut bytes).or_input()?;
+        io::stdin()
+            .lock()
+            .take(ceiling.max_bytes)
+            .read_to_end(&mut bytes)
+            .or_input()?;
         formats::points::parse_xyz(&bytes, &ceiling)
             .map_err(|fault| Failure::input(format!("standard input: {fault}")))?
     } else {

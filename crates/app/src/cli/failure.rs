@@ -27,17 +27,26 @@ pub struct Failure {
 impl Failure {
     /// Wrong usage: exit code 2.
     pub fn usage(message: impl fmt::Display) -> Self {
-        Self { cause: Cause::Usage, error: anyhow::anyhow!("{message}") }
+        Self {
+            cause: Cause::Usage,
+            error: anyhow::anyhow!("{message}"),
+        }
     }
 
     /// Bad input: exit code 3.
     pub fn input(message: impl fmt::Display) -> Self {
-        Self { cause: Cause::Input, error: anyhow::anyhow!("{message}") }
+        Self {
+            cause: Cause::Input,
+            error: anyhow::anyhow!("{message}"),
+        }
     }
 
     /// A limit was reached, or the work was cancelled: exit code 4.
     pub fn limit(message: impl fmt::Display) -> Self {
-        Self { cause: Cause::Limit, error: anyhow::anyhow!("{message}") }
+        Self {
+            cause: Cause::Limit,
+            error: anyhow::anyhow!("{message}"),
+        }
     }
 
     /// The exit code.
@@ -59,7 +68,10 @@ impl Failure {
 
     /// Puts `subject` (a file, mostly) before the message.
     pub fn about(self, subject: impl fmt::Display) -> Self {
-        Self { cause: self.cause, error: self.error.context(subject.to_string()) }
+        Self {
+            cause: self.cause,
+            error: self.error.context(subject.to_string()),
+        }
     }
 }
 
@@ -80,10 +92,16 @@ pub trait OrFail<T> {
 
 impl<T, E: Into<anyhow::Error>> OrFail<T> for Result<T, E> {
     fn or_input(self) -> Outcome<T> {
-        self.map_err(|e| Failure { cause: Cause::Input, error: e.into() })
+        self.map_err(|e| Failure {
+            cause: Cause::Input,
+            error: e.into(),
+        })
     }
     fn or_limit(self) -> Outcome<T> {
-        self.map_err(|e| Failure { cause: Cause::Limit, error: e.into() })
+        self.map_err(|e| Failure {
+            cause: Cause::Limit,
+            error: e.into(),
+        })
     }
 }
 
@@ -94,7 +112,10 @@ impl From<FitError> for Failure {
             FitError::NotEnoughSamples { .. } | FitError::Degenerate(_) => Cause::Input,
             FitError::Option { .. } => Cause::Usage,
         };
-        Self { cause, error: e.into() }
+        Self {
+            cause,
+            error: e.into(),
+        }
     }
 }
 
@@ -104,7 +125,9 @@ mod tests {
 
     #[test]
     fn broken_pipe_is_found_below_its_context() {
-        let e = Err::<(), _>(io::Error::from(io::ErrorKind::BrokenPipe)).or_limit().unwrap_err();
+        let e = Err::<(), _>(io::Error::from(io::ErrorKind::BrokenPipe))
+            .or_limit()
+            .unwrap_err();
         assert!(e.about("standard output").is_broken_pipe());
         assert!(!Failure::input("broken pipe").is_broken_pipe());
     }
@@ -112,10 +135,23 @@ mod tests {
     #[test]
     fn exit_codes_follow_the_cause() {
         assert_eq!(Failure::from(FitError::Cancelled).code(), 4);
-        assert_eq!(Failure::from(FitError::MemoryLimit { needed: 2, limit: 1 }).code(), 4);
-        assert_eq!(Failure::from(FitError::NotEnoughSamples { found: 1, needed: 4 }).code(), 3);
-        let option = FitError::Option { option: "--smoothing", value: -1.0, requirement: "it must be positive" };
+        assert_eq!(
+            Failure::from(FitError::MemoryLimit { needed: 2, limit: 1 }).code(),
+            4
+        );
+        assert_eq!(
+            Failure::from(FitError::NotEnoughSamples { found: 1, needed: 4 }).code(),
+            3
+        );
+        let option = FitError::Option {
+            option: "--smoothing",
+            value: -1.0,
+            requirement: "it must be positive",
+        };
         assert_eq!(Failure::from(option).code(), 2);
-        assert_eq!(Failure::input("no such file").about("a.ply").to_string(), "a.ply: no such file");
+        assert_eq!(
+            Failure::input("no such file").about("a.ply").to_string(),
+            "a.ply: no such file"
+        );
     }
 }

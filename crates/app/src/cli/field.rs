@@ -48,14 +48,23 @@ impl OpenField {
     pub fn load(path: &Path) -> Outcome<Self> {
         let loaded = formats::field::load(path, &limits(None)).map_err(reading)?;
         let stored: StoredReport = serde_json::from_str(&loaded.meta.report).map_err(|e| {
-            Failure::input(format!("{}: its fit report cannot be read ({e}); fit the input again", path.display()))
-        })?;
-        let leaves = loaded.meta.leaves.iter().map(leaf).collect::<Option<Vec<Leaf>>>().ok_or_else(|| {
             Failure::input(format!(
-                "{}: a leaf stopped for a reason that this program does not know; use a newer isoclay",
+                "{}: its fit report cannot be read ({e}); fit the input again",
                 path.display()
             ))
         })?;
+        let leaves = loaded
+            .meta
+            .leaves
+            .iter()
+            .map(leaf)
+            .collect::<Option<Vec<Leaf>>>()
+            .ok_or_else(|| {
+                Failure::input(format!(
+                    "{}: a leaf stopped for a reason that this program does not know; use a newer isoclay",
+                    path.display()
+                ))
+            })?;
         let report = FitReport {
             input_count: stored.input_count,
             used_count: stored.used_count,
@@ -134,11 +143,6 @@ impl OpenField {
         self.loaded.meta.unit
     }
 
-    /// Whether the field was fitted to a volume, so that its values are densities.
-    pub fn is_volume(&self) -> bool {
-        self.loaded.meta.source == SourceKind::Volume
-    }
-
     /// Iso-value at which the surface is meant to lie.
     pub fn iso(&self) -> f64 {
         self.loaded.meta.iso.unwrap_or(0.0)
@@ -202,7 +206,11 @@ pub fn save(path: &Path, field: &AnyField, report: &FitReport, meta: FieldMeta) 
     either!(field, f => save_as(path, f, &meta))
 }
 
-fn save_as<T: formats::field::Stored>(path: &Path, field: &HierarchicalSpline<T>, meta: &FieldMeta) -> Outcome<String> {
+fn save_as<T: formats::field::Stored>(
+    path: &Path,
+    field: &HierarchicalSpline<T>,
+    meta: &FieldMeta,
+) -> Outcome<String> {
     formats::field::save(path, field, meta).map_err(writing)?;
     Ok(hex(&field.sha256()))
 }
@@ -220,6 +228,15 @@ fn record(leaf: &Leaf) -> LeafRecord {
 
 fn leaf(r: &LeafRecord) -> Option<Leaf> {
     use StopReason::*;
-    let reason = [Tolerance, Depth, NoData, Noise, Budget, Memory].into_iter().find(|s| *s as u8 == r.reason)?;
-    Some(Leaf { level: r.level, cell: r.cell, sample_count: r.sample_count, rms: r.rms, max: r.max, reason })
+    let reason = [Tolerance, Depth, NoData, Noise, Budget, Memory]
+        .into_iter()
+        .find(|s| *s as u8 == r.reason)?;
+    Some(Leaf {
+        level: r.level,
+        cell: r.cell,
+        sample_count: r.sample_count,
+        rms: r.rms,
+        max: r.max,
+        reason,
+    })
 }

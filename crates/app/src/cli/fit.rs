@@ -1,17 +1,17 @@
 use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::ValueEnum;
 use fitting::points::{OrientedPoints, PointOptions, fit_points};
-use fitting::volume::{Method as VolumeMethod, VolumeOptions, fit_volume};
-use fitting::{Cancel, Control, FitError, FitReport};
+use fitting::{Cancel, Control, FitError, FitReport, StopReason};
 use formats::Unit;
+use formats::field::{AnyField, FieldMeta, SourceKind, Stored};
 use formats::points::PointCloud;
 use formats::volumes::Volume;
 
 use super::cost::{Cost, rss_bytes};
 use super::failure::{Failure, Outcome};
-use super::field::{OpenField, Spline};
+use super::field::{self, either};
 use super::input::{self, Input, bounding_box, check_output, remaining};
 use super::progress::Bar;
 use super::quantity::{Memory, Tolerance, human_bytes, positive};
@@ -95,11 +95,13 @@ fn unit(s: &str) -> Result<Unit, String> {
 /// A fitted field with what the fit says of it.
 pub struct Fitted {
     /// The field.
-    pub spline: Spline,
+    pub field: AnyField,
     /// Errors, leaves, notes.
     pub report: FitReport,
     /// Unit of lengths.
     pub unit: Unit,
+    /// What it was fitted to.
+    pub source: SourceKind,
     /// Iso-value that meshing takes if the user names none.
     pub iso: f64,
 }
@@ -121,35 +123,59 @@ pub fn run(args: &Args) -> Outcome {
         cancel,
         memory_limit: args.memory.map(remaining),
     };
-    let fitted = fit(&input, &args.choice, &mut control)
-        .map_err(|f| if f.code() == 3 { f.about(args.input.display()) } else { f })?;
+    let fitted = fit(&input, &args.choice, &mut control).map_err(|f| {
+        if f.code() == 3 {
+            f.about(args.input.display())
+        } else {
+            f
+        }
+    })?;
     interrupt::check(&control.cancel)?;
     bar.show("writing", 0.99);
-    let sha256 = OpenField::save(&args.output, &fitted)?;
+    let meta = FieldMeta {
+        source: fitted.source,
+        unit: fitted.unit,
+        iso: Some(fitted.iso),
+        provenance: provenance(args),
+        ..Default::default()
+    };
+    let sha256 = field::save(&args.output, &fitted.field, &fitted.report, meta)?;
     bar.clear();
-    Summary { field_sha256: Some(sha256), output: Some(args.output.display().to_string()), ..fitted.summary(&input) }
-        .with_cost(&cost)
-        .print(args.json)
+    Summary {
+        field_sha256: Some(sha256),
+        output: Some(args.output.display().to_string()),
+        ..fitted.summary(&input)
+    }
+    .with_cost(&cost)
+    .print(args.json)
+}
+
+/// Where the field comes from, for the file: enough to make it again.
+fn provenance(args: &Args) -> String {
+    let options: Vec<String> = std::env::args().skip(1).collect();
+    serde_json::json!({
+        "program": concat!("isoclay ", env!("CARGO_PKG_VERSION")),
+        "input": args.input.file_name().map(|n| n.to_string_lossy()),
+        "arguments": options,
+    })
+    .to_string()
 }
 
 /// Fits an input as chosen.
 pub fn fit(input: &Input, choice: &Choice, control: &mut Control) -> Outcome<Fitted> {
     match (input, choice.precision) {
-        (Input::Cloud(cloud), Precision::F32) => fit_cloud(cloud, choice, control, Spline::F32),
-        (Input::Cloud(cloud), Precision::F64) => fit_cloud(cloud, choice, control, Spline::F64),
-        (Input::Volume(volume), Precision::F32) => fit_voxels(volume, choice, control, Spline::F32),
-        (Input::Volume(volume), Precision::F64) => fit_voxels(volume, choice, control, Spline::F64),
+        (Input::Cloud(cloud), Precision::F32) => fit_cloud::<f32>(cloud, choice, control),
+        (Input::Cloud(cloud), Precision::F64) => fit_cloud::<f64>(cloud, choice, control),
+        (Input::Volume(volume), Precision::F32) => fit_voxels::<f32>(volume, choice, control),
+        (Input::Volume(volume), Precision::F64) => fit_voxels::<f64>(volume, choice, control),
     }
 }
 
-fn fit_cloud<T: Real>(
-    cloud: &PointCloud,
-    choice: &Choice,
-    control: &mut Control,
-    wrap: fn(HierarchicalSpline<T>) -> Spline,
-) -> Outcome<Fitted> {
+fn fit_cloud<T: Stored>(cloud: &PointCloud, choice: &Choice, control: &mut Control) -> Outcome<Fitted> {
     if choice.method == Method::Interpolate {
-        return Err(Failure::usage("--method interpolate is for volumes; leave it out for a point cloud"));
+        return Err(Failure::usage(
+            "--method interpolate is for volumes; leave it out for a point cloud",
+        ));
     }
     let Some(normals) = &cloud.normals else {
         return Err(Failure::input(
@@ -163,15 +189,32 @@ fn fit_cloud<T: Real>(
     let unit = stated_unit(cloud.unit, choice.unit)?;
     let diagonal = bounding_box(&cloud.positions).size().length();
     let options = PointOptions {
-        tolerance: choice.tolerance.map(|t| t.length(diagonal, unit)).transpose().map_err(Failure::usage)?,
+        tolerance: choice
+            .tolerance
+            .map(|t| t.length(diagonal, unit))
+            .transpose()
+            .map_err(Failure::usage)?,
         coefficients: choice.coefficients.map(NonZeroUsize::get),
         max_depth: choice.max_depth.map(usize::from),
         smoothing: choice.smoothing,
     };
-    let points = OrientedPoints { positions: &cloud.positions, normals };
+    let points = OrientedPoints {
+        positions: &cloud.positions,
+        normals,
+    };
     let (field, mut report) = fit_points::<T>(&points, &options, control).map_err(|e| explain(e, control))?;
     report.notes.splice(0..0, cloud.notes.iter().cloned());
-    Ok(Fitted { spline: wrap(field), report, unit, iso: 0.0 })
+    Ok(Fitted {
+        field: T::any(field),
+        report,
+        unit,
+        source: SourceKind::Cloud,
+        iso: 0.0,
+    })
+}
+
+fn fit_voxels<T: Stored>(_: &Volume, _: &Choice, _: &mut Control) -> Outcome<Fitted> {
+    unimplemented!()
 }
 
 /// The unit of a file whose header says `known`, of which the user says `stated`.
@@ -216,9 +259,9 @@ impl Fitted {
                 Input::Cloud(_) => self.unit.to_string(),
                 Input::Volume(_) => "density".into(),
             }),
-            coefficients: Some(self.spline.coefficient_count()),
-            totals_bytes: Some(self.spline.totals_bytes()),
-            bricks: Some(self.spline.brick_count()),
+            coefficients: Some(either!(&self.field, f => f.coefficient_count())),
+            totals_bytes: Some(either!(&self.field, f => f.totals_bytes())),
+            bricks: Some(either!(&self.field, f => f.brick_count())),
             depth: Some(r.depth),
             tolerance: Some(r.tolerance),
             smoothing: Some(r.smoothing),
@@ -230,7 +273,11 @@ impl Fitted {
             leaves: Some(r.leaves.len()),
             leaves_over_tolerance: Some(r.leaves.iter().filter(over).count()),
             leaves_without_data: Some(
-                r.leaves.iter().filter(over).filter(|l| l.reason == StopReason::NoData).count(),
+                r.leaves
+                    .iter()
+                    .filter(over)
+                    .filter(|l| l.reason == StopReason::NoData)
+                    .count(),
             ),
             notes: r.notes.clone(),
             ..Default::default()

@@ -31,7 +31,12 @@ struct Entry {
 }
 
 fn entry(key: &'static str, label: &'static str, text: impl Into<String>, value: impl Into<Value>) -> Entry {
-    Entry { key, label, text: text.into(), value: value.into() }
+    Entry {
+        key,
+        label,
+        text: text.into(),
+        value: value.into(),
+    }
 }
 
 fn count(key: &'static str, label: &'static str, n: usize) -> Entry {
@@ -67,7 +72,9 @@ pub fn run(args: &Args) -> Outcome {
         writeln!(out, "{}", Value::Object(object)).or_limit()
     } else {
         let first = [("kind", kind.to_string())];
-        let rows = first.into_iter().chain(entries.into_iter().map(|e| (e.label, e.text)));
+        let rows = first
+            .into_iter()
+            .chain(entries.into_iter().map(|e| (e.label, e.text)));
         writeln!(out, "{}", table(rows, &notes)).or_limit()
     }
 }
@@ -92,7 +99,11 @@ fn of_cloud(cloud: &PointCloud) -> Vec<Entry> {
         count("points", "points", cloud.positions.len()),
         count("points_in_file", "points in the file", cloud.file_count),
         count("faces", "faces", cloud.face_count),
-        count("unused_vertices", "vertices without a face", cloud.unused_vertices),
+        count(
+            "unused_vertices",
+            "vertices without a face",
+            cloud.unused_vertices,
+        ),
         entry("normals", "normals", normals, normals),
         count("zero_normals", "unusable normals", cloud.zero_normals),
         entry("unit", "unit", cloud.unit.symbol(), cloud.unit.symbol()),
@@ -110,15 +121,29 @@ fn of_header(h: &VolumeHeader) -> Vec<Entry> {
     let rows: Vec<[f64; 4]> = (0..3)
         .map(|r| {
             let m = h.world_from_voxel;
-            [m.matrix3.x_axis[r], m.matrix3.y_axis[r], m.matrix3.z_axis[r], m.translation[r]]
+            [
+                m.matrix3.x_axis[r],
+                m.matrix3.y_axis[r],
+                m.matrix3.z_axis[r],
+                m.translation[r],
+            ]
         })
         .collect();
     vec![
-        entry("dims", "voxels", h.dims.map(|n| n.to_string()).join(" × "), json!(h.dims)),
+        entry(
+            "dims",
+            "voxels",
+            h.dims.map(|n| n.to_string()).join(" × "),
+            json!(h.dims),
+        ),
         entry(
             "spacing",
             "spacing",
-            format!("{} {}", h.spacing().to_array().map(human_number).join(" × "), h.unit),
+            format!(
+                "{} {}",
+                h.spacing().to_array().map(human_number).join(" × "),
+                h.unit
+            ),
             json!(h.spacing().to_array()),
         ),
         entry("unit", "unit", h.unit.symbol(), h.unit.symbol()),
@@ -126,7 +151,10 @@ fn of_header(h: &VolumeHeader) -> Vec<Entry> {
         entry(
             "world_from_voxel",
             "world from voxel",
-            rows.iter().map(|r| format!("[{}]", r.map(human_number).join(", "))).collect::<Vec<_>>().join(" "),
+            rows.iter()
+                .map(|r| format!("[{}]", r.map(human_number).join(", ")))
+                .collect::<Vec<_>>()
+                .join(" "),
             json!(rows),
         ),
     ]
@@ -153,28 +181,61 @@ fn of_field(open: &OpenField) -> Vec<Entry> {
     let mut entries = vec![
         entry("precision", "precision", open.precision(), open.precision()),
         count("levels", "levels", open.level_count()),
-        entry("cells", "cells of the coarsest", lattice.cells.map(|n| n.to_string()).join(" × "), json!(lattice.cells)),
+        entry(
+            "cells",
+            "cells of the coarsest",
+            lattice.cells.map(|n| n.to_string()).join(" × "),
+            json!(lattice.cells),
+        ),
         entry(
             "finest_spacing",
             "finest knot spacing",
-            format!("{} {}", spacing.to_array().map(human_number).join(" × "), open.unit()),
+            format!(
+                "{} {}",
+                spacing.to_array().map(human_number).join(" × "),
+                open.unit()
+            ),
             json!(spacing.to_array()),
         ),
         count("coefficients", "coefficients", open.coefficient_count()),
-        entry("coefficients_per_level", "  on each level", open.per_level().map(human_count).collect::<Vec<_>>().join(", "), json!(open.per_level().collect::<Vec<_>>())),
+        entry(
+            "coefficients_per_level",
+            "  on each level",
+            open.per_level()
+                .into_iter()
+                .map(human_count)
+                .collect::<Vec<_>>()
+                .join(", "),
+            json!(open.per_level()),
+        ),
         count("bricks", "bricks", open.brick_count()),
-        entry("totals_bytes", "totals", human_bytes(open.totals_bytes() as u64), open.totals_bytes()),
+        entry(
+            "totals_bytes",
+            "totals",
+            human_bytes(open.totals_bytes() as u64),
+            open.totals_bytes(),
+        ),
         corners(&lattice.world_box()),
         entry("unit", "unit", open.unit().symbol(), open.unit().symbol()),
         entry("iso", "iso-value", human_number(open.iso()), open.iso()),
         count("input_count", "samples given", report.input_count),
         count("used_count", "samples used", report.used_count),
-        entry("tolerance", "tolerance", human_number(report.tolerance), report.tolerance),
+        entry(
+            "tolerance",
+            "tolerance",
+            human_number(report.tolerance),
+            report.tolerance,
+        ),
         entry("rms", "error rms", human_number(report.rms), report.rms),
         entry("p95", "error p95", human_number(report.p95), report.p95),
         entry("max", "error max", human_number(report.max), report.max),
         count("leaves", "leaves", report.leaves.len()),
     ];
-    entries.push(entry("field_sha256", "field sha256", open.sha256(), open.sha256()));
+    entries.push(entry(
+        "field_sha256",
+        "field sha256",
+        open.sha256(),
+        open.sha256(),
+    ));
     entries
 }

@@ -22,8 +22,12 @@ pub enum Input {
 pub fn read(path: &Path, memory: Option<Memory>) -> Outcome<Input> {
     let limits = limits(memory);
     match formats::detect(path).map_err(reading)? {
-        Kind::Cloud(_) => formats::points::read(path, &limits).map_err(reading).map(Input::Cloud),
-        Kind::Volume => formats::volumes::read(path, &limits).map_err(reading).map(Input::Volume),
+        Kind::Cloud(_) => formats::points::read(path, &limits)
+            .map_err(reading)
+            .map(Input::Cloud),
+        Kind::Volume => formats::volumes::read(path, &limits)
+            .map_err(reading)
+            .map(Input::Volume),
         Kind::Field => Err(Failure::input(format!(
             "{}: is a fitted field, where a point cloud or a volume is needed",
             path.display()
@@ -33,7 +37,9 @@ pub fn read(path: &Path, memory: Option<Memory>) -> Outcome<Input> {
 
 /// What reading may hold: the ceiling of the user less what the process holds already.
 pub fn limits(memory: Option<Memory>) -> ReadLimits {
-    memory.map_or_else(ReadLimits::default, |m| ReadLimits { max_bytes: remaining(m) })
+    memory.map_or_else(ReadLimits::default, |m| ReadLimits {
+        max_bytes: remaining(m),
+    })
 }
 
 /// Bytes of the user's ceiling that are still free.
@@ -63,10 +69,16 @@ pub fn writing(e: FormatError) -> Failure {
 
 /// Refuses an output that cannot be written before hours of work are spent on it.
 pub fn check_output(path: &Path, extensions: &[&str]) -> Outcome {
-    let name = path.file_name().map(|n| n.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    let name = path
+        .file_name()
+        .map(|n| n.to_string_lossy().to_ascii_lowercase())
+        .unwrap_or_default();
     let is_device = path.metadata().is_ok_and(|m| !m.is_file() && !m.is_dir());
     if path.is_dir() {
-        return Err(Failure::usage(format!("-o {}: is a directory; name a file in it", path.display())));
+        return Err(Failure::usage(format!(
+            "-o {}: is a directory; name a file in it",
+            path.display()
+        )));
     }
     if !is_device && !extensions.iter().any(|e| name.ends_with(&format!(".{e}"))) {
         return Err(Failure::usage(format!(
@@ -93,6 +105,8 @@ pub fn check_output(path: &Path, extensions: &[&str]) -> Outcome {
 pub fn bounding_box(points: &[DVec3]) -> Aabb {
     let (min, max) = points
         .iter()
-        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), &p| (lo.min(p), hi.max(p)));
+        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), &p| {
+            (lo.min(p), hi.max(p))
+        });
     Aabb { min, max }
 }

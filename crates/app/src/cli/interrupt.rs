@@ -20,5 +20,9 @@ pub fn cancel_on_interrupt(cancel: &Cancel) -> Outcome {
 
 /// Gives way to a cancel between two stages of work.
 pub fn check(cancel: &Cancel) -> Outcome {
-    if cancel.is_cancelled() { Err(fitting::FitError::Cancelled.into()) } else { Ok(()) }
+    if cancel.is_cancelled() {
+        Err(fitting::FitError::Cancelled.into())
+    } else {
+        Ok(())
+    }
 }

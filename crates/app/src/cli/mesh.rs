@@ -1,5 +1,5 @@
-use std::ops::ControlFlow;
 use std::num::NonZeroUsize;
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use bspline::polygonize::{Mesh, MeshReport, PolygonizeError, PolygonizeOptions, polygonize_with};
@@ -54,9 +54,18 @@ pub fn run(args: &Args) -> Outcome {
     let cancel = Cancel::new();
     interrupt::cancel_on_interrupt(&cancel)?;
     let open = OpenField::load(&args.field)?;
-    let options = PolygonizeOptions { iso: args.iso.unwrap_or(open.iso()), open: args.open, ..Default::default() };
+    let options = PolygonizeOptions {
+        iso: args.iso.unwrap_or(open.iso()),
+        open: args.open,
+        ..Default::default()
+    };
     let bar = Bar::new();
-    let mut mesher = Mesher { field: open.field(), options, cancel: &cancel, bar: &bar };
+    let mut mesher = Mesher {
+        field: open.field(),
+        options,
+        cancel: &cancel,
+        bar: &bar,
+    };
     let mut notes = Vec::new();
     let (mesh, report, frame) = match args.tolerance {
         Some(tolerance) => mesher.to_tolerance(&open, tolerance, &mut notes)?,
@@ -70,7 +79,11 @@ pub fn run(args: &Args) -> Outcome {
     }
     interrupt::check(&cancel)?;
     bar.show("writing", 0.99);
-    let written = formats::meshes::Mesh { vertices: &mesh.positions, triangles: &mesh.triangles, colors: None };
+    let written = formats::meshes::Mesh {
+        vertices: &mesh.positions,
+        triangles: &mesh.triangles,
+        colors: None,
+    };
     notes.extend(formats::meshes::save(&args.output, &written).map_err(writing)?);
     bar.clear();
     notes.extend(doubts(&report));
@@ -92,10 +105,16 @@ pub fn run(args: &Args) -> Outcome {
 fn doubts(report: &MeshReport) -> Vec<String> {
     let mut notes = Vec::new();
     if report.unconverged_vertices > 0 {
-        notes.push(format!("{} vertices are less exact than the others", report.unconverged_vertices));
+        notes.push(format!(
+            "{} vertices are less exact than the others",
+            report.unconverged_vertices
+        ));
     }
     if report.nan_nodes > 0 {
-        notes.push(format!("at {} nodes the field is not a number; they count as outside", report.nan_nodes));
+        notes.push(format!(
+            "at {} nodes the field is not a number; they count as outside",
+            report.nan_nodes
+        ));
     }
     notes
 }
@@ -118,7 +137,11 @@ impl Mesher<'_> {
         let (cancel, bar) = (self.cancel, self.bar);
         let mut progress = |fraction| {
             bar.show("meshing", fraction);
-            if cancel.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            if cancel.is_cancelled() {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
         };
         let (mesh, report) =
             polygonize_with(self.field, &frame, &self.options, &mut progress).map_err(|e| match e {
@@ -144,12 +167,18 @@ impl Mesher<'_> {
         let mut best: Option<((Mesh, MeshReport, Frame), f64)> = None;
         for _ in 0..6 {
             let trial = self.on(frame)?;
-            let Some(around) = trial.0.bounding_box() else { return Ok(trial) };
-            let wanted = tolerance.length(around.size().length(), open.unit()).map_err(Failure::usage)?;
+            let Some(around) = trial.0.bounding_box() else {
+                return Ok(trial);
+            };
+            let wanted = tolerance
+                .length(around.size().length(), open.unit())
+                .map_err(Failure::usage)?;
             let error = self.chord_error(&trial.0, &trial.2);
             let met = error <= wanted;
             let cells = trial.2.cells.into_iter().max().unwrap_or(1);
-            let best_cells = best.as_ref().map(|((_, _, f), _)| f.cells.into_iter().max().unwrap_or(1));
+            let best_cells = best
+                .as_ref()
+                .map(|((_, _, f), _)| f.cells.into_iter().max().unwrap_or(1));
             // Good enough within 15 % of the coarsest that will do, or no finer than one that did.
             let settled = met && error > 0.7 * wanted;
             if met && best_cells.is_none_or(|b| cells < b) {
@@ -169,7 +198,10 @@ impl Mesher<'_> {
         let (found, error) = best.ok_or_else(|| {
             Failure::limit("the tolerance asked for needs more cells than can be meshed; raise --tolerance")
         })?;
-        notes.push(format!("99 % of the triangle centres lie within {} of the surface", human_number(error)));
+        notes.push(format!(
+            "99 % of the triangle centres lie within {} of the surface",
+            human_number(error)
+        ));
         Ok(found)
     }
 

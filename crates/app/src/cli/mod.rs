@@ -25,7 +25,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use failure::{Failure, Outcome, OrFail};
+use failure::{Failure, OrFail, Outcome};
 
 /// Turns scans into elastic clay: point clouds and volumes become implicit B-spline solids and watertight
 /// meshes.

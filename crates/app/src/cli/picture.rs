@@ -7,7 +7,7 @@ use fitting::Cancel;
 use glam::DVec3;
 
 use super::cost::Cost;
-use super::failure::{Failure, Outcome};
+use super::failure::Outcome;
 use super::field::OpenField;
 use super::input::{check_output, writing};
 use super::mesh::Mesher;
@@ -63,7 +63,9 @@ enum Axis {
 }
 
 fn size(s: &str) -> Result<[usize; 2], String> {
-    let numbers = s.split_once('x').and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
+    let numbers = s
+        .split_once('x')
+        .and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
     numbers
         .filter(|n: &[usize; 2]| n.iter().all(|n| (16..=8192).contains(n)))
         .ok_or_else(|| "write width x height, each 16 to 8192: 1200x900".into())
@@ -78,17 +80,30 @@ pub fn run(args: &Args) -> Outcome {
     interrupt::cancel_on_interrupt(&cancel)?;
     let open = OpenField::load(&args.field)?;
     let bar = Bar::new();
-    let options = PolygonizeOptions { iso: args.iso.unwrap_or(open.iso()), ..Default::default() };
+    let options = PolygonizeOptions {
+        iso: args.iso.unwrap_or(open.iso()),
+        ..Default::default()
+    };
     let frame = match args.resolution {
         Some(n) => open.frame_of_resolution(n),
         None => open.frame_of_subdivision(2),
     };
-    let (mesh, _, frame) = Mesher { field: open.field(), options, cancel: &cancel, bar: &bar }.on(frame)?;
+    let (mesh, _, frame) = Mesher {
+        field: open.field(),
+        options,
+        cancel: &cancel,
+        bar: &bar,
+    }
+    .on(frame)?;
     if mesh.triangles.is_empty() {
         return Err(open.no_surface(&args.field, options.iso));
     }
     bar.show("drawing", 0.5);
-    let scene = Scene { field: open.field(), positions: &mesh.positions, triangles: &mesh.triangles };
+    let scene = Scene {
+        field: open.field(),
+        positions: &mesh.positions,
+        triangles: &mesh.triangles,
+    };
     let pixels = draw(&scene, &args.view());
     interrupt::check(&cancel)?;
     let [width, height] = args.size.map(|n| n as u32);
@@ -121,6 +136,10 @@ impl Args {
         };
         let (a, e) = (self.azimuth.to_radians(), self.elevation.to_radians());
         let toward_eye = (front * a.cos() + side * a.sin()) * e.cos() + up * e.sin();
-        View { size: self.size, up, toward_eye }
+        View {
+            size: self.size,
+            up,
+            toward_eye,
+        }
     }
 }

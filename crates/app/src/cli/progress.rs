@@ -26,7 +26,8 @@ impl Bar {
     /// Shows `stage` and the share done, `0..=1`.
     pub fn show(&self, stage: &'static str, fraction: f64) {
         self.0.set_message(stage);
-        self.0.set_position((fraction.clamp(0.0, 1.0) * STEPS as f64) as u64);
+        self.0
+            .set_position((fraction.clamp(0.0, 1.0) * STEPS as f64) as u64);
     }
 
     /// Takes the bar off the screen.

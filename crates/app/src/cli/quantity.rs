@@ -59,9 +59,9 @@ impl FromStr for Tolerance {
         } else {
             (text, Self::Plain)
         };
-        positive(number.trim_end())
-            .map(make)
-            .map_err(|e| format!("{e}; write a number, with mm or % behind it if you like: 0.2, 0.2mm, 0.01%"))
+        positive(number.trim_end()).map(make).map_err(|e| {
+            format!("{e}; write a number, with mm or % behind it if you like: 0.2, 0.2mm, 0.01%")
+        })
     }
 }
 
@@ -117,7 +117,9 @@ impl FromStr for Memory {
             .map_err(|e| format!("{e}; write a size such as 2GiB, 512MiB, 1.5GB or a number of bytes"))?
             * scale;
         if !(1.0..1e18).contains(&bytes) {
-            return Err(format!("{s} is no size that a memory can have; write a size such as 2GiB"));
+            return Err(format!(
+                "{s} is no size that a memory can have; write a size such as 2GiB"
+            ));
         }
         Ok(Self(bytes as u64))
     }
@@ -128,7 +130,11 @@ pub fn human_bytes(bytes: u64) -> String {
     let mut value = bytes as f64;
     for unit in ["B", "KiB", "MiB", "GiB"] {
         if value < 1024.0 {
-            return if unit == "B" { format!("{value:.0} B") } else { format!("{value:.1} {unit}") };
+            return if unit == "B" {
+                format!("{value:.0} B")
+            } else {
+                format!("{value:.1} {unit}")
+            };
         }
         value /= 1024.0;
     }
@@ -173,9 +179,14 @@ mod tests {
         assert_eq!(parse("0.5 mm"), Ok(Tolerance::Mm(0.5)));
         assert_eq!(parse(".01%"), Ok(Tolerance::Percent(0.01)));
         assert_eq!(parse(" 3 % "), Ok(Tolerance::Percent(3.0)));
-        for bad in ["", "%", "mm", "0", "-1", "nan", "inf", "1cm", "1m", "1e400", "1%%", "0%", "x", "1,5"] {
+        for bad in [
+            "", "%", "mm", "0", "-1", "nan", "inf", "1cm", "1m", "1e400", "1%%", "0%", "x", "1,5",
+        ] {
             let e = parse(bad).unwrap_err();
-            assert!(e.contains("0.2mm"), "{bad:?} must be refused with a remedy, got {e:?}");
+            assert!(
+                e.contains("0.2mm"),
+                "{bad:?} must be refused with a remedy, got {e:?}"
+            );
         }
     }
 
@@ -185,7 +196,12 @@ mod tests {
         assert_eq!(Tolerance::Percent(1.0).length(250.0, Unit::Unknown), Ok(2.5));
         assert_eq!(Tolerance::Mm(2.0).length(1.0, Unit::Metre), Ok(0.002));
         assert_eq!(Tolerance::Mm(2.0).length(1.0, Unit::Centimetre), Ok(0.2));
-        assert!(Tolerance::Mm(2.0).length(1.0, Unit::Unknown).unwrap_err().contains("--unit"));
+        assert!(
+            Tolerance::Mm(2.0)
+                .length(1.0, Unit::Unknown)
+                .unwrap_err()
+                .contains("--unit")
+        );
     }
 
     #[test]
@@ -205,7 +221,10 @@ mod tests {
         assert_eq!(parse("4096"), Ok(4096));
         assert_eq!(parse("4096B"), Ok(4096));
         for bad in ["", "GiB", "0", "-1GiB", "2Gib", "2 G", "1e30GiB", "nan", "0.1B"] {
-            assert!(parse(bad).unwrap_err().contains("2GiB"), "{bad:?} must be refused with a remedy");
+            assert!(
+                parse(bad).unwrap_err().contains("2GiB"),
+                "{bad:?} must be refused with a remedy"
+            );
         }
     }
 

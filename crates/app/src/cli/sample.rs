@@ -79,7 +79,8 @@ pub fn run(args: &Args) -> Outcome {
     }
     bar.show("writing", 0.99);
     let map = header.world_from_voxel;
-    formats::volumes::save(&args.output, dims, &values, &map, header.unit, StoreAs::Float32).map_err(writing)?;
+    formats::volumes::save(&args.output, dims, &values, &map, header.unit, StoreAs::Float32)
+        .map_err(writing)?;
     bar.clear();
     Summary {
         input_count: Some(values.len()),
@@ -95,7 +96,10 @@ pub fn run(args: &Args) -> Outcome {
 /// The grid whose nodes are the voxel centres.
 pub fn voxel_frame(header: &formats::volumes::VolumeHeader) -> Frame {
     // The last node of an axis is the last voxel; a frame has at least one cell, a volume may have one voxel.
-    Frame { world_from_grid: header.world_from_voxel, cells: header.dims.map(|n| (n as u32 - 1).max(1)) }
+    Frame {
+        world_from_grid: header.world_from_voxel,
+        cells: header.dims.map(|n| (n as u32 - 1).max(1)),
+    }
 }
 
 /// [`Field::frame_values`] of one slab, its rows shared among the threads.
@@ -103,9 +107,11 @@ fn slab_values(field: &dyn Field, frame: &Frame, x0: usize, count: [usize; 3], o
     use rayon::prelude::*;
     // Whole sheets of x, so that parts lie together in memory.
     let sheets = count[0].div_ceil(rayon::current_num_threads()).max(1);
-    out.par_chunks_mut(sheets * count[1] * count[2]).enumerate().for_each(|(part, out)| {
-        let first = x0 + part * sheets;
-        let thick = out.len() / (count[1] * count[2]);
-        field.frame_values(frame, [first as i64, 0, 0], [thick, count[1], count[2]], out);
-    });
+    out.par_chunks_mut(sheets * count[1] * count[2])
+        .enumerate()
+        .for_each(|(part, out)| {
+            let first = x0 + part * sheets;
+            let thick = out.len() / (count[1] * count[2]);
+            field.frame_values(frame, [first as i64, 0, 0], [thick, count[1], count[2]], out);
+        });
 }

@@ -125,7 +125,12 @@ impl Summary {
         let size = |x: f64| format!("{}{unit}", human_number(x));
         let rows = [
             ("input", self.input_count.map(count)),
-            ("used", self.used_count.filter(|n| Some(*n) != self.input_count).map(count)),
+            (
+                "used",
+                self.used_count
+                    .filter(|n| Some(*n) != self.input_count)
+                    .map(count),
+            ),
             ("tolerance", self.tolerance.map(size)),
             ("noise found", self.noise.map(size)),
             ("smoothing", self.smoothing.map(human_number)),
@@ -133,7 +138,10 @@ impl Summary {
             ("error p95", self.p95.map(size)),
             ("error max", self.max.map(size)),
             ("bound on |residual|", self.bound.map(human_number)),
-            ("unprojected points", self.unprojected.filter(|n| *n > 0).map(count)),
+            (
+                "unprojected points",
+                self.unprojected.filter(|n| *n > 0).map(count),
+            ),
             ("leaves", self.leaves.map(count)),
             ("  over tolerance", self.leaves_over_tolerance.map(count)),
             ("  refused for lack of data", self.leaves_without_data.map(count)),
@@ -151,7 +159,11 @@ impl Summary {
             ("field sha256", self.field_sha256.clone()),
             ("written", self.output.clone()),
         ];
-        table(rows.into_iter().filter_map(|(label, value)| Some((label, value?))), &self.notes)
+        table(
+            rows.into_iter()
+                .filter_map(|(label, value)| Some((label, value?))),
+            &self.notes,
+        )
     }
 }
 
@@ -159,7 +171,10 @@ impl Summary {
 pub fn table<'a>(rows: impl IntoIterator<Item = (&'a str, String)>, notes: &[String]) -> String {
     let rows: Vec<_> = rows.into_iter().collect();
     let width = rows.iter().map(|(label, _)| label.len()).max().unwrap_or(0);
-    let mut lines: Vec<String> = rows.iter().map(|(label, value)| format!("{label:width$}  {value}")).collect();
+    let mut lines: Vec<String> = rows
+        .iter()
+        .map(|(label, value)| format!("{label:width$}  {value}"))
+        .collect();
     lines.extend(notes.iter().map(|n| format!("note: {n}")));
     lines.join("\n")
 }
@@ -175,7 +190,11 @@ mod tests {
 
     #[test]
     fn json_holds_what_applies_and_nothing_else() {
-        let s = Summary { rms: Some(0.25), threads: Some(2), ..Default::default() };
+        let s = Summary {
+            rms: Some(0.25),
+            threads: Some(2),
+            ..Default::default()
+        };
         assert_eq!(s.json(), r#"{"rms":0.25,"threads":2}"#);
     }
 
@@ -189,6 +208,9 @@ mod tests {
             notes: vec!["2 points merged".into()],
             ..Default::default()
         };
-        assert_eq!(s.table(), "input      34 834\nerror rms  0.2500 mm\nnote: 2 points merged");
+        assert_eq!(
+            s.table(),
+            "input      34 834\nerror rms  0.2500 mm\nnote: 2 points merged"
+        );
     }
 }

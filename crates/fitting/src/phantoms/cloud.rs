@@ -92,8 +92,8 @@ fn project(field: &dyn Field, start: DVec3, band: f64) -> Option<(DVec3, DVec3)>
         let (f, g) = field.value_gradient(x);
         let g2 = g.length_squared();
         let step = g * (f / g2);
-        // Also false for NaN, where the gradient vanishes.
-        if !(step.length() <= 2.0 * band) {
+        // Not a number where the gradient vanishes.
+        if step.length().is_nan() || step.length() > 2.0 * band {
             return None;
         }
         x -= step;
