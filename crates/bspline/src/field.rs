@@ -34,7 +34,10 @@ impl Aabb {
         let half = self.size() * 0.5;
         let m = map.matrix3;
         let reach = m.x_axis.abs() * half.x + m.y_axis.abs() * half.y + m.z_axis.abs() * half.z;
-        let slack = (center.abs() + reach) * (8.0 * f64::EPSILON);
+        // Terms that cancel in `center` have rounded all the same.
+        let c = self.center().abs();
+        let terms = m.x_axis.abs() * c.x + m.y_axis.abs() * c.y + m.z_axis.abs() * c.z;
+        let slack = (terms + map.translation.abs() + reach) * (8.0 * f64::EPSILON);
         Self {
             min: center - reach - slack,
             max: center + reach + slack,

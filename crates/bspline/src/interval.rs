@@ -48,6 +48,15 @@ impl Interval {
         }
     }
 
+    /// What both allow: sound if both are. If rounding has left nothing between them, the gap itself.
+    pub fn intersection(self, other: Self) -> Self {
+        let (a, b) = (self.lo.max(other.lo), self.hi.min(other.hi));
+        Self {
+            lo: a.min(b),
+            hi: a.max(b),
+        }
+    }
+
     /// `{ min(a, b) }`.
     pub fn min(self, other: Self) -> Self {
         Self {

@@ -6,14 +6,23 @@
 //!
 //! Index order is `(x, y, z)` with `z` fastest in memory, everywhere in this crate.
 
+pub mod basis;
+pub mod csg;
 pub mod cubic;
 mod field;
 pub mod hierarchical;
 mod interval;
+pub mod knots;
 pub mod polygonize;
+pub mod primitives;
 mod real;
+pub mod restrict;
 
+pub use basis::Basis;
+pub use csg::{Csg, CsgError};
 pub use field::{Aabb, Field, Frame, Jet};
 pub use hierarchical::HierarchicalSpline;
 pub use interval::Interval;
+pub use knots::{KnotError, KnotVector};
+pub use primitives::{Primitive, PrimitiveError};
 pub use real::Real;

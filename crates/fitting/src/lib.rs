@@ -1,8 +1,9 @@
 //! Samples in, field out.
 
-pub mod budget;
+mod budget;
 pub mod phantoms;
-pub mod report;
+pub mod points;
+mod report;
 
 pub use budget::{Cancel, Control, Progress};
 pub use report::{FitReport, Leaf, StopReason};

@@ -21,10 +21,7 @@ const BUFFER: usize = 1 << 17;
 ///
 /// # Errors
 /// I/O, with the path; [`Fault::Directory`].
-pub fn replace(
-    path: &Path,
-    body: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-) -> Result<(), FormatError> {
+pub fn replace(path: &Path, body: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), FormatError> {
     replace_through(path, |file| file, body).map_err(|fault| fault.at(path))
 }
 
@@ -41,17 +38,22 @@ pub(crate) fn replace_through<W: Write>(
     match &old {
         Some(m) if m.is_dir() => return Err(Fault::Directory),
         Some(m) if !m.is_file() => {
-            let file = OpenOptions::new().write(true).open(&target).map_err(fail("opening the output"))?;
+            let file = OpenOptions::new()
+                .write(true)
+                .open(&target)
+                .map_err(fail("opening the output"))?;
             return write_all(through(file), body).map_err(fail("writing"));
         }
         _ => {}
     }
-    let temporary = temporary_in(&target, old.map(|m| m.permissions())).map_err(fail("creating the output"))?;
+    let temporary =
+        temporary_in(&target, old.map(|m| m.permissions())).map_err(fail("creating the output"))?;
     let (file, name) = temporary.into_parts();
     let sync = file.try_clone().map_err(fail("creating the output"))?;
     write_all(through(file), body).map_err(fail("writing"))?;
     sync.sync_all().map_err(fail("writing"))?;
-    name.persist(&target).map_err(|e| fail("renaming the output")(e.error))?;
+    name.persist(&target)
+        .map_err(|e| fail("renaming the output")(e.error))?;
     // The rename itself reaches the disk with its directory; where that cannot be asked for, it comes later.
     if let Ok(directory) = File::open(directory_of(&target)) {
         let _ = directory.sync_all();
@@ -125,7 +127,11 @@ pub(crate) mod tests {
         fs::write(&path, "the old file").unwrap();
         for room in 0.. {
             let result = replace_through(&path, |file| Fills { inner: file, room }, &body);
-            assert_eq!(fs::read_dir(&directory).unwrap().count(), 1, "a temporary file is left");
+            assert_eq!(
+                fs::read_dir(&directory).unwrap().count(),
+                1,
+                "a temporary file is left"
+            );
             match result {
                 Ok(()) => {
                     assert_eq!(fs::metadata(&path).unwrap().len(), room as u64);
@@ -160,7 +166,11 @@ pub(crate) mod tests {
             w.write_all(b"new")?;
             Err(io::Error::other("no more"))
         });
-        assert!(e.unwrap_err().to_string().contains("out: writing failed: no more"));
+        assert!(
+            e.unwrap_err()
+                .to_string()
+                .contains("out: writing failed: no more")
+        );
         let caught = std::panic::catch_unwind(|| replace(&path, |_| panic!("writer broke")));
         assert!(caught.is_err());
         assert_eq!(fs::read(&path).unwrap(), b"old");

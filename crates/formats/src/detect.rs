@@ -56,7 +56,10 @@ pub fn detect(path: &Path) -> Result<Kind, FormatError> {
     let look = || {
         let mut input = input::open(path)?;
         let mut head = Vec::with_capacity(LOOK);
-        (&mut input.source).take(LOOK as u64).read_to_end(&mut head).map_err(read_fault)?;
+        (&mut input.source)
+            .take(LOOK as u64)
+            .read_to_end(&mut head)
+            .map_err(read_fault)?;
         kind_of(&head, path)
     };
     look().map_err(|fault| fault.at(path))
@@ -88,17 +91,24 @@ pub(crate) fn kind_of(head: &[u8], path: &Path) -> Result<Kind, Fault> {
             purpose: "input",
             supported: SUPPORTED,
         }),
-        other => {
-            Err(Fault::UnknownKind { found: format!(".{other}"), purpose: "input", supported: SUPPORTED })
-        }
+        other => Err(Fault::UnknownKind {
+            found: format!(".{other}"),
+            purpose: "input",
+            supported: SUPPORTED,
+        }),
     }
 }
 
 /// Extension in lower case, the one before `.gz` if there is one.
 pub(crate) fn extension(path: &Path) -> String {
-    let name = path.file_name().map(|n| n.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    let name = path
+        .file_name()
+        .map(|n| n.to_string_lossy().to_ascii_lowercase())
+        .unwrap_or_default();
     let name = name.strip_suffix(".gz").unwrap_or(&name);
-    name.rsplit_once('.').map(|(_, e)| e.to_owned()).unwrap_or_default()
+    name.rsplit_once('.')
+        .map(|(_, e)| e.to_owned())
+        .unwrap_or_default()
 }
 
 /// Whether a name ends in `.gz`.
@@ -113,14 +123,23 @@ mod tests {
     #[test]
     fn content_wins_over_the_name_and_the_name_over_nothing() {
         let kind = |head: &[u8], name: &str| kind_of(head, Path::new(name));
-        assert_eq!(kind(b"ply\nformat", "scan.obj").unwrap(), Kind::Cloud(PointFormat::Ply));
+        assert_eq!(
+            kind(b"ply\nformat", "scan.obj").unwrap(),
+            Kind::Cloud(PointFormat::Ply)
+        );
         assert_eq!(kind(&field::MAGIC, "x").unwrap(), Kind::Field);
-        assert_eq!(kind(b"v 1 2 3", "a.OBJ.gz").unwrap(), Kind::Cloud(PointFormat::Obj));
+        assert_eq!(
+            kind(b"v 1 2 3", "a.OBJ.gz").unwrap(),
+            Kind::Cloud(PointFormat::Obj)
+        );
         assert_eq!(kind(b"1 2 3", "a.b.csv").unwrap(), Kind::Cloud(PointFormat::Xyz));
         assert!(matches!(kind(b"", "a.ply"), Err(Fault::Empty)));
         for name in ["scan.las", "scan", "scan.gz"] {
             let e = kind(b"LASF", name).unwrap_err().to_string();
-            assert!(e.contains(".ply") && e.contains(".nii") && e.contains(".iclay"), "{e}");
+            assert!(
+                e.contains(".ply") && e.contains(".nii") && e.contains(".iclay"),
+                "{e}"
+            );
         }
     }
 }

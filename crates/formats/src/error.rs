@@ -127,11 +127,18 @@ impl std::fmt::Display for Place {
 impl Fault {
     /// Adds the file's name.
     pub fn at(self, path: &Path) -> FormatError {
-        FormatError { path: path.to_path_buf(), fault: self }
+        FormatError {
+            path: path.to_path_buf(),
+            fault: self,
+        }
     }
 
     pub(crate) fn line(line: u64, what: impl Into<String>, remedy: &'static str) -> Self {
-        Self::Syntax { place: Place::Line(line), what: what.into(), remedy }
+        Self::Syntax {
+            place: Place::Line(line),
+            what: what.into(),
+            remedy,
+        }
     }
 }
 

@@ -54,22 +54,36 @@ pub(crate) fn open(path: &Path) -> Result<Input, Fault> {
     if !meta.is_file() {
         // A pipe cannot be rewound after a look at its first bytes.
         let source = Source::Plain(BufReader::with_capacity(1 << 16, file));
-        return Ok(Input { source, length_hint: 0, length_bound: None });
+        return Ok(Input {
+            source,
+            length_hint: 0,
+            length_bound: None,
+        });
     }
     let mut magic = [0; 2];
     let gzip = meta.len() >= 18 && file.read_exact(&mut magic).is_ok() && magic == GZIP_MAGIC;
     let (mut length, mut bound) = (meta.len(), meta.len());
     if gzip {
         let mut tail = [0; 4];
-        file.seek(SeekFrom::End(-4)).and_then(|_| file.read_exact(&mut tail)).map_err(io_fault("reading"))?;
+        file.seek(SeekFrom::End(-4))
+            .and_then(|_| file.read_exact(&mut tail))
+            .map_err(io_fault("reading"))?;
         // Deflate cannot blow a byte up to more than 1032.
         bound = meta.len().saturating_mul(1032);
         length = u64::from(u32::from_le_bytes(tail)).min(bound);
     }
     file.seek(SeekFrom::Start(0)).map_err(io_fault("reading"))?;
     let plain = BufReader::with_capacity(1 << 16, file);
-    let source = if gzip { Source::Gzip(Box::new(MultiGzDecoder::new(plain))) } else { Source::Plain(plain) };
-    Ok(Input { source, length_hint: length, length_bound: Some(bound) })
+    let source = if gzip {
+        Source::Gzip(Box::new(MultiGzDecoder::new(plain)))
+    } else {
+        Source::Plain(plain)
+    };
+    Ok(Input {
+        source,
+        length_hint: length,
+        length_bound: Some(bound),
+    })
 }
 
 impl Input {
@@ -79,7 +93,9 @@ impl Input {
         if let Source::Plain(_) = self.source {
             // Known before a byte is read, so that a large file is refused at once.
             if self.length_hint > limit {
-                return budget.reserve("the file's content", self.length_hint, 1).map(|()| Vec::new());
+                return budget
+                    .reserve("the file's content", self.length_hint, 1)
+                    .map(|()| Vec::new());
             }
         }
         // The hint of a gzip file is a claim: trusted up to a size that does no harm, then doubled.
@@ -115,12 +131,12 @@ impl Input {
 /// What an error while reading content means: the gzip decoder reports cuts and damage as I/O errors.
 pub(crate) fn read_fault(source: io::Error) -> Fault {
     match source.kind() {
-        io::ErrorKind::UnexpectedEof => {
-            Fault::Damaged { what: "it ends too early, before the end of its content".into() }
-        }
-        io::ErrorKind::InvalidInput | io::ErrorKind::InvalidData => {
-            Fault::Damaged { what: format!("the gzip stream does not hold ({source})") }
-        }
+        io::ErrorKind::UnexpectedEof => Fault::Damaged {
+            what: "it ends too early, before the end of its content".into(),
+        },
+        io::ErrorKind::InvalidInput | io::ErrorKind::InvalidData => Fault::Damaged {
+            what: format!("the gzip stream does not hold ({source})"),
+        },
         _ => io_fault("reading")(source),
     }
 }

@@ -22,14 +22,21 @@ pub(crate) struct Budget {
 
 impl Budget {
     pub fn new(limits: &ReadLimits) -> Self {
-        Self { limit: limits.max_bytes, used: 0 }
+        Self {
+            limit: limits.max_bytes,
+            used: 0,
+        }
     }
 
     /// Books `count` items of `size` bytes before they are allocated.
     pub fn reserve(&mut self, what: &'static str, count: u64, size: usize) -> Result<(), Fault> {
         let needed = self.used.saturating_add(count.saturating_mul(size as u64));
         if needed > self.limit {
-            return Err(Fault::Limit { what, needed, limit: self.limit });
+            return Err(Fault::Limit {
+                what,
+                needed,
+                limit: self.limit,
+            });
         }
         self.used = needed;
         Ok(())
@@ -50,7 +57,10 @@ pub(crate) struct Counted<T> {
 
 impl<T> Counted<T> {
     pub fn new(what: &'static str) -> Self {
-        Self { items: Vec::new(), what }
+        Self {
+            items: Vec::new(),
+            what,
+        }
     }
 
     pub fn push(&mut self, item: T, budget: &mut Budget) -> Result<(), Fault> {
@@ -75,7 +85,14 @@ mod tests {
         b.reserve("a", 10, 8).unwrap();
         assert_eq!(b.left(), 20);
         b.reserve("b", 20, 1).unwrap();
-        assert!(matches!(b.reserve("c", 1, 1), Err(Fault::Limit { needed: 101, limit: 100, .. })));
+        assert!(matches!(
+            b.reserve("c", 1, 1),
+            Err(Fault::Limit {
+                needed: 101,
+                limit: 100,
+                ..
+            })
+        ));
         assert!(b.reserve("c", u64::MAX, 8).is_err());
     }
 
@@ -83,7 +100,9 @@ mod tests {
     fn a_counted_vector_cannot_outgrow_its_budget() {
         let mut b = Budget::new(&ReadLimits { max_bytes: 8 * 1000 });
         let mut v = Counted::new("points");
-        let pushed = (0..10_000).take_while(|i| v.push(*i as u64, &mut b).is_ok()).count();
+        let pushed = (0..10_000)
+            .take_while(|i| v.push(*i as u64, &mut b).is_ok())
+            .count();
         assert_eq!(pushed, 512);
         assert!(v.items.capacity() * 8 <= 8000);
     }

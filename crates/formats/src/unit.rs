@@ -32,9 +32,15 @@ impl Unit {
 
     /// The unit stored under `code`, the number of its variant.
     pub fn from_code(code: u8) -> Option<Self> {
-        [Self::Unknown, Self::Micrometre, Self::Millimetre, Self::Centimetre, Self::Metre]
-            .into_iter()
-            .find(|u| *u as u8 == code)
+        [
+            Self::Unknown,
+            Self::Micrometre,
+            Self::Millimetre,
+            Self::Centimetre,
+            Self::Metre,
+        ]
+        .into_iter()
+        .find(|u| *u as u8 == code)
     }
 
     /// Symbol: `mm`, `cm`, `m`, `um`, or `file unit`.

@@ -2,8 +2,9 @@
 
 use glam::DVec3;
 
-use super::brick::{BRICK, Brick, HALO, NONE};
+use super::brick::{BRICK, Brick, NONE};
 use super::spline::HierarchicalSpline;
+use crate::restrict::{RestrictedAxis, restricted_range};
 use crate::{Aabb, Interval, Real};
 
 /// Interval of the field over a box given in lattice coordinates.
@@ -19,6 +20,7 @@ pub(super) fn over_lattice_box<T: Real>(spline: &HierarchicalSpline<T>, b: &Aabb
     let mut hull = Hull {
         lo: f64::INFINITY,
         hi: f64::NEG_INFINITY,
+        magnitude: 0.0,
     };
     let counts = spline.lattice().cells.map(|n| n.div_ceil(BRICK as u32));
     let range = |a: usize| {
@@ -33,16 +35,17 @@ pub(super) fn over_lattice_box<T: Real>(spline: &HierarchicalSpline<T>, b: &Aabb
             }
         }
     }
-    // What evaluation in T can add: 4 + 4 + 4 products and sums on each of three axes, and the weights' own
-    // rounding, relative to the largest coefficient in play.
-    let magnitude = hull.lo.abs().max(hull.hi.abs());
-    let interval = Interval::new(hull.lo, hull.hi).widened(64.0 * T::UNIT_ROUND_OFF * magnitude);
+    // Rounding of the restriction, and of evaluation in T, both against the largest coefficient in play.
+    let rounding = (64.0 * T::UNIT_ROUND_OFF + 3.0 * RestrictedAxis::<T>::axis_error()) * hull.magnitude;
+    let interval = Interval::new(hull.lo, hull.hi).widened(rounding);
     interval - fall(spline, b, &inside)
 }
 
 struct Hull {
     lo: f64,
     hi: f64,
+    /// Largest coefficient of the bricks visited.
+    magnitude: f64,
 }
 
 impl Hull {
@@ -55,52 +58,54 @@ impl Hull {
 /// Adds the range of brick `index` of `level`, over the part of `b` in it.
 fn visit<T: Real>(spline: &HierarchicalSpline<T>, level: usize, index: usize, b: &Aabb, hull: &mut Hull) {
     let brick = &spline.levels[level][index];
+    let [least, most] = brick.hull.map(T::as_f64);
+    hull.magnitude = hull.magnitude.max(least.abs()).max(most.abs());
     let width = BRICK as f64 / (1u64 << level) as f64;
     let corner = DVec3::from_array(brick.key.0.map(|k| k as f64 * width));
     let end = (corner + width).min(spline.lattice().extent());
-    if b.min.cmple(corner).all() && b.max.cmpge(end).all() {
-        return hull.add(brick.hull.map(T::as_f64));
+    let Some(part) = shared(b, corner, end) else {
+        return;
+    };
+    if part.min == corner && part.max == end {
+        return hull.add([least, most]);
     }
     if !brick.has_children() {
-        return hull.add(local_hull(brick, level, b));
+        return hull.add(local_hull(brick, level, &part));
     }
     for octant in 0..8usize {
-        let low = corner
-            + DVec3::from_array(std::array::from_fn(|a| {
-                (octant >> (2 - a) & 1) as f64 * width / 2.0
-            }));
-        let part = Aabb {
-            min: b.min.max(low),
-            max: b.max.min((low + width / 2.0).min(end)),
-        };
-        if !part.min.cmple(part.max).all() {
+        if let child @ 0..NONE = brick.children[octant] {
+            visit(spline, level + 1, child as usize, b, hull);
             continue;
         }
-        match brick.children[octant] {
-            NONE => hull.add(local_hull(brick, level, &part)),
-            child => visit(spline, level + 1, child as usize, &part, hull),
+        let half = |a: usize| (octant >> (2 - a) & 1) as f64 * width / 2.0;
+        let low = corner + DVec3::from_array(std::array::from_fn(half));
+        if let Some(part) = shared(b, low, (low + width / 2.0).min(end)) {
+            hull.add(local_hull(brick, level, &part));
         }
     }
 }
 
-/// Hull of the coefficients that the cells of `b` in the brick read.
+/// The part of `b` between `low` and `high`. None where they share just a face, which the brick on its other side
+/// covers as well (the field is continuous), unless `b` is no thicker than that itself.
+fn shared(b: &Aabb, low: DVec3, high: DVec3) -> Option<Aabb> {
+    let part = Aabb {
+        min: b.min.max(low),
+        max: b.max.min(high),
+    };
+    let thick =
+        (0..3).all(|a| part.min[a] < part.max[a] || (part.min[a] == part.max[a] && b.min[a] == b.max[a]));
+    thick.then_some(part)
+}
+
+/// Range of the brick's coefficients after restriction to its part of `b`.
 fn local_hull<T: Real>(brick: &Brick<T>, level: usize, b: &Aabb) -> [f64; 2] {
     let scale = (1u64 << level) as f64;
-    let range = |a: usize| {
+    let axes = std::array::from_fn(|a| {
         let first = (BRICK as u32 * brick.key.0[a]) as f64;
-        let cell = |q: f64| (q * scale - first).clamp(0.0, BRICK as f64 - 1.0) as usize;
-        cell(b.min[a])..cell(b.max[a]) + 4
-    };
-    let (mut lo, mut hi) = (T::infinity(), T::neg_infinity());
-    for x in range(0) {
-        for y in range(1) {
-            let row = (x * HALO + y) * HALO;
-            for c in &brick.totals[row + range(2).start..row + range(2).end] {
-                lo = lo.min(*c);
-                hi = hi.max(*c);
-            }
-        }
-    }
+        let local = |q: f64| (q * scale - first).clamp(0.0, BRICK as f64);
+        RestrictedAxis::new(local(b.min[a]), local(b.max[a]))
+    });
+    let (lo, hi) = restricted_range(&brick.totals, &axes);
     [lo.as_f64(), hi.as_f64()]
 }
 

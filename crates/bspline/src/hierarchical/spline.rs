@@ -138,6 +138,17 @@ impl<T: Real> HierarchicalSpline<T> {
         hash.finalize().into()
     }
 
+    /// Bound on what rounding can do to one evaluation of the value inside the box.
+    ///
+    /// 4 + 4 + 4 products and sums, and the rounding of the weights, against the largest coefficient.
+    pub fn rounding_bound(&self) -> f64 {
+        let largest = self.levels[0]
+            .iter()
+            .map(|b| b.hull[0].as_f64().abs().max(b.hull[1].as_f64().abs()))
+            .fold(0.0, f64::max);
+        64.0 * T::UNIT_ROUND_OFF * largest
+    }
+
     /// Where lattice point `q`, inside the box, is evaluated: in the finest brick that covers it.
     #[inline]
     pub(super) fn place(&self, q: DVec3) -> Place<'_, T> {
@@ -264,15 +275,6 @@ impl<T: Real> Field for HierarchicalSpline<T> {
     }
 
     fn frame_bounds(&self, frame: &Frame, lo: [i64; 3], hi: [i64; 3]) -> Interval {
-        let v = |a: [i64; 3]| DVec3::new(a[0] as f64, a[1] as f64, a[2] as f64);
-        let lattice_from_grid = self.lattice_from_world * frame.world_from_grid;
-        bounds::over_lattice_box(
-            self,
-            &Aabb {
-                min: v(lo),
-                max: v(hi),
-            }
-            .transformed(&lattice_from_grid),
-        )
+        bounds::over_lattice_box(self, &grid::lattice_box(self, frame, lo, hi))
     }
 }

@@ -41,13 +41,21 @@ impl MeshFormat {
     /// # Errors
     /// [`Fault::UnknownKind`] with what is supported.
     pub fn from_path(path: &Path) -> Result<Self, FormatError> {
-        let extension = if detect::is_gz_name(path) { "gz".into() } else { detect::extension(path) };
+        let extension = if detect::is_gz_name(path) {
+            "gz".into()
+        } else {
+            detect::extension(path)
+        };
         match extension.as_str() {
             "ply" => Ok(Self::Ply),
             "stl" => Ok(Self::Stl),
             "obj" => Ok(Self::Obj),
             other => Err(Fault::UnknownKind {
-                found: if other.is_empty() { "a name without an extension".into() } else { format!(".{other}") },
+                found: if other.is_empty() {
+                    "a name without an extension".into()
+                } else {
+                    format!(".{other}")
+                },
                 purpose: "mesh output",
                 supported: ".ply, .stl and .obj",
             }
@@ -70,9 +78,18 @@ impl MeshFormat {
 pub fn save(path: &Path, mesh: &Mesh) -> Result<Vec<String>, FormatError> {
     let format = MeshFormat::from_path(path)?;
     if mesh.vertices.len() > i32::MAX as usize || mesh.triangles.len() > u32::MAX as usize {
-        let value = format!("{} vertices and {} triangles", mesh.vertices.len(), mesh.triangles.len());
+        let value = format!(
+            "{} vertices and {} triangles",
+            mesh.vertices.len(),
+            mesh.triangles.len()
+        );
         let remedy = "mesh at a lower resolution";
-        return Err(Fault::Output { what: "a mesh", value, remedy }.at(path));
+        return Err(Fault::Output {
+            what: "a mesh",
+            value,
+            remedy,
+        }
+        .at(path));
     }
     atomic::replace(path, |out| write(out, mesh, format))?;
     let mut notes = Vec::new();
@@ -97,8 +114,14 @@ pub fn save(path: &Path, mesh: &Mesh) -> Result<Vec<String>, FormatError> {
 pub fn write(out: &mut dyn Write, mesh: &Mesh, format: MeshFormat) -> io::Result<()> {
     let count = mesh.vertices.len();
     let largest = mesh.triangles.iter().flatten().copied().max();
-    assert!(largest.is_none_or(|v| (v as usize) < count), "vertex index {largest:?} with {count} vertices");
-    assert!(mesh.colors.is_none_or(|c| c.len() == count), "one colour per vertex");
+    assert!(
+        largest.is_none_or(|v| (v as usize) < count),
+        "vertex index {largest:?} with {count} vertices"
+    );
+    assert!(
+        mesh.colors.is_none_or(|c| c.len() == count),
+        "one colour per vertex"
+    );
     match format {
         MeshFormat::Ply => ply::write(out, mesh),
         MeshFormat::Stl => stl::write(out, mesh),
@@ -108,8 +131,12 @@ pub fn write(out: &mut dyn Write, mesh: &Mesh, format: MeshFormat) -> io::Result
 
 /// Whether rounding to `f32` moves a vertex by more than a millionth of the diagonal.
 fn needs_double(vertices: &[DVec3]) -> bool {
-    let Some(first) = vertices.first() else { return false };
-    let (min, max) = vertices.iter().fold((*first, *first), |(lo, hi), v| (lo.min(*v), hi.max(*v)));
+    let Some(first) = vertices.first() else {
+        return false;
+    };
+    let (min, max) = vertices
+        .iter()
+        .fold((*first, *first), |(lo, hi), v| (lo.min(*v), hi.max(*v)));
     let furthest = min.abs().max(max.abs()).max_element();
     furthest * f64::from(f32::EPSILON) * 0.5 > 1e-6 * (max - min).length()
 }

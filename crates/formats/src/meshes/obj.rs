@@ -13,7 +13,11 @@ pub(super) fn write(out: &mut dyn Write, mesh: &Mesh) -> io::Result<()> {
         bytes.push(b'v');
         for x in p.to_array() {
             bytes.push(b' ');
-            let text = if double { digits.format(x) } else { digits.format(x as f32) };
+            let text = if double {
+                digits.format(x)
+            } else {
+                digits.format(x as f32)
+            };
             bytes.extend_from_slice(text.as_bytes());
         }
         bytes.push(b'\n');

@@ -22,8 +22,16 @@ pub fn save_points(
     colors: Option<&[[u8; 3]]>,
 ) -> Result<(), FormatError> {
     if detect::extension(path) != "ply" || detect::is_gz_name(path) {
-        let found = path.extension().map(|e| format!(".{}", e.to_string_lossy())).unwrap_or_default();
-        return Err(Fault::UnknownKind { found, purpose: "point output", supported: ".ply" }.at(path));
+        let found = path
+            .extension()
+            .map(|e| format!(".{}", e.to_string_lossy()))
+            .unwrap_or_default();
+        return Err(Fault::UnknownKind {
+            found,
+            purpose: "point output",
+            supported: ".ply",
+        }
+        .at(path));
     }
     atomic::replace(path, |out| write_vertices(out, points, normals, colors, None))
 }
@@ -49,17 +57,30 @@ fn write_vertices(
     colors: Option<&[[u8; 3]]>,
     faces: Option<usize>,
 ) -> io::Result<()> {
-    assert!(normals.is_none_or(|n| n.len() == points.len()), "one normal per point");
-    assert!(colors.is_none_or(|c| c.len() == points.len()), "one colour per point");
+    assert!(
+        normals.is_none_or(|n| n.len() == points.len()),
+        "one normal per point"
+    );
+    assert!(
+        colors.is_none_or(|c| c.len() == points.len()),
+        "one colour per point"
+    );
     let double = needs_double(points);
     let kind = if double { "double" } else { "float" };
-    write!(out, "ply\nformat binary_little_endian 1.0\ncomment isoclay\nelement vertex {}\n", points.len())?;
+    write!(
+        out,
+        "ply\nformat binary_little_endian 1.0\ncomment isoclay\nelement vertex {}\n",
+        points.len()
+    )?;
     write!(out, "property {kind} x\nproperty {kind} y\nproperty {kind} z\n")?;
     if normals.is_some() {
         write!(out, "property float nx\nproperty float ny\nproperty float nz\n")?;
     }
     if colors.is_some() {
-        write!(out, "property uchar red\nproperty uchar green\nproperty uchar blue\n")?;
+        write!(
+            out,
+            "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+        )?;
     }
     if let Some(n) = faces {
         write!(out, "element face {n}\nproperty list uchar int vertex_indices\n")?;

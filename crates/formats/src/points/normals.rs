@@ -14,11 +14,25 @@ use crate::limits::Budget;
 /// # Errors
 /// [`Fault::Value`] if no point is left.
 pub(super) fn finish(raw: RawCloud, budget: &mut Budget) -> Result<PointCloud, Fault> {
-    let RawCloud { mut positions, normals, triangles, corner_normals, face_count, short_faces, notes } = raw;
+    let RawCloud {
+        mut positions,
+        normals,
+        triangles,
+        corner_normals,
+        face_count,
+        short_faces,
+        notes,
+    } = raw;
     let file_count = positions.len();
     let has_faces = face_count > 0;
     let invalid_dropped = positions.iter().filter(|p| !p.is_finite()).count();
-    let mut cloud = PointCloud { file_count, face_count, invalid_dropped, notes, ..Default::default() };
+    let mut cloud = PointCloud {
+        file_count,
+        face_count,
+        invalid_dropped,
+        notes,
+        ..Default::default()
+    };
 
     let mut normals = normals;
     if has_faces {
@@ -57,10 +71,15 @@ pub(super) fn finish(raw: RawCloud, budget: &mut Budget) -> Result<PointCloud, F
             (true, None) => NormalSource::Faces,
             _ => NormalSource::Stored,
         };
-        cloud.unused_vertices =
-            positions.iter().zip(&is_used).filter(|(p, used)| p.is_finite() && !**used).count();
+        cloud.unused_vertices = positions
+            .iter()
+            .zip(&is_used)
+            .filter(|(p, used)| p.is_finite() && !**used)
+            .count();
         if cloud.unused_vertices + invalid_dropped > 0 {
-            keep(&mut positions, normals.as_mut(), |v, p| is_used[v] && p.is_finite());
+            keep(&mut positions, normals.as_mut(), |v, p| {
+                is_used[v] && p.is_finite()
+            });
         }
     } else {
         if normals.is_some() {
@@ -102,7 +121,10 @@ fn add_corners(
     own: Option<([u32; 3], &Vec<DVec3>)>,
 ) {
     for i in 0..3 {
-        let (u, w) = (corners[(i + 1) % 3] - corners[i], corners[(i + 2) % 3] - corners[i]);
+        let (u, w) = (
+            corners[(i + 1) % 3] - corners[i],
+            corners[(i + 2) % 3] - corners[i],
+        );
         // |u × w| is twice the area at every corner; the arctangent keeps its digits for thin triangles, the
         // arccosine does not.
         let angle = double_area.atan2(u.dot(w));
@@ -124,9 +146,9 @@ fn unit_or_zero(n: DVec3) -> DVec3 {
     if squared > 1e-200 && squared < 1e200 {
         return n / squared.sqrt();
     }
-    // Twice, because 1/largest itself overflows for subnormal numbers.
-    let scaled = (n * (f64::MAX.sqrt().min(1.0 / largest.max(f64::MIN_POSITIVE)))).normalize_or_zero();
-    if scaled.is_finite() { scaled } else { DVec3::ZERO }
+    // A power of two is exact; this one brings every double to where its square is a normal number.
+    let scale = 2f64.powi(if largest < 1.0 { 600 } else { -600 });
+    (n * scale).normalize()
 }
 
 fn keep(positions: &mut Vec<DVec3>, normals: Option<&mut Vec<DVec3>>, wanted: impl Fn(usize, DVec3) -> bool) {
@@ -156,7 +178,10 @@ fn note_repairs(cloud: &mut PointCloud) {
         ));
     }
     if cloud.unused_vertices > 0 {
-        cloud.notes.push(format!("{} of {total} vertices are used by no face; left out", cloud.unused_vertices));
+        cloud.notes.push(format!(
+            "{} of {total} vertices are used by no face; left out",
+            cloud.unused_vertices
+        ));
     }
     if cloud.degenerate_faces > 0 {
         cloud.notes.push(format!(
@@ -184,17 +209,33 @@ mod tests {
 
     /// Octahedron: by symmetry the normal of each vertex points away from the centre.
     fn octahedron() -> RawCloud {
-        let positions = vec![DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
+        let positions = vec![
+            DVec3::X,
+            DVec3::NEG_X,
+            DVec3::Y,
+            DVec3::NEG_Y,
+            DVec3::Z,
+            DVec3::NEG_Z,
+        ];
         let mut triangles = Vec::new();
         for x in 0..2u32 {
             for y in 0..2 {
                 for z in 0..2 {
                     let [a, b, c] = [x, 2 + y, 4 + z];
-                    triangles.push(if (x + y + z) % 2 == 0 { [a, b, c] } else { [a, c, b] });
+                    triangles.push(if (x + y + z) % 2 == 0 {
+                        [a, b, c]
+                    } else {
+                        [a, c, b]
+                    });
                 }
             }
         }
-        RawCloud { positions, face_count: triangles.len(), triangles, ..Default::default() }
+        RawCloud {
+            positions,
+            face_count: triangles.len(),
+            triangles,
+            ..Default::default()
+        }
     }
 
     #[test]
@@ -216,7 +257,14 @@ mod tests {
                 triangles = vec![[0, 1, 4], [0, 4, 2], [0, 2, 3], [0, 3, 1]];
             }
             let face_count = triangles.len();
-            clean(RawCloud { positions, triangles, face_count, ..Default::default() }).normals.unwrap()[0]
+            clean(RawCloud {
+                positions,
+                triangles,
+                face_count,
+                ..Default::default()
+            })
+            .normals
+            .unwrap()[0]
         };
         assert!((corner(false) - corner(true)).length() < 1e-15);
         assert!((corner(false) - DVec3::ONE.normalize()).length() < 1e-15);
@@ -232,7 +280,14 @@ mod tests {
         raw.face_count += 2;
         let cloud = clean(raw);
         assert_eq!(cloud.positions.len(), 6);
-        assert_eq!((cloud.unused_vertices, cloud.invalid_dropped, cloud.degenerate_faces), (1, 1, 1));
+        assert_eq!(
+            (
+                cloud.unused_vertices,
+                cloud.invalid_dropped,
+                cloud.degenerate_faces
+            ),
+            (1, 1, 1)
+        );
         assert_eq!(cloud.notes.len(), 3);
         assert_eq!(cloud.file_count, 8);
     }
@@ -241,19 +296,33 @@ mod tests {
     fn zero_and_nan_normals_become_zero_and_are_counted() {
         let cloud = clean(RawCloud {
             positions: vec![DVec3::ZERO; 4],
-            normals: Some(vec![DVec3::ZERO, DVec3::NAN, DVec3::splat(1e-320), DVec3::new(0.0, 3.0, 4.0)]),
+            normals: Some(vec![
+                DVec3::ZERO,
+                DVec3::NAN,
+                DVec3::splat(1e-320),
+                DVec3::new(0.0, 3.0, 4.0),
+            ]),
             ..Default::default()
         });
         assert_eq!(cloud.zero_normals, 2);
         let n = cloud.normals.unwrap();
-        assert!((n[2].length() - 1.0).abs() < 1e-3, "a subnormal direction is still one: {}", n[2]);
+        assert!(
+            (n[2].length() - 1.0).abs() < 1e-3,
+            "a subnormal direction is still one: {}",
+            n[2]
+        );
         assert!((n[3] - DVec3::new(0.0, 0.6, 0.8)).length() < 1e-15);
     }
 
     #[test]
     fn a_cloud_of_nan_alone_is_an_error() {
-        let raw = RawCloud { positions: vec![DVec3::NAN; 3], ..Default::default() };
-        let e = finish(raw, &mut Budget::new(&ReadLimits::default())).unwrap_err().to_string();
+        let raw = RawCloud {
+            positions: vec![DVec3::NAN; 3],
+            ..Default::default()
+        };
+        let e = finish(raw, &mut Budget::new(&ReadLimits::default()))
+            .unwrap_err()
+            .to_string();
         assert!(e.contains("0 of 3"), "{e}");
     }
 }

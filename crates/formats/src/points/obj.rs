@@ -20,7 +20,8 @@ pub fn parse_obj(bytes: &[u8], limits: &ReadLimits) -> Result<PointCloud, Fault>
     parse(bytes, &mut Budget::new(limits))
 }
 
-const INDEX_REMEDY: &str = "indices count from 1, or from -1 backwards, and stay within what the file defines";
+const INDEX_REMEDY: &str =
+    "indices count from 1, or from -1 backwards, and stay within what the file defines";
 
 pub(super) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<PointCloud, Fault> {
     if bytes.is_empty() {
@@ -87,7 +88,10 @@ pub(super) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<PointCloud, Fau
             _ => {}
         }
     }
-    for (i, defined) in [positions.items.len(), vertex_normals.items.len()].into_iter().enumerate() {
+    for (i, defined) in [positions.items.len(), vertex_normals.items.len()]
+        .into_iter()
+        .enumerate()
+    {
         let (needed, line) = furthest[i];
         if needed as usize > defined {
             let what = ["vertex", "normal"][i];
@@ -151,7 +155,11 @@ fn corner(word: &[u8], defined: [usize; 2], line: u64) -> Result<[u32; 2], Fault
     };
     match (vertex, normal) {
         (Some(v), Some(n)) => Ok([v, n]),
-        _ => Err(Fault::line(line, format!("cannot use the corner {}", excerpt(word)), INDEX_REMEDY)),
+        _ => Err(Fault::line(
+            line,
+            format!("cannot use the corner {}", excerpt(word)),
+            INDEX_REMEDY,
+        )),
     }
 }
 
@@ -207,7 +215,10 @@ mod tests {
             ("v 0 0\n", "line 1: 2 coordinates"),
             ("v 0 0 zero\n", "line 1: \"zero\" is not a number"),
             ("v 0 0 0\nf 1 2 3\n", "line 2: vertex 3 is named, the file has 1"),
-            ("v 0 0 0\nf 1//1 1//1 1//1\n", "line 2: normal 1 is named, the file has 0"),
+            (
+                "v 0 0 0\nf 1//1 1//1 1//1\n",
+                "line 2: normal 1 is named, the file has 0",
+            ),
             ("v 0 0 0\nf 0 1 1\n", "corner \"0\""),
             ("v 0 0 0\nf -2 1 1\n", "corner \"-2\""),
             ("v 0 0 0\nf 1.5 1 1\n", "corner \"1.5\""),

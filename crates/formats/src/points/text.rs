@@ -13,7 +13,11 @@ pub(super) struct Words<'a> {
 
 impl<'a> Words<'a> {
     pub fn new(bytes: &'a [u8], first_line: u64) -> Self {
-        Self { bytes, at: 0, line: first_line }
+        Self {
+            bytes,
+            at: 0,
+            line: first_line,
+        }
     }
 
     /// Bytes not yet read.
@@ -52,7 +56,10 @@ impl<'a> Lines<'a> {
 
     pub fn new(bytes: &'a [u8]) -> Self {
         // Some exporters on Windows put a byte order mark in front.
-        Self { rest: bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes), line: 0 }
+        Self {
+            rest: bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes),
+            line: 0,
+        }
     }
 
     pub fn next(&mut self) -> Option<&'a [u8]> {

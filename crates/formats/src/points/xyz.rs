@@ -45,13 +45,19 @@ pub(super) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<PointCloud, Fau
                 continue;
             }
             if is_column_names(text) {
-                notes.push(format!("line {line}: column names {} were skipped", excerpt(text)));
+                notes.push(format!(
+                    "line {line}: column names {} were skipped",
+                    excerpt(text)
+                ));
                 continue;
             }
         }
         let mut row = [0.0; 6];
         let mut found = 0;
-        for word in text.split(|c| matches!(c, b' ' | b'\t' | b',' | b';')).filter(|w| !w.is_empty()) {
+        for word in text
+            .split(|c| matches!(c, b' ' | b'\t' | b',' | b';'))
+            .filter(|w| !w.is_empty())
+        {
             if found < 6 {
                 row[found] = number(word, line)?;
             }
@@ -87,7 +93,9 @@ pub(super) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<PointCloud, Fau
         });
     }
     if let Some(n) = promised.filter(|n| *n != found as i64) {
-        notes.push(format!("the first line promises {n} points, {found} are there; all were read"));
+        notes.push(format!(
+            "the first line promises {n} points, {found} are there; all were read"
+        ));
     }
     match columns {
         3 => {}
@@ -112,7 +120,9 @@ pub(super) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<PointCloud, Fau
 
 /// Whether a line holds words only, as `X,Y,Z` does.
 fn is_column_names(text: &[u8]) -> bool {
-    let mut words = text.split(|c| matches!(c, b' ' | b'\t' | b',' | b';')).filter(|w| !w.is_empty());
+    let mut words = text
+        .split(|c| matches!(c, b' ' | b'\t' | b',' | b';'))
+        .filter(|w| !w.is_empty());
     words.clone().count() >= 3
         && words.all(|w| {
             w.iter().any(u8::is_ascii_alphabetic)
@@ -141,7 +151,11 @@ mod tests {
             "1 2 3 .5\n4 5 6 .5\n",
         ] {
             let c = read(text).unwrap();
-            assert_eq!(c.positions, [DVec3::new(1., 2., 3.), DVec3::new(4., 5., 6.)], "{text:?}");
+            assert_eq!(
+                c.positions,
+                [DVec3::new(1., 2., 3.), DVec3::new(4., 5., 6.)],
+                "{text:?}"
+            );
             assert_eq!(c.normals, None, "{text:?}");
         }
     }
@@ -151,7 +165,11 @@ mod tests {
         let c = read("1 2 3 0 0 1\n4 5 6 0 0.6 0.8\n").unwrap();
         assert_eq!(c.normals.unwrap()[1], DVec3::new(0., 0.6, 0.8).normalize());
         let c = read("1 2 3 0 0 1\n4 5 6 12 0 0\n").unwrap();
-        assert!(c.normals.is_none() && c.notes[0].contains("line 2"), "{:?}", c.notes);
+        assert!(
+            c.normals.is_none() && c.notes[0].contains("line 2"),
+            "{:?}",
+            c.notes
+        );
         let c = read("1 2 3 0 0 0\n4 5 6 0 0 0\n").unwrap();
         assert_eq!((c.zero_normals, c.normals.unwrap().len()), (2, 2));
     }

@@ -66,7 +66,10 @@ pub(super) fn choose(t: &Transforms, notes: &mut Vec<String>) -> Result<(DAffine
 fn sform(t: &Transforms) -> DAffine3 {
     let r = t.rows.map(|row| DVec3::new(row[0], row[1], row[2]));
     let offset = DVec3::new(t.rows[0][3], t.rows[1][3], t.rows[2][3]);
-    DAffine3 { matrix3: DMat3::from_cols(r[0], r[1], r[2]).transpose(), translation: offset }
+    DAffine3 {
+        matrix3: DMat3::from_cols(r[0], r[1], r[2]).transpose(),
+        translation: offset,
+    }
 }
 
 fn qform(t: &Transforms) -> Option<DAffine3> {
@@ -81,7 +84,10 @@ fn qform(t: &Transforms) -> Option<DAffine3> {
     let [dx, dy, dz] = t.spacing.map(f64::abs);
     let flip = if t.qfac < 0.0 { -1.0 } else { 1.0 };
     let matrix3 = rotation * DMat3::from_diagonal(DVec3::new(dx, dy, dz * flip));
-    Some(DAffine3 { matrix3, translation: DVec3::from_array(t.offset) })
+    Some(DAffine3 {
+        matrix3,
+        translation: DVec3::from_array(t.offset),
+    })
 }
 
 /// Finite, with axes of some length that do not lie in one plane.
@@ -91,7 +97,11 @@ pub(crate) fn is_usable(a: &DAffine3) -> bool {
     if !a.is_finite() || lengths.iter().any(|l| !(l.is_finite() && *l > 1e-100)) {
         return false;
     }
-    let unit = DMat3::from_cols(m.x_axis / lengths[0], m.y_axis / lengths[1], m.z_axis / lengths[2]);
+    let unit = DMat3::from_cols(
+        m.x_axis / lengths[0],
+        m.y_axis / lengths[1],
+        m.z_axis / lengths[2],
+    );
     unit.determinant().abs() >= LEAST_VOLUME
 }
 
@@ -120,14 +130,23 @@ mod tests {
             let (a, o) = choose(t, notes).unwrap();
             (a.transform_point3(p), o)
         };
-        assert_eq!(at(&t, &mut notes), (DVec3::new(-15.0, 9.0, 407.0), Orientation::Sform));
+        assert_eq!(
+            at(&t, &mut notes),
+            (DVec3::new(-15.0, 9.0, 407.0), Orientation::Sform)
+        );
         t.sform_code = 0;
         // A quarter turn about z, third axis mirrored: (x, y, z) -> (-3y, 2x, -4z) + offset.
         let (q, o) = at(&t, &mut notes);
-        assert!((q - DVec3::new(-29.0, 4.0, -397.0)).length() < 1e-12 && o == Orientation::Qform, "{q}");
+        assert!(
+            (q - DVec3::new(-29.0, 4.0, -397.0)).length() < 1e-12 && o == Orientation::Qform,
+            "{q}"
+        );
         assert!(notes.is_empty());
         t.qform_code = 0;
-        assert_eq!(at(&t, &mut notes), (DVec3::new(2.0, 30.0, 400.0), Orientation::Spacings));
+        assert_eq!(
+            at(&t, &mut notes),
+            (DVec3::new(2.0, 30.0, 400.0), Orientation::Spacings)
+        );
         assert_eq!(notes.len(), 1);
     }
 
@@ -140,6 +159,11 @@ mod tests {
         assert_eq!(choose(&t, &mut notes).unwrap().1, Orientation::Spacings);
         assert_eq!(notes.len(), 3);
         t.spacing[1] = 0.0;
-        assert!(choose(&t, &mut notes).unwrap_err().to_string().contains("spacing"));
+        assert!(
+            choose(&t, &mut notes)
+                .unwrap_err()
+                .to_string()
+                .contains("spacing")
+        );
     }
 }

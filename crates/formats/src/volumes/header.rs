@@ -35,10 +35,16 @@ pub(crate) fn looks_like_nifti(head: &[u8]) -> bool {
 /// Header size and endianness from the first four bytes.
 fn sizes(head: &[u8]) -> Option<(usize, bool)> {
     let raw: [u8; 4] = head.get(..4)?.try_into().ok()?;
-    [(SIZE_1, false), (SIZE_2, false), (SIZE_1, true), (SIZE_2, true)].into_iter().find(|(size, big)| {
-        let n = if *big { i32::from_be_bytes(raw) } else { i32::from_le_bytes(raw) };
-        n == *size as i32
-    })
+    [(SIZE_1, false), (SIZE_2, false), (SIZE_1, true), (SIZE_2, true)]
+        .into_iter()
+        .find(|(size, big)| {
+            let n = if *big {
+                i32::from_be_bytes(raw)
+            } else {
+                i32::from_le_bytes(raw)
+            };
+            n == *size as i32
+        })
 }
 
 /// Numbers at byte offsets.
@@ -50,8 +56,14 @@ struct Bytes<'a> {
 macro_rules! getter {
     ($name:ident, $t:ty) => {
         fn $name(&self, at: usize) -> $t {
-            let raw = self.raw[at..at + size_of::<$t>()].try_into().expect("offset within the header");
-            if self.big { <$t>::from_be_bytes(raw) } else { <$t>::from_le_bytes(raw) }
+            let raw = self.raw[at..at + size_of::<$t>()]
+                .try_into()
+                .expect("offset within the header");
+            if self.big {
+                <$t>::from_be_bytes(raw)
+            } else {
+                <$t>::from_le_bytes(raw)
+            }
         }
     };
 }
@@ -95,7 +107,11 @@ pub(super) fn read(source: &mut impl Read) -> Result<Parsed, Fault> {
         fill(source, &mut raw[SIZE_1..], SIZE_1)?;
     }
     let b = Bytes { raw: &raw, big };
-    let magic = if size == SIZE_1 { &raw[344..347] } else { &raw[4..7] };
+    let magic = if size == SIZE_1 {
+        &raw[344..347]
+    } else {
+        &raw[4..7]
+    };
     match magic {
         b"n+1" | b"n+2" => {}
         b"ni1" | b"ni2" => {
@@ -113,7 +129,11 @@ pub(super) fn read(source: &mut impl Read) -> Result<Parsed, Fault> {
             });
         }
     }
-    let fields = if size == SIZE_1 { version_1(&b) } else { version_2(&b) };
+    let fields = if size == SIZE_1 {
+        version_1(&b)
+    } else {
+        version_2(&b)
+    };
     let mut parsed = check(fields, size)?;
     parsed.big_endian = big;
     Ok(parsed)
@@ -206,7 +226,9 @@ fn check(f: Fields, size: usize) -> Result<Parsed, Fault> {
             remedy: "take one out, in nibabel img.slicer[..., 0], and save it as its own file",
         });
     }
-    let count = (1..4).try_fold(1u64, |n, i| n.checked_mul(extent(i) as u64)).filter(|n| *n <= 1 << 42);
+    let count = (1..4)
+        .try_fold(1u64, |n, i| n.checked_mul(extent(i) as u64))
+        .filter(|n| *n <= 1 << 42);
     if count.is_none() {
         return Err(Fault::Value {
             what: "the number of voxels",
@@ -263,7 +285,11 @@ fn check(f: Fields, size: usize) -> Result<Parsed, Fault> {
     let header = VolumeHeader {
         dims: [1, 2, 3].map(|i| extent(i) as usize),
         world_from_voxel,
-        unit: if unit == Unit::Unknown { unit } else { Unit::Millimetre },
+        unit: if unit == Unit::Unknown {
+            unit
+        } else {
+            Unit::Millimetre
+        },
         orientation,
         stored,
         rescale,

@@ -11,6 +11,7 @@ use std::path::Path;
 use glam::{DAffine3, DVec3};
 
 pub use affine::Orientation;
+pub(crate) use affine::is_usable as is_usable_affine;
 pub(crate) use header::looks_like_nifti;
 pub use read::parse_nifti;
 pub use voxel::VoxelType;

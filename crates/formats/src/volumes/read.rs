@@ -33,7 +33,11 @@ pub(super) fn volume(
         if stored_bytes > found {
             let [x, y, z] = parsed.header.dims;
             let what = format!("{x} x {y} x {z} voxels of {}", parsed.header.stored);
-            return Err(Fault::Truncated { what, needed: stored_bytes, found });
+            return Err(Fault::Truncated {
+                what,
+                needed: stored_bytes,
+                found,
+            });
         }
     }
     budget.reserve("the volume", count as u64, size_of::<f32>())?;
@@ -105,7 +109,11 @@ fn convert<const BIG: bool>(raw: &[u8], stored: VoxelType, rescale: Option<[f64;
         ($t:ty) => {{
             let voxels = raw.chunks_exact(size_of::<$t>()).map(|b| {
                 let b = b.try_into().expect("chunks of this size");
-                if BIG { <$t>::from_be_bytes(b) } else { <$t>::from_le_bytes(b) }
+                if BIG {
+                    <$t>::from_be_bytes(b)
+                } else {
+                    <$t>::from_le_bytes(b)
+                }
             });
             match rescale {
                 None => values.extend(voxels.map(|v| v as f32)),
@@ -130,7 +138,9 @@ fn convert<const BIG: bool>(raw: &[u8], stored: VoxelType, rescale: Option<[f64;
 }
 
 fn finish(parsed: Parsed, mut values: Vec<f32>) -> Result<Volume, Fault> {
-    let Parsed { header, mut notes, .. } = parsed;
+    let Parsed {
+        header, mut notes, ..
+    } = parsed;
     if header.stored.exceeds_f32() {
         notes.push(format!("voxels of {} were rounded to float32", header.stored));
     }
@@ -148,7 +158,11 @@ fn finish(parsed: Parsed, mut values: Vec<f32>) -> Result<Volume, Fault> {
                 remedy: "check how the volume was exported",
             });
         }
-        let least = values.iter().copied().filter(|v| v.is_finite()).fold(f32::INFINITY, f32::min);
+        let least = values
+            .iter()
+            .copied()
+            .filter(|v| v.is_finite())
+            .fold(f32::INFINITY, f32::min);
         for v in values.iter_mut().filter(|v| !v.is_finite()) {
             *v = least;
         }
@@ -157,5 +171,10 @@ fn finish(parsed: Parsed, mut values: Vec<f32>) -> Result<Volume, Fault> {
             values.len()
         ));
     }
-    Ok(Volume { header, values, replaced_count, notes })
+    Ok(Volume {
+        header,
+        values,
+        replaced_count,
+        notes,
+    })
 }

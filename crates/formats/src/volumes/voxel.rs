@@ -37,7 +37,11 @@ impl VoxelType {
 
     /// NIfTI `datatype` code.
     pub(super) fn code(self) -> i16 {
-        Self::CODES.iter().find(|(_, t)| *t == self).expect("every type is listed").0
+        Self::CODES
+            .iter()
+            .find(|(_, t)| *t == self)
+            .expect("every type is listed")
+            .0
     }
 
     /// Bytes of a voxel.

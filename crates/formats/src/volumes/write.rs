@@ -52,9 +52,12 @@ pub fn save(
     let gzip = detect::is_gz_name(path);
     if detect::extension(path) != "nii" {
         let found = format!(".{}", detect::extension(path));
-        return Err(
-            Fault::UnknownKind { found, purpose: "volume output", supported: ".nii and .nii.gz" }.at(path)
-        );
+        return Err(Fault::UnknownKind {
+            found,
+            purpose: "volume output",
+            supported: ".nii and .nii.gz",
+        }
+        .at(path));
     }
     let header = header(dims, world_from_voxel, unit, store).map_err(|f| f.at(path))?;
     atomic::replace(path, |out| {
@@ -84,13 +87,20 @@ pub fn write_nifti(
     store: StoreAs,
 ) -> Result<(), Fault> {
     let header = header(dims, world_from_voxel, unit, store)?;
-    voxels(out, &header, dims, values, store).map_err(|source| Fault::Io { doing: "writing", source })
+    voxels(out, &header, dims, values, store).map_err(|source| Fault::Io {
+        doing: "writing",
+        source,
+    })
 }
 
 fn header(dims: [usize; 3], map: &DAffine3, unit: Unit, store: StoreAs) -> Result<[u8; 352], Fault> {
     let (voxel, slope, intercept) = match store {
         StoreAs::Float32 => (VoxelType::F32, 1.0, 0.0),
-        StoreAs::Integer { voxel, slope, intercept } => {
+        StoreAs::Integer {
+            voxel,
+            slope,
+            intercept,
+        } => {
             let is_integer = !matches!(voxel, VoxelType::F32 | VoxelType::F64);
             let (s, i) = (slope as f32, intercept as f32);
             if !is_integer || s == 0.0 || !s.is_finite() || !i.is_finite() {
@@ -152,14 +162,22 @@ fn voxels(
     values: &[f32],
     store: StoreAs,
 ) -> io::Result<()> {
-    assert_eq!(values.len(), dims.iter().product::<usize>(), "one value per voxel");
+    assert_eq!(
+        values.len(),
+        dims.iter().product::<usize>(),
+        "one value per voxel"
+    );
     out.write_all(header)?;
     let mut bytes = Vec::with_capacity(1 << 17);
     for part in values.chunks(1 << 14) {
         bytes.clear();
         match store {
             StoreAs::Float32 => bytes.extend(part.iter().flat_map(|v| v.to_le_bytes())),
-            StoreAs::Integer { voxel, slope, intercept } => {
+            StoreAs::Integer {
+                voxel,
+                slope,
+                intercept,
+            } => {
                 // What the header holds, so that reading inverts it.
                 let (s, i) = (f64::from(slope as f32), f64::from(intercept as f32));
                 let steps = part.iter().map(|v| ((f64::from(*v) - i) / s).round());

@@ -24,7 +24,11 @@ fn decode<const BIG: bool>(kind: Scalar, b: &[u8]) -> f64 {
     macro_rules! get {
         ($t:ty) => {{
             let raw = b[..size_of::<$t>()].try_into().expect("length by construction");
-            f64::from(if BIG { <$t>::from_be_bytes(raw) } else { <$t>::from_le_bytes(raw) })
+            f64::from(if BIG {
+                <$t>::from_be_bytes(raw)
+            } else {
+                <$t>::from_le_bytes(raw)
+            })
         }};
     }
     match kind {
@@ -54,7 +58,11 @@ impl<'a, const BIG: bool> Binary<'a, BIG> {
     #[cold]
     fn cut(&self, needed: u64) -> Fault {
         let what = format!("the row at byte {}", self.at);
-        Fault::Truncated { what, needed, found: (self.bytes.len() - self.at) as u64 }
+        Fault::Truncated {
+            what,
+            needed,
+            found: (self.bytes.len() - self.at) as u64,
+        }
     }
 
     /// Reads the given properties of every row of an element without lists.
@@ -116,14 +124,22 @@ impl Values for Words<'_> {
             None => number(word, self.line)?,
         };
         // As the binary forms would round it.
-        Ok(if kind == Scalar::F32 { value as f32 as f64 } else { value })
+        Ok(if kind == Scalar::F32 {
+            value as f32 as f64
+        } else {
+            value
+        })
     }
 
     fn length(&mut self, kind: Scalar) -> Result<u64, Fault> {
         let length = Values::next(self, kind)?;
         if !(length >= 0.0 && length.fract() == 0.0 && length <= u32::MAX as f64) {
             let what = format!("a list has {} entries", excerpt(length.to_string().as_bytes()));
-            return Err(Fault::line(self.line, what, "a list starts with its whole, non-negative length"));
+            return Err(Fault::line(
+                self.line,
+                what,
+                "a list starts with its whole, non-negative length",
+            ));
         }
         Ok(length as u64)
     }

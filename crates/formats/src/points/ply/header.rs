@@ -115,15 +115,22 @@ pub(super) struct Header {
 pub(super) fn read(bytes: &[u8]) -> Result<Header, Fault> {
     let mut lines = Lines::new(bytes);
     if lines.next().map(<[u8]>::trim_ascii) != Some(b"ply") {
-        return Err(Fault::line(1, "the file does not start with \"ply\"", "check that this is a PLY file"));
+        return Err(Fault::line(
+            1,
+            "the file does not start with \"ply\"",
+            "check that this is a PLY file",
+        ));
     }
     let mut encoding = None;
     let mut elements: Vec<Element> = Vec::new();
     while let Some(text) = lines.next() {
         let line = lines.line;
         let bad = |remedy| Fault::line(line, format!("cannot use {}", excerpt(text)), remedy);
-        let words: Vec<&[u8]> =
-            text.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty()).take(6).collect();
+        let words: Vec<&[u8]> = text
+            .split(u8::is_ascii_whitespace)
+            .filter(|w| !w.is_empty())
+            .take(6)
+            .collect();
         match words[..] {
             [] | [b"comment" | b"obj_info", ..] => {}
             [b"format", name, _version] => {
@@ -141,7 +148,11 @@ pub(super) fn read(bytes: &[u8]) -> Result<Header, Fault> {
                 if elements.iter().any(|e| e.name == name) {
                     return Err(bad("an element is declared once"));
                 }
-                elements.push(Element { name, count, properties: Vec::new() });
+                elements.push(Element {
+                    name,
+                    count,
+                    properties: Vec::new(),
+                });
             }
             [b"property", ref rest @ ..] => {
                 let shape_name = match *rest {
@@ -155,7 +166,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<Header, Fault> {
                 let known = "known types are char, uchar, short, ushort, int, uint, float, double \
                              (int8 to float64), and list COUNT ITEM";
                 let (shape, name) = shape_name.ok_or_else(|| bad(known))?;
-                let element = elements.last_mut().ok_or_else(|| bad("a property follows its element"))?;
+                let element = elements
+                    .last_mut()
+                    .ok_or_else(|| bad("a property follows its element"))?;
                 let name = String::from_utf8_lossy(name).into_owned();
                 if element.find(&name).is_some() {
                     return Err(bad("a property is declared once"));
@@ -163,12 +176,21 @@ pub(super) fn read(bytes: &[u8]) -> Result<Header, Fault> {
                 element.properties.push(Property { name, shape });
             }
             [b"end_header"] => {
-                let encoding =
-                    encoding.ok_or_else(|| bad("the header lacks its format line; add \"format ascii 1.0\""))?;
+                let encoding = encoding
+                    .ok_or_else(|| bad("the header lacks its format line; add \"format ascii 1.0\""))?;
                 let body = bytes.len() - lines.left();
-                return Ok(Header { encoding, elements, body, lines: line });
+                return Ok(Header {
+                    encoding,
+                    elements,
+                    body,
+                    lines: line,
+                });
             }
-            _ => return Err(bad("a header holds format, element, property, comment and end_header lines")),
+            _ => {
+                return Err(bad(
+                    "a header holds format, element, property, comment and end_header lines",
+                ));
+            }
         }
     }
     Err(Fault::Truncated {
@@ -191,7 +213,13 @@ mod tests {
         assert_eq!(h.encoding, Encoding::Big);
         assert_eq!(h.elements[0].fixed_stride(), Some(9));
         assert_eq!(h.elements[1].fixed_stride(), None);
-        assert_eq!((h.elements[1].least_row(Encoding::Big), h.elements[1].least_row(Encoding::Ascii)), (1, 2));
+        assert_eq!(
+            (
+                h.elements[1].least_row(Encoding::Big),
+                h.elements[1].least_row(Encoding::Ascii)
+            ),
+            (1, 2)
+        );
         assert_eq!(&text[h.body..], b"\nrest");
     }
 
@@ -209,8 +237,14 @@ mod tests {
             ("ply\nwhat is this\n", 2, "what is"),
         ] {
             let e = read(text.as_bytes()).unwrap_err().to_string();
-            assert!(e.starts_with(&format!("line {line}:")) && e.contains(word), "{text:?}: {e}");
+            assert!(
+                e.starts_with(&format!("line {line}:")) && e.contains(word),
+                "{text:?}: {e}"
+            );
         }
-        assert!(matches!(read(b"ply\nformat ascii 1.0\n"), Err(Fault::Truncated { .. })));
+        assert!(matches!(
+            read(b"ply\nformat ascii 1.0\n"),
+            Err(Fault::Truncated { .. })
+        ));
     }
 }

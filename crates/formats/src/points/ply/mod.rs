@@ -32,7 +32,13 @@ pub(super) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<PointCloud, Fau
     let header = header::read(bytes)?;
     let body = &bytes[header.body..];
     let raw = match header.encoding {
-        Encoding::Ascii => read_elements(Words::new(body, header.lines + 1), &header, budget, Words::left, None),
+        Encoding::Ascii => read_elements(
+            Words::new(body, header.lines + 1),
+            &header,
+            budget,
+            Words::left,
+            None,
+        ),
         Encoding::Little => binary::<false>(body, &header, budget),
         Encoding::Big => binary::<true>(body, &header, budget),
     }?;
@@ -41,7 +47,13 @@ pub(super) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<PointCloud, Fau
 
 fn binary<const BIG: bool>(body: &[u8], header: &Header, budget: &mut Budget) -> Result<RawCloud, Fault> {
     let fast: Gather<Binary<'_, BIG>> = gather_vertices;
-    read_elements(Binary::<BIG> { bytes: body, at: 0 }, header, budget, |v| v.bytes.len() - v.at, Some(fast))
+    read_elements(
+        Binary::<BIG> { bytes: body, at: 0 },
+        header,
+        budget,
+        |v| v.bytes.len() - v.at,
+        Some(fast),
+    )
 }
 
 /// A quick way through an element whose rows all have the same length.
@@ -54,11 +66,15 @@ fn read_elements<V: Values>(
     left: impl Fn(&V) -> usize,
     gather: Option<Gather<V>>,
 ) -> Result<RawCloud, Fault> {
-    let vertex = header.elements.iter().find(|e| e.name == "vertex").ok_or_else(|| Fault::Value {
-        what: "the list of elements",
-        value: names(&header.elements),
-        remedy: "a point cloud needs an element \"vertex\"",
-    })?;
+    let vertex = header
+        .elements
+        .iter()
+        .find(|e| e.name == "vertex")
+        .ok_or_else(|| Fault::Value {
+            what: "the list of elements",
+            value: names(&header.elements),
+            remedy: "a point cloud needs an element \"vertex\"",
+        })?;
     let columns = Columns::of(vertex)?;
     let mut raw = RawCloud::default();
     let mut triangles = Counted::new("triangles of the faces");
@@ -92,7 +108,9 @@ fn read_elements<V: Values>(
                 }
             }
             "face" => {
-                let list = ["vertex_indices", "vertex_index"].iter().find_map(|n| element.find(n));
+                let list = ["vertex_indices", "vertex_index"]
+                    .iter()
+                    .find_map(|n| element.find(n));
                 let list = list.filter(|p| matches!(element.properties[*p].shape, Shape::List { .. }));
                 if list.is_none() && element.count > 0 {
                     raw.notes.push(
@@ -114,12 +132,18 @@ fn read_elements<V: Values>(
                 })?;
             }
             "tristrips" => {
-                let list = ["vertex_indices", "vertex_index"].iter().find_map(|n| element.find(n));
+                let list = ["vertex_indices", "vertex_index"]
+                    .iter()
+                    .find_map(|n| element.find(n));
                 walk(&mut values, element, &none, list, |row, _, strip| {
                     for run in strip.split(|v| *v == -1.0) {
                         check_corners(run, vertex.count, "tristrips", row)?;
                         for i in 2..run.len() {
-                            let (a, b) = if i % 2 == 0 { (i - 2, i - 1) } else { (i - 1, i - 2) };
+                            let (a, b) = if i % 2 == 0 {
+                                (i - 2, i - 1)
+                            } else {
+                                (i - 1, i - 2)
+                            };
                             let tri = [run[a], run[b], run[i]].map(|v| v as u32);
                             // A repeated corner is how a strip turns, not a broken face.
                             if tri[0] != tri[1] && tri[1] != tri[2] && tri[2] != tri[0] {
@@ -139,12 +163,19 @@ fn read_elements<V: Values>(
 }
 
 fn names(elements: &[Element]) -> String {
-    let all: Vec<_> = elements.iter().take(8).map(|e| e.name.chars().take(20).collect::<String>()).collect();
+    let all: Vec<_> = elements
+        .iter()
+        .take(8)
+        .map(|e| e.name.chars().take(20).collect::<String>())
+        .collect();
     format!("[{}]", all.join(", "))
 }
 
 fn check_corners(corners: &[f64], vertices: u64, element: &'static str, row: u64) -> Result<(), Fault> {
-    match corners.iter().find(|v| !(**v >= 0.0 && **v < vertices as f64 && v.fract() == 0.0)) {
+    match corners
+        .iter()
+        .find(|v| !(**v >= 0.0 && **v < vertices as f64 && v.fract() == 0.0))
+    {
         None => Ok(()),
         Some(v) => Err(Fault::Syntax {
             place: Place::Row(element, row),
@@ -164,7 +195,9 @@ fn gather_vertices<const BIG: bool>(
     let rows = element.count as usize;
     let at = columns.at;
     match &mut raw.normals {
-        None => values.gather(rows, stride, &[at[0], at[1], at[2]], |p| raw.positions.push(p.into())),
+        None => values.gather(rows, stride, &[at[0], at[1], at[2]], |p| {
+            raw.positions.push(p.into())
+        }),
         Some(normals) => values.gather(rows, stride, &at, |v| {
             raw.positions.push(DVec3::new(v[0], v[1], v[2]));
             normals.push(DVec3::new(v[3], v[4], v[5]));
@@ -190,8 +223,12 @@ impl Columns {
             })
         });
         if wanted[..3].iter().any(Option::is_none) {
-            let names: Vec<_> =
-                vertex.properties.iter().take(12).map(|p| p.name.chars().take(20).collect::<String>()).collect();
+            let names: Vec<_> = vertex
+                .properties
+                .iter()
+                .take(12)
+                .map(|p| p.name.chars().take(20).collect::<String>())
+                .collect();
             return Err(Fault::Value {
                 what: "the list of vertex properties",
                 value: format!("[{}]", names.join(", ")),
@@ -199,8 +236,11 @@ impl Columns {
             });
         }
         let has_normals = wanted[3..].iter().all(Option::is_some);
-        let mut columns =
-            Self { slots: vec![None; vertex.properties.len()], at: [(0, Scalar::F32); 6], has_normals };
+        let mut columns = Self {
+            slots: vec![None; vertex.properties.len()],
+            at: [(0, Scalar::F32); 6],
+            has_normals,
+        };
         for (slot, found) in wanted.iter().enumerate() {
             if let (Some((p, kind)), true) = (*found, slot < 3 || has_normals) {
                 let before = vertex.properties[..p].iter().map(|q| match q.shape {

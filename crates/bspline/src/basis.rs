@@ -1,0 +1,136 @@
+//! The B-splines that are not zero at a parameter, with their derivatives.
+
+use crate::Real;
+use crate::knots::{KnotVector, MAX_DEGREE};
+
+/// Highest derivative that is computed.
+pub const MAX_DERIVATIVE: usize = 3;
+
+const ORDER: usize = MAX_DEGREE + 1;
+
+/// Values and derivatives of the `p + 1` functions `first() ..= span` at one parameter.
+///
+/// `N_{i,p}^{(k)}(t)` [DIS eq. 1's `B`, `C`, `D`; The NURBS Book eqs. 2.5 and 2.9], per unit of the parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Basis<T> {
+    span: usize,
+    degree: usize,
+    rows: [[T; ORDER]; MAX_DERIVATIVE + 1],
+}
+
+impl<T: Real> Basis<T> {
+    /// Evaluates at `t` the values and the derivatives up to `order <= 3`; higher ones than asked for are 0.
+    ///
+    /// At a knot the right-hand limits, at the end of the domain the left-hand ones; outside the domain the
+    /// polynomials of the first and last span. All arithmetic is in double precision, rounded to `T` once:
+    /// knots that differ in `f64` may coincide in `f32`, and the recurrence divides by their differences.
+    ///
+    /// # Panics
+    /// If `order > 3`.
+    pub fn at(knots: &KnotVector, t: f64, order: usize) -> Self {
+        assert!(
+            order <= MAX_DERIVATIVE,
+            "derivative {order} of at most {MAX_DERIVATIVE}"
+        );
+        let (p, span) = (knots.degree(), knots.span(t));
+        let table = Table::new(&knots.knots()[span + 1 - p..=span + p], p, t);
+        let mut rows = [[T::zero(); ORDER]; MAX_DERIVATIVE + 1];
+        for r in 0..=p {
+            rows[0][r] = T::from_f64(table.ndu[r][p]);
+        }
+        if order > 0 {
+            let derivatives = table.derivatives(p, order.min(p));
+            for k in 1..=order.min(p) {
+                rows[k] = derivatives[k].map(T::from_f64);
+            }
+        }
+        Self {
+            span,
+            degree: p,
+            rows,
+        }
+    }
+
+    /// Knot span in which the parameter lies.
+    pub fn span(&self) -> usize {
+        self.span
+    }
+
+    /// Index of the first function that is not zero.
+    pub fn first(&self) -> usize {
+        self.span - self.degree
+    }
+
+    /// Values of the functions `first() ..= span()`; they sum to 1.
+    pub fn values(&self) -> &[T] {
+        self.derivative(0)
+    }
+
+    /// Derivatives of order `k` of the same functions; for `k > 0` they sum to 0.
+    ///
+    /// # Panics
+    /// If `k > 3`.
+    pub fn derivative(&self, k: usize) -> &[T] {
+        &self.rows[k][..=self.degree]
+    }
+}
+
+/// The triangle of all lower degrees, The NURBS Book A2.2: `ndu[r][j]` is function `r` of degree `j`, and
+/// `ndu[j][r]`, `r < j`, the knot difference that stands under it.
+struct Table {
+    ndu: [[f64; ORDER]; ORDER],
+}
+
+impl Table {
+    /// `u` are the `2p` knots round the span, of which `u[p-1] < u[p]` are its ends.
+    fn new(u: &[f64], p: usize, t: f64) -> Self {
+        let mut ndu = [[0.0; ORDER]; ORDER];
+        let (mut left, mut right) = ([0.0; ORDER], [0.0; ORDER]);
+        ndu[0][0] = 1.0;
+        for j in 1..=p {
+            left[j] = t - u[p - j];
+            right[j] = u[p - 1 + j] - t;
+            let mut saved = 0.0;
+            for r in 0..j {
+                // Difference of the knots themselves, not the sum of the two distances: exact in more cases.
+                ndu[j][r] = u[p + r] - u[p + r - j];
+                let share = ndu[r][j - 1] / ndu[j][r];
+                ndu[r][j] = saved + right[r + 1] * share;
+                saved = left[j - r] * share;
+            }
+            ndu[j][j] = saved;
+        }
+        Self { ndu }
+    }
+
+    /// Derivatives `1 ..= order <= p`, The NURBS Book A2.3.
+    fn derivatives(&self, p: usize, order: usize) -> [[f64; ORDER]; MAX_DERIVATIVE + 1] {
+        let ndu = &self.ndu;
+        let mut out = [[0.0; ORDER]; MAX_DERIVATIVE + 1];
+        for r in 0..=p {
+            let mut previous = [0.0; MAX_DERIVATIVE + 1];
+            previous[0] = 1.0;
+            for k in 1..=order {
+                let mut row = [0.0; MAX_DERIVATIVE + 1];
+                let low = p - k;
+                let mut d = 0.0;
+                // Term j takes function r-k+j of degree p-k, which exists for 0 <= r-k+j <= p-k.
+                for j in k.saturating_sub(r)..=k.min(p - r) {
+                    let s = r + j - k;
+                    let from_same = if j < k { previous[j] } else { 0.0 };
+                    let from_left = if j > 0 { previous[j - 1] } else { 0.0 };
+                    row[j] = (from_same - from_left) / ndu[low + 1][s];
+                    d += row[j] * ndu[s][low];
+                }
+                out[k][r] = d;
+                previous = row;
+            }
+        }
+        let mut factor = 1.0;
+        for k in 1..=order {
+            factor *= (p + 1 - k) as f64;
+            out[k].iter_mut().for_each(|d| *d *= factor);
+        }
+        out
+    }
+}

@@ -1,0 +1,308 @@
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::CsgError;
+use crate::{Aabb, Field, Frame, Interval, Jet};
+
+/// Points of a batch that are pruned together: enough to pay for the bounds, few enough to lie close together
+/// in a sorted batch.
+const CHUNK: usize = 64;
+
+/// Edge of the blocks of grid nodes that are pruned one by one.
+const BLOCK: usize = 16;
+
+/// Which value wins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Operation {
+    /// The largest.
+    Union,
+    /// The smallest.
+    Intersection,
+}
+
+/// The largest or smallest of several fields, each as it is or reflected about an iso-value.
+///
+/// Where several branches are equal the first of them gives gradient and Hessian.
+#[derive(Clone)]
+pub struct Boolean {
+    operation: Operation,
+    branches: Vec<Branch>,
+}
+
+#[derive(Clone)]
+struct Branch {
+    field: Arc<dyn Field>,
+    /// `Some(2c)` stands for `2c - f`, the complement at iso-value `c`.
+    twice_iso: Option<f64>,
+}
+
+impl Branch {
+    fn plain(field: Arc<dyn Field>) -> Self {
+        Self {
+            field,
+            twice_iso: None,
+        }
+    }
+
+    fn map(&self, value: f64) -> f64 {
+        self.twice_iso.map_or(value, |c| c - value)
+    }
+
+    fn map_interval(&self, range: Interval) -> Interval {
+        self.twice_iso.map_or(range, |c| Interval::point(c) - range)
+    }
+
+    fn value_gradient(&self, (value, gradient): (f64, DVec3)) -> (f64, DVec3) {
+        (
+            self.map(value),
+            if self.twice_iso.is_some() {
+                -gradient
+            } else {
+                gradient
+            },
+        )
+    }
+}
+
+impl Boolean {
+    /// Union or intersection.
+    ///
+    /// # Errors
+    /// [`CsgError::NoBranches`].
+    pub fn new(operation: Operation, solids: Vec<Arc<dyn Field>>) -> Result<Self, CsgError> {
+        if solids.is_empty() {
+            return Err(CsgError::NoBranches);
+        }
+        Ok(Self {
+            operation,
+            branches: solids.into_iter().map(Branch::plain).collect(),
+        })
+    }
+
+    /// `solid` without `taken`, at iso-value `iso`.
+    ///
+    /// # Errors
+    /// [`CsgError::NotFinite`].
+    pub fn difference(solid: Arc<dyn Field>, taken: Vec<Arc<dyn Field>>, iso: f64) -> Result<Self, CsgError> {
+        if !(2.0 * iso).is_finite() {
+            return Err(CsgError::NotFinite {
+                name: "twice the iso-value",
+                value: 2.0 * iso,
+            });
+        }
+        let mut branches = vec![Branch::plain(solid)];
+        branches.extend(taken.into_iter().map(|field| Branch {
+            field,
+            twice_iso: Some(2.0 * iso),
+        }));
+        Ok(Self {
+            operation: Operation::Intersection,
+            branches,
+        })
+    }
+
+    /// Which value wins.
+    pub fn operation(&self) -> Operation {
+        self.operation
+    }
+
+    /// The fields, and the iso-value about which each is reflected, if it is.
+    pub fn branches(&self) -> impl Iterator<Item = (&Arc<dyn Field>, Option<f64>)> {
+        self.branches
+            .iter()
+            .map(|b| (&b.field, b.twice_iso.map(|c| c / 2.0)))
+    }
+
+    /// Whether `challenger`, of a later branch, takes the place of `best`. Equal values do not, nor does NaN.
+    fn wins(&self, challenger: f64, best: f64) -> bool {
+        match self.operation {
+            Operation::Union => challenger > best,
+            Operation::Intersection => challenger < best,
+        }
+    }
+
+    /// The winner over the branches: its index and what `of` gave for it.
+    fn select<R>(&self, of: impl Fn(&Branch) -> (f64, R)) -> (&Branch, f64, R) {
+        let (first, rest) = self.branches.split_first().expect("a Boolean has a branch");
+        let (value, found) = of(first);
+        let mut best = (first, value, found);
+        for branch in rest {
+            let (value, found) = of(branch);
+            if self.wins(value, best.1) {
+                best = (branch, value, found);
+            }
+        }
+        best
+    }
+
+    fn combine(&self, ranges: impl Iterator<Item = Interval>) -> Interval {
+        let best = match self.operation {
+            Operation::Union => ranges.reduce(Interval::max),
+            Operation::Intersection => ranges.reduce(Interval::min),
+        };
+        best.expect("a Boolean has a branch")
+    }
+
+    /// The branches that can win where their ranges are as `range` says, in order; at least one.
+    fn live(&self, range: impl Fn(&dyn Field) -> Interval) -> Vec<&Branch> {
+        if let [only] = self.branches.as_slice() {
+            return vec![only];
+        }
+        let ranges: Vec<Interval> = self
+            .branches
+            .iter()
+            .map(|b| b.map_interval(range(b.field.as_ref())))
+            .collect();
+        let best = self.combine(ranges.iter().copied());
+        // Strictly beaten everywhere: even a tie keeps a branch, so that values and gradients are those of the
+        // whole tree to the bit.
+        let lives = |r: &Interval| match self.operation {
+            Operation::Union => r.hi >= best.lo || r.hi.is_nan(),
+            Operation::Intersection => r.lo <= best.hi || r.lo.is_nan(),
+        };
+        self.branches
+            .iter()
+            .zip(&ranges)
+            .filter(|(_, r)| lives(r))
+            .map(|(b, _)| b)
+            .collect()
+    }
+
+    /// Values of one block from the branches that live there. `term` is as long as `out`.
+    fn block_values(
+        &self,
+        live: &[&Branch],
+        frame: &Frame,
+        lo: [i64; 3],
+        count: [usize; 3],
+        out: &mut [f64],
+        term: &mut Vec<f64>,
+    ) {
+        let (first, rest) = live.split_first().expect("a branch lives everywhere");
+        first.field.frame_values(frame, lo, count, out);
+        out.iter_mut().for_each(|v| *v = first.map(*v));
+        term.resize(if rest.is_empty() { 0 } else { out.len() }, 0.0);
+        for branch in rest {
+            branch.field.frame_values(frame, lo, count, term);
+            for (o, t) in out.iter_mut().zip(term.iter()) {
+                let t = branch.map(*t);
+                if self.wins(t, *o) {
+                    *o = t;
+                }
+            }
+        }
+    }
+}
+
+impl Field for Boolean {
+    fn value(&self, p: DVec3) -> f64 {
+        self.select(|b| (b.map(b.field.value(p)), ())).1
+    }
+
+    fn value_gradient(&self, p: DVec3) -> (f64, DVec3) {
+        let (_, value, gradient) = self.select(|b| b.value_gradient(b.field.value_gradient(p)));
+        (value, gradient)
+    }
+
+    fn jet(&self, p: DVec3) -> Jet {
+        // Values decide as in the other methods; only the winner's jet is asked for.
+        let (branch, value, gradient) = self.select(|b| b.value_gradient(b.field.value_gradient(p)));
+        let hessian = branch.field.jet(p).hessian;
+        Jet {
+            value,
+            gradient,
+            hessian: if branch.twice_iso.is_some() {
+                -hessian
+            } else {
+                hessian
+            },
+        }
+    }
+
+    fn bounds(&self, b: &Aabb) -> Interval {
+        self.combine(
+            self.branches
+                .iter()
+                .map(|branch| branch.map_interval(branch.field.bounds(b))),
+        )
+    }
+
+    fn values_gradients(&self, points: &[DVec3], out: &mut [(f64, DVec3)]) {
+        assert_eq!(points.len(), out.len(), "one output slot per point");
+        let mut term = [(0.0, DVec3::ZERO); CHUNK];
+        for (points, out) in points.chunks(CHUNK).zip(out.chunks_mut(CHUNK)) {
+            let (min, max) = points
+                .iter()
+                .fold((points[0], points[0]), |b, p| (b.0.min(*p), b.1.max(*p)));
+            // NaN hides from min and max: such a batch is not pruned.
+            let known = points.iter().all(|p| p.is_finite());
+            let live = self.live(|field| {
+                if known {
+                    field.bounds(&Aabb { min, max })
+                } else {
+                    Interval::EVERYTHING
+                }
+            });
+            let (first, rest) = live.split_first().expect("a branch lives everywhere");
+            first.field.values_gradients(points, out);
+            out.iter_mut().for_each(|o| *o = first.value_gradient(*o));
+            let term = &mut term[..points.len()];
+            for branch in rest {
+                branch.field.values_gradients(points, term);
+                for (o, t) in out.iter_mut().zip(term.iter()) {
+                    let t = branch.value_gradient(*t);
+                    if self.wins(t.0, o.0) {
+                        *o = t;
+                    }
+                }
+            }
+        }
+    }
+
+    fn frame_values(&self, frame: &Frame, lo: [i64; 3], count: [usize; 3], out: &mut [f64]) {
+        assert_eq!(
+            out.len(),
+            count.iter().product::<usize>(),
+            "one output slot per node"
+        );
+        if out.is_empty() {
+            return;
+        }
+        let live = |lo: [i64; 3], count: [usize; 3]| {
+            let hi: [i64; 3] = std::array::from_fn(|a| lo[a] + count[a] as i64 - 1);
+            self.live(|field| field.frame_bounds(frame, lo, hi))
+        };
+        let mut term = Vec::new();
+        let whole = live(lo, count);
+        if whole.len() == 1 || count.iter().all(|n| *n <= BLOCK) {
+            return self.block_values(&whole, frame, lo, count, out, &mut term);
+        }
+        let mut block = Vec::new();
+        let starts = |a: usize| (0..count[a]).step_by(BLOCK);
+        for i in starts(0) {
+            for j in starts(1) {
+                for k in starts(2) {
+                    let start = [i, j, k];
+                    let from: [i64; 3] = std::array::from_fn(|a| lo[a] + start[a] as i64);
+                    let part: [usize; 3] = std::array::from_fn(|a| BLOCK.min(count[a] - start[a]));
+                    block.resize(part.iter().product(), 0.0);
+                    self.block_values(&live(from, part), frame, from, part, &mut block, &mut term);
+                    for (row, values) in block.chunks(part[2]).enumerate() {
+                        let (x, y) = (i + row / part[1], j + row % part[1]);
+                        let at = (x * count[1] + y) * count[2] + k;
+                        out[at..at + part[2]].copy_from_slice(values);
+                    }
+                }
+            }
+        }
+    }
+
+    fn frame_bounds(&self, frame: &Frame, lo: [i64; 3], hi: [i64; 3]) -> Interval {
+        self.combine(
+            self.branches
+                .iter()
+                .map(|b| b.map_interval(b.field.frame_bounds(frame, lo, hi))),
+        )
+    }
+}

@@ -1,0 +1,120 @@
+use std::sync::Arc;
+
+use glam::{DMat3, DVec3};
+
+use super::CsgError;
+use crate::{Aabb, Field, Frame, Interval, Jet};
+
+/// `f = constant + Σ_i w_i f_i`, added in the order given.
+///
+/// Bounds add the branches' own; they know nothing of how the branches vary together, so the sum of a field
+/// and its near opposite is bounded loosely.
+#[derive(Clone)]
+pub struct Sum {
+    terms: Vec<(f64, Arc<dyn Field>)>,
+    constant: f64,
+}
+
+impl Sum {
+    /// # Errors
+    /// [`CsgError::NotFinite`].
+    pub fn new(terms: Vec<(f64, Arc<dyn Field>)>, constant: f64) -> Result<Self, CsgError> {
+        let finite = |name, value: f64| {
+            if value.is_finite() {
+                Ok(())
+            } else {
+                Err(CsgError::NotFinite { name, value })
+            }
+        };
+        finite("the constant", constant)?;
+        terms.iter().try_for_each(|(w, _)| finite("a weight", *w))?;
+        Ok(Self { terms, constant })
+    }
+
+    /// Weights and fields.
+    pub fn terms(&self) -> &[(f64, Arc<dyn Field>)] {
+        &self.terms
+    }
+
+    /// What is added to the weighted fields.
+    pub fn constant(&self) -> f64 {
+        self.constant
+    }
+
+    fn add_intervals(&self, of: impl Fn(&dyn Field) -> Interval) -> Interval {
+        self.terms
+            .iter()
+            .fold(Interval::point(self.constant), |sum, (w, field)| {
+                sum + Interval::point(*w) * of(field.as_ref())
+            })
+    }
+}
+
+impl Field for Sum {
+    fn value(&self, p: DVec3) -> f64 {
+        self.terms
+            .iter()
+            .fold(self.constant, |sum, (w, field)| sum + w * field.value(p))
+    }
+
+    fn value_gradient(&self, p: DVec3) -> (f64, DVec3) {
+        self.terms
+            .iter()
+            .fold((self.constant, DVec3::ZERO), |sum, (w, field)| {
+                let (value, gradient) = field.value_gradient(p);
+                (sum.0 + w * value, sum.1 + *w * gradient)
+            })
+    }
+
+    fn jet(&self, p: DVec3) -> Jet {
+        let zero = Jet {
+            value: self.constant,
+            gradient: DVec3::ZERO,
+            hessian: DMat3::ZERO,
+        };
+        self.terms.iter().fold(zero, |sum, (w, field)| {
+            let jet = field.jet(p);
+            Jet {
+                value: sum.value + w * jet.value,
+                gradient: sum.gradient + *w * jet.gradient,
+                hessian: sum.hessian + jet.hessian * *w,
+            }
+        })
+    }
+
+    fn bounds(&self, b: &Aabb) -> Interval {
+        self.add_intervals(|field| field.bounds(b))
+    }
+
+    fn values_gradients(&self, points: &[DVec3], out: &mut [(f64, DVec3)]) {
+        assert_eq!(points.len(), out.len(), "one output slot per point");
+        out.fill((self.constant, DVec3::ZERO));
+        let mut term = vec![(0.0, DVec3::ZERO); points.len()];
+        for (w, field) in &self.terms {
+            field.values_gradients(points, &mut term);
+            for (o, t) in out.iter_mut().zip(&term) {
+                *o = (o.0 + w * t.0, o.1 + *w * t.1);
+            }
+        }
+    }
+
+    fn frame_values(&self, frame: &Frame, lo: [i64; 3], count: [usize; 3], out: &mut [f64]) {
+        assert_eq!(
+            out.len(),
+            count.iter().product::<usize>(),
+            "one output slot per node"
+        );
+        out.fill(self.constant);
+        let mut term = vec![0.0; out.len()];
+        for (w, field) in &self.terms {
+            field.frame_values(frame, lo, count, &mut term);
+            for (o, t) in out.iter_mut().zip(&term) {
+                *o += w * t;
+            }
+        }
+    }
+
+    fn frame_bounds(&self, frame: &Frame, lo: [i64; 3], hi: [i64; 3]) -> Interval {
+        self.add_intervals(|field| field.frame_bounds(frame, lo, hi))
+    }
+}

@@ -1,0 +1,356 @@
+//! Least squares on one surface level, by Jacobi-preconditioned conjugate gradients without a matrix.
+//!
+//! Energy (unit box): `Σ_k w_k [(f(x_k) - d_k)² + β²|∇f(x_k) + n_k|²] + μ Σ_i (Δ C_i)²`, `Δ` the seven-point Laplacian
+//! of the level's totals, a stencil counted where all its taps exist. The unknowns are the corrections of the
+//! active functions; the penalty sees the whole field, so the coarser levels' part is on the right-hand side.
+
+use bspline::Real;
+use bspline::hierarchical::{BRICK, BRICK_LEN, HALO, HALO_LEN};
+use rayon::prelude::*;
+
+use super::band::{Band, NONE};
+use super::stencil::{Spot, gather, scatter, scatter_squares};
+
+/// Strides of a brick with halo.
+const STRIDES: [usize; 2] = [HALO * HALO, HALO];
+/// Bricks a thread takes at once; sums are over these chunks, whatever the number of threads.
+const CHUNK: usize = 32;
+
+/// A sample of a band, in the cell coordinates of its brick.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BandSample<T> {
+    pub spot: Spot<T>,
+    pub weight: T,
+    /// Value asked for.
+    pub target: T,
+    /// Outward unit normal.
+    pub normal: [T; 3],
+}
+
+/// The samples of one brick: `samples[start..end]`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BrickSamples {
+    pub brick: u32,
+    pub start: u32,
+    pub end: u32,
+}
+
+/// Weights of a level.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Weights {
+    /// `β`, unit box.
+    pub beta: f64,
+    /// `μ`.
+    pub mu: f64,
+}
+
+/// What a solve did.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct SolveReport {
+    pub iterations: usize,
+    /// Preconditioned residual against the start's.
+    pub residual: f64,
+}
+
+/// The normal equations of one band.
+pub(crate) struct BandProblem<'a, T> {
+    pub band: &'a Band<T>,
+    pub samples: &'a [BandSample<T>],
+    pub bricks: &'a [BrickSamples],
+    pub weights: Weights,
+    /// Index of a brick's halo among those of bricks with samples.
+    slot_of: Vec<u32>,
+}
+
+impl<'a, T: Real> BandProblem<'a, T> {
+    pub fn new(
+        band: &'a Band<T>,
+        samples: &'a [BandSample<T>],
+        bricks: &'a [BrickSamples],
+        weights: Weights,
+    ) -> Self {
+        let mut slot_of = vec![NONE; band.keys.len()];
+        for (slot, b) in bricks.iter().enumerate() {
+            slot_of[b.brick as usize] = slot as u32;
+        }
+        Self {
+            band,
+            samples,
+            bricks,
+            weights,
+            slot_of,
+        }
+    }
+
+    /// Corrections of the active functions that lower the energy, in band order.
+    ///
+    /// Stops at `tolerance` times the starting preconditioned residual, or after `limit` iterations.
+    pub fn solve(&self, tolerance: f64, limit: usize) -> (Vec<T>, SolveReport) {
+        let inverse = self.inverse_diagonal();
+        let mut r = self.descent_direction();
+        let mut x = vec![T::zero(); r.len()];
+        let mut p: Vec<T> = r.iter().zip(&inverse).map(|(r, d)| *r * *d).collect();
+        let mut energy = weighted_square(&r, &inverse);
+        let start = energy;
+        let mut report = SolveReport {
+            iterations: 0,
+            residual: f64::from(start > 0.0),
+        };
+        let mut dense = vec![T::zero(); self.band.totals.len()];
+        let mut scratch = Scratch::default();
+        while report.iterations < limit && energy > tolerance * tolerance * start {
+            self.expand(&p, &mut dense);
+            let image = self.apply(&dense, &mut scratch);
+            let curvature = dot(&p, &image);
+            if curvature <= 0.0 {
+                break;
+            }
+            let alpha = T::from_f64(energy / curvature);
+            for i in 0..x.len() {
+                x[i] += alpha * p[i];
+                r[i] -= alpha * image[i];
+            }
+            let next = weighted_square(&r, &inverse);
+            let beta = T::from_f64(next / energy);
+            energy = next;
+            for i in 0..p.len() {
+                p[i] = r[i] * inverse[i] + beta * p[i];
+            }
+            report.iterations += 1;
+            report.residual = (energy / start).sqrt();
+        }
+        (x, report)
+    }
+
+    /// Writes a vector over active functions into an array of bricks.
+    fn expand(&self, active: &[T], dense: &mut [T]) {
+        for (b, values) in dense.chunks_exact_mut(BRICK_LEN).enumerate() {
+            self.band.for_active(b, |slot, at| values[slot] = active[at]);
+        }
+    }
+
+    fn gradient_weight(&self) -> T {
+        T::from_f64((self.weights.beta * (1u64 << self.band.depth) as f64).powi(2))
+    }
+
+    /// `Hx` on the active functions, for `x` given in bricks.
+    fn apply(&self, dense: &[T], scratch: &mut Scratch<T>) -> Vec<T> {
+        let gw = self.gradient_weight();
+        self.data_halos(dense, &mut scratch.halos, |sample, v, g, out| {
+            let w = sample.weight;
+            scatter(out, sample.spot, STRIDES, w * v, g.map(|g| w * gw * g));
+        });
+        self.laplacians(dense, &mut scratch.laplacians);
+        self.gathered(scratch, T::one())
+    }
+
+    /// Half the negative gradient of the energy at the prolonged field.
+    fn descent_direction(&self) -> Vec<T> {
+        let gw = self.gradient_weight();
+        let h = T::from_f64(0.5f64.powi(self.band.depth as i32));
+        let mut scratch = Scratch::default();
+        self.data_halos(&self.band.totals, &mut scratch.halos, |sample, v, g, out| {
+            let w = sample.weight;
+            let miss = std::array::from_fn(|a| w * gw * (g[a] + h * sample.normal[a]));
+            scatter(out, sample.spot, STRIDES, w * (v - sample.target), miss);
+        });
+        self.laplacians(&self.band.totals, &mut scratch.laplacians);
+        self.gathered(&scratch, -T::one())
+    }
+
+    /// For every sample: value and cell gradient of `dense`, handed to `f` with the halo to add to.
+    fn data_halos(
+        &self,
+        dense: &[T],
+        halos: &mut Vec<T>,
+        f: impl Fn(&BandSample<T>, T, [T; 3], &mut [T]) + Sync,
+    ) {
+        halos.resize(self.bricks.len() * HALO_LEN, T::zero());
+        halos
+            .par_chunks_mut(CHUNK * HALO_LEN)
+            .zip(self.bricks.par_chunks(CHUNK))
+            .for_each(|(halos, bricks)| {
+                let mut values = [T::zero(); HALO_LEN];
+                for (out, b) in halos.chunks_exact_mut(HALO_LEN).zip(bricks) {
+                    out.fill(T::zero());
+                    self.band.halo(dense, b.brick as usize, &mut values);
+                    pulp::Arch::new().dispatch(
+                        #[inline(always)]
+                        || {
+                            for sample in &self.samples[b.start as usize..b.end as usize] {
+                                let (v, g) = gather(&values, sample.spot, STRIDES);
+                                f(sample, v, g, out);
+                            }
+                        },
+                    );
+                }
+            });
+    }
+
+    /// `Δ dense` at every slot whose stencil is complete, else 0.
+    fn laplacians(&self, dense: &[T], out: &mut Vec<T>) {
+        out.resize(dense.len(), T::zero());
+        out.par_chunks_mut(CHUNK * BRICK_LEN)
+            .enumerate()
+            .for_each(|(chunk, out)| {
+                for (i, out) in out.chunks_exact_mut(BRICK_LEN).enumerate() {
+                    let brick = chunk * CHUNK + i;
+                    seven_point(self.band, dense, brick, out);
+                    self.clear_incomplete(brick, out);
+                }
+            });
+    }
+
+    /// Stencils centred on the first or last function of the box lack a tap.
+    fn clear_incomplete(&self, brick: usize, out: &mut [T]) {
+        let last = (1usize << self.band.depth) + 2;
+        let key = self.band.keys[brick].0.map(|k| k as usize * BRICK);
+        if key.iter().all(|&k| k > 0 && k + BRICK <= last) {
+            return;
+        }
+        for (slot, value) in out.iter_mut().enumerate() {
+            let s = [key[0] + slot / 64, key[1] + slot / 8 % 8, key[2] + slot % 8];
+            if s.iter().any(|&s| s == 0 || s >= last) {
+                *value = T::zero();
+            }
+        }
+    }
+
+    /// `sign · (data + μ Δᵀ Laplacians)` on the active functions.
+    fn gathered(&self, scratch: &Scratch<T>, sign: T) -> Vec<T> {
+        let mut out = vec![T::zero(); self.band.active_count()];
+        let mu = T::from_f64(self.weights.mu);
+        let chunks = split_by_offsets(&mut out, &self.band.offsets, CHUNK);
+        chunks.into_par_iter().enumerate().for_each(|(chunk, out)| {
+            let first = chunk * CHUNK;
+            let base = self.band.offsets[first];
+            let (mut data, mut penalty) = ([T::zero(); BRICK_LEN], [T::zero(); BRICK_LEN]);
+            for brick in first..(first + CHUNK).min(self.band.keys.len()) {
+                if self.band.masks[brick] == [0; BRICK] {
+                    continue;
+                }
+                self.band
+                    .collect_halos(&scratch.halos, &self.slot_of, brick, &mut data);
+                seven_point(self.band, &scratch.laplacians, brick, &mut penalty);
+                self.band.for_active(brick, |slot, at| {
+                    out[at - base] = sign * (data[slot] + mu * penalty[slot]);
+                });
+            }
+        });
+        out
+    }
+
+    fn inverse_diagonal(&self) -> Vec<T> {
+        let gw = self.gradient_weight();
+        let mut scratch = Scratch::default();
+        self.data_halos(&self.band.totals, &mut scratch.halos, |sample, _, _, out| {
+            let w = sample.weight;
+            scatter_squares(out, sample.spot, STRIDES, w, [w * gw; 3]);
+        });
+        scratch.laplacians.resize(self.band.totals.len(), T::zero());
+        let mut diagonal = self.gathered(&scratch, T::one());
+        // Δᵀ Δ: 6² from the stencil's own centre, 1 from each of six neighbours'. Where the box cuts some off
+        // this is an overestimate, which a preconditioner may be.
+        let penalty = T::from_f64(42.0 * self.weights.mu);
+        for d in &mut diagonal {
+            *d = T::one() / (*d + penalty + T::min_positive_value());
+        }
+        diagonal
+    }
+}
+
+#[derive(Default)]
+struct Scratch<T> {
+    halos: Vec<T>,
+    laplacians: Vec<T>,
+}
+
+/// Seven-point Laplacian (its own transpose) of an array of bricks, at the slots of one brick.
+fn seven_point<T: Real>(band: &Band<T>, dense: &[T], brick: usize, out: &mut [T]) {
+    const W: usize = BRICK + 2;
+    let mut padded = [T::zero(); W * W * W];
+    let own = &dense[brick * BRICK_LEN..(brick + 1) * BRICK_LEN];
+    for x in 0..BRICK {
+        for y in 0..BRICK {
+            let to = ((x + 1) * W + y + 1) * W + 1;
+            padded[to..to + BRICK].copy_from_slice(&own[(x * BRICK + y) * BRICK..][..BRICK]);
+        }
+    }
+    let face = |d: usize| match band.neighbours[brick][d] {
+        NONE => None,
+        b => Some(&dense[b as usize * BRICK_LEN..(b as usize + 1) * BRICK_LEN]),
+    };
+    const LAST: usize = BRICK - 1;
+    for (neighbour, layer, at) in [(4, LAST, 0), (22, 0, W - 1)] {
+        if let Some(values) = face(neighbour) {
+            for y in 0..BRICK {
+                let to = (at * W + y + 1) * W + 1;
+                padded[to..to + BRICK].copy_from_slice(&values[(layer * BRICK + y) * BRICK..][..BRICK]);
+            }
+        }
+    }
+    for (neighbour, layer, at) in [(10, LAST, 0), (16, 0, W - 1)] {
+        if let Some(values) = face(neighbour) {
+            for x in 0..BRICK {
+                let to = ((x + 1) * W + at) * W + 1;
+                padded[to..to + BRICK].copy_from_slice(&values[(x * BRICK + layer) * BRICK..][..BRICK]);
+            }
+        }
+    }
+    for (neighbour, layer, at) in [(12, LAST, 0), (14, 0, W - 1)] {
+        if let Some(values) = face(neighbour) {
+            for x in 0..BRICK {
+                for y in 0..BRICK {
+                    padded[((x + 1) * W + y + 1) * W + at] = values[(x * BRICK + y) * BRICK + layer];
+                }
+            }
+        }
+    }
+    let six = T::from_f64(6.0);
+    for x in 0..BRICK {
+        for y in 0..BRICK {
+            let at = ((x + 1) * W + y + 1) * W + 1;
+            let row = &mut out[(x * BRICK + y) * BRICK..][..BRICK];
+            for z in 0..BRICK {
+                let i = at + z;
+                row[z] = ((padded[i - W * W] + padded[i + W * W]) + (padded[i - W] + padded[i + W]))
+                    + ((padded[i - 1] + padded[i + 1]) - six * padded[i]);
+            }
+        }
+    }
+}
+
+/// The slices of `values` that belong to each chunk of `chunk` bricks.
+fn split_by_offsets<'v, T>(values: &'v mut [T], offsets: &[usize], chunk: usize) -> Vec<&'v mut [T]> {
+    let bricks = offsets.len() - 1;
+    let mut rest = values;
+    let mut parts = Vec::with_capacity(bricks.div_ceil(chunk));
+    for first in (0..bricks).step_by(chunk) {
+        let len = offsets[(first + chunk).min(bricks)] - offsets[first];
+        let (part, tail) = rest.split_at_mut(len);
+        parts.push(part);
+        rest = tail;
+    }
+    parts
+}
+
+/// Sums run over fixed lanes, so that they do not depend on the vector width, and accumulate in f64.
+fn lane_sum(n: usize, term: impl Fn(usize) -> f64) -> f64 {
+    const LANES: usize = 8;
+    let mut lanes = [0.0; LANES];
+    for i in (0..n - n % LANES).step_by(LANES) {
+        for (l, lane) in lanes.iter_mut().enumerate() {
+            *lane += term(i + l);
+        }
+    }
+    let tail: f64 = (n - n % LANES..n).map(term).sum();
+    lanes.iter().sum::<f64>() + tail
+}
+
+fn dot<T: Real>(a: &[T], b: &[T]) -> f64 {
+    lane_sum(a.len(), |i| a[i].as_f64() * b[i].as_f64())
+}
+
+fn weighted_square<T: Real>(a: &[T], w: &[T]) -> f64 {
+    lane_sum(a.len(), |i| a[i].as_f64() * a[i].as_f64() * w[i].as_f64())
+}

@@ -1,0 +1,63 @@
+//! Samples merged for the coarse levels: one entry per half-cell and octant of the normal.
+
+use glam::DVec3;
+
+use super::samples::Samples;
+
+/// Mean of the samples of one half-cell whose normals share an octant.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cluster {
+    /// Mean position, unit box.
+    pub position: DVec3,
+    /// Mean of the unit normals, not normalized: short where they disagree.
+    pub normal: DVec3,
+    /// Samples merged.
+    pub count: f64,
+    /// `¼ · count / count of the half-cell`: every occupied half-cell weighs the same, whatever its density.
+    pub weight: f64,
+}
+
+/// Clusters for the grid with `2^depth` cells: half-cells are cells of `depth + 1`.
+pub(crate) fn clusters(samples: &Samples, depth: usize) -> Vec<Cluster> {
+    let entries = samples.positions.iter().zip(&samples.normals);
+    merge(
+        entries.map(|(p, n)| (*p, DVec3::from(n.map(f64::from)), 1.0)),
+        depth,
+    )
+}
+
+/// The clusters of the next coarser grid, from those of this one (which are in Morton order).
+pub(crate) fn coarser(finer: &[Cluster], depth: usize) -> Vec<Cluster> {
+    merge(finer.iter().map(|c| (c.position, c.normal, c.count)), depth)
+}
+
+fn merge(entries: impl Iterator<Item = (DVec3, DVec3, f64)>, depth: usize) -> Vec<Cluster> {
+    let n = (2u64 << depth) as f64;
+    let mut out = Vec::new();
+    let mut bins = [(DVec3::ZERO, DVec3::ZERO, 0.0f64); 8];
+    let mut current = [u32::MAX; 3];
+    let mut flush = |bins: &mut [(DVec3, DVec3, f64); 8]| {
+        let total: f64 = bins.iter().map(|b| b.2).sum();
+        for (position, normal, count) in bins.iter().filter(|b| b.2 > 0.0) {
+            out.push(Cluster {
+                position: *position / *count,
+                normal: *normal / *count,
+                count: *count,
+                weight: 0.25 * count / total,
+            });
+        }
+        *bins = [(DVec3::ZERO, DVec3::ZERO, 0.0); 8];
+    };
+    for (position, normal, count) in entries {
+        let cell = (position * n).to_array().map(|x| x as u32);
+        if cell != current {
+            flush(&mut bins);
+            current = cell;
+        }
+        let octant = (0..3).map(|a| usize::from(normal[a] < 0.0) << a).sum::<usize>();
+        let bin = &mut bins[octant];
+        *bin = (bin.0 + position * count, bin.1 + normal * count, bin.2 + count);
+    }
+    flush(&mut bins);
+    out
+}

@@ -1,0 +1,85 @@
+//! Fits of oriented point clouds.
+
+mod band;
+mod band_solve;
+mod cascade;
+mod clusters;
+mod coarse;
+mod cross_validation;
+mod full_grid;
+mod noise;
+mod plan;
+mod residual;
+pub use residual::newton_distance;
+mod samples;
+mod stencil;
+
+use bspline::{HierarchicalSpline, Real};
+
+use crate::{Control, FitError, FitReport};
+use plan::{Plan, Smoothing};
+pub use samples::OrientedPoints;
+use samples::Samples;
+
+/// What the caller may choose; `None` is chosen from the data.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PointOptions {
+    /// Rms distance per leaf, world units.
+    pub tolerance: Option<f64>,
+    /// No level is begun once so many coefficients are spent.
+    pub coefficients: Option<usize>,
+    /// Deepest level: `2^max_depth` cells along the box.
+    pub max_depth: Option<usize>,
+    /// Weight `μ` of the bending energy on the finest level.
+    pub smoothing: Option<f64>,
+}
+
+/// Fits a signed distance, positive inside, to points with outward normals.
+///
+/// # Errors
+/// See [`FitError`].
+pub fn fit_points<T: Real>(
+    cloud: &OrientedPoints<'_>,
+    options: &PointOptions,
+    control: &mut Control,
+) -> Result<(HierarchicalSpline<T>, FitReport), FitError> {
+    control.step("sorting points", 0.0)?;
+    let samples = Samples::prepare(*cloud)?;
+    let tolerance = options.tolerance.unwrap_or(1e-4 * samples.diagonal) / samples.scale;
+    let noise = match options.smoothing {
+        None => noise::estimate(&samples, tolerance),
+        Some(_) => None,
+    };
+    let mut plan = Plan::new(&samples, options, tolerance, noise);
+    let trace = std::env::var_os("TRACE").is_some();
+    let t0 = std::time::Instant::now();
+    control.step("fitting coarse levels", 0.05)?;
+    let base = coarse::solve(&samples, plan.beta, 1.0);
+    if trace {
+        eprintln!("coarse {:?}", t0.elapsed());
+    }
+    if let Some(sigma) = noise {
+        let mu = cross_validation::choose::<T>(&samples, &base, &plan, sigma, control)?;
+        plan.smoothing = Smoothing::Halving(mu);
+    }
+    let cascade = cascade::run::<T>(&samples, &base, &plan, control)?;
+    if trace {
+        eprintln!("cascade {:?} {:?}", t0.elapsed(), cascade.iterations);
+    }
+    control.step("building the field", 0.9)?;
+    let field = cascade::assemble(&samples, &base, &cascade.levels);
+    if trace {
+        eprintln!(
+            "assemble {:?} bricks {} coefs {}",
+            t0.elapsed(),
+            field.brick_count(),
+            field.coefficient_count()
+        );
+    }
+    control.step("measuring", 0.95)?;
+    let report = residual::report(&field, &samples, &cascade, cloud.positions.len(), &plan, noise);
+    if trace {
+        eprintln!("report {:?}", t0.elapsed());
+    }
+    Ok((field, report))
+}

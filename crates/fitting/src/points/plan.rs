@@ -1,0 +1,118 @@
+//! The one rule that turns data and options into depths and weights.
+
+use super::PointOptions;
+use super::band_solve::Weights;
+use super::samples::{BASE_DEPTH, MAX_DEPTH, Samples};
+use crate::StopReason;
+
+/// How a cascade runs.
+#[derive(Clone, Debug)]
+pub(crate) struct Plan {
+    /// Rms distance that ends the refinement of a cell, unit box.
+    pub tolerance: f64,
+    /// Deepest level.
+    pub max_depth: usize,
+    /// Whether every occupied cell is split down to `max_depth`, whatever its residual.
+    pub uniform: bool,
+    /// Active functions after which no further level is begun.
+    pub coefficients: Option<usize>,
+    /// `β` of the finest level, unit box.
+    pub beta: f64,
+    /// `μ` of a level.
+    pub smoothing: Smoothing,
+    /// CG stops at this relative residual ...
+    pub residual: f64,
+    /// ... or after this many iterations.
+    pub iterations: usize,
+    /// Whether cells with many samples are thinned on the way down.
+    pub thin: bool,
+    /// Why cells of the deepest level are not split.
+    pub limited_by: StopReason,
+    /// Value targets in the place of 0, and no normals: for the trace of the smoother.
+    pub probe: Option<Vec<f32>>,
+}
+
+/// Weight of the bending energy by level.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Smoothing {
+    /// One weight on the way, one on the deepest level.
+    Steps { coarse: f64, finest: f64 },
+    /// `μ·2^(depth - max_depth)`.
+    Halving(f64),
+}
+
+/// Deepest level of a clean cloud when the caller gives none.
+const DEFAULT_DEPTH: usize = 10;
+
+impl Plan {
+    /// Clean clouds: `β = 0.6 s` (`s` the mean spacing), refined by residual. Noisy ones: every occupied cell
+    /// down to the last spacing of at least `2σ̂`, `β = 0.3 s`, and `μ` left to cross-validation.
+    ///
+    /// `tolerance` and `noise` in the unit box.
+    pub fn new(samples: &Samples, options: &PointOptions, tolerance: f64, noise: Option<f64>) -> Self {
+        let spacing = samples.mean_spacing();
+        let asked = options.max_depth.map(|d| d.clamp(BASE_DEPTH + 1, MAX_DEPTH));
+        let clean = Self {
+            tolerance,
+            max_depth: asked.unwrap_or(DEFAULT_DEPTH),
+            uniform: false,
+            coefficients: options.coefficients,
+            beta: 0.6 * spacing,
+            smoothing: Smoothing::Steps {
+                coarse: 1e-3,
+                finest: options.smoothing.unwrap_or(1e-4),
+            },
+            residual: 0.03,
+            iterations: 8,
+            thin: true,
+            limited_by: StopReason::Depth,
+            probe: None,
+        };
+        let Some(sigma) = noise else { return clean };
+        let justified = ((0.5 / sigma).log2().floor() as usize).clamp(BASE_DEPTH + 1, MAX_DEPTH);
+        Self {
+            max_depth: asked.unwrap_or(justified),
+            uniform: true,
+            beta: 0.3 * spacing,
+            residual: 0.01,
+            iterations: 20,
+            thin: false,
+            limited_by: if asked.is_some() {
+                StopReason::Depth
+            } else {
+                StopReason::Noise
+            },
+            ..clean
+        }
+    }
+
+    /// Weights of the energy on the level of `depth`. `β` is at least a quarter cell on levels that are refined
+    /// again: it keeps the near far-field clean.
+    pub fn weights(&self, depth: usize) -> Weights {
+        let quarter = 0.25 * 0.5f64.powi(depth as i32);
+        let beta = if depth == self.max_depth {
+            self.beta
+        } else {
+            self.beta.max(quarter)
+        };
+        Weights {
+            beta,
+            mu: self.smoothing.at(depth, self.max_depth),
+        }
+    }
+}
+
+impl Smoothing {
+    fn at(self, depth: usize, max_depth: usize) -> f64 {
+        match self {
+            Self::Steps { coarse, finest } => {
+                if depth == max_depth {
+                    finest
+                } else {
+                    coarse
+                }
+            }
+            Self::Halving(mu) => mu * 0.5f64.powi((max_depth - depth) as i32),
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! The fit's own account of its error: Newton distances of the samples to the zero set.
+
+use bspline::{Field, HierarchicalSpline, Real};
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::cascade::Cascade;
+use super::plan::{Plan, Smoothing};
+use super::samples::Samples;
+use crate::{FitReport, Leaf};
+
+/// Steps of the projection.
+const NEWTON_STEPS: usize = 5;
+
+/// Distance from `p` to the zero set of `field`, found by Newton steps along the gradient, and `|f(p)|`.
+///
+/// Steps stop when they are under a hundredth of the way gone. Where the gradient vanishes the way gone so far
+/// is returned.
+pub fn newton_distance(field: &dyn Field, p: DVec3) -> (f64, f64) {
+    let (first, mut gradient) = field.value_gradient(p);
+    let (mut x, mut value) = (p, first);
+    for step in 0..NEWTON_STEPS {
+        let steepness = gradient.length_squared();
+        if steepness < 1e-12 {
+            break;
+        }
+        let move_by = gradient * (-value / steepness);
+        x += move_by;
+        if step + 1 == NEWTON_STEPS || move_by.length() <= 0.01 * (x - p).length() {
+            break;
+        }
+        (value, gradient) = field.value_gradient(x);
+    }
+    ((x - p).length(), first.abs())
+}
+
+pub(crate) fn report<T: Real>(
+    field: &HierarchicalSpline<T>,
+    samples: &Samples,
+    cascade: &Cascade<T>,
+    input_count: usize,
+    plan: &Plan,
+    noise: Option<f64>,
+) -> FitReport {
+    let measured: Vec<(f64, f64)> = samples
+        .positions
+        .par_iter()
+        .with_min_len(4096)
+        .map(|u| newton_distance(field, samples.origin + *u * samples.scale))
+        .collect();
+    let leaves = cascade.leaves.iter().map(|leaf| {
+        let part = &measured[leaf.start as usize..leaf.end as usize];
+        let square: f64 = part.iter().map(|m| m.0 * m.0).sum();
+        Leaf {
+            level: leaf.depth as u8,
+            cell: leaf.at,
+            sample_count: part.len() as u32,
+            rms: (square / part.len() as f64).sqrt() as f32,
+            max: part.iter().map(|m| m.0).fold(0.0, f64::max) as f32,
+            reason: leaf.reason,
+        }
+    });
+    let mut distances: Vec<f64> = measured.iter().map(|m| m.0).collect();
+    let count = distances.len();
+    let rms = (distances.iter().map(|d| d * d).sum::<f64>() / count as f64).sqrt();
+    let max = distances.iter().copied().fold(0.0, f64::max);
+    let p95 = *distances
+        .select_nth_unstable_by((count - 1) * 95 / 100, f64::total_cmp)
+        .1;
+    FitReport {
+        input_count,
+        used_count: count,
+        coefficients: field.coefficient_count(),
+        depth: super::samples::BASE_DEPTH + field.level_count() - 1,
+        rms,
+        p95,
+        max,
+        bound: measured.iter().map(|m| m.1).fold(0.0, f64::max) + field.rounding_bound(),
+        noise: noise.map(|sigma| sigma * samples.scale),
+        tolerance: plan.tolerance * samples.scale,
+        smoothing: match plan.smoothing {
+            Smoothing::Steps { finest, .. } => finest,
+            Smoothing::Halving(mu) => mu,
+        },
+        leaves: leaves.collect(),
+        notes: samples.notes.clone(),
+    }
+}

@@ -1,0 +1,232 @@
+//! Oriented points, made ready: checked, scaled to a unit box, in Morton order.
+
+use bspline::hierarchical::Lattice;
+use glam::{DAffine3, DMat3, DVec3};
+
+use crate::FitError;
+
+/// Points with normals, as given. Normals point outward and need no unit length.
+#[derive(Clone, Copy, Debug)]
+pub struct OrientedPoints<'a> {
+    /// World positions.
+    pub positions: &'a [DVec3],
+    /// One normal per position.
+    pub normals: &'a [DVec3],
+}
+
+/// Margin of the box round the points, as a multiple of their longest side.
+const BOX_SCALE: f64 = 1.15;
+/// Deepest level a Morton key can tell apart.
+pub(crate) const MAX_DEPTH: usize = 16;
+/// Level of the coarsest grid that is stored in the field: 32 cells along the box.
+pub(crate) const BASE_DEPTH: usize = 5;
+/// Share of the points that may lie outside the robust extent before they count as part of the scan.
+const OUTLIER_SHARE: f64 = 1e-3;
+
+/// The usable samples in Morton order of their position.
+#[derive(Debug)]
+pub(crate) struct Samples {
+    /// Positions in the unit box.
+    pub positions: Vec<DVec3>,
+    /// Outward unit normals.
+    pub normals: Vec<[f32; 3]>,
+    /// Edge of the (cubic) box in world units.
+    pub scale: f64,
+    /// Corner of the box in world units.
+    pub origin: DVec3,
+    /// Diagonal of the points' own bounding box, world units.
+    pub diagonal: f64,
+    /// What was left out, and why.
+    pub notes: Vec<String>,
+}
+
+impl Samples {
+    /// Checks, scales and sorts.
+    ///
+    /// Left out, with a note: points that are not finite, points without a usable normal, and lone points
+    /// farther than ten times the robust extent of the rest.
+    ///
+    /// # Errors
+    /// [`FitError::Degenerate`] if no normal is usable or the points span no volume or area;
+    /// [`FitError::NotEnoughSamples`] if fewer than 10 are left.
+    pub fn prepare(cloud: OrientedPoints<'_>) -> Result<Self, FitError> {
+        assert_eq!(cloud.positions.len(), cloud.normals.len(), "one normal per point");
+        let total = cloud.positions.len();
+        let mut notes = Vec::new();
+        let mut note = |count: usize, what: &str| {
+            if count > 0 {
+                notes.push(format!("{count} of {total} points left out: {what}"));
+            }
+        };
+        let finite = |p: &DVec3| p.is_finite() && p.abs().max_element() < 1e150;
+        let mut kept: Vec<u32> = (0..total as u32)
+            .filter(|&i| finite(&cloud.positions[i as usize]))
+            .collect();
+        note(total - kept.len(), "a coordinate is not finite");
+        let finite_count = kept.len();
+        kept.retain(|&i| usable_normal(cloud.normals[i as usize]));
+        note(finite_count - kept.len(), "the normal is zero or not finite");
+        if kept.is_empty() && finite_count > 0 {
+            return Err(FitError::Degenerate(
+                "every normal is zero: give points with outward normals, or a mesh whose faces define them"
+                    .into(),
+            ));
+        }
+        let with_normal = kept.len();
+        drop_far_outliers(cloud.positions, &mut kept);
+        note(
+            with_normal - kept.len(),
+            "farther than ten extents from the bulk of the points",
+        );
+        if kept.len() < 10 {
+            return Err(FitError::NotEnoughSamples {
+                found: kept.len(),
+                needed: 10,
+            });
+        }
+        let (min, max) = extent(cloud.positions, &kept);
+        let size = max - min;
+        let longest = size.max_element();
+        if longest <= 1e-12 * min.abs().max(max.abs()).max_element() || longest == 0.0 {
+            return Err(FitError::Degenerate(format!(
+                "all {} points lie at {min}",
+                kept.len()
+            )));
+        }
+        if is_collinear(cloud.positions, &kept, longest) {
+            return Err(FitError::Degenerate(
+                "the points lie on one line: a solid needs a surface around it".into(),
+            ));
+        }
+        let scale = BOX_SCALE * longest;
+        let origin = (min + max) * 0.5 - scale * 0.5;
+        let mut keyed: Vec<(u64, u32)> = kept
+            .iter()
+            .map(|&i| (morton((cloud.positions[i as usize] - origin) / scale), i))
+            .collect();
+        keyed.sort_unstable();
+        let positions = keyed
+            .iter()
+            .map(|k| (cloud.positions[k.1 as usize] - origin) / scale)
+            .collect();
+        let unit = |n: DVec3| (n / n.abs().max_element()).normalize().as_vec3().to_array();
+        let normals = keyed.iter().map(|k| unit(cloud.normals[k.1 as usize])).collect();
+        Ok(Self {
+            positions,
+            normals,
+            scale,
+            origin,
+            diagonal: size.length(),
+            notes,
+        })
+    }
+
+    /// The grids of the fit: level 0 has 32 cells along the box.
+    pub fn lattice(&self) -> Lattice {
+        let cells = 1u32 << BASE_DEPTH;
+        Lattice {
+            world_from_lattice: DAffine3 {
+                matrix3: DMat3::from_diagonal(DVec3::splat(self.scale / cells as f64)),
+                translation: self.origin,
+            },
+            cells: [cells; 3],
+        }
+    }
+
+    /// Mean spacing `√(area/N)` of the samples, unit box.
+    ///
+    /// The area is that of the occupied cells, `cells·h²/1.5`, on the grid where a cell holds about six points.
+    pub fn mean_spacing(&self) -> f64 {
+        let n = self.positions.len();
+        let occupied = |depth: usize| {
+            let mut last = [u32::MAX; 3];
+            (0..n)
+                .filter(|&i| std::mem::replace(&mut last, self.cell(i, depth)) != last)
+                .count()
+        };
+        let mut depth = 2;
+        while depth < MAX_DEPTH && n > 6 * occupied(depth) {
+            depth += 1;
+        }
+        let area = occupied(depth) as f64 * 0.25f64.powi(depth as i32) / 1.5;
+        (area / n as f64).sqrt()
+    }
+
+    /// Cell of the grid with `2^depth` cells along the box.
+    pub fn cell(&self, index: usize, depth: usize) -> [u32; 3] {
+        let n = (1u64 << depth) as f64;
+        (self.positions[index] * n).to_array().map(|x| x as u32)
+    }
+}
+
+fn usable_normal(n: DVec3) -> bool {
+    n.is_finite() && n.abs().max_element() > 0.0
+}
+
+fn extent(positions: &[DVec3], kept: &[u32]) -> (DVec3, DVec3) {
+    kept.iter()
+        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), &i| {
+            let p = positions[i as usize];
+            (lo.min(p), hi.max(p))
+        })
+}
+
+/// Removes points far beyond the bulk, when they are few: one such point would take all resolution away.
+fn drop_far_outliers(positions: &[DVec3], kept: &mut Vec<u32>) {
+    if kept.len() < 100 {
+        return;
+    }
+    // The extent of the bulk: of a strided choice of points, without its outermost few.
+    let stride = kept.len().div_ceil(4096);
+    let (mut low, mut high) = (DVec3::ZERO, DVec3::ZERO);
+    for a in 0..3 {
+        let mut axis: Vec<f64> = kept
+            .iter()
+            .step_by(stride)
+            .map(|&i| positions[i as usize][a])
+            .collect();
+        let trim = (axis.len() as f64 * OUTLIER_SHARE).ceil() as usize;
+        let last = axis.len() - 1;
+        low[a] = *axis.select_nth_unstable_by(trim, f64::total_cmp).1;
+        high[a] = *axis.select_nth_unstable_by(last - trim, f64::total_cmp).1;
+    }
+    let reach = 10.0 * (high - low).max_element();
+    let within = |i: &u32| {
+        let p = positions[*i as usize];
+        (low - p).max(p - high).max_element() <= reach
+    };
+    let outside = kept.iter().filter(|i| !within(i)).count();
+    if reach > 0.0 && outside as f64 <= OUTLIER_SHARE * kept.len() as f64 + 1.0 {
+        kept.retain(within);
+    }
+}
+
+/// Whether all points lie within `1e-9` of the extent from the line through the two farthest found.
+fn is_collinear(positions: &[DVec3], kept: &[u32], longest: f64) -> bool {
+    let p = |i: u32| positions[i as usize];
+    let first = p(kept[0]);
+    let farthest = |from: DVec3| {
+        kept.iter()
+            .map(|&i| p(i))
+            .max_by(|a, b| (*a - from).length().total_cmp(&(*b - from).length()))
+    };
+    let a = farthest(first).expect("not empty");
+    let b = farthest(a).expect("not empty");
+    let direction = (b - a).normalize_or_zero();
+    kept.iter()
+        .all(|&i| (p(i) - a).cross(direction).length() <= 1e-9 * longest)
+}
+
+/// Interleaved bits of the cell at [`MAX_DEPTH`], x highest.
+fn morton(unit: DVec3) -> u64 {
+    let n = (1u64 << MAX_DEPTH) as f64;
+    let spread = |x: f64| {
+        let mut v = (x * n).clamp(0.0, n - 1.0) as u64;
+        v = (v | v << 32) & 0x001f_0000_0000_ffff;
+        v = (v | v << 16) & 0x001f_0000_ff00_00ff;
+        v = (v | v << 8) & 0x100f_00f0_0f00_f00f;
+        v = (v | v << 4) & 0x10c3_0c30_c30c_30c3;
+        (v | v << 2) & 0x1249_2492_4924_9249
+    };
+    spread(unit.x) << 2 | spread(unit.y) << 1 | spread(unit.z)
+}

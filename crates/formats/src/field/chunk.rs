@@ -1,0 +1,123 @@
+//! Chunks: type, compression, lengths, CRC-32, payload.
+
+use std::io::{self, Read, Write};
+
+use super::cursor::Cursor;
+use crate::Fault;
+use crate::error::excerpt;
+use crate::limits::Budget;
+
+/// Bytes in front of a payload.
+const HEAD: usize = 28;
+/// zstd level: coefficients are mostly noise, higher levels gain under 1 % and cost several times the time.
+const LEVEL: i32 = 1;
+/// Payloads below this are stored as they are.
+const WORTH_PACKING: usize = 256;
+
+const STORED: u32 = 0;
+const ZSTD: u32 = 1;
+
+pub(super) type Kind = [u8; 4];
+
+/// Writes one chunk.
+pub(super) fn write(out: &mut dyn Write, kind: Kind, raw: &[u8]) -> io::Result<()> {
+    let packed = match raw.len() {
+        0..WORTH_PACKING => None,
+        _ => Some(zstd::bulk::compress(raw, LEVEL)?).filter(|p| p.len() < raw.len()),
+    };
+    let (method, payload) = packed.as_deref().map_or((STORED, raw), |p| (ZSTD, p));
+    let mut head = [0; HEAD];
+    head[..4].copy_from_slice(&kind);
+    head[4..8].copy_from_slice(&method.to_le_bytes());
+    head[8..16].copy_from_slice(&(payload.len() as u64).to_le_bytes());
+    head[16..24].copy_from_slice(&(raw.len() as u64).to_le_bytes());
+    let crc = checksum(&head, payload);
+    head[24..].copy_from_slice(&crc.to_le_bytes());
+    out.write_all(&head)?;
+    out.write_all(payload)
+}
+
+/// CRC-32 of the head up to the checksum and of the payload as stored.
+fn checksum(head: &[u8], payload: &[u8]) -> u32 {
+    let mut crc = crc32fast::Hasher::new();
+    crc.update(&head[..24]);
+    crc.update(payload);
+    crc.finalize()
+}
+
+/// A chunk whose checksum holds, still packed.
+pub(super) struct Chunk<'a> {
+    pub kind: Kind,
+    method: u32,
+    raw_length: u64,
+    payload: &'a [u8],
+}
+
+impl<'a> Chunk<'a> {
+    /// Takes the chunk at the front of `rest`, which starts at byte `at` of the file.
+    pub fn take(rest: &mut &'a [u8], at: u64) -> Result<Self, Fault> {
+        let mut cursor = Cursor::new(rest, "a chunk");
+        let head = cursor.take(HEAD as u64)?;
+        let u32_at = |i: usize| u32::from_le_bytes(head[i..i + 4].try_into().expect("4 bytes"));
+        let u64_at = |i: usize| u64::from_le_bytes(head[i..i + 8].try_into().expect("8 bytes"));
+        let payload = cursor.take(u64_at(8))?;
+        let kind: Kind = head[..4].try_into().expect("4 bytes");
+        let (stored, computed) = (u32_at(24), checksum(head, payload));
+        if stored != computed {
+            return Err(Fault::Damaged {
+                what: format!(
+                    "chunk {} at byte {at} has checksum {computed:08x}, {stored:08x} is stored",
+                    excerpt(&kind)
+                ),
+            });
+        }
+        *rest = &rest[HEAD + payload.len()..];
+        Ok(Self {
+            kind,
+            method: u32_at(4),
+            raw_length: u64_at(16),
+            payload,
+        })
+    }
+
+    /// Bytes it takes in the file.
+    pub fn stored_length(&self) -> u64 {
+        (HEAD + self.payload.len()) as u64
+    }
+
+    /// The payload, unpacked.
+    pub fn unpack(&self, budget: &mut Budget) -> Result<Vec<u8>, Fault> {
+        budget.reserve("an unpacked chunk", self.raw_length, 1)?;
+        let raw = match self.method {
+            STORED => self.payload.to_vec(),
+            ZSTD => {
+                // Read up to what was booked, so that a stream longer than it says is seen, not held.
+                let mut raw = Vec::with_capacity(self.raw_length.min(1 << 24) as usize);
+                zstd::stream::read::Decoder::with_buffer(self.payload)
+                    .and_then(|d| d.take(self.raw_length + 1).read_to_end(&mut raw))
+                    .map_err(|e| Fault::Damaged {
+                        what: format!("chunk {} cannot be unpacked ({e})", excerpt(&self.kind)),
+                    })?;
+                raw
+            }
+            other => {
+                return Err(Fault::Value {
+                    what: "the compression of a chunk",
+                    value: other.to_string(),
+                    remedy: "known are 0 (none) and 1 (zstd); a newer version of the program may read it",
+                });
+            }
+        };
+        if raw.len() as u64 != self.raw_length {
+            return Err(Fault::Damaged {
+                what: format!(
+                    "chunk {} unpacks to {} bytes, {} are stated",
+                    excerpt(&self.kind),
+                    raw.len(),
+                    self.raw_length
+                ),
+            });
+        }
+        Ok(raw)
+    }
+}

@@ -1,0 +1,151 @@
+//! A field as bytes.
+
+use std::io::{self, Write};
+
+use bspline::HierarchicalSpline;
+
+use super::chunk::{self, Kind};
+use super::levels::{for_active, to_bytes};
+use super::{FieldMeta, MAGIC, MAX_LEVELS, Stored, VERSION};
+use crate::Fault;
+
+pub(super) const HEADER: Kind = *b"HEAD";
+pub(super) const LEVEL: Kind = *b"CORR";
+pub(super) const LEAVES: Kind = *b"LEAF";
+pub(super) const REPORT: Kind = *b"REPT";
+pub(super) const NOTES: Kind = *b"NOTE";
+pub(super) const PROVENANCE: Kind = *b"PROV";
+pub(super) const END: Kind = *b"DONE";
+
+/// The bytes of a field file.
+///
+/// # Errors
+/// As [`super::save`], without I/O.
+pub fn encode<T: Stored>(field: &HierarchicalSpline<T>, meta: &FieldMeta) -> Result<Vec<u8>, Fault> {
+    check(field, meta)?;
+    let mut bytes = Vec::new();
+    write(&mut bytes, field, meta).map_err(|source| Fault::Io {
+        doing: "packing",
+        source,
+    })?;
+    Ok(bytes)
+}
+
+/// Refuses what reading would refuse.
+pub(super) fn check<T: Stored>(field: &HierarchicalSpline<T>, meta: &FieldMeta) -> Result<(), Fault> {
+    let refuse = |what, value: String| {
+        Err(Fault::Output {
+            what,
+            value,
+            remedy: "fit the input again",
+        })
+    };
+    if field.level_count() > MAX_LEVELS {
+        return refuse("a number of levels", field.level_count().to_string());
+    }
+    for level in 0..field.level_count() {
+        for (key, c) in field.corrections(level) {
+            let mut bad = None;
+            for_active(&c.mask, |slot| {
+                if !c.values[slot].is_finite() {
+                    bad = Some(slot);
+                }
+            });
+            if let Some(slot) = bad {
+                return refuse(
+                    "a coefficient",
+                    format!("{:?} in brick {:?} of level {level}", c.values[slot], key.0),
+                );
+            }
+        }
+    }
+    if let Some(leaf) = meta
+        .leaves
+        .iter()
+        .find(|l| !(l.rms.is_finite() && l.max.is_finite()))
+    {
+        return refuse("a residual", format!("{leaf:?}"));
+    }
+    if let Some(iso) = meta.iso.filter(|v| !v.is_finite()) {
+        return refuse("an iso-value", iso.to_string());
+    }
+    Ok(())
+}
+
+/// Writes a checked field.
+pub(super) fn write<T: Stored>(
+    out: &mut dyn Write,
+    field: &HierarchicalSpline<T>,
+    meta: &FieldMeta,
+) -> io::Result<()> {
+    out.write_all(&MAGIC)?;
+    out.write_all(&VERSION.to_le_bytes())?;
+    let mut count = 0u32;
+    let mut put = |kind: Kind, raw: &[u8]| {
+        count += 1;
+        chunk::write(out, kind, raw)
+    };
+    put(HEADER, &header(field, meta))?;
+    for level in 0..field.level_count() {
+        put(LEVEL, &to_bytes(level as u32, field.corrections(level)))?;
+    }
+    if !meta.leaves.is_empty() {
+        put(LEAVES, &leaves(meta))?;
+    }
+    if !meta.report.is_empty() {
+        put(REPORT, meta.report.as_bytes())?;
+    }
+    if !meta.notes.is_empty() {
+        let mut raw = (meta.notes.len() as u32).to_le_bytes().to_vec();
+        meta.notes.iter().for_each(|n| text(&mut raw, n));
+        put(NOTES, &raw)?;
+    }
+    if !meta.provenance.is_empty() {
+        put(PROVENANCE, meta.provenance.as_bytes())?;
+    }
+    chunk::write(out, END, &count.to_le_bytes())
+}
+
+fn header<T: Stored>(field: &HierarchicalSpline<T>, meta: &FieldMeta) -> Vec<u8> {
+    let lattice = field.lattice();
+    let mut raw = vec![
+        T::BYTES as u8,
+        meta.source as u8,
+        meta.unit as u8,
+        u8::from(meta.iso.is_some()),
+    ];
+    raw.extend((field.level_count() as u32).to_le_bytes());
+    lattice.cells.iter().for_each(|n| raw.extend(n.to_le_bytes()));
+    lattice
+        .world_from_lattice
+        .to_cols_array()
+        .iter()
+        .for_each(|x| raw.extend(x.to_le_bytes()));
+    raw.extend(field.slope().to_le_bytes());
+    raw.extend(meta.iso.unwrap_or(0.0).to_le_bytes());
+    text(&mut raw, &meta.density_unit);
+    raw
+}
+
+fn text(raw: &mut Vec<u8>, s: &str) {
+    raw.extend((s.len() as u32).to_le_bytes());
+    raw.extend(s.as_bytes());
+}
+
+/// The leaf table, a column after the other: columns of like numbers pack several times better than rows.
+fn leaves(meta: &FieldMeta) -> Vec<u8> {
+    let leaves = &meta.leaves;
+    let mut raw = Vec::with_capacity(4 + leaves.len() * 26);
+    raw.extend((leaves.len() as u32).to_le_bytes());
+    raw.extend(leaves.iter().map(|l| l.level));
+    raw.extend(leaves.iter().map(|l| l.reason));
+    for axis in 0..3 {
+        leaves.iter().for_each(|l| raw.extend(l.cell[axis].to_le_bytes()));
+    }
+    leaves
+        .iter()
+        .for_each(|l| raw.extend(l.sample_count.to_le_bytes()));
+    leaves.iter().for_each(|l| raw.extend(l.rms.to_le_bytes()));
+    leaves.iter().for_each(|l| raw.extend(l.max.to_le_bytes()));
+    raw
+}

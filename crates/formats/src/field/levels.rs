@@ -1,0 +1,144 @@
+//! The corrections of a level as bytes: keys, masks, then the values of active slots in byte planes.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use bspline::hierarchical::{BRICK, BrickKey, Corrections, Lattice};
+
+use super::Stored;
+use super::cursor::Cursor;
+use crate::Fault;
+use crate::limits::Budget;
+
+/// The bricks of one level, in key order.
+pub(super) type Level<T> = BTreeMap<BrickKey, Arc<Corrections<T>>>;
+
+/// Bytes of a level's chunk before packing.
+pub(super) fn to_bytes<T: Stored>(level: u32, bricks: &Level<T>) -> Vec<u8> {
+    let active: usize = bricks.values().map(|c| c.count()).sum();
+    let mut bytes = Vec::with_capacity(8 + bricks.len() * (12 + 64) + active * T::BYTES);
+    bytes.extend(level.to_le_bytes());
+    bytes.extend((bricks.len() as u32).to_le_bytes());
+    for key in bricks.keys() {
+        key.0.iter().for_each(|k| bytes.extend(k.to_le_bytes()));
+    }
+    for c in bricks.values() {
+        c.mask.iter().for_each(|m| bytes.extend(m.to_le_bytes()));
+    }
+    // Byte i of all values, then byte i + 1: signs and exponents stand together and pack, mantissas do not.
+    let planes = bytes.len();
+    bytes.resize(planes + active * T::BYTES, 0);
+    let mut at = 0;
+    for c in bricks.values() {
+        for_active(&c.mask, |slot| {
+            for (i, b) in c.values[slot].to_raw().as_ref().iter().enumerate() {
+                bytes[planes + i * active + at] = *b;
+            }
+            at += 1;
+        });
+    }
+    bytes
+}
+
+/// Calls `each` with the number of every active slot, in order.
+pub(super) fn for_active(mask: &[u64; BRICK], mut each: impl FnMut(usize)) {
+    for (word, bits) in mask.iter().enumerate() {
+        let mut bits = *bits;
+        while bits != 0 {
+            each(64 * word + bits.trailing_zeros() as usize);
+            bits &= bits - 1;
+        }
+    }
+}
+
+/// Reads the chunk of level `expected`; keys, masks and values are checked against `lattice`.
+pub(super) fn from_bytes<T: Stored>(
+    bytes: &[u8],
+    expected: u32,
+    lattice: &Lattice,
+    budget: &mut Budget,
+) -> Result<Level<T>, Fault> {
+    let mut cursor = Cursor::new(bytes, "the corrections of a level");
+    let (level, count) = (cursor.u32()?, cursor.u32()?);
+    if level != expected {
+        return Err(wrong(format!(
+            "level {level} stands where level {expected} has to"
+        )));
+    }
+    let keys = cursor.take(u64::from(count) * 12)?;
+    let masks = cursor.take(u64::from(count) * 64)?;
+    let planes = &bytes[8 + keys.len() + masks.len()..];
+    let active: u64 = masks
+        .as_chunks::<8>()
+        .0
+        .iter()
+        .map(|m| u64::from_le_bytes(*m).count_ones() as u64)
+        .sum();
+    cursor.take(active * T::BYTES as u64)?;
+    cursor.end()?;
+    let active = active as usize;
+
+    budget.reserve(
+        "the coefficients",
+        count.into(),
+        size_of::<Corrections<T>>() + 512 * T::BYTES + 64,
+    )?;
+    // Functions stand at slots 0 ..= n+2 of each axis.
+    let last = lattice.cells_at(level as usize).map(|n| n + 2);
+    let mut bricks = Vec::with_capacity(count as usize);
+    let mut previous = None;
+    let mut at = 0;
+    for (key, mask) in keys.as_chunks::<12>().0.iter().zip(masks.as_chunks::<64>().0) {
+        let word = |i: usize| u32::from_le_bytes(std::array::from_fn(|b| key[4 * i + b]));
+        let key = BrickKey([word(0), word(1), word(2)]);
+        if previous.is_some_and(|p| p >= key) {
+            return Err(wrong(format!(
+                "brick {:?} of level {level} is out of order",
+                key.0
+            )));
+        }
+        previous = Some(key);
+        let mut c = Corrections::<T>::empty();
+        c.mask = std::array::from_fn(|i| u64::from_le_bytes(std::array::from_fn(|b| mask[8 * i + b])));
+        if !(0..3).all(|a| key.0[a] <= last[a] / BRICK as u32) || !within(&c.mask, key, last) {
+            return Err(wrong(format!(
+                "brick {:?} of level {level} lies outside of the lattice",
+                key.0
+            )));
+        }
+        let mut is_finite = true;
+        for_active(&c.mask, |slot| {
+            let value = T::from_bytes(|i| planes[i * active + at]);
+            is_finite &= value.is_finite();
+            c.values[slot] = value;
+            at += 1;
+        });
+        if !is_finite {
+            return Err(wrong(format!(
+                "brick {:?} of level {level} holds a value that is not finite",
+                key.0
+            )));
+        }
+        bricks.push((key, Arc::new(c)));
+    }
+    // From a sorted list the tree is built in one go.
+    Ok(bricks.into_iter().collect())
+}
+
+/// Whether all active slots of a brick are at most `last`, on each axis.
+fn within(mask: &[u64; BRICK], key: BrickKey, last: [u32; 3]) -> bool {
+    let room = |a: usize| last[a] - key.0[a] * BRICK as u32;
+    if (0..3).all(|a| room(a) >= BRICK as u32 - 1) {
+        return true;
+    }
+    let mut inside = true;
+    for_active(mask, |slot| {
+        let place = [slot / 64, slot / 8 % 8, slot % 8];
+        inside &= (0..3).all(|a| place[a] as u32 <= room(a));
+    });
+    inside
+}
+
+fn wrong(what: String) -> Fault {
+    Fault::Damaged { what }
+}
