@@ -1,0 +1,203 @@
+//! What is fitted, and how: the input of a volume fit, checked.
+
+use bspline::Aabb;
+use glam::{DAffine3, DVec3};
+use rayon::prelude::*;
+
+use super::quantile::quantiles;
+use crate::FitError;
+
+/// Largest magnitude that can be fitted: coefficients, up to 27 times a voxel, have to stay finite in `f32`.
+const LARGEST: f32 = f32::MAX / 1024.0;
+
+/// A volume of densities on a regular grid, borrowed.
+#[derive(Clone, Copy, Debug)]
+pub struct VolumeView<'a> {
+    /// Voxels along x, y, z.
+    pub dims: [usize; 3],
+    /// Density of voxel `(x, y, z)` at `x + nx (y + ny z)`.
+    pub values: &'a [f32],
+    /// Voxel indices (voxel centres on integers) to world.
+    pub world_from_voxel: DAffine3,
+}
+
+/// How the coefficients are chosen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum VolumeMethod {
+    /// Least squares on few functions, chosen one by one where the density needs them.
+    #[default]
+    Adaptive,
+    /// One coefficient per voxel, exact at every voxel.
+    Interpolate,
+}
+
+/// Options of a volume fit; the default asks for what the noise justifies.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct VolumeOptions {
+    /// How the coefficients are chosen.
+    pub method: VolumeMethod,
+    /// Largest rms residual of a leaf, a density, `> 0`.
+    pub tolerance: Option<f64>,
+    /// Largest number of coefficients, at least 64. Alone it is spent whole, as far as that lowers the residual.
+    pub coefficients: Option<usize>,
+    /// Finest level that may be used; level 0 has a knot every 4 voxels unless the number of coefficients asks for
+    /// fewer.
+    pub max_depth: Option<usize>,
+    /// Weight `μ >= 0` of the ridge `μ Σ c²‖B‖²` on functions above level 0, against 1 for a voxel; 0 if not given.
+    /// It shrinks detail; dense voxels do not need it.
+    pub smoothing: Option<f64>,
+}
+
+/// What a look at every voxel tells.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Overview {
+    pub min: f32,
+    pub max: f32,
+    /// 1st and 99th percentile.
+    pub percentiles: [f32; 2],
+}
+
+impl Overview {
+    /// Range that percentages of densities refer to.
+    pub fn range(&self) -> f64 {
+        let [low, high] = self.percentiles.map(f64::from);
+        if high > low { high - low } else { f64::from(self.max) - f64::from(self.min) }
+    }
+
+    /// Largest magnitude.
+    pub fn magnitude(&self) -> f64 {
+        f64::from(self.min.abs().max(self.max.abs()))
+    }
+}
+
+impl VolumeView<'_> {
+    /// Looks at every voxel once.
+    ///
+    /// # Errors
+    /// [`FitError::NotEnoughSamples`] for a volume without voxels, [`FitError::Degenerate`] if the number of
+    /// values is not that of the dimensions, the map to the world cannot be inverted, or a voxel is not finite or
+    /// too large; the sentence says where and what would help.
+    pub(crate) fn check(&self) -> Result<Overview, FitError> {
+        let [nx, ny, nz] = self.dims;
+        if self.dims.contains(&0) {
+            return Err(FitError::NotEnoughSamples { found: 0, needed: 1 });
+        }
+        if nx.checked_mul(ny).and_then(|n| n.checked_mul(nz)) != Some(self.values.len()) {
+            return Err(FitError::Degenerate(format!(
+                "a volume of {nx} × {ny} × {nz} voxels comes with {} values; correct the dimensions",
+                self.values.len()
+            )));
+        }
+        if let Some(n) = self.dims.into_iter().find(|&n| n > 1 << 28) {
+            return Err(FitError::Degenerate(format!(
+                "{n} voxels along an axis; at most 2^28 can be fitted: split the volume"
+            )));
+        }
+        let map = self.world_from_voxel;
+        if !map.is_finite() || !map.inverse().is_finite() || map.matrix3.determinant() == 0.0 {
+            return Err(FitError::Degenerate(format!(
+                "the map from voxels to world cannot be inverted: {:?}; correct the spacing or orientation",
+                map.to_cols_array()
+            )));
+        }
+        let start = (f32::INFINITY, f32::NEG_INFINITY, 0_usize);
+        let (min, max, odd) = self
+            .values
+            .par_chunks(1 << 16)
+            .map(|chunk| {
+                chunk.iter().fold(start, |(lo, hi, odd), &v| {
+                    let bad = usize::from(!v.is_finite());
+                    (if v < lo { v } else { lo }, if v > hi { v } else { hi }, odd + bad)
+                })
+            })
+            .reduce(|| start, |a, b| (a.0.min(b.0), a.1.max(b.1), a.2 + b.2));
+        let place = |bad: fn(&f32) -> bool| {
+            let i = self.values.iter().position(bad).expect("counted above");
+            format!("voxel ({}, {}, {}) is {}", i % nx, i / nx % ny, i / (nx * ny), self.values[i])
+        };
+        if odd > 0 {
+            return Err(FitError::Degenerate(format!(
+                "{} ({odd} of {} voxels are not finite); replace them, for example by the value of air, before fitting",
+                place(|v| !v.is_finite()),
+                self.values.len()
+            )));
+        }
+        if min.abs().max(max.abs()) > LARGEST {
+            return Err(FitError::Degenerate(format!(
+                "{}; magnitudes up to {LARGEST:e} can be fitted: divide the densities before fitting",
+                place(|v| v.abs() > LARGEST)
+            )));
+        }
+        Ok(Overview { min, max, percentiles: quantiles(self.values, [0.01, 0.99]) })
+    }
+
+    /// Fall of the density per world length that stands for the volume: the median of `|∇d|` over voxels where
+    /// it is at least a hundredth of its largest value; for a constant volume, 1.
+    pub(crate) fn typical_slope(&self, overview: &Overview) -> f64 {
+        const PROBES: usize = 1 << 18;
+        let strides = [1, self.dims[0], self.dims[0] * self.dims[1]];
+        // Gradients are covectors: world gradient = inverse transpose · voxel gradient.
+        let world = self.world_from_voxel.matrix3.inverse().transpose();
+        let stride = self.values.len().div_ceil(PROBES);
+        let mut magnitudes: Vec<f32> = (0..self.values.len())
+            .step_by(stride)
+            .map(|i| {
+                let difference = |a: usize| {
+                    let k = i / strides[a] % self.dims[a];
+                    let (back, ahead) = (usize::from(k > 0), usize::from(k + 1 < self.dims[a]));
+                    let steps = (back + ahead).max(1) as f64;
+                    let at = |j: usize| f64::from(self.values[j]);
+                    (at(i + ahead * strides[a]) - at(i - back * strides[a])) / steps
+                };
+                (world * DVec3::new(difference(0), difference(1), difference(2))).length() as f32
+            })
+            .collect();
+        let largest = magnitudes.iter().copied().fold(0.0_f32, f32::max);
+        magnitudes.retain(|&m| m > 0.0 && m >= largest * 0.01 && m.is_finite());
+        if !magnitudes.is_empty() {
+            return f64::from(quantiles(&magnitudes, [0.5])[0]);
+        }
+        let span = f64::from(overview.max) - f64::from(overview.min);
+        let reach = Aabb {
+            min: DVec3::ZERO,
+            max: DVec3::new(self.dims[0] as f64, self.dims[1] as f64, self.dims[2] as f64),
+        }
+        .transformed(&self.world_from_voxel)
+        .size()
+        .length();
+        if span > 0.0 && reach > 0.0 { span / reach } else { 1.0 }
+    }
+}
+
+impl VolumeOptions {
+    /// Refuses values out of range and contradictions.
+    pub(crate) fn check(&self) -> Result<(), FitError> {
+        let refuse = |option, value, requirement| Err(FitError::Option { option, value, requirement });
+        if let Some(t) = self.tolerance
+            && !(t > 0.0 && t.is_finite())
+        {
+            return refuse("tolerance", t, "it has to be a positive density");
+        }
+        if let Some(m) = self.smoothing
+            && !(m >= 0.0 && m.is_finite())
+        {
+            return refuse("smoothing", m, "it has to be 0 or a positive number");
+        }
+        if self.method == VolumeMethod::Interpolate {
+            const EXACT: &str = "the interpolating method takes one coefficient per voxel and leaves no residual; \
+                leave the option out or choose the adaptive method";
+            let given = [
+                ("tolerance", self.tolerance),
+                ("coefficients", self.coefficients.map(|n| n as f64)),
+                ("max_depth", self.max_depth.map(|n| n as f64)),
+                ("smoothing", self.smoothing),
+            ];
+            for (option, value) in given {
+                if let Some(value) = value {
+                    return refuse(option, value, EXACT);
+                }
+            }
+        }
+        Ok(())
+    }
+}
