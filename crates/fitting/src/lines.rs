@@ -25,7 +25,9 @@ pub trait LineSolve<T>: Sync {
 /// If two indices are equal or one is out of range.
 #[inline(always)]
 pub(crate) fn rows_mut<T, R: AsMut<[T]>, const N: usize>(rows: &mut [R], at: [usize; N]) -> [&mut [T]; N] {
-    rows.get_disjoint_mut(at).expect("distinct rows within the line").map(|r| r.as_mut())
+    rows.get_disjoint_mut(at)
+        .expect("distinct rows within the line")
+        .map(|r| r.as_mut())
 }
 
 /// Solves along x, y and z of an array of `size` (x fastest).
@@ -101,5 +103,7 @@ pub(crate) fn solve_along_z<T: Real>(op: &impl LineSolve<T>, data: &mut [T], pla
             tile.push(piece);
         }
     }
-    tiles.par_iter_mut().for_each(|rows| Arch::new().dispatch(|| op.solve(rows)));
+    tiles
+        .par_iter_mut()
+        .for_each(|rows| Arch::new().dispatch(|| op.solve(rows)));
 }

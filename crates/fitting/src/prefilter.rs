@@ -48,7 +48,14 @@ impl<T: Real> Prefilter<T> {
             })
             .collect();
         let t = T::from_f64;
-        Self { samples, ends, inverse_pivots, one: T::one(), four: t(4.0), six: t(6.0) }
+        Self {
+            samples,
+            ends,
+            inverse_pivots,
+            one: T::one(),
+            four: t(4.0),
+            six: t(6.0),
+        }
     }
 
     /// Rows that [`LineSolve::solve`] overwrites, at least.
@@ -65,7 +72,13 @@ impl<T: Real> Prefilter<T> {
     /// Solves rows `first..last`, whose row before (if any) holds a known coefficient, or is missing for zero.
     /// `known_after` says that row `last` holds a known coefficient too.
     #[inline(always)]
-    fn sweep<R: AsRef<[T]> + AsMut<[T]>>(&self, rows: &mut [R], first: usize, last: usize, known_after: bool) {
+    fn sweep<R: AsRef<[T]> + AsMut<[T]>>(
+        &self,
+        rows: &mut [R],
+        first: usize,
+        last: usize,
+        known_after: bool,
+    ) {
         let six = self.six;
         for i in first..last {
             let u = self.inverse_pivots[i - first];
@@ -179,4 +192,3 @@ impl<T: Real> LineSolve<T> for Prefilter<T> {
         }
     }
 }
-

@@ -4,7 +4,7 @@ use bspline::hierarchical::Lattice;
 use bspline::{Field, Frame, HierarchicalSpline, Real};
 use fitting::{FitReport, Leaf, StopReason};
 use formats::Unit;
-use formats::field::{AnyField, FieldMeta, LeafRecord, LoadedField, SourceKind};
+use formats::field::{AnyField, FieldMeta, LeafRecord, LoadedField};
 use serde::{Deserialize, Serialize};
 
 use super::failure::{Failure, Outcome};

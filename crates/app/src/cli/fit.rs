@@ -3,6 +3,7 @@ use std::path::PathBuf;
 
 use clap::ValueEnum;
 use fitting::points::{OrientedPoints, PointOptions, fit_points};
+use fitting::volume::{VolumeMethod, VolumeOptions, VolumeView, fit_volume, otsu_threshold};
 use fitting::{Cancel, Control, FitError, FitReport, StopReason};
 use formats::Unit;
 use formats::field::{AnyField, FieldMeta, SourceKind, Stored};
@@ -12,7 +13,7 @@ use formats::volumes::Volume;
 use super::cost::{Cost, rss_bytes};
 use super::failure::{Failure, Outcome};
 use super::field::{self, either};
-use super::input::{self, Input, bounding_box, check_output, remaining};
+use super::input::{self, Input, check_output, remaining};
 use super::progress::Bar;
 use super::quantity::{Memory, Tolerance, human_bytes, positive};
 use super::summary::Summary;
@@ -50,7 +51,8 @@ pub struct Choice {
     /// Coefficients to spend
     #[arg(long, value_name = "N")]
     pub coefficients: Option<NonZeroUsize>,
-    /// Finest level allowed; each level halves the knot spacing
+    /// Finest level allowed. Clouds: 2^N cells along the box, 6 to 16. Volumes: 0 is a knot every four voxels, 2 one
+    /// at every voxel
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=16))]
     pub max_depth: Option<u8>,
     /// How to fit a volume
@@ -187,7 +189,11 @@ fn fit_cloud<T: Stored>(cloud: &PointCloud, choice: &Choice, control: &mut Contr
         return Err(FitError::NotEnoughSamples { found: 0, needed: 10 }.into());
     }
     let unit = stated_unit(cloud.unit, choice.unit)?;
-    let diagonal = bounding_box(&cloud.positions).size().length();
+    let points = OrientedPoints {
+        positions: &cloud.positions,
+        normals,
+    };
+    let diagonal = points.diagonal();
     let options = PointOptions {
         tolerance: choice
             .tolerance
@@ -197,10 +203,6 @@ fn fit_cloud<T: Stored>(cloud: &PointCloud, choice: &Choice, control: &mut Contr
         coefficients: choice.coefficients.map(NonZeroUsize::get),
         max_depth: choice.max_depth.map(usize::from),
         smoothing: choice.smoothing,
-    };
-    let points = OrientedPoints {
-        positions: &cloud.positions,
-        normals,
     };
     let (field, mut report) = fit_points::<T>(&points, &options, control).map_err(|e| explain(e, control))?;
     report.notes.splice(0..0, cloud.notes.iter().cloned());
@@ -213,8 +215,43 @@ fn fit_cloud<T: Stored>(cloud: &PointCloud, choice: &Choice, control: &mut Contr
     })
 }
 
-fn fit_voxels<T: Stored>(_: &Volume, _: &Choice, _: &mut Control) -> Outcome<Fitted> {
-    unimplemented!()
+fn fit_voxels<T: Stored>(volume: &Volume, choice: &Choice, control: &mut Control) -> Outcome<Fitted> {
+    let header = &volume.header;
+    let unit = stated_unit(header.unit, choice.unit)?;
+    let view = VolumeView {
+        dims: header.dims,
+        values: &volume.values,
+        world_from_voxel: header.world_from_voxel,
+    };
+    // Only a share of the range has to look at every voxel for it.
+    let range = match choice.tolerance {
+        Some(Tolerance::Percent(_)) => view.density_range()?,
+        _ => 1.0,
+    };
+    let options = VolumeOptions {
+        method: match choice.method {
+            Method::Adaptive => VolumeMethod::Adaptive,
+            Method::Interpolate => VolumeMethod::Interpolate,
+        },
+        tolerance: choice
+            .tolerance
+            .map(|t| t.density(range))
+            .transpose()
+            .map_err(Failure::usage)?,
+        coefficients: choice.coefficients.map(NonZeroUsize::get),
+        max_depth: choice.max_depth.map(usize::from),
+        smoothing: choice.smoothing,
+    };
+    let (field, mut report) = fit_volume::<T>(&view, &options, control).map_err(|e| explain(e, control))?;
+    report.notes.splice(0..0, volume.notes.iter().cloned());
+    let iso = otsu_threshold(&volume.values);
+    Ok(Fitted {
+        field: T::any(field),
+        report,
+        unit,
+        source: SourceKind::Volume,
+        iso,
+    })
 }
 
 /// The unit of a file whose header says `known`, of which the user says `stated`.

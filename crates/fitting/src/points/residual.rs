@@ -52,7 +52,7 @@ pub(crate) fn report<T: Real>(
         let part = &measured[leaf.start as usize..leaf.end as usize];
         let square: f64 = part.iter().map(|m| m.0 * m.0).sum();
         Leaf {
-            level: leaf.depth as u8,
+            level: (leaf.depth - super::samples::BASE_DEPTH) as u8,
             cell: leaf.at,
             sample_count: part.len() as u32,
             rms: (square / part.len() as f64).sqrt() as f32,

@@ -23,17 +23,29 @@ impl ActiveSet {
     pub fn full(size: [usize; 3]) -> Self {
         let [nx, ny, nz] = size;
         let x = (0..ny * nz).flat_map(|_| 0..nx as u32).collect();
-        Self { size, row_start: (0..=ny * nz).map(|r| r * nx).collect(), x }
+        Self {
+            size,
+            row_start: (0..=ny * nz).map(|r| r * nx).collect(),
+            x,
+        }
     }
 
     /// No function.
     pub fn empty(size: [usize; 3]) -> Self {
-        Self { size, row_start: vec![0; size[1] * size[2] + 1], x: Vec::new() }
+        Self {
+            size,
+            row_start: vec![0; size[1] * size[2] + 1],
+            x: Vec::new(),
+        }
     }
 
     /// The functions whose dense index (x fastest) is listed in `indices`, which rises strictly.
     pub fn from_indices(size: [usize; 3], indices: impl Iterator<Item = usize>) -> Self {
-        let mut set = Self { size, row_start: Vec::with_capacity(size[1] * size[2] + 1), x: Vec::new() };
+        let mut set = Self {
+            size,
+            row_start: Vec::with_capacity(size[1] * size[2] + 1),
+            x: Vec::new(),
+        };
         set.row_start.push(0);
         for index in indices {
             let row = index / size[0];
@@ -77,7 +89,9 @@ impl ActiveSet {
     /// Dense indices (x fastest) in packed order.
     pub fn indices(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.size[1] * self.size[2]).flat_map(move |r| {
-            self.x[self.row_start[r]..self.row_start[r + 1]].iter().map(move |&x| r * self.size[0] + x as usize)
+            self.x[self.row_start[r]..self.row_start[r + 1]]
+                .iter()
+                .map(move |&x| r * self.size[0] + x as usize)
         })
     }
 
@@ -129,7 +143,10 @@ mod tests {
         assert_eq!(set.row(3, 0), 3..4);
         assert_eq!(set.planes(1..3), 4..6);
         assert_eq!(ActiveSet::full(size).len(), 60);
-        assert_eq!(ActiveSet::from_indices(size, std::iter::empty()), ActiveSet::empty(size));
+        assert_eq!(
+            ActiveSet::from_indices(size, std::iter::empty()),
+            ActiveSet::empty(size)
+        );
         let mut dense = vec![0.0; 60];
         set.scatter_add(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0], &mut dense);
         assert_eq!(set.gather(&dense), [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);

@@ -72,7 +72,13 @@ impl<'a, T: Real> Adaptive<'a, T> {
         let mut base = correlations(domain, &r, &fit.active[domain.finest()]).swap_remove(0);
         least_squares(domain, 0, &mut base);
         fit.coefficients[0] = base;
-        let mut this = Self { problem, fit, residual: r, scratch, depth };
+        let mut this = Self {
+            problem,
+            fit,
+            residual: r,
+            scratch,
+            depth,
+        };
         this.update_residual();
         this
     }
@@ -98,7 +104,13 @@ impl<'a, T: Real> Adaptive<'a, T> {
 
     fn update_residual(&mut self) {
         let (domain, samples) = (self.problem.domain, &self.problem.samples);
-        residual(domain, samples, &self.fit.active, &self.fit.coefficients, &mut self.residual);
+        residual(
+            domain,
+            samples,
+            &self.fit.active,
+            &self.fit.coefficients,
+            &mut self.residual,
+        );
     }
 
     /// Joint least squares.
@@ -108,7 +120,14 @@ impl<'a, T: Real> Adaptive<'a, T> {
         control: &mut Control,
         span: (f64, f64),
     ) -> Result<(), FitError> {
-        solve_jointly(&self.problem, &mut self.fit, &mut self.residual, iterations, control, span)
+        solve_jointly(
+            &self.problem,
+            &mut self.fit,
+            &mut self.residual,
+            iterations,
+            control,
+            span,
+        )
     }
 
     /// Least-squares coefficients of the residual on `level`, all its functions taken.
@@ -161,10 +180,14 @@ impl<'a, T: Real> Adaptive<'a, T> {
     pub fn scores(&mut self) -> Scores<T> {
         let domain = self.domain();
         let none = ActiveSet::empty(domain.functions(domain.finest()));
-        let mut dense =
-            if self.depth > 0 { correlations(domain, &self.residual, &none) } else { Vec::new() };
-        let layouts: Vec<DetailLayout> =
-            (1..=self.depth).map(|level| DetailLayout::of_level(domain, level)).collect();
+        let mut dense = if self.depth > 0 {
+            correlations(domain, &self.residual, &none)
+        } else {
+            Vec::new()
+        };
+        let layouts: Vec<DetailLayout> = (1..=self.depth)
+            .map(|level| DetailLayout::of_level(domain, level))
+            .collect();
         let mut levels = Vec::with_capacity(self.depth);
         for &layout in &layouts {
             let level = layout.level;
@@ -210,11 +233,17 @@ impl<'a, T: Real> Adaptive<'a, T> {
         let limit = (EXCHANGE_LIMIT * count as f64) as usize;
         let mut cutoff = largest(&scores.lists(), count);
         let mut own = self.own_scores(&scores);
-        let leaving = own.iter().zip(1..).filter(|&(&(s, i), _)| !cutoff.keeps(s, i)).count();
+        let leaving = own
+            .iter()
+            .zip(1..)
+            .filter(|&(&(s, i), _)| !cutoff.keeps(s, i))
+            .count();
         if leaving > limit {
             // Those that stay are out of the competition: an infinite score; those that leave have none.
             own.sort_unstable_by(|a, b| {
-                a.0.partial_cmp(&b.0).expect("scores are numbers").then(b.1.cmp(&a.1))
+                a.0.partial_cmp(&b.0)
+                    .expect("scores are numbers")
+                    .then(b.1.cmp(&a.1))
             });
             for (rank, &(_, index)) in own.iter().enumerate() {
                 *entry(&mut scores.levels, index) = if rank < limit { T::zero() } else { T::infinity() };
@@ -229,8 +258,9 @@ impl<'a, T: Real> Adaptive<'a, T> {
         let mut own = Vec::new();
         let mut offset = 0;
         for (layout, list) in scores.layouts.iter().zip(&scores.levels) {
-            layout
-                .for_each_active(&self.fit.active[layout.level], |_, i| own.push((list[i], offset + i)));
+            layout.for_each_active(&self.fit.active[layout.level], |_, i| {
+                own.push((list[i], offset + i))
+            });
             offset += list.len();
         }
         own

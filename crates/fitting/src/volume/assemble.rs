@@ -61,7 +61,11 @@ fn assemble<T: Real>(
             let mut layer: Vec<Option<Corrections<T>>> = (0..bx * by).map(|_| None).collect();
             fill(z, &mut layer);
             let key = |i: usize| BrickKey([(i % bx) as u32, (i / bx) as u32, z as u32]);
-            layer.into_iter().enumerate().filter_map(|(i, c)| Some((key(i), Arc::new(c?)))).collect()
+            layer
+                .into_iter()
+                .enumerate()
+                .filter_map(|(i, c)| Some((key(i), Arc::new(c?))))
+                .collect()
         })
         .collect();
     layers.into_iter().flatten().collect()

@@ -25,7 +25,11 @@ pub(crate) struct Axis {
 impl Axis {
     pub fn new(samples: usize, levels: usize) -> Self {
         let coarsest = 1 << (levels - 1);
-        Self { samples, cells: (samples - 1).div_ceil(coarsest).max(1), levels }
+        Self {
+            samples,
+            cells: (samples - 1).div_ceil(coarsest).max(1),
+            levels,
+        }
     }
 
     /// Voxels between knots of `level`.
@@ -90,7 +94,9 @@ impl Axis {
     pub fn five_taps(&self) -> Vec<[f64; 5]> {
         let g = self.gram(self.levels - 1);
         let at = |s: usize, back: usize| if back <= s { g[s - back][back] } else { 0.0 };
-        (0..g.len()).map(|s| [at(s, 2), at(s, 1), g[s][0], g[s][1], g[s][2]]).collect()
+        (0..g.len())
+            .map(|s| [at(s, 2), at(s, 1), g[s][0], g[s][1], g[s][2]])
+            .collect()
     }
 }
 
@@ -105,7 +111,10 @@ mod tests {
         for (got, want) in taps[10].iter().zip(expected) {
             assert!((got - want).abs() < 1e-15);
         }
-        assert!((taps[0][2] - 1.0 / 36.0).abs() < 1e-15, "the first function meets one sample only");
+        assert!(
+            (taps[0][2] - 1.0 / 36.0).abs() < 1e-15,
+            "the first function meets one sample only"
+        );
     }
 
     #[test]
@@ -119,8 +128,16 @@ mod tests {
     #[test]
     fn detail_functions_stay_with_the_voxels() {
         let axis = Axis::new(8, 3); // voxels 0..=7, knots up to 8
-        let of = |level| (0..axis.functions(level)).filter(|&s| axis.is_candidate(level, s)).collect::<Vec<_>>();
-        assert_eq!(of(2), (1..=8).collect::<Vec<_>>(), "finest: one function per voxel");
+        let of = |level| {
+            (0..axis.functions(level))
+                .filter(|&s| axis.is_candidate(level, s))
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(
+            of(2),
+            (1..=8).collect::<Vec<_>>(),
+            "finest: one function per voxel"
+        );
         assert_eq!(of(1), (0..=5).collect::<Vec<_>>(), "spacing 2: centres -2 ..= 8");
     }
 }

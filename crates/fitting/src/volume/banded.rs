@@ -42,7 +42,10 @@ impl<T: Real> BandCholesky<T> {
                     }
                 }
                 l[i][back] = if back == 0 {
-                    assert!(sum > 0.0, "Gram matrix not positive definite at function {i}: pivot {sum}");
+                    assert!(
+                        sum > 0.0,
+                        "Gram matrix not positive definite at function {i}: pivot {sum}"
+                    );
                     sum.sqrt()
                 } else {
                     sum / l[k][0]
@@ -50,12 +53,26 @@ impl<T: Real> BandCholesky<T> {
             }
         }
         let t = T::from_f64;
-        let forward = (0..n).map(|i| std::array::from_fn(|j| t(l[i][j] / l[i][0]))).collect();
+        let forward = (0..n)
+            .map(|i| std::array::from_fn(|j| t(l[i][j] / l[i][0])))
+            .collect();
         let backward = (0..n)
-            .map(|i| std::array::from_fn(|j| if i + j < n { t(l[i + j][j] / l[i][0]) } else { T::zero() }))
+            .map(|i| {
+                std::array::from_fn(|j| {
+                    if i + j < n {
+                        t(l[i + j][j] / l[i][0])
+                    } else {
+                        T::zero()
+                    }
+                })
+            })
             .collect();
         let inverse_diagonal = l.iter().map(|row| t(1.0 / row[0])).collect();
-        Self { forward, backward, inverse_diagonal }
+        Self {
+            forward,
+            backward,
+            inverse_diagonal,
+        }
     }
 
     /// `row = row/L_ii - Σ_j factor[j] others[j]`, terms in the order given.
@@ -138,7 +155,11 @@ mod tests {
                     for t in s.saturating_sub(3)..(s + 4).min(n) {
                         sum += g[s.min(t)][s.abs_diff(t)] * rows[t][0];
                     }
-                    assert!((sum - b[s]).abs() < 1e-9, "{samples} samples, level {level}, row {s}: {sum} {}", b[s]);
+                    assert!(
+                        (sum - b[s]).abs() < 1e-9,
+                        "{samples} samples, level {level}, row {s}: {sum} {}",
+                        b[s]
+                    );
                 }
             }
         }

@@ -15,7 +15,11 @@ use crate::prefilter::{LineEnds, Prefilter};
 /// correlations of the residual with them: `(GxⓍGyⓍGz)⁻¹`, one banded factor per axis.
 pub(crate) fn least_squares<T: Real>(domain: &Domain<T>, level: usize, correlations: &mut [T]) {
     let factors = domain.axes.map(|a| BandCholesky::of_level(&a, level));
-    solve_all_axes([&factors[0], &factors[1], &factors[2]], correlations, domain.functions(level));
+    solve_all_axes(
+        [&factors[0], &factors[1], &factors[2]],
+        correlations,
+        domain.functions(level),
+    );
 }
 
 /// Coefficients of the finest level that pass through the residual at every sample, in place of it. Coefficient
@@ -39,9 +43,17 @@ pub(crate) struct DetailLayout {
 impl DetailLayout {
     pub fn of_level<T: Real>(domain: &Domain<T>, level: usize) -> Self {
         if level == domain.finest() {
-            Self { level, size: domain.padded(), first: 1 }
+            Self {
+                level,
+                size: domain.padded(),
+                first: 1,
+            }
         } else {
-            Self { level, size: domain.functions(level), first: 0 }
+            Self {
+                level,
+                size: domain.functions(level),
+                first: 0,
+            }
         }
     }
 
@@ -52,7 +64,11 @@ impl DetailLayout {
             (0..n)
                 .map(|i| {
                     let s = i + self.first;
-                    if axis.is_candidate(self.level, s) { T::from_f64(norms[s]) } else { T::zero() }
+                    if axis.is_candidate(self.level, s) {
+                        T::from_f64(norms[s])
+                    } else {
+                        T::zero()
+                    }
                 })
                 .collect()
         };
@@ -64,14 +80,17 @@ impl DetailLayout {
     pub fn score<T: Real>(self, domain: &Domain<T>, weight: T, coefficients: &mut [T]) {
         let [nx, ny, _] = self.size;
         let norms = self.norms(domain);
-        coefficients.par_chunks_mut(nx * ny).enumerate().for_each(|(z, plane)| {
-            for (y, row) in plane.chunks_mut(nx).enumerate() {
-                let yz = weight * (norms[1][y] * norms[2][z]);
-                for (c, &n) in row.iter_mut().zip(&norms[0]) {
-                    *c = c.abs() * (yz * n);
+        coefficients
+            .par_chunks_mut(nx * ny)
+            .enumerate()
+            .for_each(|(z, plane)| {
+                for (y, row) in plane.chunks_mut(nx).enumerate() {
+                    let yz = weight * (norms[1][y] * norms[2][z]);
+                    for (c, &n) in row.iter_mut().zip(&norms[0]) {
+                        *c = c.abs() * (yz * n);
+                    }
                 }
-            }
-        });
+            });
     }
 
     /// Function index (dense, in the level's own size) of an entry.
@@ -81,7 +100,13 @@ impl DetailLayout {
     }
 
     /// The functions whose score is kept; the array's scores are counted from `offset`.
-    pub fn select<T: Real>(self, domain: &Domain<T>, scores: &[T], cutoff: Cutoff, offset: usize) -> ActiveSet {
+    pub fn select<T: Real>(
+        self,
+        domain: &Domain<T>,
+        scores: &[T],
+        cutoff: Cutoff,
+        offset: usize,
+    ) -> ActiveSet {
         let functions = domain.functions(self.level);
         let [nx, ny, nz] = self.size;
         let mut picked = Vec::new();

@@ -1,7 +1,7 @@
 //! A volume fit from end to end.
 
-use bspline::hierarchical::{BRICK_LEN, HALO_LEN, HierarchicalSpline, Lattice, LevelCorrections};
 use bspline::Real;
+use bspline::hierarchical::{BRICK_LEN, HALO_LEN, HierarchicalSpline, Lattice, LevelCorrections};
 use glam::{DAffine3, DVec3};
 
 use super::active::{ActiveSet, Packed};
@@ -47,7 +47,11 @@ pub fn fit_volume<T: Real>(
     let overview = view.check()?;
     let levels = level_count(view.dims, options)?;
     // A power of two changes no mantissa: only squares of huge and tiny densities need it.
-    let exponent = if overview.magnitude() > 0.0 { overview.magnitude().log2().floor() as i32 + 1 } else { 0 };
+    let exponent = if overview.magnitude() > 0.0 {
+        overview.magnitude().log2().floor() as i32 + 1
+    } else {
+        0
+    };
     let samples = Samples {
         values: view.values,
         dims: view.dims,
@@ -73,8 +77,9 @@ fn interpolate<T: Real>(
     let dense = interpolating_coefficients(domain, samples);
     control.step("bricks", 0.4)?;
     let bricks = full_bricks(domain.functions(finest), &dense, T::one() / samples.scale);
-    let mut active: Vec<ActiveSet> =
-        (0..domain.levels()).map(|level| ActiveSet::empty(domain.functions(level))).collect();
+    let mut active: Vec<ActiveSet> = (0..domain.levels())
+        .map(|level| ActiveSet::empty(domain.functions(level)))
+        .collect();
     active[finest] = ActiveSet::full(domain.functions(finest));
     let mut stored = vec![Vec::new(); finest];
     stored.push(dense);
@@ -90,7 +95,9 @@ fn interpolate<T: Real>(
         view.typical_slope(overview),
         corrections,
     );
-    let mut report = report(view, domain, &measured, samples.scale.as_f64(), |_| StopReason::Depth);
+    let mut report = report(view, domain, &measured, samples.scale.as_f64(), |_| {
+        StopReason::Depth
+    });
     (report.coefficients, report.depth) = (count, finest);
     control.step("done", 1.0)?;
     Ok((spline, report))
@@ -109,8 +116,16 @@ fn adapt<T: Real>(
     // Scores below this are rounding of the level before.
     let floor = 16.0 * T::UNIT_ROUND_OFF;
     let (budget, budget_reason) = budget(domain, options, control)?;
-    let problem = Problem { domain, samples: *samples, ridge: options.smoothing.unwrap_or(0.0) };
-    let mut goal = Goal { tolerance: options.tolerance.unwrap_or(0.0), noise: None, outcome: Outcome::Met };
+    let problem = Problem {
+        domain,
+        samples: *samples,
+        ridge: options.smoothing.unwrap_or(0.0),
+    };
+    let mut goal = Goal {
+        tolerance: options.tolerance.unwrap_or(0.0),
+        noise: None,
+        outcome: Outcome::Met,
+    };
     let (active, coefficients) = if overview.min == overview.max {
         let fit = super::joint::Fit::new(domain);
         let value = T::from_f64(f64::from(overview.min)) * samples.scale;
@@ -136,8 +151,11 @@ fn adapt<T: Real>(
     let measured = measure(samples, domain, &active, &coefficients);
     control.step("bricks", 0.95)?;
     let unscale = T::one() / samples.scale;
-    let corrections: Vec<LevelCorrections<T>> =
-        active.iter().zip(&coefficients).map(|(a, c)| sparse_bricks(a, c, unscale)).collect();
+    let corrections: Vec<LevelCorrections<T>> = active
+        .iter()
+        .zip(&coefficients)
+        .map(|(a, c)| sparse_bricks(a, c, unscale))
+        .collect();
     let used_depth = active.iter().rposition(|a| a.len() > 0).unwrap_or(0);
     let count = active.iter().map(ActiveSet::len).sum();
     drop((active, coefficients));
@@ -161,7 +179,11 @@ fn adapt<T: Real>(
     report.tolerance = goal.tolerance;
     report.noise = goal.noise;
     report.smoothing = problem.ridge;
-    let missed = report.leaves.iter().filter(|l| f64::from(l.rms) > goal.tolerance).count();
+    let missed = report
+        .leaves
+        .iter()
+        .filter(|l| f64::from(l.rms) > goal.tolerance)
+        .count();
     if goal.tolerance > 0.0 && missed > 0 {
         report.notes.push(format!(
             "{missed} of {} leaves stay above the tolerance of {:.6}",
@@ -209,7 +231,11 @@ fn lattice<T: Real>(view: &VolumeView, domain: &Domain<T>) -> Lattice {
 
 /// Levels that leave at least half of the coefficients for detail.
 fn level_count(dims: [usize; 3], options: &VolumeOptions) -> Result<usize, FitError> {
-    let base = |levels| dims.map(|n| Axis::new(n, levels).functions(0)).iter().product::<usize>();
+    let base = |levels| {
+        dims.map(|n| Axis::new(n, levels).functions(0))
+            .iter()
+            .product::<usize>()
+    };
     let mut levels = LEVELS;
     if let Some(wanted) = options.coefficients {
         if wanted < 64 {
@@ -235,7 +261,9 @@ fn bytes_per_coefficient<T>() -> u64 {
 fn brick_bytes<T>(dims: [usize; 3], levels: usize, depth: usize) -> u64 {
     let brick = (HALO_LEN + BRICK_LEN) as u64 * size_of::<T>() as u64 + 160;
     let count = |level| dims.map(|n| Axis::new(n, levels).functions(level).div_ceil(8) as u64);
-    (0..=depth).map(|level| count(level).iter().product::<u64>() * brick).sum()
+    (0..=depth)
+        .map(|level| count(level).iter().product::<u64>() * brick)
+        .sum()
 }
 
 /// Refuses fits whose arrays over all voxels alone exceed the ceiling.
@@ -246,7 +274,10 @@ fn reserve_fixed<T>(
     control: &Control,
 ) -> Result<(), FitError> {
     let bytes = size_of::<T>() as u64;
-    let padded: u64 = dims.map(|n| Axis::new(n, levels).padded() as u64).iter().product();
+    let padded: u64 = dims
+        .map(|n| Axis::new(n, levels).padded() as u64)
+        .iter()
+        .product();
     let depth = options.max_depth.unwrap_or(levels - 1).min(levels - 1);
     let bricks = brick_bytes::<T>(dims, levels, depth);
     control.reserve(match options.method {
@@ -272,7 +303,11 @@ fn budget<T: Real>(
     let base = domain.function_count(0) as u64;
     control.reserve(fixed + base * bytes_per_coefficient::<T>())?;
     let affordable = ((limit - fixed) / bytes_per_coefficient::<T>()) as usize;
-    Ok(if affordable < asked { (affordable, StopReason::Memory) } else { (asked, StopReason::Budget) })
+    Ok(if affordable < asked {
+        (affordable, StopReason::Memory)
+    } else {
+        (asked, StopReason::Budget)
+    })
 }
 
 /// The report of what was measured; `reason` says why a leaf of given rms residual was left.

@@ -23,7 +23,14 @@ pub(crate) fn apply_normal_matrix<T: Real>(
     let finest = domain.finest();
     let totals = coarse_totals(domain, active, p);
     let mut dense = vec![T::zero(); domain.function_count(finest - 1)];
-    apply_finest(domain, &totals[finest - 1], &active[finest], &p[finest], &mut q[finest], &mut dense);
+    apply_finest(
+        domain,
+        &totals[finest - 1],
+        &active[finest],
+        &p[finest],
+        &mut q[finest],
+        &mut dense,
+    );
     drop(totals);
     for level in (0..finest).rev() {
         q[level] = active[level].gather(&dense);
@@ -91,7 +98,11 @@ fn slab<T: Real>(
                 if y >= 2 {
                     let at = |j: usize| {
                         let r = y + j; // row r - 4, centre y - 2
-                        if r >= 4 && r - 4 < ny { &rows[(r - 4) % 5][..] } else { &zero_row[..] }
+                        if r >= 4 && r - 4 < ny {
+                            &rows[(r - 4) % 5][..]
+                        } else {
+                            &zero_row[..]
+                        }
                     };
                     let out = &mut plane[(y - 2) * width..(y - 1) * width];
                     domain.taps[1].combine(y - 2, std::array::from_fn(at), out);
@@ -104,7 +115,11 @@ fn slab<T: Real>(
         let center = z - 2;
         let planes: [&[T]; 5] = std::array::from_fn(|j| {
             let r = z + j; // plane r - 4
-            if r >= 4 && r - 4 < nz { &ring[(r - 4) % 5][..] } else { &zero_plane[..] }
+            if r >= 4 && r - 4 < nz {
+                &ring[(r - 4) % 5][..]
+            } else {
+                &zero_plane[..]
+            }
         });
         for y in 0..ny {
             let at = y * width..(y + 1) * width;

@@ -16,19 +16,26 @@ use crate::prefilter::{LineEnds, Prefilter};
 pub(crate) fn interpolating_coefficients<T: Real>(domain: &Domain<T>, samples: &Samples<T>) -> Vec<T> {
     let [fx, fy, fz] = domain.functions(domain.finest());
     let [nx, ny, nz] = domain.samples();
-    let filters = domain.samples().map(|n| Prefilter::<T>::new(n, LineEnds::NotAKnot));
+    let filters = domain
+        .samples()
+        .map(|n| Prefilter::<T>::new(n, LineEnds::NotAKnot));
     let mut dense = vec![T::zero(); fx * fy * fz];
     // Voxel plane z lies at function plane z + 1; planes and rows that hold no voxel are filled by the filters.
-    dense.par_chunks_mut(fx * fy).skip(1).take(nz).enumerate().for_each(|(z, plane)| {
-        Arch::new().dispatch(|| {
-            let rows = &mut plane[fx..(ny + 1) * fx];
-            for (y, row) in rows.chunks_mut(fx).enumerate() {
-                samples.row(y, z, &mut row[1..nx + 1]);
-            }
-            solve_along_x(&filters[0], rows, fx);
-            solve_along_y(&filters[1], plane, fx);
+    dense
+        .par_chunks_mut(fx * fy)
+        .skip(1)
+        .take(nz)
+        .enumerate()
+        .for_each(|(z, plane)| {
+            Arch::new().dispatch(|| {
+                let rows = &mut plane[fx..(ny + 1) * fx];
+                for (y, row) in rows.chunks_mut(fx).enumerate() {
+                    samples.row(y, z, &mut row[1..nx + 1]);
+                }
+                solve_along_x(&filters[0], rows, fx);
+                solve_along_y(&filters[1], plane, fx);
+            });
         });
-    });
     solve_along_z(&filters[2], &mut dense, fx * fy);
     dense
 }
@@ -41,7 +48,11 @@ mod tests {
 
     fn max_residual<T: Real>(dims: [usize; 3], values: &[f32]) -> f64 {
         let domain = Domain::<T>::new(dims, 3);
-        let samples = Samples { values, dims, scale: T::one() };
+        let samples = Samples {
+            values,
+            dims,
+            scale: T::one(),
+        };
         let dense = interpolating_coefficients(&domain, &samples);
         let mut active: Vec<ActiveSet> = (0..3).map(|l| ActiveSet::empty(domain.functions(l))).collect();
         active[2] = ActiveSet::full(domain.functions(2));
@@ -50,7 +61,14 @@ mod tests {
 
     #[test]
     fn passes_through_every_voxel() {
-        for dims in [[23, 18, 31], [1, 1, 1], [2, 3, 4], [5, 1, 6], [7, 2, 3], [64, 4, 1]] {
+        for dims in [
+            [23, 18, 31],
+            [1, 1, 1],
+            [2, 3, 4],
+            [5, 1, 6],
+            [7, 2, 3],
+            [64, 4, 1],
+        ] {
             let n: usize = dims.iter().product();
             let values: Vec<f32> = (0..n).map(|i| (i * 7919 % 4099) as f32 / 4.0 - 500.0).collect();
             // Errors of the filter are amplified by at most 3 per axis inside and 30 at an end.

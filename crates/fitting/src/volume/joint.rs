@@ -27,7 +27,11 @@ impl<T: Real> Fit<T> {
         let active: Vec<ActiveSet> = (0..domain.levels())
             .map(|level| {
                 let size = domain.functions(level);
-                if level == 0 { ActiveSet::full(size) } else { ActiveSet::empty(size) }
+                if level == 0 {
+                    ActiveSet::full(size)
+                } else {
+                    ActiveSet::empty(size)
+                }
             })
             .collect();
         let coefficients = active.iter().map(|a| vec![T::zero(); a.len()]).collect();
@@ -77,7 +81,13 @@ pub(crate) fn solve_jointly<T: Real>(
     let mut gradient: Packed<T> = dense
         .into_iter()
         .enumerate()
-        .map(|(level, g)| if level == finest { g } else { fit.active[level].gather(&g) })
+        .map(|(level, g)| {
+            if level == finest {
+                g
+            } else {
+                fit.active[level].gather(&g)
+            }
+        })
         .collect();
     if problem.ridge > 0.0 {
         add_ridge(&mut gradient, &norms, &fit.coefficients, |level| -ridge(level));
@@ -90,7 +100,10 @@ pub(crate) fn solve_jointly<T: Real>(
     let mut rho = dot(&gradient, &z);
     let start = rho;
     for iteration in 0..iterations {
-        control.step("solving jointly", span.0 + (span.1 - span.0) * iteration as f64 / iterations as f64)?;
+        control.step(
+            "solving jointly",
+            span.0 + (span.1 - span.0) * iteration as f64 / iterations as f64,
+        )?;
         // Below this the direction is rounding noise of the storage type.
         if rho <= start * T::UNIT_ROUND_OFF * T::UNIT_ROUND_OFF {
             break;
@@ -111,7 +124,10 @@ pub(crate) fn solve_jointly<T: Real>(
         let beta = T::from_f64(next / rho);
         rho = next;
         for (p, z) in p.iter_mut().zip(&z) {
-            p.par_iter_mut().with_min_len(DOT_CHUNK).zip(z).for_each(|(p, &z)| *p = z + beta * *p);
+            p.par_iter_mut()
+                .with_min_len(DOT_CHUNK)
+                .zip(z)
+                .for_each(|(p, &z)| *p = z + beta * *p);
         }
     }
     residual(domain, &problem.samples, &fit.active, &fit.coefficients, r);
@@ -125,8 +141,9 @@ fn squared_norms<T: Real>(domain: &Domain<T>, active: &[ActiveSet]) -> Packed<T>
         .enumerate()
         .map(|(level, set)| {
             let square = |n: &f64| T::from_f64(n * n);
-            let [nx, ny, nz] =
-                domain.axes.map(|a| a.norms(level).iter().map(square).collect::<Vec<_>>());
+            let [nx, ny, nz] = domain
+                .axes
+                .map(|a| a.norms(level).iter().map(square).collect::<Vec<_>>());
             let mut out = Vec::with_capacity(set.len());
             for (z, &nz) in nz.iter().enumerate() {
                 for (y, &ny) in ny.iter().enumerate() {
@@ -143,7 +160,11 @@ fn squared_norms<T: Real>(domain: &Domain<T>, active: &[ActiveSet]) -> Packed<T>
 fn precondition<T: Real>(g: &Packed<T>, norms: &Packed<T>, z: &mut Packed<T>, scale: impl Fn(usize) -> T) {
     for (level, ((z, g), n)) in z.iter_mut().zip(g).zip(norms).enumerate() {
         let scale = scale(level);
-        z.par_iter_mut().with_min_len(DOT_CHUNK).zip(g).zip(n).for_each(|((z, &g), &n)| *z = scale * g / n);
+        z.par_iter_mut()
+            .with_min_len(DOT_CHUNK)
+            .zip(g)
+            .zip(n)
+            .for_each(|((z, &g), &n)| *z = scale * g / n);
     }
 }
 
@@ -151,13 +172,20 @@ fn precondition<T: Real>(g: &Packed<T>, norms: &Packed<T>, z: &mut Packed<T>, sc
 fn add_ridge<T: Real>(y: &mut Packed<T>, norms: &Packed<T>, x: &Packed<T>, weight: impl Fn(usize) -> T) {
     for (level, ((y, x), n)) in y.iter_mut().zip(x).zip(norms).enumerate() {
         let weight = weight(level);
-        y.par_iter_mut().with_min_len(DOT_CHUNK).zip(x).zip(n).for_each(|((y, &x), &n)| *y += weight * n * x);
+        y.par_iter_mut()
+            .with_min_len(DOT_CHUNK)
+            .zip(x)
+            .zip(n)
+            .for_each(|((y, &x), &n)| *y += weight * n * x);
     }
 }
 
 fn axpy<T: Real>(y: &mut Packed<T>, a: T, x: &Packed<T>) {
     for (y, x) in y.iter_mut().zip(x) {
-        y.par_iter_mut().with_min_len(DOT_CHUNK).zip(x).for_each(|(y, &x)| *y += a * x);
+        y.par_iter_mut()
+            .with_min_len(DOT_CHUNK)
+            .zip(x)
+            .for_each(|(y, &x)| *y += a * x);
     }
 }
 
@@ -166,8 +194,11 @@ pub(crate) fn dot<T: Real>(a: &Packed<T>, b: &Packed<T>) -> f64 {
     a.iter()
         .zip(b)
         .map(|(a, b)| {
-            let terms: Vec<f64> =
-                a.par_chunks(DOT_CHUNK).zip(b.par_chunks(DOT_CHUNK)).map(|(a, b)| dot_chunk(a, b)).collect();
+            let terms: Vec<f64> = a
+                .par_chunks(DOT_CHUNK)
+                .zip(b.par_chunks(DOT_CHUNK))
+                .map(|(a, b)| dot_chunk(a, b))
+                .collect();
             terms.iter().sum::<f64>()
         })
         .sum()
@@ -176,8 +207,12 @@ pub(crate) fn dot<T: Real>(a: &Packed<T>, b: &Packed<T>) -> f64 {
 fn dot_chunk<T: Real>(a: &[T], b: &[T]) -> f64 {
     let mut lanes = [0.0_f64; DOT_LANES];
     let (a_chunks, b_chunks) = (a.chunks_exact(DOT_LANES), b.chunks_exact(DOT_LANES));
-    let tail: f64 =
-        a_chunks.remainder().iter().zip(b_chunks.remainder()).map(|(&x, &y)| x.as_f64() * y.as_f64()).sum();
+    let tail: f64 = a_chunks
+        .remainder()
+        .iter()
+        .zip(b_chunks.remainder())
+        .map(|(&x, &y)| x.as_f64() * y.as_f64())
+        .sum();
     for (a, b) in a_chunks.zip(b_chunks) {
         for l in 0..DOT_LANES {
             lanes[l] += a[l].as_f64() * b[l].as_f64();

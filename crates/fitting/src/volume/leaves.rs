@@ -35,7 +35,10 @@ impl LeafGrid {
         let level = domain.levels() - 1 - LEAF.ilog2() as usize;
         // Cells that hold no voxel pad an axis at its end; they are no leaves.
         let used = |a: Axis| (a.samples - 1).div_ceil(LEAF).max(1);
-        Self { cells: domain.axes.map(used), level }
+        Self {
+            cells: domain.axes.map(used),
+            level,
+        }
     }
 
     pub fn len(&self) -> usize {
@@ -68,7 +71,11 @@ impl LeafSums {
     pub fn new(grid: LeafGrid, planes: &Range<usize>) -> Self {
         let (first, last) = (grid.cell(2, planes.start), grid.cell(2, planes.end - 1));
         let leaves = vec![LeafResidual::default(); (last + 1 - first) * grid.cells[0] * grid.cells[1]];
-        Self { grid, first_layer: first, leaves }
+        Self {
+            grid,
+            first_layer: first,
+            leaves,
+        }
     }
 
     /// Takes the residuals of row `(y, z)`.
@@ -137,8 +144,15 @@ mod tests {
                 }
                 parts.push(part);
             }
-            assert_eq!(LeafSums::merge(grid, parts), expected, "{dims:?}: small integers sum exactly");
-            assert_eq!(expected.iter().map(|l| l.count as usize).sum::<usize>(), dims.iter().product());
+            assert_eq!(
+                LeafSums::merge(grid, parts),
+                expected,
+                "{dims:?}: small integers sum exactly"
+            );
+            assert_eq!(
+                expected.iter().map(|l| l.count as usize).sum::<usize>(),
+                dims.iter().product()
+            );
         }
     }
 }

@@ -39,9 +39,16 @@ pub(crate) fn measure<T: Real>(
     active: &[ActiveSet],
     stored: &Packed<T>,
 ) -> Measured {
-    let exact: Packed<f64> = stored.iter().map(|l| l.iter().map(|&c| c.as_f64()).collect()).collect();
+    let exact: Packed<f64> = stored
+        .iter()
+        .map(|l| l.iter().map(|&c| c.as_f64()).collect())
+        .collect();
     let domain = Domain::<f64>::new(domain.samples(), domain.levels());
-    let samples = Samples { values: samples.values, dims: samples.dims, scale: samples.scale.as_f64() };
+    let samples = Samples {
+        values: samples.values,
+        dims: samples.dims,
+        scale: samples.scale.as_f64(),
+    };
     let finest = domain.finest();
     let [nx, ny, _] = domain.samples();
     let grid = LeafGrid::new(&domain);
@@ -53,8 +60,13 @@ pub(crate) fn measure<T: Real>(
         .map(|(i, slab)| {
             Arch::new().dispatch(|| {
                 let planes = i * SLAB..i * SLAB + slab.len() / (nx * ny);
-                let rows =
-                    TotalRows::new(&domain, finest, &totals[finest - 1], &active[finest], &exact[finest]);
+                let rows = TotalRows::new(
+                    &domain,
+                    finest,
+                    &totals[finest - 1],
+                    &active[finest],
+                    &exact[finest],
+                );
                 let mut sums = LeafSums::new(grid, &planes);
                 let mut targets = slab.chunks_mut(nx);
                 let mut max = 0.0_f64;
@@ -77,7 +89,10 @@ pub(crate) fn measure<T: Real>(
     let leaves = LeafSums::merge(grid, parts.into_iter().map(|p| p.0));
     let sum: f64 = leaves.iter().map(|l| l.sum_of_squares).sum();
     let [p95] = quantiles(&magnitudes, [0.95]);
-    let largest_sum: f64 = exact.iter().map(|l| l.iter().fold(0.0, |m: f64, c| m.max(c.abs()))).sum();
+    let largest_sum: f64 = exact
+        .iter()
+        .map(|l| l.iter().fold(0.0, |m: f64, c| m.max(c.abs())))
+        .sum();
     let rounding = rounding_factor(domain.levels()) * (T::UNIT_ROUND_OFF + f64::EPSILON) * largest_sum;
     Measured {
         grid,

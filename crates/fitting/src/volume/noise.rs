@@ -42,7 +42,11 @@ pub(crate) fn noise_level<T: Real>(domain: &Domain<T>, samples: &Samples<T>, res
             textured.push(magnitude);
         }
     }
-    let used = if textured.len() as f64 >= TEXTURED_SHARE * all.len() as f64 { textured } else { all };
+    let used = if textured.len() as f64 >= TEXTURED_SHARE * all.len() as f64 {
+        textured
+    } else {
+        all
+    };
     let [mad] = quantiles(&used, [0.5]);
     SIGMA_PER_MAD * f64::from(mad) / GAIN_PER_AXIS.powi(3).sqrt()
 }

@@ -13,7 +13,11 @@ fn ordered(v: f32) -> u32 {
 }
 
 fn value(ordered: u32) -> f32 {
-    f32::from_bits(if ordered >> 31 == 1 { ordered & !(1 << 31) } else { !ordered })
+    f32::from_bits(if ordered >> 31 == 1 {
+        ordered & !(1 << 31)
+    } else {
+        !ordered
+    })
 }
 
 /// Histogram of `bin(v)` over the values for which there is one.
@@ -72,8 +76,9 @@ mod tests {
 
     #[test]
     fn quantiles_are_those_of_the_sorted_list() {
-        let values: Vec<f32> =
-            (0..10_001_u32).map(|i| ((i * 7919 % 10_007) as f32 - 5000.0) * 1.7e-3).collect();
+        let values: Vec<f32> = (0..10_001_u32)
+            .map(|i| ((i * 7919 % 10_007) as f32 - 5000.0) * 1.7e-3)
+            .collect();
         let mut sorted = values.clone();
         sorted.sort_by(f32::total_cmp);
         let qs = [0.0, 0.01, 0.5, 0.95, 1.0];

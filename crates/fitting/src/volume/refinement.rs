@@ -151,19 +151,21 @@ pub(crate) fn prolong<T: Real>(
     let [nx, ny, _] = domain.functions(level);
     let phases = domain.phases(level);
     let mut fine = vec![T::zero(); domain.function_count(level)];
-    fine.par_chunks_mut(nx * ny * SLAB).enumerate().for_each(|(i, slab)| {
-        Arch::new().dispatch(|| {
-            let mut rows = TotalRows::new(domain, level, coarse, active, packed);
-            let mut buffer = vec![T::zero(); phases.len()];
-            for (z, plane) in slab.chunks_mut(nx * ny).enumerate() {
-                rows.start_plane(i * SLAB + z);
-                for (y, row) in plane.chunks_mut(nx).enumerate() {
-                    rows.row(y, &mut buffer);
-                    phases.join_functions(&buffer, row);
+    fine.par_chunks_mut(nx * ny * SLAB)
+        .enumerate()
+        .for_each(|(i, slab)| {
+            Arch::new().dispatch(|| {
+                let mut rows = TotalRows::new(domain, level, coarse, active, packed);
+                let mut buffer = vec![T::zero(); phases.len()];
+                for (z, plane) in slab.chunks_mut(nx * ny).enumerate() {
+                    rows.start_plane(i * SLAB + z);
+                    for (y, row) in plane.chunks_mut(nx).enumerate() {
+                        rows.row(y, &mut buffer);
+                        phases.join_functions(&buffer, row);
+                    }
                 }
-            }
+            });
         });
-    });
     fine
 }
 

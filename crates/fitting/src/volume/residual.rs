@@ -23,16 +23,21 @@ pub(crate) fn residual<T: Real>(
     let [nx, ny, _] = domain.padded();
     let totals = coarse_totals(domain, active, packed);
     let coarse = &totals[finest - 1];
-    out.par_chunks_mut(nx * ny * SLAB).enumerate().for_each(|(i, slab)| {
-        Arch::new().dispatch(|| {
-            let rows = TotalRows::new(domain, finest, coarse, &active[finest], &packed[finest]);
-            let planes = i * SLAB..i * SLAB + slab.len() / (nx * ny);
-            let mut targets = slab.chunks_mut(nx);
-            residual_slab(domain, samples, rows, planes, |_, _, row| {
-                targets.next().expect("as many rows as asked for").copy_from_slice(row);
+    out.par_chunks_mut(nx * ny * SLAB)
+        .enumerate()
+        .for_each(|(i, slab)| {
+            Arch::new().dispatch(|| {
+                let rows = TotalRows::new(domain, finest, coarse, &active[finest], &packed[finest]);
+                let planes = i * SLAB..i * SLAB + slab.len() / (nx * ny);
+                let mut targets = slab.chunks_mut(nx);
+                residual_slab(domain, samples, rows, planes, |_, _, row| {
+                    targets
+                        .next()
+                        .expect("as many rows as asked for")
+                        .copy_from_slice(row);
+                });
             });
         });
-    });
 }
 
 /// Hands rows `(y, z, d - f)` of the sample planes `planes` to `emit`, in order of z then y.

@@ -67,7 +67,8 @@ impl Phases {
         let (o_before, o, o_after) = (&odd[..n], &odd[1..n + 1], &odd[2..n + 2]);
         let out = &mut out[..n];
         for s in 0..n {
-            out[s] = three_quarters * o[s] + eighth * (o_before[s] + o_after[s]) + half * (e_before[s] + e[s]);
+            out[s] =
+                three_quarters * o[s] + eighth * (o_before[s] + o_after[s]) + half * (e_before[s] + e[s]);
         }
     }
 
@@ -80,12 +81,22 @@ impl Phases {
         let (even, odd) = row.split_at(self.half());
         let (out_even, out_odd) = out.split_at_mut(self.half());
         // f[2s] = E[s] + 4 O[s+1] + E[s+1], s = 0 ..= m
-        let (a, b, c, o) = (&even[1..m + 2], &odd[2..m + 3], &even[2..m + 3], &mut out_even[1..m + 2]);
+        let (a, b, c, o) = (
+            &even[1..m + 2],
+            &odd[2..m + 3],
+            &even[2..m + 3],
+            &mut out_even[1..m + 2],
+        );
         for s in 0..m + 1 {
             o[s] = a[s] + c[s] + four * b[s];
         }
         // f[2s-1] = O[s] + 4 E[s] + O[s+1], s = 1 ..= m
-        let (a, b, c, o) = (&odd[2..m + 2], &even[2..m + 2], &odd[3..m + 3], &mut out_odd[2..m + 2]);
+        let (a, b, c, o) = (
+            &odd[2..m + 2],
+            &even[2..m + 2],
+            &odd[3..m + 3],
+            &mut out_odd[2..m + 2],
+        );
         for s in 0..m {
             o[s] = a[s] + c[s] + four * b[s];
         }
@@ -99,12 +110,22 @@ impl Phases {
         let (f_even, f_odd) = f.split_at(self.half());
         let (even, odd) = out.split_at_mut(self.half());
         // t[s] collects f[s-2] + 4 f[s-1] + f[s]; t[2s] = fe[s-1] + 4 fo[s] + fe[s] with f[2s-1] at fo[s].
-        let (a, b, c, o) = (&f_even[..m + 2], &f_odd[1..m + 3], &f_even[1..m + 3], &mut even[1..m + 3]);
+        let (a, b, c, o) = (
+            &f_even[..m + 2],
+            &f_odd[1..m + 3],
+            &f_even[1..m + 3],
+            &mut even[1..m + 3],
+        );
         for s in 0..m + 2 {
             o[s] = a[s] + c[s] + four * b[s];
         }
         // t[2s-1] = fo[s-1] + 4 fe[s-1] + fo[s]
-        let (a, b, c, o) = (&f_odd[1..m + 2], &f_even[1..m + 2], &f_odd[2..m + 3], &mut odd[2..m + 3]);
+        let (a, b, c, o) = (
+            &f_odd[1..m + 2],
+            &f_even[1..m + 2],
+            &f_odd[2..m + 3],
+            &mut odd[2..m + 3],
+        );
         for s in 0..m + 1 {
             o[s] = a[s] + c[s] + four * b[s];
         }
@@ -205,7 +226,12 @@ impl<T: Real> FiveTaps<T> {
         let differs = |row: &[f64; 5]| row.iter().zip(inner).any(|(a, b)| (a - b).abs() > 1e-12);
         Self {
             inner: inner.map(T::from_f64),
-            outer: rows.iter().enumerate().filter(|(_, r)| differs(r)).map(|(s, r)| (s, convert(r))).collect(),
+            outer: rows
+                .iter()
+                .enumerate()
+                .filter(|(_, r)| differs(r))
+                .map(|(s, r)| (s, convert(r)))
+                .collect(),
             rows: rows.iter().map(convert).collect(),
         }
     }
@@ -285,7 +311,9 @@ mod tests {
     use crate::volume::axis::Axis;
 
     fn noise(n: usize, seed: u64) -> Vec<f64> {
-        (0..n as u64).map(|i| (((i * 7919 + seed * 104_729) % 1000) as f64 - 500.0) / 500.0).collect()
+        (0..n as u64)
+            .map(|i| (((i * 7919 + seed * 104_729) % 1000) as f64 - 500.0) / 500.0)
+            .collect()
     }
 
     fn to_phases(p: Phases, natural: &[f64]) -> Vec<f64> {
@@ -369,7 +397,12 @@ mod tests {
             let rows: Vec<[f64; 1]> = (0..axis.functions(2)).map(|s| [t[p.slot(s)]]).collect();
             let zero = [0.0];
             for s in 0..rows.len() {
-                let at = |j: usize| (s + j).checked_sub(2).and_then(|i| rows.get(i)).map_or(&zero[..], |r| &r[..]);
+                let at = |j: usize| {
+                    (s + j)
+                        .checked_sub(2)
+                        .and_then(|i| rows.get(i))
+                        .map_or(&zero[..], |r| &r[..])
+                };
                 let mut out = [0.0];
                 taps.combine(s, std::array::from_fn(at), &mut out);
                 assert!((out[0] - expected[p.slot(s)]).abs() < 1e-14);

@@ -19,7 +19,10 @@ pub(crate) struct Cutoff {
 impl Cutoff {
     /// Keeps every score above `threshold`.
     pub fn above(threshold: f64) -> Self {
-        Self { key: key(threshold as f32), before: 0 }
+        Self {
+            key: key(threshold as f32),
+            before: 0,
+        }
     }
 
     /// This cutoff, but nothing at or below `threshold`.
@@ -76,7 +79,10 @@ pub(crate) fn largest<T: Real>(lists: &[&[T]], count: usize) -> Cutoff {
     let bin = bin as u32 - 1;
     let wanted = count - above;
     if wanted == 0 {
-        return Cutoff { key: ((bin + 1) << DROPPED_BITS) - 1, before: 0 };
+        return Cutoff {
+            key: ((bin + 1) << DROPPED_BITS) - 1,
+            before: 0,
+        };
     }
     let mut members: Vec<(u32, usize)> = Vec::with_capacity(histogram[bin as usize]);
     let mut offset = 0;
@@ -89,7 +95,10 @@ pub(crate) fn largest<T: Real>(lists: &[&[T]], count: usize) -> Cutoff {
     }
     let order = |a: &(u32, usize), b: &(u32, usize)| b.0.cmp(&a.0).then(a.1.cmp(&b.1));
     let (_, &mut (key, index), _) = members.select_nth_unstable_by(wanted - 1, order);
-    Cutoff { key, before: index + 1 }
+    Cutoff {
+        key,
+        before: index + 1,
+    }
 }
 
 #[cfg(test)]
@@ -108,7 +117,9 @@ mod tests {
 
     #[test]
     fn keeps_the_largest_and_of_equals_the_first() {
-        let a: Vec<f64> = (0..300_000_u64).map(|i| (i * 7919 % 1000) as f64 - 10.0).collect();
+        let a: Vec<f64> = (0..300_000_u64)
+            .map(|i| (i * 7919 % 1000) as f64 - 10.0)
+            .collect();
         let (first, second) = a.split_at(123_457);
         let lists = [first, second];
         let mut order: Vec<usize> = (0..a.len()).filter(|&i| a[i] > 0.0).collect();
@@ -125,6 +136,10 @@ mod tests {
         let scores = [0.0, -1.0, f64::NAN, 0.0];
         assert!(kept(&[&scores], largest(&[&scores], 4)).is_empty());
         assert!(kept(&[&scores], Cutoff::above(0.0)).is_empty());
-        assert_eq!(kept(&[&[1.0, 2.0, 3.0]], Cutoff::above(2.0)), [2], "strictly above");
+        assert_eq!(
+            kept(&[&[1.0, 2.0, 3.0]], Cutoff::above(2.0)),
+            [2],
+            "strictly above"
+        );
     }
 }

@@ -161,7 +161,11 @@ impl<T: Real> Adaptive<'_, T> {
         let mut scores = self.detail(level);
         layout.score(domain, T::one(), &mut scores);
         layout.for_each_active(&self.fit.active[level], |_, entry| scores[entry] = T::zero());
-        let wanted = if generous { dilated(grid, failing) } else { failing.to_vec() };
+        let wanted = if generous {
+            dilated(grid, failing)
+        } else {
+            failing.to_vec()
+        };
         let functions = domain.functions(level);
         let leaf_of: [Vec<usize>; 3] = std::array::from_fn(|a| {
             let axis = domain.axes[a];
@@ -187,7 +191,10 @@ impl<T: Real> Adaptive<'_, T> {
         }
         self.recycle(level, scores);
         if generous {
-            return offered.into_iter().map(|(_, score, index)| (score, index)).collect();
+            return offered
+                .into_iter()
+                .map(|(_, score, index)| (score, index))
+                .collect();
         }
         offered.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)).then(a.2.cmp(&b.2)));
         let mut picked = Vec::new();
@@ -219,7 +226,10 @@ impl<T: Real> Adaptive<'_, T> {
 
 fn count_kept<T: Real>(lists: &[&[T]], cutoff: Cutoff) -> usize {
     // A threshold keeps by value alone; the index does not matter.
-    lists.iter().map(|l| l.par_iter().filter(|&&s| cutoff.keeps(s, usize::MAX)).count()).sum()
+    lists
+        .iter()
+        .map(|l| l.par_iter().filter(|&&s| cutoff.keeps(s, usize::MAX)).count())
+        .sum()
 }
 
 /// Marked leaves and their 26 neighbours.

@@ -61,7 +61,11 @@ impl Overview {
     /// Range that percentages of densities refer to.
     pub fn range(&self) -> f64 {
         let [low, high] = self.percentiles.map(f64::from);
-        if high > low { high - low } else { f64::from(self.max) - f64::from(self.min) }
+        if high > low {
+            high - low
+        } else {
+            f64::from(self.max) - f64::from(self.min)
+        }
     }
 
     /// Largest magnitude.
@@ -107,13 +111,23 @@ impl VolumeView<'_> {
             .map(|chunk| {
                 chunk.iter().fold(start, |(lo, hi, odd), &v| {
                     let bad = usize::from(!v.is_finite());
-                    (if v < lo { v } else { lo }, if v > hi { v } else { hi }, odd + bad)
+                    (
+                        if v < lo { v } else { lo },
+                        if v > hi { v } else { hi },
+                        odd + bad,
+                    )
                 })
             })
             .reduce(|| start, |a, b| (a.0.min(b.0), a.1.max(b.1), a.2 + b.2));
         let place = |bad: fn(&f32) -> bool| {
             let i = self.values.iter().position(bad).expect("counted above");
-            format!("voxel ({}, {}, {}) is {}", i % nx, i / nx % ny, i / (nx * ny), self.values[i])
+            format!(
+                "voxel ({}, {}, {}) is {}",
+                i % nx,
+                i / nx % ny,
+                i / (nx * ny),
+                self.values[i]
+            )
         };
         if odd > 0 {
             return Err(FitError::Degenerate(format!(
@@ -128,7 +142,20 @@ impl VolumeView<'_> {
                 place(|v| v.abs() > LARGEST)
             )));
         }
-        Ok(Overview { min, max, percentiles: quantiles(self.values, [0.01, 0.99]) })
+        Ok(Overview {
+            min,
+            max,
+            percentiles: quantiles(self.values, [0.01, 0.99]),
+        })
+    }
+
+    /// Range between the 1st and the 99th percentile, which shares of a density refer to; of the extremes where
+    /// these percentiles coincide.
+    ///
+    /// # Errors
+    /// As [`super::fit_volume`], for a volume that cannot be fitted.
+    pub fn density_range(&self) -> Result<f64, FitError> {
+        Ok(self.check()?.range())
     }
 
     /// Fall of the density per world length that stands for the volume: the median of `|∇d|` over voxels where
@@ -165,14 +192,24 @@ impl VolumeView<'_> {
         .transformed(&self.world_from_voxel)
         .size()
         .length();
-        if span > 0.0 && reach > 0.0 { span / reach } else { 1.0 }
+        if span > 0.0 && reach > 0.0 {
+            span / reach
+        } else {
+            1.0
+        }
     }
 }
 
 impl VolumeOptions {
     /// Refuses values out of range and contradictions.
     pub(crate) fn check(&self) -> Result<(), FitError> {
-        let refuse = |option, value, requirement| Err(FitError::Option { option, value, requirement });
+        let refuse = |option, value, requirement| {
+            Err(FitError::Option {
+                option,
+                value,
+                requirement,
+            })
+        };
         if let Some(t) = self.tolerance
             && !(t > 0.0 && t.is_finite())
         {
