@@ -64,20 +64,39 @@ fn project(field: &dyn Field, p: DVec3, spacing: f64) -> Projected {
 /// order.
 fn newton(field: &dyn Field, start: DVec3, spacing: f64) -> Result<(DVec3, DVec3), (DVec3, f64)> {
     let mut x = start;
+    let (mut f, mut g) = field.value_gradient(x);
     let mut left = f64::INFINITY;
     for _ in 0..NEWTON_STEPS {
-        let (f, g) = field.value_gradient(x);
         let slope = g.length();
         left = f.abs() / slope;
         if !left.is_finite() {
             return Err((x, spacing));
         }
-        x -= g * (f / slope / slope * (spacing / left).min(1.0));
         if left <= 1e-6 * spacing {
             return Ok((x, g / slope));
         }
+        let next = x - g * (f / slope / slope * (spacing / left).min(1.0));
+        let (f_next, g_next) = field.value_gradient(next);
+        // Across a crease Newton's steps go to and fro; what they bracket is found by halving.
+        if f_next.abs() > 0.5 * f.abs() && (f_next > 0.0) != (f > 0.0) {
+            return Ok(bisect(field, [x, next], f > 0.0));
+        }
+        (x, f, g) = (next, f_next, g_next);
     }
     Err((x, left))
+}
+
+/// The zero between two points of different sign, and the unit gradient there; `inside` is the sign at the first.
+fn bisect(field: &dyn Field, [mut a, mut b]: [DVec3; 2], inside: bool) -> (DVec3, DVec3) {
+    for _ in 0..40 {
+        let middle = (a + b) * 0.5;
+        if (field.value(middle) > 0.0) == inside {
+            a = middle
+        } else {
+            b = middle
+        }
+    }
+    (b, field.value_gradient(b).1.normalize_or_zero())
 }
 
 #[cfg(test)]

@@ -80,8 +80,10 @@ pub fn run(args: &Args) -> Outcome {
         write_report(directory, args, &open, &index, &measured)?;
     }
     let (s, audit) = (&measured.statistics, &measured.audit);
+    // An interpolating fit aims at none.
+    let has_tolerance = open.report().tolerance > 0.0;
     let mut notes = Vec::new();
-    if audit.claimed_below > 0 {
+    if has_tolerance && audit.claimed_below > 0 {
         notes.push(format!(
             "{} leaves are above the tolerance although the fit calls them below",
             audit.claimed_below
@@ -92,14 +94,14 @@ pub fn run(args: &Args) -> Outcome {
         unit: Some(measured.unit.clone()),
         coefficients: Some(open.coefficient_count()),
         depth: Some(open.report().depth),
-        tolerance: Some(open.report().tolerance),
+        tolerance: has_tolerance.then_some(open.report().tolerance),
         rms: Some(s.rms),
         p95: Some(s.p95),
         max: Some(s.max),
         unprojected: measured.unprojected,
         leaves: Some(audit.leaves),
-        leaves_over_tolerance: Some(audit.over_tolerance),
-        leaves_without_data: Some(audit.without_data),
+        leaves_over_tolerance: has_tolerance.then_some(audit.over_tolerance),
+        leaves_without_data: has_tolerance.then_some(audit.without_data),
         field_sha256: Some(open.sha256()),
         output: args.output.as_ref().map(|d| d.display().to_string()),
         notes,

@@ -289,6 +289,8 @@ impl Fitted {
     pub fn summary(&self, input: &Input) -> Summary {
         let r = &self.report;
         let over = |l: &&fitting::Leaf| f64::from(l.rms) > r.tolerance;
+        // An interpolating fit aims at none.
+        let has_tolerance = r.tolerance > 0.0;
         Summary {
             input_count: Some(r.input_count),
             used_count: Some(r.used_count),
@@ -300,7 +302,7 @@ impl Fitted {
             totals_bytes: Some(either!(&self.field, f => f.totals_bytes())),
             bricks: Some(either!(&self.field, f => f.brick_count())),
             depth: Some(r.depth),
-            tolerance: Some(r.tolerance),
+            tolerance: has_tolerance.then_some(r.tolerance),
             smoothing: Some(r.smoothing),
             noise: r.noise,
             rms: Some(r.rms),
@@ -308,14 +310,14 @@ impl Fitted {
             max: Some(r.max),
             bound: Some(r.bound),
             leaves: Some(r.leaves.len()),
-            leaves_over_tolerance: Some(r.leaves.iter().filter(over).count()),
-            leaves_without_data: Some(
+            leaves_over_tolerance: has_tolerance.then(|| r.leaves.iter().filter(over).count()),
+            leaves_without_data: has_tolerance.then(|| {
                 r.leaves
                     .iter()
                     .filter(over)
                     .filter(|l| l.reason == StopReason::NoData)
-                    .count(),
-            ),
+                    .count()
+            }),
             notes: r.notes.clone(),
             ..Default::default()
         }

@@ -46,6 +46,9 @@ pub struct Args {
     json: bool,
 }
 
+/// Triangles that make a user think of a smaller mesh.
+const MANY: usize = 4_000_000;
+
 /// Meshes a field file.
 pub fn run(args: &Args) -> Outcome {
     let cost = Cost::start();
@@ -87,6 +90,9 @@ pub fn run(args: &Args) -> Outcome {
     notes.extend(formats::meshes::save(&args.output, &written).map_err(writing)?);
     bar.clear();
     notes.extend(doubts(&report));
+    if args.resolution.is_none() && args.tolerance.is_none() && mesh.triangles.len() > MANY {
+        notes.push("the finest level covers a small part of the solid; --resolution or --tolerance give a smaller mesh".into());
+    }
     Summary {
         vertices: Some(mesh.positions.len()),
         triangles: Some(mesh.triangles.len()),

@@ -52,8 +52,9 @@ const TRIES: usize = 100_000;
 /// Draws points evenly from the zero set of `field` inside `within`.
 ///
 /// Uniform candidates of the box that lie within a thin band of the surface are projected on it by Newton's
-/// method, `x ← x - f∇f/|∇f|²`. A candidate counts only if it lies on the normal of its foot, so that each patch
-/// of the surface collects the candidates of its own normals and edges are not crowded.
+/// method, `x ← x - f∇f/|∇f|²`. A candidate counts only if it lies on the normal of its foot and its mirror image
+/// sees the same normal, so that each patch of the surface collects the candidates of its own normals and edges are
+/// not crowded.
 ///
 /// `None` if the box seems to hold no surface.
 pub fn sample_cloud(field: &dyn Field, within: &Aabb, options: &CloudOptions) -> Option<SampledCloud> {
@@ -101,8 +102,11 @@ fn project(field: &dyn Field, start: DVec3, band: f64) -> Option<(DVec3, DVec3)>
             let normal = -g / g2.sqrt();
             let offset = start - x;
             let across = offset - normal * offset.dot(normal);
-            return (offset.length() <= band && across.length() <= 0.05 * offset.length().max(1e-9 * band))
-                .then_some((x, normal));
+            let is_foot = offset.length() <= band
+                && across.length() <= 0.05 * offset.length().max(1e-9 * band)
+                // On an edge the mirror image belongs to a face.
+                && field.value_gradient(x - offset).1.normalize_or_zero().dot(normal) < -0.99;
+            return is_foot.then_some((x, normal));
         }
     }
     None
