@@ -127,8 +127,9 @@ impl<T: Real> RestrictedAxis<T> {
     ///
     /// A weight is made of three factors (a difference and a quotient each), their products and two sums, so
     /// it is right to 13 units of `f64`; rounding it to `T` and the sum of four products add 5 units of `T`.
-    /// Over three axes the errors add up: widen a hull by `3·axis_error()·max |c|`. The rounding of `a` and
-    /// `b` themselves, and of the spline's own evaluation, is the caller's.
+    /// Over three axes the errors add up: widen a hull by `3·axis_error()·max |c|`, the largest of the coefficients
+    /// that the box reads, not of the hull: near the zero set the coefficients of a small box are small, and the
+    /// rounding is not. The rounding of `a` and `b`, and of the spline's own evaluation, is the caller's.
     pub fn axis_error() -> f64 {
         // 2 % on top for the products of errors that are left out above.
         1.02 * (5.0 * T::UNIT_ROUND_OFF + 13.0 * f64::UNIT_ROUND_OFF)

@@ -306,3 +306,38 @@ fn bounds_hold_outside_the_box_and_on_oblique_lattices() {
         }
     }
 }
+
+#[test]
+fn bounds_of_boxes_along_the_knots_read_their_own_cells_only() {
+    // One huge coefficient: function 5 of level 0, whose support is the cells 3 .. 7 on each axis.
+    let lattice = Lattice {
+        world_from_lattice: DAffine3::from_scale_rotation_translation(
+            DVec3::new(0.1, 0.3, 0.7),
+            glam::DQuat::IDENTITY,
+            DVec3::splat(1.0 / 3.0),
+        ),
+        cells: [12; 3],
+    };
+    let mut bricks = BTreeMap::new();
+    set::<f32>(&mut bricks, [6, 6, 6], 1e6);
+    let level = bricks.into_iter().map(|(k, c)| (k, Arc::new(c))).collect();
+    let f = HierarchicalSpline::from_corrections(lattice, 1.0, vec![level]);
+    let frame = Frame {
+        world_from_grid: lattice.world_from_lattice,
+        cells: lattice.cells,
+    };
+    for first in 0..12i64 {
+        for last in first + 1..=12 {
+            let bound = f.frame_bounds(&frame, [first, 0, 0], [last, 12, 12]);
+            let reads = first < 7 && last > 3;
+            assert_eq!(bound.hi > 1e5, reads, "cells {first} .. {last}: {bound:?}");
+            for node in first..=last {
+                let value = f.value(frame.node([node, 5, 5]));
+                assert!(
+                    bound.contains(value),
+                    "node {node} of {first} .. {last}: {value} {bound:?}"
+                );
+            }
+        }
+    }
+}

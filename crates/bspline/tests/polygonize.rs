@@ -1,13 +1,16 @@
 //! Laws of the mesher: what every mesh must be, on fields chosen to break it.
 
+use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
+use bspline::hierarchical::{BRICK_LEN, BrickKey, Corrections, Lattice};
 use bspline::polygonize::{
     Mesh, MeshReport, Placement, PolygonizeError, PolygonizeOptions, check_mesh, polygonize, polygonize_with,
 };
-use bspline::{Aabb, Field, Frame, Interval, Jet};
-use glam::{DAffine3, DMat3, DVec3};
+use bspline::{Aabb, Field, Frame, HierarchicalSpline, Interval, Jet};
+use glam::{DAffine3, DMat3, DQuat, DVec3};
 
 /// A field from its value with gradient; bounds as given.
 struct Formula<F, B> {
@@ -599,4 +602,75 @@ fn senseless_requests_are_refused() {
         error.expect_err("too large"),
         PolygonizeError::TooManyBlocks { limit: 1 << 16 }
     );
+}
+
+/// Full coarse level and a finer one in part of the box, random.
+fn random_spline(seed: u64, world_from_lattice: DAffine3) -> HierarchicalSpline<f32> {
+    let mut random = Random(seed);
+    let mut level = |bricks: &[[u32; 3]], size: f64| {
+        let mut made = BTreeMap::new();
+        for &key in bricks {
+            let mut corrections = Corrections::empty();
+            for slot in 0..BRICK_LEN {
+                let at = [slot / 64, slot / 8 % 8, slot % 8];
+                corrections.set(at, (size * (2.0 * random.unit() - 1.0)) as f32);
+            }
+            made.insert(BrickKey(key), Arc::new(corrections));
+        }
+        made
+    };
+    let coarse: Vec<[u32; 3]> = (0..8).map(|n| [n >> 2, n >> 1 & 1, n & 1]).collect();
+    let levels = vec![
+        level(&coarse, 1.0),
+        level(&[[0, 0, 0], [1, 1, 0], [1, 2, 1]], 0.5),
+    ];
+    let lattice = Lattice {
+        world_from_lattice,
+        cells: [10, 9, 12],
+    };
+    HierarchicalSpline::from_corrections(lattice, 1.0, levels)
+}
+
+#[test]
+fn splines_are_meshed_along_and_across_their_knots() {
+    for seed in 0..4 {
+        let map = DAffine3::from_scale_rotation_translation(
+            DVec3::new(1.0, 0.7, 1.2),
+            DQuat::from_rotation_z(if seed % 2 == 0 { 0.0 } else { 0.4 }),
+            DVec3::new(3.0, -50.0, 7.0),
+        );
+        let field = random_spline(seed, map);
+        let along = Frame {
+            world_from_grid: map * DAffine3::from_scale(DVec3::splat(0.25)),
+            cells: [40, 36, 48],
+        };
+        // Turned against the lattice and larger than its box.
+        let across = Frame::over(&field.lattice().world_box(), [45; 3]);
+        for frame in [along, across] {
+            let (mesh, report) = mesh_of(&field, &frame, &PolygonizeOptions::default());
+            let check = check_mesh(&mesh);
+            assert!(check.is_closed_manifold() && check.triangles > 5000, "{check:?}");
+            assert_eq!(report.unsound_blocks, 0);
+            // Roots within 1e-4 of an edge up to the clamp of 1e-3, and the field's own rounding. The steepest
+            // slope is about 3 per cell of the finer level.
+            let edge = frame.world_from_grid.matrix3.x_axis.length();
+            let step = (0..3)
+                .map(|a| frame.world_from_grid.matrix3.col(a).length())
+                .fold(edge, f64::max);
+            let box_ = Aabb::new(DVec3::ZERO, frame.cells.map(f64::from).into());
+            let mut far = 0;
+            for &p in &mesh.positions {
+                let q = frame.world_from_grid.inverse().transform_point3(p);
+                if q.cmpge(box_.min).all() && q.cmple(box_.max).all() {
+                    let (f, gradient) = field.value_gradient(p);
+                    far += (f.abs() > 2e-4 * step * gradient.length() + 1e-6) as usize;
+                }
+            }
+            assert!(
+                far * 100 < mesh.positions.len(),
+                "{far} of {}",
+                mesh.positions.len()
+            );
+        }
+    }
 }

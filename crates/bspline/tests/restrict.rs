@@ -1,7 +1,7 @@
 //! Uniform cubic weights and the restriction of a spline to part of its cells.
 
 use bspline::restrict::{CELLS, COEFFICIENTS, RestrictedAxis, restricted_range};
-use bspline::{Real, cubic};
+use bspline::{Interval, Real, cubic};
 use proptest::prelude::*;
 
 const N: usize = COEFFICIENTS;
@@ -145,6 +145,46 @@ proptest! {
             prop_assert!(low - slack <= f && f <= high + slack, "{f} not in [{low}, {high}]");
         }
     }
+}
+
+/// In single precision, near the zero set of large coefficients, where the hull is smaller than its rounding.
+#[test]
+fn bounds_in_single_precision_hold_points() {
+    let plane = |x: usize, y: usize, z: usize| 900.0 * (x as f32 + 0.7 * y as f32 - 1.3 * z as f32 - 1.234);
+    let mut c = [0.0f32; N * N * N];
+    (0..N * N * N).for_each(|i| c[i] = plane(i / N / N, i / N % N, i % N));
+    let largest = c.iter().fold(0.0f64, |m, c| m.max(f64::from(c.abs())));
+    let mut nearly_zero = 0;
+    for i in 0..2000 {
+        let [x, y] = [(i as f64 * 0.618).fract() * 8.0, (i as f64 * 0.414).fract() * 8.0];
+        // Function h is centred on h - 1.
+        let z = ((x + 1.0 + 0.7 * (y + 1.0) - 1.234) / 1.3 - 1.0).clamp(0.0, 8.0);
+        let axes = [x, y, z].map(|q| RestrictedAxis::<f32>::new(q, q));
+        // 8 units in the weights of an axis, t rounded to f32 under slopes of 4/3 max |c|, 64 sums.
+        let evaluation = (64.0 + 3.0 * (8.0 + 4.0 / 3.0)) * f32::UNIT_ROUND_OFF;
+        let (lo, hi) = restricted_range(&c, &axes);
+        let bounds = Interval::new(f64::from(lo), f64::from(hi))
+            .widened((evaluation + 3.0 * RestrictedAxis::<f32>::axis_error()) * largest);
+        let part = |q: f64| {
+            let cell = (q.floor() as usize).min(CELLS - 1);
+            (cell, cubic::values((q - cell as f64) as f32))
+        };
+        let [(i, u), (j, v), (k, w)] = [x, y, z].map(part);
+        let mut f = 0.0f32;
+        for (a, u) in u.iter().enumerate() {
+            for (b, v) in v.iter().enumerate() {
+                for (d, w) in w.iter().enumerate() {
+                    f += u * (v * (w * c[((i + a) * N + j + b) * N + k + d]));
+                }
+            }
+        }
+        assert!(
+            bounds.contains(f64::from(f)),
+            "{f} leaves {bounds:?} at {x} {y} {z}"
+        );
+        nearly_zero += usize::from(f.abs() < 1e-2);
+    }
+    assert!(nearly_zero > 500, "{nearly_zero}");
 }
 
 /// The hull of a smooth function exceeds its range less and less as the box shrinks (quadratically), whereas

@@ -1,6 +1,12 @@
-//! Samples in, field out.
+//! Samples in, field out: fits of oriented point clouds ([`points`]) and of voxel grids ([`volume`]).
+//!
+//! A fit takes plain slices and gives a [`bspline::HierarchicalSpline`] with a [`FitReport`]: residuals of every
+//! leaf, why it was not split, and what was repaired in the input. The caller holds a [`Control`]: progress out,
+//! cancel in, a ceiling on memory.
 
 mod budget;
+mod components;
+mod error;
 mod lines;
 pub mod phantoms;
 pub mod points;
@@ -9,7 +15,6 @@ mod report;
 pub mod volume;
 
 pub use budget::{Cancel, Control, Progress};
-pub use report::{FitReport, Leaf, StopReason};
-
-mod error;
+pub use components::{UnsupportedComponent, unsupported_components};
 pub use error::FitError;
+pub use report::{FitReport, Leaf, StopReason};

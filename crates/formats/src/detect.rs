@@ -41,8 +41,8 @@ impl fmt::Display for Kind {
     }
 }
 
-pub(crate) const CLOUDS: &str = "point clouds .ply .obj .xyz .txt .asc .csv .pts, each also .gz";
-const SUPPORTED: &str = "point clouds .ply .obj .xyz .txt .asc .csv .pts and volumes .nii, each also .gz, \
+pub(crate) const CLOUDS: &str = "point clouds .ply .obj .xyz .xyzn .txt .asc .csv .pts, each also .gz";
+const SUPPORTED: &str = "point clouds .ply .obj .xyz .xyzn .txt .asc .csv .pts and volumes .nii, each also .gz, \
                          and fields .iclay";
 
 /// Bytes that are enough to know every content that can be known.
@@ -82,7 +82,7 @@ pub(crate) fn kind_of(head: &[u8], path: &Path) -> Result<Kind, Fault> {
     let extension = extension(path);
     match extension.as_str() {
         "ply" => Ok(Kind::Cloud(PointFormat::Ply)),
-        "xyz" | "txt" | "asc" | "csv" | "pts" => Ok(Kind::Cloud(PointFormat::Xyz)),
+        "xyz" | "xyzn" | "txt" | "asc" | "csv" | "pts" => Ok(Kind::Cloud(PointFormat::Xyz)),
         "obj" => Ok(Kind::Cloud(PointFormat::Obj)),
         "nii" => Ok(Kind::Volume),
         "iclay" => Ok(Kind::Field),

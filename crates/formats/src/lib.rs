@@ -38,7 +38,7 @@ pub mod points;
 mod unit;
 pub mod volumes;
 
-pub use detect::{Kind, detect};
+pub use detect::{Kind, PointFormat, detect};
 pub use error::{Fault, FormatError};
 pub use limits::ReadLimits;
 pub use unit::Unit;

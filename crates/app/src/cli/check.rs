@@ -1,7 +1,7 @@
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-use fitting::{Cancel, StopReason};
+use fitting::{Cancel, StopReason, UnsupportedComponent, unsupported_components};
 use formats::points::PointCloud;
 use formats::volumes::Volume;
 use glam::DVec3;
@@ -47,6 +47,8 @@ struct Measured {
     audit: LeafAudit,
     count: usize,
     unprojected: Option<usize>,
+    /// Pieces of the solid or of its complement without a sample, larger than a cell.
+    unsupported: Vec<UnsupportedComponent>,
     unit: String,
 }
 
@@ -89,6 +91,10 @@ pub fn run(args: &Args) -> Outcome {
             audit.claimed_below
         ));
     }
+    notes.extend(measured.unsupported.iter().map(|c| {
+        let what = if c.is_inside { "piece of the solid" } else { "cavity" };
+        format!("a {what} of {} cells of 1/{COMPONENT_CELLS} round {} holds no sample", c.cell_count, c.at)
+    }));
     Summary {
         input_count: Some(measured.count),
         unit: Some(measured.unit.clone()),
@@ -99,6 +105,7 @@ pub fn run(args: &Args) -> Outcome {
         p95: Some(s.p95),
         max: Some(s.max),
         unprojected: measured.unprojected,
+        unsupported_components: Some(measured.unsupported.len()).filter(|_| measured.unprojected.is_some()),
         leaves: Some(audit.leaves),
         leaves_over_tolerance: has_tolerance.then_some(audit.over_tolerance),
         leaves_without_data: has_tolerance.then_some(audit.without_data),
@@ -128,10 +135,22 @@ fn measure_cloud(open: &OpenField, index: &LeafIndex, cloud: &PointCloud) -> Mea
         audit,
         count: errors.len(),
         unprojected: Some(projected.iter().filter(|p| !p.converged).count()),
+        unsupported: unsupported(open, &cloud.positions),
         unit: open.unit().to_string(),
         positions: cloud.positions.clone(),
         errors,
     }
+}
+
+/// Cells along the longest side of the grid on which components are told apart.
+const COMPONENT_CELLS: u32 = 128;
+
+/// Components that no sample speaks for. A single cell may be a corner of the surface between two nodes.
+fn unsupported(open: &OpenField, samples: &[DVec3]) -> Vec<UnsupportedComponent> {
+    let frame = open.frame_of_resolution(COMPONENT_CELLS);
+    let mut components = unsupported_components(open.field(), open.iso(), &frame, samples);
+    components.retain(|c| c.cell_count > 1);
+    components
 }
 
 /// Voxels shown in the error map of a volume: the worst ones.
@@ -163,6 +182,7 @@ fn measure_volume(open: &OpenField, index: &LeafIndex, volume: &Volume) -> Measu
             .collect(),
         count: errors.len(),
         unprojected: None,
+        unsupported: Vec::new(),
         unit: "density".into(),
         audit,
         errors: worst.iter().map(|&i| errors[i].abs()).collect(),
@@ -220,6 +240,9 @@ fn write_report(
         "unprojected": measured.unprojected,
         "stated_by_the_fit": { "rms": report.rms, "p95": report.p95, "max": report.max, "bound": report.bound },
         "leaves": audit,
+        "components_without_samples": measured.unsupported.iter().map(|c| json!({
+            "inside": c.is_inside, "cells": c.cell_count, "at": c.at.to_array(),
+        })).collect::<Vec<_>>(),
         "error_ply": { "points": measured.positions.len(), "violet": 0.0, "yellow": full_scale },
         "octree_ply": { "boxes": "edges of the leaves with samples, violet coarse to yellow fine; red: above the \
                                   tolerance and not split for lack of data" },

@@ -65,6 +65,9 @@ pub struct Summary {
     /// Points that Newton's method could not bring to the surface.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unprojected: Option<usize>,
+    /// Components of the solid or of its complement that hold no sample, larger than a cell of 1/128 of the box.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unsupported_components: Option<usize>,
     /// Vertices of the mesh.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub vertices: Option<usize>,
@@ -142,6 +145,7 @@ impl Summary {
                 "unprojected points",
                 self.unprojected.filter(|n| *n > 0).map(count),
             ),
+            ("parts without samples", self.unsupported_components.filter(|n| *n > 0).map(count)),
             ("leaves", self.leaves.map(count)),
             ("  over tolerance", self.leaves_over_tolerance.map(count)),
             ("  refused for lack of data", self.leaves_without_data.map(count)),

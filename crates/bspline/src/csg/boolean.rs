@@ -9,8 +9,9 @@ use crate::{Aabb, Field, Frame, Interval, Jet};
 /// in a sorted batch.
 const CHUNK: usize = 64;
 
-/// Edge of the blocks of grid nodes that are pruned one by one.
-const BLOCK: usize = 16;
+/// Edges of the blocks of grid nodes that are not divided further, where two branches live and where more do: 16
+/// and 8 cells with the nodes at both ends.
+const BLOCK: [usize; 2] = [17, 9];
 
 /// Which value wins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,6 +64,16 @@ impl Branch {
             },
         )
     }
+}
+
+/// The nodes asked for, where their values go, and room for those of one block.
+struct Grid<'a> {
+    frame: &'a Frame,
+    lo: [i64; 3],
+    count: [usize; 3],
+    out: &'a mut [f64],
+    block: Vec<f64>,
+    term: Vec<f64>,
 }
 
 impl Boolean {
@@ -144,13 +155,12 @@ impl Boolean {
         best.expect("a Boolean has a branch")
     }
 
-    /// The branches that can win where their ranges are as `range` says, in order; at least one.
-    fn live(&self, range: impl Fn(&dyn Field) -> Interval) -> Vec<&Branch> {
-        if let [only] = self.branches.as_slice() {
+    /// Those of `candidates` that can win where their ranges are as `range` says, in order; at least one.
+    fn live<'a>(&self, candidates: &[&'a Branch], range: impl Fn(&dyn Field) -> Interval) -> Vec<&'a Branch> {
+        if let [only] = candidates {
             return vec![only];
         }
-        let ranges: Vec<Interval> = self
-            .branches
+        let ranges: Vec<Interval> = candidates
             .iter()
             .map(|b| b.map_interval(range(b.field.as_ref())))
             .collect();
@@ -161,12 +171,51 @@ impl Boolean {
             Operation::Union => r.hi >= best.lo || r.hi.is_nan(),
             Operation::Intersection => r.lo <= best.hi || r.lo.is_nan(),
         };
-        self.branches
+        candidates
             .iter()
             .zip(&ranges)
             .filter(|(_, r)| lives(r))
-            .map(|(b, _)| b)
+            .map(|(b, _)| *b)
             .collect()
+    }
+
+    /// Values of the block of `count` nodes from node `start` of `grid`, of which only `candidates` can decide:
+    /// divided until few of them live.
+    fn fill(&self, candidates: &[&Branch], grid: &mut Grid, start: [usize; 3], count: [usize; 3]) {
+        let lo: [i64; 3] = std::array::from_fn(|a| grid.lo[a] + start[a] as i64);
+        let hi: [i64; 3] = std::array::from_fn(|a| lo[a] + count[a] as i64 - 1);
+        let live = self.live(candidates, |field| field.frame_bounds(grid.frame, lo, hi));
+        let edge = BLOCK[usize::from(live.len() > 2)];
+        if live.len() > 1 && count.iter().any(|n| *n > edge) {
+            let halves: [usize; 3] = std::array::from_fn(|a| {
+                if count[a] > edge {
+                    count[a].div_ceil(2)
+                } else {
+                    count[a]
+                }
+            });
+            for octant in 0..8usize {
+                let upper = [octant >> 2 & 1, octant >> 1 & 1, octant & 1];
+                let part = std::array::from_fn(|a| [halves[a], count[a] - halves[a]][upper[a]]);
+                if part.iter().all(|n| *n > 0) {
+                    let from = std::array::from_fn(|a| start[a] + halves[a] * upper[a]);
+                    self.fill(&live, grid, from, part);
+                }
+            }
+        } else if count == grid.count {
+            let mut term = std::mem::take(&mut grid.term);
+            self.block_values(&live, grid.frame, lo, count, grid.out, &mut term);
+        } else {
+            let (mut block, mut term) = (std::mem::take(&mut grid.block), std::mem::take(&mut grid.term));
+            block.resize(count.iter().product(), 0.0);
+            self.block_values(&live, grid.frame, lo, count, &mut block, &mut term);
+            for (row, values) in block.chunks(count[2]).enumerate() {
+                let (x, y) = (start[0] + row / count[1], start[1] + row % count[1]);
+                let at = (x * grid.count[1] + y) * grid.count[2] + start[2];
+                grid.out[at..at + count[2]].copy_from_slice(values);
+            }
+            (grid.block, grid.term) = (block, term);
+        }
     }
 
     /// Values of one block from the branches that live there. `term` is as long as `out`.
@@ -231,13 +280,14 @@ impl Field for Boolean {
     fn values_gradients(&self, points: &[DVec3], out: &mut [(f64, DVec3)]) {
         assert_eq!(points.len(), out.len(), "one output slot per point");
         let mut term = [(0.0, DVec3::ZERO); CHUNK];
+        let all: Vec<&Branch> = self.branches.iter().collect();
         for (points, out) in points.chunks(CHUNK).zip(out.chunks_mut(CHUNK)) {
             let (min, max) = points
                 .iter()
                 .fold((points[0], points[0]), |b, p| (b.0.min(*p), b.1.max(*p)));
             // NaN hides from min and max: such a batch is not pruned.
             let known = points.iter().all(|p| p.is_finite());
-            let live = self.live(|field| {
+            let live = self.live(&all, |field| {
                 if known {
                     field.bounds(&Aabb { min, max })
                 } else {
@@ -269,33 +319,16 @@ impl Field for Boolean {
         if out.is_empty() {
             return;
         }
-        let live = |lo: [i64; 3], count: [usize; 3]| {
-            let hi: [i64; 3] = std::array::from_fn(|a| lo[a] + count[a] as i64 - 1);
-            self.live(|field| field.frame_bounds(frame, lo, hi))
+        let all: Vec<&Branch> = self.branches.iter().collect();
+        let mut grid = Grid {
+            frame,
+            lo,
+            count,
+            out,
+            block: Vec::new(),
+            term: Vec::new(),
         };
-        let mut term = Vec::new();
-        let whole = live(lo, count);
-        if whole.len() == 1 || count.iter().all(|n| *n <= BLOCK) {
-            return self.block_values(&whole, frame, lo, count, out, &mut term);
-        }
-        let mut block = Vec::new();
-        let starts = |a: usize| (0..count[a]).step_by(BLOCK);
-        for i in starts(0) {
-            for j in starts(1) {
-                for k in starts(2) {
-                    let start = [i, j, k];
-                    let from: [i64; 3] = std::array::from_fn(|a| lo[a] + start[a] as i64);
-                    let part: [usize; 3] = std::array::from_fn(|a| BLOCK.min(count[a] - start[a]));
-                    block.resize(part.iter().product(), 0.0);
-                    self.block_values(&live(from, part), frame, from, part, &mut block, &mut term);
-                    for (row, values) in block.chunks(part[2]).enumerate() {
-                        let (x, y) = (i + row / part[1], j + row % part[1]);
-                        let at = (x * count[1] + y) * count[2] + k;
-                        out[at..at + part[2]].copy_from_slice(values);
-                    }
-                }
-            }
-        }
+        self.fill(&all, &mut grid, [0; 3], count);
     }
 
     fn frame_bounds(&self, frame: &Frame, lo: [i64; 3], hi: [i64; 3]) -> Interval {

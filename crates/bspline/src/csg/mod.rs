@@ -4,6 +4,20 @@
 //! of patches is a sum of affine nodes (DIS eq. 3). The results are sharp: along a crease the gradient jumps. Every
 //! node passes blocks of grid nodes and batches of points on to its branches, so that theirs are as fast as
 //! alone, and leaves out those branches that their bounds prove irrelevant. Leaving out never changes a bit.
+//!
+//! ```
+//! use std::sync::Arc;
+//! use bspline::primitives::{Cuboid, Cylinder};
+//! use bspline::{Csg, Field};
+//! use glam::{DAffine3, DVec3};
+//!
+//! let block = Arc::new(Cuboid::new(DVec3::ZERO, DVec3::new(2.0, 1.0, 1.0))?);
+//! let drill = Arc::new(Cylinder::new(DVec3::NEG_Z, DVec3::Z, 0.5)?);
+//! let drill = Csg::affine(drill, DAffine3::from_scale(DVec3::new(1.0, 1.0, 2.0)))?;
+//! let drilled = Csg::difference(block, vec![Arc::new(drill)], 0.0)?;
+//! assert!(drilled.value(DVec3::ZERO) < 0.0 && drilled.value(DVec3::X) > 0.0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod affine;
 mod boolean;

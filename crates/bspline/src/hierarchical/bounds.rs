@@ -73,7 +73,8 @@ fn visit<T: Real>(spline: &HierarchicalSpline<T>, level: usize, index: usize, b:
         return hull.add(local_hull(brick, level, &part));
     }
     for octant in 0..8usize {
-        if let child @ 0..NONE = brick.children[octant] {
+        let child = brick.children[octant];
+        if child != NONE {
             visit(spline, level + 1, child as usize, b, hull);
             continue;
         }

@@ -24,7 +24,7 @@ pub struct PolygonizeOptions {
     /// Whether the mesh gets normals (one evaluation more per vertex).
     pub normals: bool,
     /// Most blocks of 8³ cells that may hold surface before the work is refused; a block takes about
-    /// 20 kB of mesh.
+    /// 4 kB of mesh.
     pub max_blocks: usize,
 }
 
@@ -36,7 +36,7 @@ impl Default for PolygonizeOptions {
             open: false,
             placement: Placement::RootFinding { tolerance: 1e-4 },
             normals: false,
-            max_blocks: 1 << 24,
+            max_blocks: 1 << 22,
         }
     }
 }

@@ -54,7 +54,7 @@ pub fn fit_points<T: Real>(
     let trace = std::env::var_os("TRACE").is_some();
     let t0 = std::time::Instant::now();
     control.step("fitting coarse levels", 0.05)?;
-    let base = coarse::solve(&samples, plan.beta, 1.0);
+    let base = coarse::solve(&samples, plan.beta);
     if trace {
         eprintln!("coarse {:?}", t0.elapsed());
     }

@@ -6,6 +6,10 @@ use super::{NO_NORMAL, NormalSource, PointCloud, RawCloud};
 use crate::Fault;
 use crate::limits::Budget;
 
+/// Length of an angle-weighted sum that counts as zero. Angles around a vertex add up to some radians, their
+/// rounding to 1e-15; a corner of a true needle is still far above.
+const CANCELLED: f64 = 1e-12;
+
 /// Cleans `raw`.
 ///
 /// Vertex normals from faces are `Σ angle · n_face`, normalized, over the corners at the vertex
@@ -65,6 +69,10 @@ pub(super) fn finish(raw: RawCloud, budget: &mut Budget) -> Result<PointCloud, F
             }
         }
         if from_faces {
+            // The sum of a sheet and its back cancels up to rounding; what is left of it points nowhere.
+            sums.iter_mut()
+                .filter(|n| n.length_squared() < CANCELLED * CANCELLED)
+                .for_each(|n| *n = DVec3::ZERO);
             normals = Some(sums);
         }
         cloud.normal_source = match (from_faces, &corner_normals) {
@@ -101,7 +109,7 @@ pub(super) fn finish(raw: RawCloud, budget: &mut Budget) -> Result<PointCloud, F
         return Err(Fault::Value {
             what: "the number of usable points",
             value: format!(
-                "0 of {file_count} ({invalid_dropped} not finite, {} used by no face)",
+                "0 of {file_count} ({invalid_dropped} not finite, {} used by no face of any area)",
                 cloud.unused_vertices
             ),
             remedy: "check how the file was exported",
@@ -290,6 +298,24 @@ mod tests {
         );
         assert_eq!(cloud.notes.len(), 3);
         assert_eq!(cloud.file_count, 8);
+    }
+
+    #[test]
+    fn faces_back_to_back_give_a_zero_normal_and_no_rounding_noise() {
+        let positions = vec![
+            DVec3::ZERO,
+            DVec3::new(0.3, 0.1, 0.7),
+            DVec3::new(0.9, 0.2, 0.1),
+            DVec3::new(0.11, 1.7, 0.3),
+        ];
+        let triangles = vec![[0, 1, 2], [2, 1, 0], [0, 2, 3], [3, 2, 0], [1, 0, 3], [0, 1, 3]];
+        let cloud = clean(RawCloud {
+            positions,
+            triangles,
+            face_count: 6,
+            ..Default::default()
+        });
+        assert_eq!(cloud.zero_normals, 4);
     }
 
     #[test]

@@ -15,8 +15,8 @@ const UNIT_LENGTH_SLACK: f64 = 0.05;
 /// Reads the text of an XYZ file: three columns, or six and more with the normal in columns 4 to 6.
 ///
 /// Empty lines and those that start with `#` or `//` are skipped; so is a first line that holds one whole number
-/// (the count) or the names of the columns. Columns 4 to 6 are normals if each is of length 1 or 0 or not finite;
-/// otherwise (colours, say) they are skipped, with a note.
+/// (the count) or the names of the columns. Columns 4 to 6 are normals if all have length 1 or 0, or, in a file of
+/// just six columns, if any of their numbers is negative; otherwise (colours, say) they are skipped, with a note.
 ///
 /// # Errors
 /// A [`Fault`] with the line for a word that is no number or a line with another number of columns.
@@ -30,7 +30,9 @@ pub(super) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<PointCloud, Fau
     let mut normals = Counted::new("normals");
     let mut columns = 0;
     let mut promised = None;
-    let mut not_a_normal = None;
+    // Line of the first triple that is no unit vector.
+    let mut not_unit = None;
+    let mut has_negative = false;
     let mut is_first = true;
     let mut lines = Lines::new(bytes);
     while let Some(text) = lines.next() {
@@ -74,14 +76,14 @@ pub(super) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<PointCloud, Fau
             ));
         }
         positions.push(DVec3::new(row[0], row[1], row[2]), budget)?;
-        if columns >= 6 && not_a_normal.is_none() {
+        if columns == 6 || columns > 6 && not_unit.is_none() {
             let n = DVec3::new(row[3], row[4], row[5]);
             let length = n.length();
-            if length == 0.0 || !length.is_finite() || (length - 1.0).abs() <= UNIT_LENGTH_SLACK {
-                normals.push(n, budget)?;
-            } else {
-                not_a_normal = Some(line);
+            if length > 0.0 && length.is_finite() && (length - 1.0).abs() > UNIT_LENGTH_SLACK {
+                not_unit = not_unit.or(Some(line));
             }
+            has_negative |= n.min_element() < 0.0;
+            normals.push(n, budget)?;
         }
     }
     let found = positions.items.len();
@@ -97,18 +99,15 @@ pub(super) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<PointCloud, Fau
             "the first line promises {n} points, {found} are there; all were read"
         ));
     }
-    match columns {
-        3 => {}
-        4 | 5 => notes.push(format!("{columns} columns: those after the third were skipped")),
-        _ => {
-            if let Some(line) = not_a_normal {
-                notes.push(format!(
-                    "columns 4 to 6 are no unit normals (line {line}); skipped as colours or the like"
-                ));
-            }
-        }
+    // Colours are never negative, but a lidar intensity may be: it stands in files of seven columns.
+    let stored = columns >= 6 && (not_unit.is_none() || columns == 6 && has_negative);
+    match (columns, not_unit) {
+        (4 | 5, _) => notes.push(format!("{columns} columns: those after the third were skipped")),
+        (6.., Some(line)) if !stored => notes.push(format!(
+            "columns 4 to 6 are no unit normals (line {line}); skipped as colours or the like"
+        )),
+        _ => {}
     }
-    let stored = columns >= 6 && not_a_normal.is_none();
     let raw = RawCloud {
         positions: positions.items,
         normals: stored.then_some(normals.items),
@@ -167,6 +166,18 @@ mod tests {
         let c = read("1 2 3 0 0 1\n4 5 6 12 0 0\n").unwrap();
         assert!(
             c.normals.is_none() && c.notes[0].contains("line 2"),
+            "{:?}",
+            c.notes
+        );
+        let c = read("1 2 3 0 0 -2\n4 5 6 12 0 0\n").unwrap();
+        assert_eq!(
+            c.normals.unwrap(),
+            [DVec3::NEG_Z, DVec3::X],
+            "of any length, as some programs write them"
+        );
+        let c = read("1 2 3 -812 90 7 9\n4 5 6 1 0 0 9\n").unwrap();
+        assert!(
+            c.normals.is_none() && c.notes[0].contains("line 1"),
             "{:?}",
             c.notes
         );

@@ -228,12 +228,12 @@ fn check(f: Fields, size: usize) -> Result<Parsed, Fault> {
     }
     let count = (1..4)
         .try_fold(1u64, |n, i| n.checked_mul(extent(i) as u64))
-        .filter(|n| *n <= 1 << 42);
+        .filter(|n| *n <= 1 << 50);
     if count.is_none() {
         return Err(Fault::Value {
             what: "the number of voxels",
             value: format!("{} x {} x {}", extent(1), extent(2), extent(3)),
-            remedy: "at most 2^42 can be read; is the header damaged?",
+            remedy: "at most 2^50 can be read; is the header damaged?",
         });
     }
     let stored = VoxelType::from_code(f.datatype).ok_or_else(|| Fault::Value {
