@@ -92,8 +92,16 @@ pub fn run(args: &Args) -> Outcome {
         ));
     }
     notes.extend(measured.unsupported.iter().map(|c| {
-        let what = if c.is_inside { "piece of the solid" } else { "cavity" };
-        format!("a {what} of {} cells of 1/{COMPONENT_CELLS} round {} holds no sample", c.cell_count, c.at)
+        let what = if c.is_inside {
+            "piece of the solid"
+        } else {
+            "cavity"
+        };
+        format!(
+            "a {what} of {} cells of 1/{COMPONENT_CELLS} round {} holds no sample",
+            c.cells.len(),
+            c.at
+        )
     }));
     Summary {
         input_count: Some(measured.count),
@@ -148,8 +156,8 @@ const COMPONENT_CELLS: u32 = 128;
 /// Components that no sample speaks for. A single cell may be a corner of the surface between two nodes.
 fn unsupported(open: &OpenField, samples: &[DVec3]) -> Vec<UnsupportedComponent> {
     let frame = open.frame_of_resolution(COMPONENT_CELLS);
-    let mut components = unsupported_components(open.field(), open.iso(), &frame, samples);
-    components.retain(|c| c.cell_count > 1);
+    let mut components = unsupported_components(open.field(), open.iso(), &frame, samples.iter().copied());
+    components.retain(|c| c.cells.len() > 1);
     components
 }
 
@@ -241,7 +249,7 @@ fn write_report(
         "stated_by_the_fit": { "rms": report.rms, "p95": report.p95, "max": report.max, "bound": report.bound },
         "leaves": audit,
         "components_without_samples": measured.unsupported.iter().map(|c| json!({
-            "inside": c.is_inside, "cells": c.cell_count, "at": c.at.to_array(),
+            "inside": c.is_inside, "cells": c.cells.len(), "at": c.at.to_array(),
         })).collect::<Vec<_>>(),
         "error_ply": { "points": measured.positions.len(), "violet": 0.0, "yellow": full_scale },
         "octree_ply": { "boxes": "edges of the leaves with samples, violet coarse to yellow fine; red: above the \
