@@ -1,8 +1,10 @@
 //! Fits of oriented point clouds.
 
+mod assemble;
 mod band;
 mod band_solve;
 mod cascade;
+mod cells;
 mod clusters;
 mod coarse;
 mod cross_validation;
@@ -48,6 +50,7 @@ pub fn fit_points<T: Real>(
     control: &mut Control,
 ) -> Result<(HierarchicalSpline<T>, FitReport), FitError> {
     control.step("sorting points", 0.0)?;
+    control.reserve(cascade::level_bytes::<T>(0, cloud.positions.len()))?;
     let mut samples = Samples::prepare(*cloud)?;
     let tolerance = options.tolerance.unwrap_or(1e-4 * samples.diagonal) / samples.scale;
     let noise = match options.smoothing {
@@ -65,7 +68,7 @@ pub fn fit_points<T: Real>(
     let (cascade, field) = loop {
         let cascade = cascade::run::<T>(&samples, &base, &plan, control)?;
         control.step("building the field", 0.9)?;
-        let field = cascade::assemble(&samples, &base, &cascade.levels);
+        let field = assemble::assemble(&samples, &base, &cascade.levels);
         let conditions = far_field::conditions(&field, &samples);
         if conditions.is_empty() || rounds == REPAIR_ROUNDS {
             break (cascade, field);
