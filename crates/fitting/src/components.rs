@@ -10,6 +10,8 @@ pub struct UnsupportedComponent {
     pub is_inside: bool,
     /// Its cells, in the order of the grid.
     pub cells: Vec<[u32; 3]>,
+    /// World position of the centre of its first cell.
+    pub at: DVec3,
 }
 
 /// Cells `start..end` of one row along z, all of one sign.
@@ -72,9 +74,11 @@ pub fn unsupported_components(
                 }
                 if number[root] == u32::MAX {
                     number[root] = out.len() as u32;
+                    let centre = DVec3::new(x as f64, y as f64, f64::from(runs[i].start)) + 0.5;
                     out.push(UnsupportedComponent {
                         is_inside: runs[i].is_inside,
                         cells: Vec::new(),
+                        at: frame.world_from_grid.transform_point3(centre),
                     });
                 }
                 out[number[root] as usize]

@@ -53,7 +53,7 @@ pub(crate) fn report<T: Real>(
             (n + 1, s + d.0 * d.0, m.max(d.0))
         });
         Leaf {
-            level: leaf.depth as u8,
+            level: (leaf.depth - super::samples::BASE_DEPTH) as u8,
             cell: leaf.at,
             sample_count: count,
             rms: (square / f64::from(count.max(1))).sqrt() as f32,

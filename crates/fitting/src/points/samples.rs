@@ -14,6 +14,23 @@ pub struct OrientedPoints<'a> {
     pub normals: &'a [DVec3],
 }
 
+impl OrientedPoints<'_> {
+    /// Diagonal of the box round the points that a fit uses, world units: what shares of a length refer to.
+    /// 0 if no point can be used.
+    pub fn diagonal(&self) -> f64 {
+        let usable =
+            |&i: &u32| finite(&self.positions[i as usize]) && usable_normal(self.normals[i as usize]);
+        let mut kept: Vec<u32> = (0..self.positions.len() as u32).filter(usable).collect();
+        drop_far_outliers(self.positions, &mut kept);
+        let (min, max) = extent(self.positions, &kept);
+        if kept.is_empty() {
+            0.0
+        } else {
+            (max - min).length()
+        }
+    }
+}
+
 /// Margin of the box round the points, as a multiple of their longest side.
 const BOX_SCALE: f64 = 1.15;
 /// Deepest level a Morton key can tell apart.
@@ -60,7 +77,6 @@ impl Samples {
                 notes.push(format!("{count} of {total} points left out: {what}"));
             }
         };
-        let finite = |p: &DVec3| p.is_finite() && p.abs().max_element() < 1e150;
         let mut kept: Vec<u32> = (0..total as u32)
             .filter(|&i| finite(&cloud.positions[i as usize]))
             .collect();
@@ -211,6 +227,10 @@ impl Samples {
 
 fn usable_normal(n: DVec3) -> bool {
     n.is_finite() && n.abs().max_element() > 0.0
+}
+
+fn finite(p: &DVec3) -> bool {
+    p.is_finite() && p.abs().max_element() < 1e150
 }
 
 fn extent(positions: &[DVec3], kept: &[u32]) -> (DVec3, DVec3) {

@@ -27,6 +27,7 @@ mod joint;
 mod leaves;
 mod measure;
 mod noise;
+mod otsu;
 mod quantile;
 mod refinement;
 mod residual;
@@ -36,4 +37,5 @@ mod tolerance;
 mod view;
 
 pub use fit::fit_volume;
+pub use otsu::otsu_threshold;
 pub use view::{VolumeMethod, VolumeOptions, VolumeView};
