@@ -435,7 +435,10 @@ fn unsound_bounds_leave_no_hole() {
     let (expected, sound) = mesh_of(&truth, &frame, &PolygonizeOptions::default());
     let (mesh, report) = mesh_of(&liar, &frame, &PolygonizeOptions::default());
     assert!(mesh == expected);
-    assert!(sound.unsound_blocks == 0 && report.unsound_blocks > 50);
+    assert!(
+        sound.unsound_blocks == 0 && report.unsound_blocks > 20,
+        "{report:?}"
+    );
 }
 
 #[test]
