@@ -22,8 +22,15 @@ fn far_points(field: &dyn Field, region: &Aabb, distance: f64) -> Vec<DVec3> {
 fn sign_agreement<T: Real>(solid: Solid, fitted: &HierarchicalSpline<T>) -> f64 {
     let truth = solid.field();
     let level = fitted.level_count() - 1;
-    let far = far_points(&*truth, &fitted.lattice().world_box(), 2.0 * fitted.lattice().spacing(level).x);
-    let right = far.iter().filter(|p| (fitted.value(**p) > 0.0) == (truth.value(**p) > 0.0)).count();
+    let far = far_points(
+        &*truth,
+        &fitted.lattice().world_box(),
+        2.0 * fitted.lattice().spacing(level).x,
+    );
+    let right = far
+        .iter()
+        .filter(|p| (fitted.value(**p) > 0.0) == (truth.value(**p) > 0.0))
+        .count();
     right as f64 / far.len() as f64
 }
 
@@ -58,23 +65,48 @@ fn signs_far_from_the_data_are_those_of_the_solid() {
 
 #[test]
 fn a_cup_half_a_coarse_cell_thin_stays_hollow() {
-    let samples = cloud(Solid::Cup, &CloudOptions { count: 40_000, ..CloudOptions::default() });
+    let samples = cloud(
+        Solid::Cup,
+        &CloudOptions {
+            count: 40_000,
+            ..CloudOptions::default()
+        },
+    );
     let (field, _) = fit::<f32>(&samples, &to_depth(7)).expect("a clean cloud");
     let agreement = sign_agreement(Solid::Cup, &field);
     assert!(agreement >= 0.9999, "{agreement}");
-    assert!(field.value(DVec3::new(0.0, 0.0, -0.5)) < 0.0, "the inside of the bowl is outside the solid");
+    assert!(
+        field.value(DVec3::new(0.0, 0.0, -0.5)) < 0.0,
+        "the inside of the bowl is outside the solid"
+    );
 }
 
 #[test]
 fn no_piece_of_the_solid_or_cavity_is_without_samples() {
-    for solid in [Solid::Torus, Solid::Gyroid, Solid::Sheet, Solid::Cup, Solid::Tetrahedron] {
+    for solid in [
+        Solid::Torus,
+        Solid::Gyroid,
+        Solid::Sheet,
+        Solid::Cup,
+        Solid::Tetrahedron,
+    ] {
         for hole_count in [0, 5] {
-            let samples = cloud(solid, &CloudOptions { hole_count, ..CloudOptions::default() });
+            let samples = cloud(
+                solid,
+                &CloudOptions {
+                    hole_count,
+                    ..CloudOptions::default()
+                },
+            );
             let (field, _) = fit::<f32>(&samples, &to_depth(7)).expect("a clean cloud");
             let frame = Frame::over(&field.lattice().world_box(), [128; 3]);
             let found = unsupported_components(&field, 0.0, &frame, samples.positions.iter().copied());
             let largest = found.iter().map(|c| c.cells.len()).max().unwrap_or(0);
-            assert!(largest <= 1, "{}, {hole_count} holes: {largest} cells", solid.name());
+            assert!(
+                largest <= 1,
+                "{}, {hole_count} holes: {largest} cells",
+                solid.name()
+            );
         }
     }
 }
@@ -83,14 +115,23 @@ fn no_piece_of_the_solid_or_cavity_is_without_samples() {
 fn every_leaf_keeps_the_tolerance_or_says_why_not() {
     let samples = cloud(Solid::Gyroid, &CloudOptions::default());
     let tolerance = 3e-4;
-    let options = PointOptions { tolerance: Some(tolerance), ..PointOptions::default() };
+    let options = PointOptions {
+        tolerance: Some(tolerance),
+        ..PointOptions::default()
+    };
     let (_, report) = fit::<f32>(&samples, &options).expect("a clean cloud");
-    let silent = report
-        .leaves
-        .iter()
-        .filter(|l| f64::from(l.rms) > tolerance && l.reason == StopReason::Tolerance)
-        .count();
-    assert_eq!(silent, 0, "of {}", report.leaves.len());
+    let over = |reason: StopReason| {
+        let is_over = |l: &&fitting::Leaf| f64::from(l.rms) > tolerance && l.reason == reason;
+        report.leaves.iter().filter(is_over).count()
+    };
+    assert_eq!(over(StopReason::Tolerance), 0);
+    // A leaf may be moved by cells beside it that are refined later, but that has to stay rare.
+    let moved = over(StopReason::Neighbours);
+    assert!(
+        moved * 100 <= report.leaves.len(),
+        "{moved} of {}",
+        report.leaves.len()
+    );
     let samples_in_leaves: u32 = report.leaves.iter().map(|l| l.sample_count).sum();
     assert_eq!(samples_in_leaves as usize, report.used_count);
 }
@@ -98,7 +139,13 @@ fn every_leaf_keeps_the_tolerance_or_says_why_not() {
 #[test]
 fn noise_is_found_and_smoothed_away() {
     for noise in [0.01, 0.02] {
-        let samples = cloud(Solid::Sphere, &CloudOptions { noise, ..CloudOptions::default() });
+        let samples = cloud(
+            Solid::Sphere,
+            &CloudOptions {
+                noise,
+                ..CloudOptions::default()
+            },
+        );
         let (field, report) = fit::<f32>(&samples, &PointOptions::default()).expect("a noisy cloud");
         let found = report.noise.expect("noise is found");
         assert!((found / noise - 1.0).abs() < 0.2, "{found} for {noise}");
@@ -116,10 +163,19 @@ fn noise_is_found_and_smoothed_away() {
 
 #[test]
 fn the_same_bits_at_any_number_of_threads() {
-    let noisy = cloud(Solid::Torus, &CloudOptions { noise: 0.01, ..CloudOptions::default() });
+    let noisy = cloud(
+        Solid::Torus,
+        &CloudOptions {
+            noise: 0.01,
+            ..CloudOptions::default()
+        },
+    );
     let clean = cloud(Solid::Torus, &CloudOptions::default());
     let results = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("a pool");
         pool.install(|| {
             let smooth = fit::<f32>(&noisy, &PointOptions::default()).expect("a noisy cloud");
             let fine = fit::<f32>(&clean, &to_depth(7)).expect("a clean cloud");
@@ -154,7 +210,10 @@ fn bounds_exclude_empty_cells() {
         field.frame_values(&frame, lo, [2; 3], &mut corners);
         let crossed = corners.iter().any(|v| *v > 0.0) && corners.iter().any(|v| *v <= 0.0);
         let bounds = field.frame_bounds(&frame, lo, lo.map(|i| i + 1));
-        assert!(!crossed || bounds.contains(0.0), "the crossed cell {lo:?} was excluded");
+        assert!(
+            !crossed || bounds.contains(0.0),
+            "the crossed cell {lo:?} was excluded"
+        );
         empty += usize::from(!crossed);
         culled += usize::from(!crossed && !bounds.contains(0.0));
     }

@@ -11,7 +11,13 @@ use glam::DVec3;
 
 /// A ball of 4000 points in which something is wrong.
 fn spoiled(spoil: impl FnOnce(&mut SampledCloud)) -> SampledCloud {
-    let mut samples = cloud(Solid::Sphere, &CloudOptions { count: 4000, ..CloudOptions::default() });
+    let mut samples = cloud(
+        Solid::Sphere,
+        &CloudOptions {
+            count: 4000,
+            ..CloudOptions::default()
+        },
+    );
     spoil(&mut samples);
     samples
 }
@@ -33,7 +39,13 @@ fn too_few_points_are_refused() {
             c.positions.truncate(count);
             c.normals.truncate(count);
         }));
-        assert_eq!(error, FitError::NotEnoughSamples { found: count, needed: 10 });
+        assert_eq!(
+            error,
+            FitError::NotEnoughSamples {
+                found: count,
+                needed: 10
+            }
+        );
     }
 }
 
@@ -58,7 +70,11 @@ fn one_outlier_at_ten_million_is_left_out_and_told() {
     let samples = spoiled(|c| c.positions[17] = DVec3::splat(1e7));
     let (field, report) = fit::<f32>(&samples, &to_depth(6)).expect("the rest is a ball");
     assert_eq!(report.used_count, report.input_count - 1);
-    assert!(report.notes.iter().any(|n| n.contains("left out")), "{:?}", report.notes);
+    assert!(
+        report.notes.iter().any(|n| n.contains("left out")),
+        "{:?}",
+        report.notes
+    );
     assert!(report.rms < 1e-3 && field.lattice().world_box().size().x < 3.0);
 }
 
@@ -129,11 +145,21 @@ fn a_cancelled_fit_stops() {
 
 #[test]
 fn progress_never_falls() {
-    let samples = cloud(Solid::Torus, &CloudOptions { noise: 0.01, ..CloudOptions::default() });
+    let samples = cloud(
+        Solid::Torus,
+        &CloudOptions {
+            noise: 0.01,
+            ..CloudOptions::default()
+        },
+    );
     let mut control = Control::default();
     let mut last = 0.0;
     control.on_progress = Box::new(move |p| {
-        assert!(p.fraction >= last && p.fraction <= 1.0, "{} after {last}", p.fraction);
+        assert!(
+            p.fraction >= last && p.fraction <= 1.0,
+            "{} after {last}",
+            p.fraction
+        );
         last = p.fraction;
     });
     fit_points::<f32>(&oriented(&samples), &PointOptions::default(), &mut control).expect("a noisy cloud");
@@ -143,8 +169,14 @@ fn progress_never_falls() {
 fn a_memory_ceiling_stops_the_refinement_or_refuses() {
     let samples = cloud(Solid::Torus, &CloudOptions::default());
     let under = |limit: u64| {
-        let mut control = Control { memory_limit: Some(limit), ..Control::default() };
-        let options = PointOptions { tolerance: Some(1e-7), ..to_depth(9) };
+        let mut control = Control {
+            memory_limit: Some(limit),
+            ..Control::default()
+        };
+        let options = PointOptions {
+            tolerance: Some(1e-7),
+            ..to_depth(9)
+        };
         fit_points::<f32>(&oriented(&samples), &options, &mut control)
     };
     let (_, report) = under(40 << 20).expect("the coarse levels fit in");
@@ -156,8 +188,11 @@ fn a_memory_ceiling_stops_the_refinement_or_refuses() {
 #[test]
 fn a_budget_of_coefficients_stops_the_refinement() {
     let samples = cloud(Solid::Torus, &CloudOptions::default());
-    let options =
-        PointOptions { coefficients: Some(60_000), tolerance: Some(1e-7), ..PointOptions::default() };
+    let options = PointOptions {
+        coefficients: Some(60_000),
+        tolerance: Some(1e-7),
+        ..PointOptions::default()
+    };
     let (_, report) = fit::<f32>(&samples, &options).expect("a clean cloud");
     assert!(report.leaves.iter().any(|l| l.reason == StopReason::Budget));
 }

@@ -228,7 +228,7 @@ fn record(leaf: &Leaf) -> LeafRecord {
 
 fn leaf(r: &LeafRecord) -> Option<Leaf> {
     use StopReason::*;
-    let reason = [Tolerance, Depth, NoData, Noise, Budget, Memory]
+    let reason = [Tolerance, Depth, NoData, Noise, Budget, Memory, Neighbours]
         .into_iter()
         .find(|s| *s as u8 == r.reason)?;
     Some(Leaf {

@@ -1,5 +1,7 @@
 //! The surface levels, coarse to fine: each level corrects the one before where the data ask for it.
 
+use std::ops::Range;
+
 use bspline::Real;
 use bspline::hierarchical::{BRICK, BrickKey, HALO};
 
@@ -30,7 +32,8 @@ pub(crate) struct Level<T> {
 }
 
 /// Runs the cascade from the full level `base` down. No level is begun that the memory ceiling or the budget of
-/// coefficients has no room for; the cells that would have been split say so.
+/// coefficients has no room for; the cells that would have been split say so. Progress is told from `span.start` to
+/// `span.end`.
 ///
 /// # Errors
 /// [`FitError::Cancelled`].
@@ -38,6 +41,7 @@ pub(crate) fn run<T: Real>(
     samples: &Samples,
     base: &FullGrid<f64>,
     plan: &Plan,
+    span: Range<f64>,
     control: &mut Control,
 ) -> Result<Cascade<T>, FitError> {
     let mut out = Cascade {
@@ -63,9 +67,10 @@ pub(crate) fn run<T: Real>(
             break;
         }
         // Each level costs about four times the one before.
+        let share = 0.25f64.powi((plan.max_depth - depth) as i32 + 1);
         control.step(
             "fitting surface levels",
-            0.1 + 0.8 * 0.25f64.powi((plan.max_depth - depth) as i32),
+            span.start + (span.end - span.start) * share,
         )?;
         let mut band = match &coarser {
             None => Band::around(depth, &refined, &Coarser::Full(base)),

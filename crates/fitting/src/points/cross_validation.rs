@@ -38,7 +38,7 @@ pub(crate) fn choose<T: Real>(
         if tried.len() == TRIES {
             return Ok(f64::INFINITY);
         }
-        control.step("choosing the smoothing", 0.1 + 0.05 * tried.len() as f64)?;
+        control.step("choosing the smoothing", 0.1 + 0.02 * tried.len() as f64)?;
         let mu = start * 2f64.powi(exponent);
         let gcv = score::<T>(
             samples,
@@ -71,7 +71,7 @@ pub(crate) fn choose<T: Real>(
 fn score<T: Real>(samples: &Samples, base: &FullGrid<f64>, plan: &Plan, noise: f64) -> Result<f64, FitError> {
     let quiet = &mut Control::default();
     let n = samples.positions.len();
-    let cascade = cascade::run::<T>(samples, base, plan, quiet)?;
+    let cascade = cascade::run::<T>(samples, base, plan, 0.0..1.0, quiet)?;
     let field = assemble(samples, base, &cascade.levels);
     let world = |i: usize| samples.origin + samples.positions[i] * samples.scale;
     let limit = 3.0 * noise * samples.scale;
@@ -84,7 +84,7 @@ fn score<T: Real>(samples: &Samples, base: &FullGrid<f64>, plan: &Plan, noise: f
         probe: Some(signs.clone()),
         ..plan.clone()
     };
-    let answer = cascade::run::<T>(samples, &zero, &probe, quiet)?;
+    let answer = cascade::run::<T>(samples, &zero, &probe, 0.0..1.0, quiet)?;
     let field = assemble(samples, &zero, &answer.levels);
     let trace: f64 = (0..n)
         .map(|i| signs[i] as f64 * field.value(world(i)))

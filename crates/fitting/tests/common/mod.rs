@@ -19,9 +19,15 @@ pub fn fit<T: Real>(
 }
 
 pub fn oriented(cloud: &SampledCloud) -> OrientedPoints<'_> {
-    OrientedPoints { positions: &cloud.positions, normals: &cloud.normals }
+    OrientedPoints {
+        positions: &cloud.positions,
+        normals: &cloud.normals,
+    }
 }
 
 pub fn to_depth(max_depth: usize) -> PointOptions {
-    PointOptions { max_depth: Some(max_depth), ..PointOptions::default() }
+    PointOptions {
+        max_depth: Some(max_depth),
+        ..PointOptions::default()
+    }
 }
