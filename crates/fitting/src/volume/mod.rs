@@ -36,4 +36,5 @@ mod tolerance;
 mod view;
 
 pub use fit::fit_volume;
+pub(crate) use interpolate::interpolate_voxels;
 pub use view::{VolumeMethod, VolumeOptions, VolumeView};

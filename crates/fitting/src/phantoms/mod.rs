@@ -1,0 +1,7 @@
+//! Inputs of known shape and noise, made by formula: for tests, benchmarks and charts.
+
+mod head;
+mod random;
+
+pub use head::head;
+pub use random::Random;
