@@ -617,8 +617,10 @@ fn progress_rises_to_one() {
         INTERPOLATE,
     ] {
         let (sender, receiver) = std::sync::mpsc::channel();
-        let mut control = Control::default();
-        control.on_progress = Box::new(move |p| sender.send(p.fraction).expect("received below"));
+        let mut control = Control {
+            on_progress: Box::new(move |p| sender.send(p.fraction).expect("received below")),
+            ..Default::default()
+        };
         fit_volume::<f32>(&view, &options, &mut control).unwrap();
         drop(control);
         let fractions: Vec<f64> = receiver.iter().collect();
