@@ -1,2 +1,12 @@
-//! The `isoclay` program.
-fn main() {}
+//! The `isoclay` program: scans in, solids out.
+
+mod charts;
+mod check;
+mod cli;
+mod picture;
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    cli::main()
+}

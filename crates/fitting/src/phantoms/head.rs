@@ -1,4 +1,4 @@
-use super::Random;
+use super::SplitMix64;
 
 /// Ellipsoids of the modified Shepp–Logan head in three dimensions: density added, half axes, centre in the cube
 /// `[-1, 1]³`, turn about z in degrees ([Shepp 1974], contrasts of [Toft 1996], third axis of [Schabel 2006]).
@@ -24,7 +24,7 @@ const ELLIPSOIDS: [(f64, [f64; 3], [f64; 3], f64); 10] = [
 /// If an axis has no voxel.
 pub fn head(dims: [usize; 3], noise: f64, seed: u64) -> Vec<f32> {
     assert!(!dims.contains(&0), "a head of {dims:?} voxels");
-    let mut random = Random::new(seed);
+    let mut random = SplitMix64::new(seed);
     let voxel = 2.0 / dims.into_iter().max().expect("three axes") as f64;
     let center = |i: usize, n: usize| (2 * i + 1) as f64 / n as f64 - 1.0;
     let mut values = Vec::with_capacity(dims.iter().product());

@@ -8,6 +8,7 @@
 
 use bspline::{Field, Real};
 
+use super::assemble::assemble;
 use super::cascade;
 use super::full_grid::FullGrid;
 use super::plan::{Plan, Smoothing};
@@ -71,7 +72,7 @@ fn score<T: Real>(samples: &Samples, base: &FullGrid<f64>, plan: &Plan, noise: f
     let quiet = &mut Control::default();
     let n = samples.positions.len();
     let cascade = cascade::run::<T>(samples, base, plan, quiet)?;
-    let field = cascade::assemble(samples, base, &cascade.levels);
+    let field = assemble(samples, base, &cascade.levels);
     let world = |i: usize| samples.origin + samples.positions[i] * samples.scale;
     let limit = 3.0 * noise * samples.scale;
     let distance = |i: usize| newton_distance(&field, world(i)).0.min(limit);
@@ -84,7 +85,7 @@ fn score<T: Real>(samples: &Samples, base: &FullGrid<f64>, plan: &Plan, noise: f
         ..plan.clone()
     };
     let answer = cascade::run::<T>(samples, &zero, &probe, quiet)?;
-    let field = cascade::assemble(samples, &zero, &answer.levels);
+    let field = assemble(samples, &zero, &answer.levels);
     let trace: f64 = (0..n)
         .map(|i| signs[i] as f64 * field.value(world(i)))
         .sum::<f64>()

@@ -139,7 +139,7 @@ fn slab<T: Real>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::phantoms::Random;
+    use crate::phantoms::SplitMix64;
     use crate::volume::domain::Samples;
     use crate::volume::residual::{correlations, residual};
 
@@ -150,7 +150,7 @@ mod tests {
     fn normal_matrix_is_synthesis_and_its_transpose() {
         for dims in SIZES {
             let domain = Domain::<f64>::new(dims, 3);
-            let mut random = Random::new(1);
+            let mut random = SplitMix64::new(1);
             let active: Vec<ActiveSet> = (0..3)
                 .map(|level| {
                     let picked: Vec<usize> = (0..domain.function_count(level))

@@ -27,6 +27,7 @@ mod joint;
 mod leaves;
 mod measure;
 mod noise;
+mod otsu;
 mod quantile;
 mod refinement;
 mod residual;
@@ -37,4 +38,5 @@ mod view;
 
 pub use fit::fit_volume;
 pub(crate) use interpolate::interpolate_voxels;
+pub use otsu::otsu_threshold;
 pub use view::{VolumeMethod, VolumeOptions, VolumeView};

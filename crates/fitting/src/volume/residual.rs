@@ -198,7 +198,7 @@ fn correlation_slab<T: Real>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::phantoms::Random;
+    use crate::phantoms::SplitMix64;
     use bspline::cubic;
 
     /// Value of function `s` of `level` of an axis at sample `k`, from the definition.
@@ -216,7 +216,7 @@ mod tests {
     fn residual_and_correlation_are_those_of_the_definition() {
         let dims = [6, 5, 10];
         let domain = Domain::<f64>::new(dims, 3);
-        let mut random = Random::new(2);
+        let mut random = SplitMix64::new(2);
         let values: Vec<f32> = (0..dims.iter().product())
             .map(|_| random.normal() as f32)
             .collect();

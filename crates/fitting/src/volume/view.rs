@@ -149,6 +149,15 @@ impl VolumeView<'_> {
         })
     }
 
+    /// Range between the 1st and the 99th percentile, which shares of a density refer to; of the extremes where
+    /// these percentiles coincide.
+    ///
+    /// # Errors
+    /// As [`super::fit_volume`], for a volume that cannot be fitted.
+    pub fn density_range(&self) -> Result<f64, FitError> {
+        Ok(self.check()?.range())
+    }
+
     /// Fall of the density per world length that stands for the volume: the median of `|∇d|` over voxels where
     /// it is at least a hundredth of its largest value; for a constant volume, 1.
     pub(crate) fn typical_slope(&self, overview: &Overview) -> f64 {

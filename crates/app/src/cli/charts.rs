@@ -1,0 +1,228 @@
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use fitting::Cancel;
+use formats::Kind;
+use formats::points::PointCloud;
+use serde_json::{Map, Value};
+
+use super::failure::{Failure, OrFail, Outcome};
+use super::input::{self, reading, writing};
+use super::interrupt;
+use super::progress::Bar;
+use crate::charts::{Chart, Configuration, Input, Measurement, sweeps};
+
+/// Arguments of `isoclay charts`.
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(subcommand)]
+    subject: Subject,
+}
+
+#[derive(clap::Subcommand)]
+enum Subject {
+    /// Error of fits against their time and memory, over tolerance, depth, smoothing and precision
+    Fit(FitArgs),
+}
+
+#[derive(clap::Args)]
+struct FitArgs {
+    /// Clouds and volumes to fit
+    #[arg(default_values = ["data/bunny.obj.gz", "data/head.nii.gz"])]
+    inputs: Vec<PathBuf>,
+    /// Directory for the charts fit-NAME-time.svg and fit-NAME-memory.svg; made if missing
+    #[arg(short, long, value_name = "DIR", default_value = "docs/charts")]
+    output: PathBuf,
+    /// Runs of each configuration; the median of their times is shown
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u8).range(1..))]
+    runs: u8,
+    /// Print one JSON object a configuration
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the sweeps and draws the charts.
+pub fn run(args: &Args) -> Outcome {
+    let Subject::Fit(args) = &args.subject;
+    let cancel = Cancel::new();
+    interrupt::cancel_on_interrupt(&cancel)?;
+    std::fs::create_dir_all(&args.output)
+        .map_err(|e| anyhow::anyhow!("-o {}: cannot be made ({e})", args.output.display()))
+        .or_limit()?;
+    let scratch = tempfile::tempdir().or_limit()?;
+    for path in &args.inputs {
+        let subject = Prepared::new(path, scratch.path())?;
+        let configurations = sweeps(subject.kind);
+        let bar = Bar::new();
+        let mut measured = Vec::new();
+        for (i, configuration) in configurations.iter().enumerate() {
+            interrupt::check(&cancel)?;
+            bar.show("fitting", i as f64 / configurations.len() as f64);
+            let m = subject.measure(configuration, args.runs, scratch.path())?;
+            if args.json {
+                writeln!(io::stdout().lock(), "{}", m.json(&subject.name)).or_limit()?;
+            }
+            measured.push(m);
+        }
+        bar.clear();
+        for (suffix, x_title, key, unit) in [
+            (
+                "time",
+                "processor time of the whole process, s",
+                "cpu_seconds",
+                1.0,
+            ),
+            (
+                "memory",
+                "peak memory of the whole process, MiB",
+                "peak_rss_bytes",
+                1048576.0,
+            ),
+        ] {
+            let title = format!("{}: {}", subject.name, subject.title);
+            let chart = Chart::of_fit(title, x_title, key, unit, subject.y_title.clone(), &measured);
+            let svg = chart.svg().map_err(Failure::limit)?;
+            let target = args.output.join(format!("fit-{}-{suffix}.svg", subject.name));
+            formats::atomic::replace(&target, |out| out.write_all(svg.as_bytes())).map_err(writing)?;
+            if !args.json {
+                writeln!(io::stdout().lock(), "written  {}", target.display()).or_limit()?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// An input, parted into what is fitted and what the errors are measured at.
+struct Prepared {
+    kind: Input,
+    name: String,
+    title: String,
+    y_title: String,
+    fitted: PathBuf,
+    measured: PathBuf,
+}
+
+/// Every so many-th point of a cloud is kept from the fit, so that its error shows what smoothing is worth.
+const HELD_OUT: usize = 5;
+
+impl Prepared {
+    fn new(path: &Path, scratch: &Path) -> Outcome<Self> {
+        let file = path
+            .file_name()
+            .map(|n| n.to_string_lossy().into_owned())
+            .unwrap_or_default();
+        let name = file.split('.').next().unwrap_or("input").to_string();
+        if let Kind::Volume = formats::detect(path).map_err(reading)? {
+            return Ok(Self {
+                kind: Input::Volume,
+                name,
+                title: "rms residual at the voxels".into(),
+                y_title: "rms residual, density".into(),
+                fitted: path.into(),
+                measured: path.into(),
+            });
+        }
+        let input::Input::Cloud(cloud) = input::read(path, None)? else {
+            return Err(Failure::input(format!(
+                "{}: is neither a cloud nor a volume",
+                path.display()
+            )));
+        };
+        let count = cloud.positions.len();
+        if count < 10 * HELD_OUT {
+            return Err(Failure::input(format!(
+                "{}: {count} points are too few for a chart; give {} or more",
+                path.display(),
+                10 * HELD_OUT
+            )));
+        }
+        let (fitted, measured) = (scratch.join("fitted.ply"), scratch.join("measured.ply"));
+        save_part(&fitted, &cloud, |i| i % HELD_OUT != 0)?;
+        save_part(&measured, &cloud, |i| i % HELD_OUT == 0)?;
+        Ok(Self {
+            kind: Input::Cloud,
+            name,
+            title: format!(
+                "rms distance at the {} of {count} points kept from the fit",
+                count.div_ceil(HELD_OUT)
+            ),
+            y_title: format!("rms distance, {}", cloud.unit),
+            fitted,
+            measured,
+        })
+    }
+
+    /// Runs this program, since only a process of its own has a time and a memory of its own.
+    fn measure(&self, configuration: &Configuration, runs: u8, scratch: &Path) -> Outcome<Measurement> {
+        let field = scratch.join("field.iclay");
+        let mut fits = Vec::new();
+        for _ in 0..runs {
+            let options = configuration
+                .options
+                .iter()
+                .flat_map(|(o, v)| [o.to_string(), v.clone()]);
+            let arguments = [
+                self.fitted.clone().into_os_string(),
+                "-o".into(),
+                field.clone().into_os_string(),
+            ];
+            fits.push(ask("fit", arguments.into_iter().chain(options.map(Into::into)))?);
+        }
+        let mut fit = fits[0].clone();
+        for key in ["seconds", "cpu_seconds", "peak_rss_bytes"] {
+            let mut all: Vec<f64> = fits.iter().filter_map(|f| f.get(key)?.as_f64()).collect();
+            all.sort_by(f64::total_cmp);
+            fit.insert(key.into(), all.get(all.len() / 2).copied().into());
+        }
+        fit.remove("output");
+        let check = ask(
+            "check",
+            [field.into_os_string(), self.measured.clone().into_os_string()].into_iter(),
+        )?;
+        let figure = |key: &str| check.get(key).and_then(Value::as_f64).unwrap_or(f64::NAN);
+        Ok(Measurement {
+            configuration: configuration.clone(),
+            rms: figure("rms"),
+            p95: figure("p95"),
+            fit,
+        })
+    }
+}
+
+/// Writes the points whose index is kept, with their normals.
+fn save_part(path: &Path, cloud: &PointCloud, keep: impl Fn(usize) -> bool) -> Outcome {
+    let part = |all: &[glam::DVec3]| -> Vec<glam::DVec3> {
+        all.iter()
+            .enumerate()
+            .filter(|(i, _)| keep(*i))
+            .map(|(_, p)| *p)
+            .collect()
+    };
+    let normals = cloud.normals.as_deref().map(part);
+    formats::meshes::save_points(path, &part(&cloud.positions), normals.as_deref(), None).map_err(writing)
+}
+
+/// Runs a subcommand with `--json` and reads its last line.
+fn ask(subcommand: &str, arguments: impl Iterator<Item = std::ffi::OsString>) -> Outcome<Map<String, Value>> {
+    let program = std::env::current_exe().or_limit()?;
+    let out = Command::new(program)
+        .arg(subcommand)
+        .args(arguments)
+        .arg("--json")
+        .output()
+        .or_limit()?;
+    let last = out
+        .stdout
+        .trim_ascii()
+        .rsplit(|b| *b == b'\n')
+        .next()
+        .unwrap_or_default();
+    match serde_json::from_slice(last) {
+        Ok(Value::Object(object)) if out.status.success() => Ok(object),
+        _ => Err(Failure::input(format!(
+            "{subcommand}: {}",
+            String::from_utf8_lossy(&out.stderr).trim()
+        ))),
+    }
+}

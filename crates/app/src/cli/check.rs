@@ -1,0 +1,263 @@
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+
+use fitting::{Cancel, StopReason, UnsupportedComponent, unsupported_components};
+use formats::points::PointCloud;
+use formats::volumes::Volume;
+use glam::DVec3;
+use serde_json::json;
+
+use super::cost::Cost;
+use super::failure::{Failure, OrFail, Outcome};
+use super::field::OpenField;
+use super::input::{self, Input, writing};
+use super::sample::voxel_frame;
+use super::summary::Summary;
+use super::{interrupt, set_threads};
+use crate::check::{
+    ErrorStatistics, LeafAudit, LeafIndex, audit_leaves, project_points, viridis, voxel_residuals,
+    write_boxes,
+};
+
+/// Arguments of `isoclay check`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Field (.iclay)
+    field: PathBuf,
+    /// What it was fitted to
+    input: PathBuf,
+    /// Directory for error.ply, octree.ply and report.json; made if missing
+    #[arg(short, long, value_name = "REPORT_DIR")]
+    output: Option<PathBuf>,
+    /// Threads to work with [default: all cores]
+    #[arg(long, value_name = "N")]
+    threads: Option<NonZeroUsize>,
+    /// Print one JSON object instead of a table
+    #[arg(long)]
+    json: bool,
+}
+
+/// Samples with their errors, and what their leaves make of them.
+struct Measured {
+    /// Where samples lie; of a volume, those of the worst voxels.
+    positions: Vec<DVec3>,
+    /// Absolute errors, one a position.
+    errors: Vec<f64>,
+    statistics: ErrorStatistics,
+    audit: LeafAudit,
+    count: usize,
+    unprojected: Option<usize>,
+    /// Pieces of the solid or of its complement without a sample, larger than a cell.
+    unsupported: Vec<UnsupportedComponent>,
+    unit: String,
+}
+
+/// Measures the errors again.
+pub fn run(args: &Args) -> Outcome {
+    let cost = Cost::start();
+    set_threads(args.threads)?;
+    let cancel = Cancel::new();
+    interrupt::cancel_on_interrupt(&cancel)?;
+    if let Some(d) = args.output.as_ref().filter(|d| d.exists() && !d.is_dir()) {
+        return Err(Failure::usage(format!(
+            "-o {}: is no directory; name another",
+            d.display()
+        )));
+    }
+    let open = OpenField::load(&args.field)?;
+    let leaves = &open.report().leaves;
+    let index = LeafIndex::new(open.lattice(), leaves);
+    let measured = match input::read(&args.input, None)? {
+        Input::Cloud(cloud) => measure_cloud(&open, &index, &cloud),
+        Input::Volume(volume) => measure_volume(&open, &index, &volume),
+    };
+    interrupt::check(&cancel)?;
+    if measured.count == 0 {
+        return Err(Failure::input(format!(
+            "{}: there is no sample to measure at",
+            args.input.display()
+        )));
+    }
+    if let Some(directory) = &args.output {
+        write_report(directory, args, &open, &index, &measured)?;
+    }
+    let (s, audit) = (&measured.statistics, &measured.audit);
+    // An interpolating fit aims at none.
+    let has_tolerance = open.report().tolerance > 0.0;
+    let mut notes = Vec::new();
+    if has_tolerance && audit.claimed_below > 0 {
+        notes.push(format!(
+            "{} leaves are above the tolerance although the fit calls them below",
+            audit.claimed_below
+        ));
+    }
+    notes.extend(measured.unsupported.iter().map(|c| {
+        let what = if c.is_inside {
+            "piece of the solid"
+        } else {
+            "cavity"
+        };
+        format!(
+            "a {what} of {} cells of 1/{COMPONENT_CELLS} round {} holds no sample",
+            c.cells.len(),
+            c.at
+        )
+    }));
+    Summary {
+        input_count: Some(measured.count),
+        unit: Some(measured.unit.clone()),
+        coefficients: Some(open.coefficient_count()),
+        depth: Some(open.report().depth),
+        tolerance: has_tolerance.then_some(open.report().tolerance),
+        rms: Some(s.rms),
+        p95: Some(s.p95),
+        max: Some(s.max),
+        unprojected: measured.unprojected,
+        unsupported_components: Some(measured.unsupported.len()).filter(|_| measured.unprojected.is_some()),
+        leaves: Some(audit.leaves),
+        leaves_over_tolerance: has_tolerance.then_some(audit.over_tolerance),
+        leaves_without_data: has_tolerance.then_some(audit.without_data),
+        field_sha256: Some(open.sha256()),
+        output: args.output.as_ref().map(|d| d.display().to_string()),
+        notes,
+        ..Default::default()
+    }
+    .with_cost(&cost)
+    .print(args.json)
+}
+
+fn measure_cloud(open: &OpenField, index: &LeafIndex, cloud: &PointCloud) -> Measured {
+    // A point without a usable normal took no part in the fit; it is measured all the same.
+    let spacing = open.lattice().spacing(open.level_count() - 1).min_element();
+    let projected = project_points(open.field(), &cloud.positions, spacing);
+    let errors: Vec<f64> = projected.iter().map(|p| p.distance).collect();
+    let lattice_from_world = open.lattice().world_from_lattice.inverse();
+    let samples = cloud
+        .positions
+        .iter()
+        .map(|&p| lattice_from_world.transform_point3(p))
+        .zip(errors.iter().copied());
+    let audit = audit_leaves(index, samples, open.report().tolerance);
+    Measured {
+        statistics: ErrorStatistics::of(&mut errors.clone()),
+        audit,
+        count: errors.len(),
+        unprojected: Some(projected.iter().filter(|p| !p.converged).count()),
+        unsupported: unsupported(open, &cloud.positions),
+        unit: open.unit().to_string(),
+        positions: cloud.positions.clone(),
+        errors,
+    }
+}
+
+/// Cells along the longest side of the grid on which components are told apart.
+const COMPONENT_CELLS: u32 = 128;
+
+/// Components that no sample speaks for. A single cell may be a corner of the surface between two nodes.
+fn unsupported(open: &OpenField, samples: &[DVec3]) -> Vec<UnsupportedComponent> {
+    let frame = open.frame_of_resolution(COMPONENT_CELLS);
+    let mut components = unsupported_components(open.field(), open.iso(), &frame, samples.iter().copied());
+    components.retain(|c| c.cells.len() > 1);
+    components
+}
+
+/// Voxels shown in the error map of a volume: the worst ones.
+const SHOWN_VOXELS: usize = 200_000;
+
+fn measure_volume(open: &OpenField, index: &LeafIndex, volume: &Volume) -> Measured {
+    let header = &volume.header;
+    let errors = voxel_residuals(open.field(), &voxel_frame(header), header.dims, &volume.values);
+    let [nx, ny, _] = header.dims;
+    let lattice_from_voxel = open.lattice().world_from_lattice.inverse() * header.world_from_voxel;
+    let voxel = |i: usize| DVec3::new((i % nx) as f64, (i / nx % ny) as f64, (i / nx / ny) as f64);
+    let samples = errors
+        .iter()
+        .enumerate()
+        .map(|(i, &e)| (lattice_from_voxel.transform_point3(voxel(i)), e));
+    let audit = audit_leaves(index, samples, open.report().tolerance);
+    let mut worst: Vec<usize> = (0..errors.len()).collect();
+    let kept = SHOWN_VOXELS.min(worst.len());
+    if kept < worst.len() {
+        worst.select_nth_unstable_by(kept, |&a, &b| {
+            errors[b].abs().total_cmp(&errors[a].abs()).then(a.cmp(&b))
+        });
+        worst.truncate(kept);
+    }
+    Measured {
+        positions: worst
+            .iter()
+            .map(|&i| header.world_from_voxel.transform_point3(voxel(i)))
+            .collect(),
+        count: errors.len(),
+        unprojected: None,
+        unsupported: Vec::new(),
+        unit: "density".into(),
+        audit,
+        errors: worst.iter().map(|&i| errors[i].abs()).collect(),
+        statistics: ErrorStatistics::of(&mut errors.clone()),
+    }
+}
+
+/// Writes the two pictures and the figures.
+fn write_report(
+    directory: &Path,
+    args: &Args,
+    open: &OpenField,
+    index: &LeafIndex,
+    measured: &Measured,
+) -> Outcome {
+    std::fs::create_dir_all(directory)
+        .map_err(|e| anyhow::anyhow!("-o {}: cannot be made ({e})", directory.display()))
+        .or_limit()?;
+    let full_scale = measured.statistics.p99.max(f64::MIN_POSITIVE);
+    let colors: Vec<[u8; 3]> = measured.errors.iter().map(|e| viridis(e / full_scale)).collect();
+    formats::meshes::save_points(
+        &directory.join("error.ply"),
+        &measured.positions,
+        None,
+        Some(&colors),
+    )
+    .map_err(writing)?;
+
+    let (report, audit) = (open.report(), &measured.audit);
+    let finest = report.leaves.iter().map(|l| l.level).max().unwrap_or(0).max(1);
+    let boxes = report
+        .leaves
+        .iter()
+        .zip(&audit.rms)
+        .enumerate()
+        .filter_map(|(i, (leaf, &rms))| {
+            let refused = rms > report.tolerance && leaf.reason == StopReason::NoData;
+            let color = if refused {
+                [230, 0, 0]
+            } else {
+                viridis(f64::from(leaf.level) / f64::from(finest))
+            };
+            (leaf.sample_count > 0 || refused).then(|| (index.corners(i), color))
+        });
+    write_boxes(&directory.join("octree.ply"), boxes).map_err(writing)?;
+
+    let text = json!({
+        "field": args.field.display().to_string(),
+        "field_sha256": open.sha256(),
+        "input": args.input.display().to_string(),
+        "samples": measured.count,
+        "unit": measured.unit,
+        "tolerance": report.tolerance,
+        "errors": measured.statistics,
+        "unprojected": measured.unprojected,
+        "stated_by_the_fit": { "rms": report.rms, "p95": report.p95, "max": report.max, "bound": report.bound },
+        "leaves": audit,
+        "components_without_samples": measured.unsupported.iter().map(|c| json!({
+            "inside": c.is_inside, "cells": c.cells.len(), "at": c.at.to_array(),
+        })).collect::<Vec<_>>(),
+        "error_ply": { "points": measured.positions.len(), "violet": 0.0, "yellow": full_scale },
+        "octree_ply": { "boxes": "edges of the leaves with samples, violet coarse to yellow fine; red: above the \
+                                  tolerance and not split for lack of data" },
+    });
+    formats::atomic::replace(&directory.join("report.json"), |out| {
+        serde_json::to_writer_pretty(&mut *out, &text)?;
+        out.write_all(b"\n")
+    })
+    .map_err(writing)
+}

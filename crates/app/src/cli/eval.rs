@@ -1,0 +1,89 @@
+use std::io::{self, Read, Write};
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+
+use formats::points::PointCloud;
+use rayon::prelude::*;
+
+use super::failure::{Failure, OrFail, Outcome};
+use super::field::OpenField;
+use super::input::{limits, reading};
+use super::set_threads;
+
+/// Arguments of `isoclay eval`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Field (.iclay)
+    field: PathBuf,
+    /// Points, one a line or as a cloud; - reads lines from standard input
+    #[arg(long, value_name = "F")]
+    points: PathBuf,
+    /// Threads to work with [default: all cores]
+    #[arg(long, value_name = "N")]
+    threads: Option<NonZeroUsize>,
+}
+
+/// Points evaluated and printed at a time.
+const BATCH: usize = 1 << 16;
+/// Points printed by one thread at a time.
+const PART: usize = 1 << 12;
+
+/// Prints `x,y,z,value,gx,gy,gz`, one line a point, in order.
+pub fn run(args: &Args) -> Outcome {
+    set_threads(args.threads)?;
+    let open = OpenField::load(&args.field)?;
+    let cloud = read_points(&args.points)?;
+    let mut out = io::stdout().lock();
+    out.write_all(b"x,y,z,value,gx,gy,gz\n").or_limit()?;
+    for batch in cloud.positions.chunks(BATCH) {
+        let texts: Vec<Vec<u8>> = batch
+            .par_chunks(PART)
+            .map(|part| {
+                let mut jets = vec![(0.0, glam::DVec3::ZERO); part.len()];
+                open.field().values_gradients(part, &mut jets);
+                let mut text = Vec::with_capacity(part.len() * 7 * 20);
+                let mut number = zmij::Buffer::new();
+                for (p, (value, g)) in part.iter().zip(&jets) {
+                    for x in [p.x, p.y, p.z, *value, g.x, g.y, g.z] {
+                        text.extend_from_slice(number.format(x).as_bytes());
+                        text.push(b',');
+                    }
+                    text.pop();
+                    text.push(b'\n');
+                }
+                text
+            })
+            .collect();
+        for text in texts {
+            out.write_all(&text).or_limit()?;
+        }
+    }
+    out.flush().or_limit()
+}
+
+/// All points of a file or of standard input; one that cannot be used is an error, since lines are counted.
+fn read_points(path: &Path) -> Outcome<PointCloud> {
+    let cloud = if path == Path::new("-") {
+        let mut bytes = Vec::new();
+        let ceiling = limits(None);
+        io::stdin()
+            .lock()
+            .take(ceiling.max_bytes)
+            .read_to_end(&mut bytes)
+            .or_input()?;
+        formats::points::parse_xyz(&bytes, &ceiling)
+            .map_err(|fault| Failure::input(format!("standard input: {fault}")))?
+    } else {
+        formats::points::read(path, &limits(None)).map_err(reading)?
+    };
+    if cloud.positions.len() != cloud.file_count {
+        return Err(Failure::input(format!(
+            "{}: {} of {} points cannot be used (not finite, or corners of no face); give finite points without \
+             faces, so that each line of the answer belongs to one point",
+            path.display(),
+            cloud.file_count - cloud.positions.len(),
+            cloud.file_count
+        )));
+    }
+    Ok(cloud)
+}

@@ -1,0 +1,242 @@
+use std::path::Path;
+
+use bspline::hierarchical::Lattice;
+use bspline::{Field, Frame, HierarchicalSpline, Real};
+use fitting::{FitReport, Leaf, StopReason};
+use formats::Unit;
+use formats::field::{AnyField, FieldMeta, LeafRecord, LoadedField};
+use serde::{Deserialize, Serialize};
+
+use super::failure::{Failure, Outcome};
+use super::input::{limits, reading, writing};
+use super::summary::hex;
+
+/// A field file that was read.
+pub struct OpenField {
+    loaded: LoadedField,
+    report: FitReport,
+}
+
+/// The figures of a [`FitReport`] as they stand in the file; leaves and notes have places of their own.
+#[derive(Serialize, Deserialize)]
+struct StoredReport {
+    input_count: usize,
+    used_count: usize,
+    depth: usize,
+    rms: f64,
+    p95: f64,
+    max: f64,
+    bound: f64,
+    noise: Option<f64>,
+    tolerance: f64,
+    smoothing: f64,
+}
+
+/// Asks the spline of either precision.
+macro_rules! either {
+    ($any:expr, $f:ident => $ask:expr) => {
+        match $any {
+            AnyField::F32($f) => $ask,
+            AnyField::F64($f) => $ask,
+        }
+    };
+}
+pub(super) use either;
+
+impl OpenField {
+    /// Reads a field file.
+    pub fn load(path: &Path) -> Outcome<Self> {
+        let loaded = formats::field::load(path, &limits(None)).map_err(reading)?;
+        let stored: StoredReport = serde_json::from_str(&loaded.meta.report).map_err(|e| {
+            Failure::input(format!(
+                "{}: its fit report cannot be read ({e}); fit the input again",
+                path.display()
+            ))
+        })?;
+        let leaves = loaded
+            .meta
+            .leaves
+            .iter()
+            .map(leaf)
+            .collect::<Option<Vec<Leaf>>>()
+            .ok_or_else(|| {
+                Failure::input(format!(
+                    "{}: a leaf stopped for a reason that this program does not know; use a newer isoclay",
+                    path.display()
+                ))
+            })?;
+        let report = FitReport {
+            input_count: stored.input_count,
+            used_count: stored.used_count,
+            coefficients: either!(&loaded.field, f => f.coefficient_count()),
+            depth: stored.depth,
+            rms: stored.rms,
+            p95: stored.p95,
+            max: stored.max,
+            bound: stored.bound,
+            noise: stored.noise,
+            tolerance: stored.tolerance,
+            smoothing: stored.smoothing,
+            leaves,
+            notes: loaded.meta.notes.clone(),
+        };
+        Ok(Self { loaded, report })
+    }
+
+    /// The field, to be asked.
+    pub fn field(&self) -> &dyn Field {
+        self.loaded.field.as_field()
+    }
+
+    /// What the fit said of itself.
+    pub fn report(&self) -> &FitReport {
+        &self.report
+    }
+
+    /// Grids the field stands on.
+    pub fn lattice(&self) -> &Lattice {
+        either!(&self.loaded.field, f => f.lattice())
+    }
+
+    /// Number of levels.
+    pub fn level_count(&self) -> usize {
+        either!(&self.loaded.field, f => f.level_count())
+    }
+
+    /// Active functions.
+    pub fn coefficient_count(&self) -> usize {
+        self.report.coefficients
+    }
+
+    /// Active functions on each level.
+    pub fn per_level(&self) -> Vec<usize> {
+        (0..self.level_count())
+            .map(|l| either!(&self.loaded.field, f => f.corrections(l).values().map(|c| c.count()).sum()))
+            .collect()
+    }
+
+    /// Bricks over all levels.
+    pub fn brick_count(&self) -> usize {
+        either!(&self.loaded.field, f => f.brick_count())
+    }
+
+    /// Bytes that evaluation reads.
+    pub fn totals_bytes(&self) -> usize {
+        either!(&self.loaded.field, f => f.totals_bytes())
+    }
+
+    /// SHA-256 of the field, hexadecimal.
+    pub fn sha256(&self) -> String {
+        hex(&either!(&self.loaded.field, f => f.sha256()))
+    }
+
+    /// Name of the coefficients' precision.
+    pub fn precision(&self) -> &'static str {
+        match &self.loaded.field {
+            AnyField::F32(_) => <f32 as Real>::NAME,
+            AnyField::F64(_) => <f64 as Real>::NAME,
+        }
+    }
+
+    /// Unit of lengths.
+    pub fn unit(&self) -> Unit {
+        self.loaded.meta.unit
+    }
+
+    /// Iso-value at which the surface is meant to lie.
+    pub fn iso(&self) -> f64 {
+        self.loaded.meta.iso.unwrap_or(0.0)
+    }
+
+    /// The grid with `n` cells in every finest knot interval, along each axis.
+    pub fn frame_of_subdivision(&self, n: u32) -> Frame {
+        let finest = self.level_count() - 1;
+        self.frame(self.lattice().cells_at(finest).map(|c| c.saturating_mul(n)))
+    }
+
+    /// The grid with `n` cells along the longest side of the box and as many on the others as their lengths ask.
+    pub fn frame_of_resolution(&self, n: u32) -> Frame {
+        let sides = self.lattice().spacing(0) * self.lattice().extent();
+        let cell = sides.max_element() / f64::from(n);
+        self.frame((sides / cell).to_array().map(|c| (c.round() as u32).max(1)))
+    }
+
+    fn frame(&self, cells: [u32; 3]) -> Frame {
+        let lattice = self.lattice();
+        let step = lattice.extent() / glam::DVec3::from_array(cells.map(f64::from));
+        Frame {
+            world_from_grid: lattice.world_from_lattice * glam::DAffine3::from_scale(step),
+            cells,
+        }
+    }
+
+    /// The failure of a surface that is not there.
+    pub fn no_surface(&self, path: &Path, iso: f64) -> Failure {
+        let range = self.field().bounds(&self.lattice().world_box());
+        Failure::input(format!(
+            "{}: the surface f = {iso} does not meet the box, in which f stays between {:.6} and {:.6}; choose \
+             another --iso",
+            path.display(),
+            range.lo,
+            range.hi
+        ))
+    }
+}
+
+/// Writes a fitted field; returns its SHA-256.
+pub fn save(path: &Path, field: &AnyField, report: &FitReport, meta: FieldMeta) -> Outcome<String> {
+    let stored = StoredReport {
+        input_count: report.input_count,
+        used_count: report.used_count,
+        depth: report.depth,
+        rms: report.rms,
+        p95: report.p95,
+        max: report.max,
+        bound: report.bound,
+        noise: report.noise,
+        tolerance: report.tolerance,
+        smoothing: report.smoothing,
+    };
+    let meta = FieldMeta {
+        report: serde_json::to_string(&stored).expect("a struct of plain fields is always JSON"),
+        leaves: report.leaves.iter().map(record).collect(),
+        notes: report.notes.clone(),
+        ..meta
+    };
+    either!(field, f => save_as(path, f, &meta))
+}
+
+fn save_as<T: formats::field::Stored>(
+    path: &Path,
+    field: &HierarchicalSpline<T>,
+    meta: &FieldMeta,
+) -> Outcome<String> {
+    formats::field::save(path, field, meta).map_err(writing)?;
+    Ok(hex(&field.sha256()))
+}
+
+fn record(leaf: &Leaf) -> LeafRecord {
+    LeafRecord {
+        level: leaf.level,
+        cell: leaf.cell,
+        sample_count: leaf.sample_count,
+        rms: leaf.rms,
+        max: leaf.max,
+        reason: leaf.reason as u8,
+    }
+}
+
+fn leaf(r: &LeafRecord) -> Option<Leaf> {
+    use StopReason::*;
+    let reason = [Tolerance, Depth, NoData, Noise, Budget, Memory]
+        .into_iter()
+        .find(|s| *s as u8 == r.reason)?;
+    Some(Leaf {
+        level: r.level,
+        cell: r.cell,
+        sample_count: r.sample_count,
+        rms: r.rms,
+        max: r.max,
+        reason,
+    })
+}

@@ -1,0 +1,325 @@
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+use clap::ValueEnum;
+use fitting::points::{OrientedPoints, PointOptions, fit_points};
+use fitting::volume::{VolumeMethod, VolumeOptions, VolumeView, fit_volume, otsu_threshold};
+use fitting::{Cancel, Control, FitError, FitReport, StopReason};
+use formats::Unit;
+use formats::field::{AnyField, FieldMeta, SourceKind, Stored};
+use formats::points::PointCloud;
+use formats::volumes::Volume;
+
+use super::cost::{Cost, rss_bytes};
+use super::failure::{Failure, Outcome};
+use super::field::{self, either};
+use super::input::{self, Input, check_output, remaining};
+use super::progress::Bar;
+use super::quantity::{Memory, Tolerance, human_bytes, positive};
+use super::summary::Summary;
+use super::{interrupt, set_threads};
+
+/// Arguments of `isoclay fit`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Point cloud with normals or faces (.ply, .obj, .xyz) or volume (.nii), each also gzipped (.gz)
+    input: PathBuf,
+    /// Field to write (.iclay)
+    #[arg(short, long, value_name = "FIELD")]
+    output: PathBuf,
+    #[command(flatten)]
+    choice: Choice,
+    /// Memory that the process may hold, such as 2GiB
+    #[arg(long, value_name = "SIZE")]
+    memory: Option<Memory>,
+    /// Threads to work with [default: all cores]
+    #[arg(long, value_name = "N")]
+    threads: Option<NonZeroUsize>,
+    /// Print one JSON object instead of a table
+    #[arg(long)]
+    json: bool,
+}
+
+/// What the user may choose of a fit; the rest is chosen from the data.
+#[derive(Clone, Copy, Debug, clap::Args)]
+pub struct Choice {
+    /// Rms residual that each leaf stays below, or says why not. Clouds: a distance in the file's unit, in mm,
+    /// or in per cent of the diagonal. Volumes: a density, or per cent of the range between the 1st and the 99th
+    /// percentile [default: what the noise justifies; for clean data 0.01% of the diagonal, 0.5% of the range]
+    #[arg(long, value_name = "T[mm|%]")]
+    pub tolerance: Option<Tolerance>,
+    /// Coefficients to spend
+    #[arg(long, value_name = "N")]
+    pub coefficients: Option<NonZeroUsize>,
+    /// Finest level allowed. Clouds: 2^N cells along the box, 6 to 16. Volumes: 0 is a knot every four voxels, 2 one
+    /// at every voxel
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=16))]
+    pub max_depth: Option<u8>,
+    /// How to fit a volume
+    #[arg(long, value_enum, default_value_t = Method::Adaptive)]
+    pub method: Method,
+    /// Weight of the bending energy [default: chosen from the data]
+    #[arg(long, value_name = "μ", value_parser = positive)]
+    pub smoothing: Option<f64>,
+    /// Unit of the coordinates, where the file does not tell: mm, cm or m
+    #[arg(long, value_parser = unit)]
+    pub unit: Option<Unit>,
+    /// Precision of the coefficients
+    #[arg(long, value_enum, default_value_t = Precision::F32)]
+    pub precision: Precision,
+}
+
+/// How to fit a volume.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Method {
+    /// Least squares with as few coefficients as the tolerance needs.
+    Adaptive,
+    /// Exactly through all voxels, with a coefficient for each.
+    Interpolate,
+}
+
+/// Precision of the coefficients.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Precision {
+    /// 32-bit floats.
+    F32,
+    /// 64-bit floats.
+    F64,
+}
+
+fn unit(s: &str) -> Result<Unit, String> {
+    match s {
+        "mm" | "cm" | "m" => s.parse(),
+        _ => Err("write mm, cm or m".into()),
+    }
+}
+
+/// A fitted field with what the fit says of it.
+pub struct Fitted {
+    /// The field.
+    pub field: AnyField,
+    /// Errors, leaves, notes.
+    pub report: FitReport,
+    /// Unit of lengths.
+    pub unit: Unit,
+    /// What it was fitted to.
+    pub source: SourceKind,
+    /// Iso-value that meshing takes if the user names none.
+    pub iso: f64,
+}
+
+/// Fits a file and writes the field.
+pub fn run(args: &Args) -> Outcome {
+    let cost = Cost::start();
+    check_output(&args.output, &["iclay"])?;
+    set_threads(args.threads)?;
+    let cancel = Cancel::new();
+    interrupt::cancel_on_interrupt(&cancel)?;
+    let bar = Bar::new();
+    bar.show("reading", 0.0);
+    let input = input::read(&args.input, args.memory)?;
+    interrupt::check(&cancel)?;
+    let shown = bar.clone();
+    let mut control = Control {
+        on_progress: Box::new(move |p| shown.show(p.stage, p.fraction)),
+        cancel,
+        memory_limit: args.memory.map(remaining),
+    };
+    let fitted = fit(&input, &args.choice, &mut control).map_err(|f| {
+        if f.code() == 3 {
+            f.about(args.input.display())
+        } else {
+            f
+        }
+    })?;
+    interrupt::check(&control.cancel)?;
+    bar.show("writing", 0.99);
+    let meta = FieldMeta {
+        source: fitted.source,
+        unit: fitted.unit,
+        iso: Some(fitted.iso),
+        provenance: provenance(args),
+        ..Default::default()
+    };
+    let sha256 = field::save(&args.output, &fitted.field, &fitted.report, meta)?;
+    bar.clear();
+    Summary {
+        field_sha256: Some(sha256),
+        output: Some(args.output.display().to_string()),
+        ..fitted.summary(&input)
+    }
+    .with_cost(&cost)
+    .print(args.json)
+}
+
+/// Where the field comes from, for the file: enough to make it again.
+fn provenance(args: &Args) -> String {
+    let options: Vec<String> = std::env::args().skip(1).collect();
+    serde_json::json!({
+        "program": concat!("isoclay ", env!("CARGO_PKG_VERSION")),
+        "input": args.input.file_name().map(|n| n.to_string_lossy()),
+        "arguments": options,
+    })
+    .to_string()
+}
+
+/// Fits an input as chosen.
+pub fn fit(input: &Input, choice: &Choice, control: &mut Control) -> Outcome<Fitted> {
+    match (input, choice.precision) {
+        (Input::Cloud(cloud), Precision::F32) => fit_cloud::<f32>(cloud, choice, control),
+        (Input::Cloud(cloud), Precision::F64) => fit_cloud::<f64>(cloud, choice, control),
+        (Input::Volume(volume), Precision::F32) => fit_voxels::<f32>(volume, choice, control),
+        (Input::Volume(volume), Precision::F64) => fit_voxels::<f64>(volume, choice, control),
+    }
+}
+
+fn fit_cloud<T: Stored>(cloud: &PointCloud, choice: &Choice, control: &mut Control) -> Outcome<Fitted> {
+    if choice.method == Method::Interpolate {
+        return Err(Failure::usage(
+            "--method interpolate is for volumes; leave it out for a point cloud",
+        ));
+    }
+    let Some(normals) = &cloud.normals else {
+        return Err(Failure::input(
+            "the points have no normals, which tell inside from outside; give a file with columns nx ny nz \
+             (estimate and orient them with a tool such as MeshLab, CloudCompare or Open3D), or a mesh with faces",
+        ));
+    };
+    if cloud.positions.is_empty() {
+        return Err(FitError::NotEnoughSamples { found: 0, needed: 10 }.into());
+    }
+    let unit = stated_unit(cloud.unit, choice.unit)?;
+    let points = OrientedPoints {
+        positions: &cloud.positions,
+        normals,
+    };
+    let diagonal = points.diagonal();
+    let options = PointOptions {
+        tolerance: choice
+            .tolerance
+            .map(|t| t.length(diagonal, unit))
+            .transpose()
+            .map_err(Failure::usage)?,
+        coefficients: choice.coefficients.map(NonZeroUsize::get),
+        max_depth: choice.max_depth.map(usize::from),
+        smoothing: choice.smoothing,
+    };
+    let (field, mut report) = fit_points::<T>(&points, &options, control).map_err(|e| explain(e, control))?;
+    report.notes.splice(0..0, cloud.notes.iter().cloned());
+    Ok(Fitted {
+        field: T::any(field),
+        report,
+        unit,
+        source: SourceKind::Cloud,
+        iso: 0.0,
+    })
+}
+
+fn fit_voxels<T: Stored>(volume: &Volume, choice: &Choice, control: &mut Control) -> Outcome<Fitted> {
+    let header = &volume.header;
+    let unit = stated_unit(header.unit, choice.unit)?;
+    let view = VolumeView {
+        dims: header.dims,
+        values: &volume.values,
+        world_from_voxel: header.world_from_voxel,
+    };
+    // Only a share of the range has to look at every voxel for it.
+    let range = match choice.tolerance {
+        Some(Tolerance::Percent(_)) => view.density_range()?,
+        _ => 1.0,
+    };
+    let options = VolumeOptions {
+        method: match choice.method {
+            Method::Adaptive => VolumeMethod::Adaptive,
+            Method::Interpolate => VolumeMethod::Interpolate,
+        },
+        tolerance: choice
+            .tolerance
+            .map(|t| t.density(range))
+            .transpose()
+            .map_err(Failure::usage)?,
+        coefficients: choice.coefficients.map(NonZeroUsize::get),
+        max_depth: choice.max_depth.map(usize::from),
+        smoothing: choice.smoothing,
+    };
+    let (field, mut report) = fit_volume::<T>(&view, &options, control).map_err(|e| explain(e, control))?;
+    report.notes.splice(0..0, volume.notes.iter().cloned());
+    let iso = otsu_threshold(&volume.values);
+    Ok(Fitted {
+        field: T::any(field),
+        report,
+        unit,
+        source: SourceKind::Volume,
+        iso,
+    })
+}
+
+/// The unit of a file whose header says `known`, of which the user says `stated`.
+fn stated_unit(known: Unit, stated: Option<Unit>) -> Outcome<Unit> {
+    match (known, stated) {
+        (known, None) => Ok(known),
+        (Unit::Unknown, Some(stated)) => Ok(stated),
+        (known, Some(stated)) if known == stated => Ok(known),
+        (known, Some(stated)) => Err(Failure::usage(format!(
+            "--unit {stated}: the file says that its lengths are in {known}; leave the option out"
+        ))),
+    }
+}
+
+/// A memory limit in terms of the whole process, which is what the user gave.
+fn explain(e: FitError, control: &Control) -> Failure {
+    match (&e, control.memory_limit) {
+        (FitError::MemoryLimit { needed, limit }, Some(_)) => {
+            let held = rss_bytes().unwrap_or(0);
+            Failure::limit(format!(
+                "the fit needs about {} beside what is already held ({}), and --memory leaves {}; raise --memory \
+                 to {} or lower --max-depth",
+                human_bytes(*needed),
+                human_bytes(held),
+                human_bytes(*limit),
+                human_bytes(needed + held),
+            ))
+        }
+        _ => e.into(),
+    }
+}
+
+impl Fitted {
+    /// The fit's part of a summary.
+    pub fn summary(&self, input: &Input) -> Summary {
+        let r = &self.report;
+        let over = |l: &&fitting::Leaf| f64::from(l.rms) > r.tolerance;
+        // An interpolating fit aims at none.
+        let has_tolerance = r.tolerance > 0.0;
+        Summary {
+            input_count: Some(r.input_count),
+            used_count: Some(r.used_count),
+            unit: Some(match input {
+                Input::Cloud(_) => self.unit.to_string(),
+                Input::Volume(_) => "density".into(),
+            }),
+            coefficients: Some(either!(&self.field, f => f.coefficient_count())),
+            totals_bytes: Some(either!(&self.field, f => f.totals_bytes())),
+            bricks: Some(either!(&self.field, f => f.brick_count())),
+            depth: Some(r.depth),
+            tolerance: has_tolerance.then_some(r.tolerance),
+            smoothing: Some(r.smoothing),
+            noise: r.noise,
+            rms: Some(r.rms),
+            p95: Some(r.p95),
+            max: Some(r.max),
+            bound: Some(r.bound),
+            leaves: Some(r.leaves.len()),
+            leaves_over_tolerance: has_tolerance.then(|| r.leaves.iter().filter(over).count()),
+            leaves_without_data: has_tolerance.then(|| {
+                r.leaves
+                    .iter()
+                    .filter(over)
+                    .filter(|l| l.reason == StopReason::NoData)
+                    .count()
+            }),
+            notes: r.notes.clone(),
+            ..Default::default()
+        }
+    }
+}

@@ -1,0 +1,241 @@
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+use formats::points::{NormalSource, PointCloud};
+use formats::volumes::VolumeHeader;
+use formats::{Kind, ReadLimits};
+use serde_json::{Map, Value, json};
+
+use super::failure::{OrFail, Outcome};
+use super::field::OpenField;
+use super::input::{bounding_box, limits, reading};
+use super::quantity::{human_bytes, human_count, human_number};
+use super::summary::table;
+
+/// Arguments of `isoclay info`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Cloud, volume or field
+    file: PathBuf,
+    /// Print one JSON object instead of a table
+    #[arg(long)]
+    json: bool,
+}
+
+/// One line of the table and one entry of the object.
+struct Entry {
+    key: &'static str,
+    label: &'static str,
+    text: String,
+    value: Value,
+}
+
+fn entry(key: &'static str, label: &'static str, text: impl Into<String>, value: impl Into<Value>) -> Entry {
+    Entry {
+        key,
+        label,
+        text: text.into(),
+        value: value.into(),
+    }
+}
+
+fn count(key: &'static str, label: &'static str, n: usize) -> Entry {
+    entry(key, label, human_count(n), n)
+}
+
+/// Describes a file.
+pub fn run(args: &Args) -> Outcome {
+    let kind = formats::detect(&args.file).map_err(reading)?;
+    let (entries, notes) = match kind {
+        Kind::Cloud(_) => {
+            let cloud = formats::points::read(&args.file, &limits(None)).map_err(reading)?;
+            (of_cloud(&cloud), cloud.notes)
+        }
+        Kind::Volume => {
+            let volume = formats::volumes::read(&args.file, &ReadLimits::default()).map_err(reading)?;
+            let mut entries = of_header(&volume.header);
+            entries.extend(of_values(&volume.values));
+            (entries, volume.notes)
+        }
+        Kind::Field => {
+            let open = OpenField::load(&args.file)?;
+            (of_field(&open), open.report().notes.clone())
+        }
+    };
+    let mut out = io::stdout().lock();
+    if args.json {
+        let mut object = Map::new();
+        object.insert("file".into(), args.file.display().to_string().into());
+        object.insert("kind".into(), kind.to_string().into());
+        object.extend(entries.into_iter().map(|e| (e.key.to_string(), e.value)));
+        object.insert("notes".into(), notes.into());
+        writeln!(out, "{}", Value::Object(object)).or_limit()
+    } else {
+        let first = [("kind", kind.to_string())];
+        let rows = first
+            .into_iter()
+            .chain(entries.into_iter().map(|e| (e.label, e.text)));
+        writeln!(out, "{}", table(rows, &notes)).or_limit()
+    }
+}
+
+fn corners(b: &bspline::Aabb) -> Entry {
+    let text = |p: glam::DVec3| p.to_array().map(human_number).join(", ");
+    entry(
+        "box",
+        "box",
+        format!("({}) to ({})", text(b.min), text(b.max)),
+        json!([b.min.to_array(), b.max.to_array()]),
+    )
+}
+
+fn of_cloud(cloud: &PointCloud) -> Vec<Entry> {
+    let normals = match cloud.normal_source {
+        NormalSource::None => "none",
+        NormalSource::Stored => "stored",
+        NormalSource::Faces => "from faces",
+    };
+    let mut entries = vec![
+        count("points", "points", cloud.positions.len()),
+        count("points_in_file", "points in the file", cloud.file_count),
+        count("faces", "faces", cloud.face_count),
+        count(
+            "unused_vertices",
+            "vertices without a face",
+            cloud.unused_vertices,
+        ),
+        entry("normals", "normals", normals, normals),
+        count("zero_normals", "unusable normals", cloud.zero_normals),
+        entry("unit", "unit", cloud.unit.symbol(), cloud.unit.symbol()),
+    ];
+    if !cloud.positions.is_empty() {
+        let b = bounding_box(&cloud.positions);
+        entries.push(corners(&b));
+        let diagonal = b.size().length();
+        entries.push(entry("diagonal", "diagonal", human_number(diagonal), diagonal));
+    }
+    entries
+}
+
+fn of_header(h: &VolumeHeader) -> Vec<Entry> {
+    let rows: Vec<[f64; 4]> = (0..3)
+        .map(|r| {
+            let m = h.world_from_voxel;
+            [
+                m.matrix3.x_axis[r],
+                m.matrix3.y_axis[r],
+                m.matrix3.z_axis[r],
+                m.translation[r],
+            ]
+        })
+        .collect();
+    vec![
+        entry(
+            "dims",
+            "voxels",
+            h.dims.map(|n| n.to_string()).join(" × "),
+            json!(h.dims),
+        ),
+        entry(
+            "spacing",
+            "spacing",
+            format!(
+                "{} {}",
+                h.spacing().to_array().map(human_number).join(" × "),
+                h.unit
+            ),
+            json!(h.spacing().to_array()),
+        ),
+        entry("unit", "unit", h.unit.symbol(), h.unit.symbol()),
+        entry("stored", "stored as", h.stored.to_string(), h.stored.to_string()),
+        entry(
+            "world_from_voxel",
+            "world from voxel",
+            rows.iter()
+                .map(|r| format!("[{}]", r.map(human_number).join(", ")))
+                .collect::<Vec<_>>()
+                .join(" "),
+            json!(rows),
+        ),
+    ]
+}
+
+fn of_values(values: &[f32]) -> Vec<Entry> {
+    let mut sorted = values.to_vec();
+    let mut rank = |share: f64| {
+        let k = ((share * sorted.len() as f64).ceil() as usize).clamp(1, sorted.len()) - 1;
+        f64::from(*sorted.select_nth_unstable_by(k, f32::total_cmp).1)
+    };
+    let ranks = [0.0, 0.01, 0.5, 0.99, 1.0].map(&mut rank);
+    vec![entry(
+        "percentiles",
+        "min, 1 %, 50 %, 99 %, max",
+        ranks.map(human_number).join(", "),
+        json!(ranks),
+    )]
+}
+
+fn of_field(open: &OpenField) -> Vec<Entry> {
+    let (lattice, report) = (open.lattice(), open.report());
+    let spacing = lattice.spacing(open.level_count() - 1);
+    let mut entries = vec![
+        entry("precision", "precision", open.precision(), open.precision()),
+        count("levels", "levels", open.level_count()),
+        entry(
+            "cells",
+            "cells of the coarsest",
+            lattice.cells.map(|n| n.to_string()).join(" × "),
+            json!(lattice.cells),
+        ),
+        entry(
+            "finest_spacing",
+            "finest knot spacing",
+            format!(
+                "{} {}",
+                spacing.to_array().map(human_number).join(" × "),
+                open.unit()
+            ),
+            json!(spacing.to_array()),
+        ),
+        count("coefficients", "coefficients", open.coefficient_count()),
+        entry(
+            "coefficients_per_level",
+            "  on each level",
+            open.per_level()
+                .into_iter()
+                .map(human_count)
+                .collect::<Vec<_>>()
+                .join(", "),
+            json!(open.per_level()),
+        ),
+        count("bricks", "bricks", open.brick_count()),
+        entry(
+            "totals_bytes",
+            "totals",
+            human_bytes(open.totals_bytes() as u64),
+            open.totals_bytes(),
+        ),
+        corners(&lattice.world_box()),
+        entry("unit", "unit", open.unit().symbol(), open.unit().symbol()),
+        entry("iso", "iso-value", human_number(open.iso()), open.iso()),
+        count("input_count", "samples given", report.input_count),
+        count("used_count", "samples used", report.used_count),
+        entry(
+            "tolerance",
+            "tolerance",
+            human_number(report.tolerance),
+            report.tolerance,
+        ),
+        entry("rms", "error rms", human_number(report.rms), report.rms),
+        entry("p95", "error p95", human_number(report.p95), report.p95),
+        entry("max", "error max", human_number(report.max), report.max),
+        count("leaves", "leaves", report.leaves.len()),
+    ];
+    entries.push(entry(
+        "field_sha256",
+        "field sha256",
+        open.sha256(),
+        open.sha256(),
+    ));
+    entries
+}

@@ -1,0 +1,112 @@
+use std::path::Path;
+
+use bspline::Aabb;
+use formats::points::PointCloud;
+use formats::volumes::Volume;
+use formats::{Fault, FormatError, Kind, ReadLimits};
+use glam::DVec3;
+
+use super::cost;
+use super::failure::{Failure, Outcome};
+use super::quantity::{Memory, human_bytes};
+
+/// Something that can be fitted.
+pub enum Input {
+    /// Points.
+    Cloud(PointCloud),
+    /// Voxels.
+    Volume(Volume),
+}
+
+/// Reads a cloud or a volume, holding no more than `memory` in the whole process.
+pub fn read(path: &Path, memory: Option<Memory>) -> Outcome<Input> {
+    let limits = limits(memory);
+    match formats::detect(path).map_err(reading)? {
+        Kind::Cloud(_) => formats::points::read(path, &limits)
+            .map_err(reading)
+            .map(Input::Cloud),
+        Kind::Volume => formats::volumes::read(path, &limits)
+            .map_err(reading)
+            .map(Input::Volume),
+        Kind::Field => Err(Failure::input(format!(
+            "{}: is a fitted field, where a point cloud or a volume is needed",
+            path.display()
+        ))),
+    }
+}
+
+/// What reading may hold: the ceiling of the user less what the process holds already.
+pub fn limits(memory: Option<Memory>) -> ReadLimits {
+    memory.map_or_else(ReadLimits::default, |m| ReadLimits {
+        max_bytes: remaining(m),
+    })
+}
+
+/// Bytes of the user's ceiling that are still free.
+pub fn remaining(memory: Memory) -> u64 {
+    memory.0.saturating_sub(cost::rss_bytes().unwrap_or(0))
+}
+
+/// An error of reading: bad input, unless a limit stopped it.
+pub fn reading(e: FormatError) -> Failure {
+    match &e.fault {
+        Fault::Limit { what, needed, .. } => Failure::limit(format!(
+            "{}: {what} would need {}, more than the memory ceiling leaves; raise --memory if the file is trusted",
+            e.path.display(),
+            human_bytes(*needed)
+        )),
+        _ => Failure::input(e),
+    }
+}
+
+/// An error of writing: a name that no format fits is wrong usage, all else a limit of the machine.
+pub fn writing(e: FormatError) -> Failure {
+    match &e.fault {
+        Fault::UnknownKind { .. } | Fault::Directory => Failure::usage(e),
+        _ => Failure::limit(e),
+    }
+}
+
+/// Refuses an output that cannot be written before hours of work are spent on it.
+pub fn check_output(path: &Path, extensions: &[&str]) -> Outcome {
+    let name = path
+        .file_name()
+        .map(|n| n.to_string_lossy().to_ascii_lowercase())
+        .unwrap_or_default();
+    let is_device = path.metadata().is_ok_and(|m| !m.is_file() && !m.is_dir());
+    if path.is_dir() {
+        return Err(Failure::usage(format!(
+            "-o {}: is a directory; name a file in it",
+            path.display()
+        )));
+    }
+    if !is_device && !extensions.iter().any(|e| name.ends_with(&format!(".{e}"))) {
+        return Err(Failure::usage(format!(
+            "-o {}: the name has to end in .{}",
+            path.display(),
+            extensions.join(" or .")
+        )));
+    }
+    let directory = match path.parent() {
+        Some(p) if !p.as_os_str().is_empty() => p,
+        _ => Path::new("."),
+    };
+    if !directory.is_dir() {
+        return Err(Failure::usage(format!(
+            "-o {}: there is no directory {}; make it first",
+            path.display(),
+            directory.display()
+        )));
+    }
+    Ok(())
+}
+
+/// Smallest box round `points`, which are not empty.
+pub fn bounding_box(points: &[DVec3]) -> Aabb {
+    let (min, max) = points
+        .iter()
+        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), &p| {
+            (lo.min(p), hi.max(p))
+        });
+    Aabb { min, max }
+}

@@ -1,0 +1,239 @@
+use std::num::NonZeroUsize;
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+
+use bspline::polygonize::{Mesh, MeshReport, PolygonizeError, PolygonizeOptions, polygonize_with};
+use bspline::{Field, Frame};
+use fitting::Cancel;
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::cost::Cost;
+use super::failure::{Failure, Outcome};
+use super::field::OpenField;
+use super::input::{check_output, writing};
+use super::progress::Bar;
+use super::quantity::{Tolerance, finite, human_number};
+use super::summary::Summary;
+use super::{interrupt, set_threads};
+
+/// Arguments of `isoclay mesh`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Field (.iclay)
+    field: PathBuf,
+    /// Mesh to write: .ply, .stl or .obj
+    #[arg(short, long, value_name = "OUT")]
+    output: PathBuf,
+    /// Cells along the longest side of the box [default: two cells per finest knot interval]
+    #[arg(long, value_name = "N", conflicts_with = "tolerance", value_parser = clap::value_parser!(u32).range(1..=65535))]
+    resolution: Option<u32>,
+    /// Distance from the surface that 99 % of the triangles keep at their centres: in the field's unit, in mm,
+    /// or in per cent of the solid's diagonal
+    #[arg(long, value_name = "T[mm|%]")]
+    tolerance: Option<Tolerance>,
+    /// Density of the surface [default: 0 for clouds, for volumes what the file suggests]
+    #[arg(long, value_name = "V", value_parser = finite, allow_negative_numbers = true)]
+    iso: Option<f64>,
+    /// Leave the surface open where it meets the box, instead of closing it
+    #[arg(long)]
+    open: bool,
+    /// Threads to work with [default: all cores]
+    #[arg(long, value_name = "N")]
+    threads: Option<NonZeroUsize>,
+    /// Print one JSON object instead of a table
+    #[arg(long)]
+    json: bool,
+}
+
+/// Triangles that make a user think of a smaller mesh.
+const MANY: usize = 4_000_000;
+
+/// Meshes a field file.
+pub fn run(args: &Args) -> Outcome {
+    let cost = Cost::start();
+    check_output(&args.output, &["ply", "stl", "obj"])?;
+    set_threads(args.threads)?;
+    let cancel = Cancel::new();
+    interrupt::cancel_on_interrupt(&cancel)?;
+    let open = OpenField::load(&args.field)?;
+    let options = PolygonizeOptions {
+        iso: args.iso.unwrap_or(open.iso()),
+        open: args.open,
+        ..Default::default()
+    };
+    let bar = Bar::new();
+    let mut mesher = Mesher {
+        field: open.field(),
+        options,
+        cancel: &cancel,
+        bar: &bar,
+    };
+    let mut notes = Vec::new();
+    let (mesh, report, frame) = match args.tolerance {
+        Some(tolerance) => mesher.to_tolerance(&open, tolerance, &mut notes)?,
+        None => mesher.on(match args.resolution {
+            Some(n) => open.frame_of_resolution(n),
+            None => open.frame_of_subdivision(2),
+        })?,
+    };
+    if mesh.triangles.is_empty() {
+        return Err(open.no_surface(&args.field, options.iso));
+    }
+    interrupt::check(&cancel)?;
+    bar.show("writing", 0.99);
+    let written = formats::meshes::Mesh {
+        vertices: &mesh.positions,
+        triangles: &mesh.triangles,
+        colors: None,
+    };
+    notes.extend(formats::meshes::save(&args.output, &written).map_err(writing)?);
+    bar.clear();
+    notes.extend(doubts(&report));
+    if args.resolution.is_none() && args.tolerance.is_none() && mesh.triangles.len() > MANY {
+        notes.push("the finest level covers a small part of the solid; --resolution or --tolerance give a smaller mesh".into());
+    }
+    Summary {
+        vertices: Some(mesh.positions.len()),
+        triangles: Some(mesh.triangles.len()),
+        cells: Some(frame.cells),
+        unit: Some(open.unit().to_string()),
+        field_sha256: Some(open.sha256()),
+        output: Some(args.output.display().to_string()),
+        notes,
+        ..Default::default()
+    }
+    .with_cost(&cost)
+    .print(args.json)
+}
+
+/// What the mesher met that a careful user wants to know.
+fn doubts(report: &MeshReport) -> Vec<String> {
+    let mut notes = Vec::new();
+    if report.unconverged_vertices > 0 {
+        notes.push(format!(
+            "{} vertices are less exact than the others",
+            report.unconverged_vertices
+        ));
+    }
+    if report.nan_nodes > 0 {
+        notes.push(format!(
+            "at {} nodes the field is not a number; they count as outside",
+            report.nan_nodes
+        ));
+    }
+    notes
+}
+
+/// A field being meshed on one frame after the other.
+pub struct Mesher<'a> {
+    /// The field.
+    pub field: &'a dyn Field,
+    /// Iso-value, caps, placement.
+    pub options: PolygonizeOptions,
+    /// Looked at between blocks of work.
+    pub cancel: &'a Cancel,
+    /// Shows how far it has come.
+    pub bar: &'a Bar,
+}
+
+impl Mesher<'_> {
+    /// Meshes the cells of `frame`.
+    pub fn on(&mut self, frame: Frame) -> Outcome<(Mesh, MeshReport, Frame)> {
+        let (cancel, bar) = (self.cancel, self.bar);
+        let mut progress = |fraction| {
+            bar.show("meshing", fraction);
+            if cancel.is_cancelled() {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        };
+        let (mesh, report) =
+            polygonize_with(self.field, &frame, &self.options, &mut progress).map_err(|e| match e {
+                PolygonizeError::Cancelled => fitting::FitError::Cancelled.into(),
+                PolygonizeError::TooManyBlocks { .. } | PolygonizeError::TooManyVertices { .. } => {
+                    Failure::limit(format!("{e}: lower --resolution or raise --tolerance"))
+                }
+                PolygonizeError::Cells { .. } => Failure::usage(format!("{e}: lower --resolution")),
+                _ => Failure::input(e),
+            })?;
+        Ok((mesh, report, frame))
+    }
+
+    /// Meshes as coarsely as the tolerance allows. The chord error of a triangle falls with the square of its
+    /// size, so a trial at the default resolution tells the next one; each result is measured.
+    fn to_tolerance(
+        &mut self,
+        open: &OpenField,
+        tolerance: Tolerance,
+        notes: &mut Vec<String>,
+    ) -> Outcome<(Mesh, MeshReport, Frame)> {
+        let mut frame = open.frame_of_subdivision(1);
+        let mut best: Option<((Mesh, MeshReport, Frame), f64)> = None;
+        for _ in 0..6 {
+            let trial = self.on(frame)?;
+            let Some(around) = trial.0.bounding_box() else {
+                return Ok(trial);
+            };
+            let wanted = tolerance
+                .length(around.size().length(), open.unit())
+                .map_err(Failure::usage)?;
+            let error = self.chord_error(&trial.0, &trial.2);
+            let met = error <= wanted;
+            let cells = trial.2.cells.into_iter().max().unwrap_or(1);
+            let best_cells = best
+                .as_ref()
+                .map(|((_, _, f), _)| f.cells.into_iter().max().unwrap_or(1));
+            // Good enough within 15 % of the coarsest that will do, or no finer than one that did.
+            let settled = met && error > 0.7 * wanted;
+            if met && best_cells.is_none_or(|b| cells < b) {
+                best = Some((trial, error));
+            }
+            if settled || (!met && best.is_some()) {
+                break;
+            }
+            // Aims at 0.85 of the tolerance; the first error is measured, the law behind the step only assumed.
+            let factor = (error / (0.85 * wanted)).sqrt().clamp(0.125, 4.0);
+            let next = (cells as f64 * factor).ceil().max(4.0);
+            if next > 65535.0 {
+                break;
+            }
+            frame = open.frame_of_resolution(next as u32);
+        }
+        let (found, error) = best.ok_or_else(|| {
+            Failure::limit("the tolerance asked for needs more cells than can be meshed; raise --tolerance")
+        })?;
+        notes.push(format!(
+            "99 % of the triangle centres lie within {} of the surface",
+            human_number(error)
+        ));
+        Ok(found)
+    }
+
+    /// 99th percentile of the distance from triangle centres to the surface, to first order and at most half a
+    /// cell. Centres on the frame's box belong to the cut and do not count.
+    fn chord_error(&self, mesh: &Mesh, frame: &Frame) -> f64 {
+        let cell = frame.world_from_grid.matrix3.x_axis.length();
+        let grid = frame.world_from_grid.inverse();
+        let end = DVec3::from_array(frame.cells.map(f64::from));
+        let mut errors: Vec<f64> = (0..mesh.triangles.len())
+            .into_par_iter()
+            .filter_map(|t| {
+                let [a, b, c] = mesh.corners(t);
+                let p = (a + b + c) / 3.0;
+                let q = grid.transform_point3(p);
+                if q.min((end - q).abs()).min_element() < 1.0 {
+                    return None;
+                }
+                let (f, g) = self.field.value_gradient(p);
+                Some(((f - self.options.iso).abs() / g.length()).min(0.5 * cell))
+            })
+            .collect();
+        if errors.is_empty() {
+            return 0.0;
+        }
+        let rank = (errors.len() * 99 / 100).min(errors.len() - 1);
+        *errors.select_nth_unstable_by(rank, f64::total_cmp).1
+    }
+}
