@@ -15,7 +15,7 @@ pub struct UnsupportedComponent {
 }
 
 /// Components of `{f > iso}` and of its complement, by the sign at the centres of the cells of `frame`, that
-/// hold none of `samples`. In the order of their first cell.
+/// hold none of `samples`, each counted half a cell to both sides of the surface. In the order of their first cell.
 ///
 /// Memory: 6 bytes a cell.
 pub fn unsupported_components(
@@ -40,8 +40,14 @@ pub fn unsupported_components(
     }
     let grid_from_world = frame.world_from_grid.inverse();
     let mut has_sample = vec![false; inside.len()];
-    for p in samples {
-        let q = grid_from_world.transform_point3(*p).floor();
+    // A sample on the surface speaks for both sides of it, whichever of them its cell's centre is on.
+    let half = frame.world_from_grid.matrix3.x_axis.length() * 0.5;
+    let sides = samples.iter().flat_map(|&p| {
+        let step = field.value_gradient(p).1.normalize_or_zero() * half;
+        [p, p - step, p + step]
+    });
+    for p in sides {
+        let q = grid_from_world.transform_point3(p).floor();
         let within = q.cmpge(DVec3::ZERO).all() && q.x < nx as f64 && q.y < ny as f64 && q.z < nz as f64;
         if within {
             has_sample[index(q.x as usize, q.y as usize, q.z as usize)] = true;

@@ -92,8 +92,15 @@ pub fn run(args: &Args) -> Outcome {
         ));
     }
     notes.extend(measured.unsupported.iter().map(|c| {
-        let what = if c.is_inside { "piece of the solid" } else { "cavity" };
-        format!("a {what} of {} cells of 1/{COMPONENT_CELLS} round {} holds no sample", c.cell_count, c.at)
+        let what = if c.is_inside {
+            "piece of the solid"
+        } else {
+            "cavity"
+        };
+        format!(
+            "a {what} of {} cells of 1/{COMPONENT_CELLS} round {} holds no sample",
+            c.cell_count, c.at
+        )
     }));
     Summary {
         input_count: Some(measured.count),
@@ -148,7 +155,7 @@ const COMPONENT_CELLS: u32 = 128;
 /// Components that no sample speaks for. A single cell may be a corner of the surface between two nodes.
 fn unsupported(open: &OpenField, samples: &[DVec3]) -> Vec<UnsupportedComponent> {
     let frame = open.frame_of_resolution(COMPONENT_CELLS);
-    let mut components = unsupported_components(open.field(), open.iso(), &frame, samples);
+    let mut components = unsupported_components(open.field(), 0.0, &frame, samples);
     components.retain(|c| c.cell_count > 1);
     components
 }

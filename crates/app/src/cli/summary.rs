@@ -145,7 +145,10 @@ impl Summary {
                 "unprojected points",
                 self.unprojected.filter(|n| *n > 0).map(count),
             ),
-            ("parts without samples", self.unsupported_components.filter(|n| *n > 0).map(count)),
+            (
+                "parts without samples",
+                self.unsupported_components.filter(|n| *n > 0).map(count),
+            ),
             ("leaves", self.leaves.map(count)),
             ("  over tolerance", self.leaves_over_tolerance.map(count)),
             ("  refused for lack of data", self.leaves_without_data.map(count)),
