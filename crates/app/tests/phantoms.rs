@@ -127,7 +127,7 @@ fn gyroid() {
         solid: Solid::Gyroid,
         rms: 5e-4,
         p95: 6e-4,
-        mesh: 4e-3,
+        mesh: 2.5e-3,
         genus: 13,
     });
 }
