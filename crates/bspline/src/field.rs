@@ -153,4 +153,11 @@ pub trait Field: Send + Sync {
     fn frame_bounds(&self, frame: &Frame, lo: [i64; 3], hi: [i64; 3]) -> Interval {
         self.bounds(&frame.world_box(lo, hi))
     }
+
+    /// [`Field::frame_bounds`] for a caller who only asks whether all of the cells lie on one side of `level`
+    /// (`hi <= level` or `lo > level`): sound, but wider wherever that changes no answer and is cheaper.
+    fn frame_bounds_about(&self, frame: &Frame, lo: [i64; 3], hi: [i64; 3], level: f64) -> Interval {
+        let _ = level;
+        self.frame_bounds(frame, lo, hi)
+    }
 }

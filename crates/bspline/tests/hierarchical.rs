@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use bspline::hierarchical::{BrickKey, Corrections, Lattice, LevelCorrections};
-use bspline::{Aabb, Field, Frame, HierarchicalSpline, Real};
+use bspline::{Aabb, Field, Frame, HierarchicalSpline, Interval, Real};
 use common::{Options, field_conformance};
 use glam::{DAffine3, DMat3, DVec3};
 
@@ -63,7 +63,7 @@ fn random_spline<T: Real>(seed: u64, map: DAffine3, cells: [u32; 3]) -> Hierarch
                 }
             }
         } else {
-            for _ in 0..200 / level {
+            for _ in 0..300 - 100 * level {
                 let s = n.map(|n| (rng.next() * (n + 3) as f64) as u32);
                 set(&mut bricks, s, (2.0 * rng.next() - 1.0) * 0.5);
             }
@@ -340,4 +340,33 @@ fn bounds_of_boxes_along_the_knots_read_their_own_cells_only() {
             }
         }
     }
+}
+
+#[test]
+fn bounds_about_a_level_answer_like_the_bounds() {
+    let side = |b: Interval, c: f64| (b.hi <= c, b.lo > c);
+    let (mut told, mut asked) = (0, 0);
+    for seed in 0..3 {
+        let f = random_spline::<f32>(seed, DAffine3::from_scale(DVec3::new(1.0, 2.0, 0.5)), [5, 4, 9]);
+        // Reaches over the lattice's box on all sides, at an offset of its own.
+        let region = f.lattice().world_box();
+        let frame = Frame::over(&Aabb::new(region.min - 0.37, region.max + 0.41), [60; 3]);
+        let mut rng = Lcg(seed);
+        for _ in 0..4000 {
+            let size = 1.0 + 30.0 * rng.next().powi(4);
+            let lo: [i64; 3] = std::array::from_fn(|_| (rng.next() * (60.0 - size)) as i64);
+            let hi = lo.map(|x| x + size as i64);
+            let level = 2.0 * (2.0 * rng.next() - 1.0);
+            let full = side(f.frame_bounds(&frame, lo, hi), level);
+            let quick = side(f.frame_bounds_about(&frame, lo, hi, level), level);
+            assert!(
+                quick == full || quick == (false, false),
+                "{lo:?} {hi:?} {level}: {quick:?} {full:?}"
+            );
+            told += (quick != (false, false)) as u32;
+            asked += (full != (false, false)) as u32;
+        }
+    }
+    // Only rounding may lose an answer.
+    assert!(asked > 4000 && told + 10 >= asked, "{told} of {asked}");
 }

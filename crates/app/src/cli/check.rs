@@ -99,7 +99,8 @@ pub fn run(args: &Args) -> Outcome {
         };
         format!(
             "a {what} of {} cells of 1/{COMPONENT_CELLS} round {} holds no sample",
-            c.cell_count, c.at
+            c.cells.len(),
+            c.at
         )
     }));
     Summary {
@@ -155,8 +156,14 @@ const COMPONENT_CELLS: u32 = 128;
 /// Components that no sample speaks for. A single cell may be a corner of the surface between two nodes.
 fn unsupported(open: &OpenField, samples: &[DVec3]) -> Vec<UnsupportedComponent> {
     let frame = open.frame_of_resolution(COMPONENT_CELLS);
-    let mut components = unsupported_components(open.field(), 0.0, &frame, samples);
-    components.retain(|c| c.cell_count > 1);
+    // A sample on the surface speaks for both sides of it, whichever of them the centre of its cell is on.
+    let half = frame.world_from_grid.matrix3.x_axis.length() * 0.5;
+    let sides = samples.iter().flat_map(|&p| {
+        let step = open.field().value_gradient(p).1.normalize_or_zero() * half;
+        [p, p - step, p + step]
+    });
+    let mut components = unsupported_components(open.field(), 0.0, &frame, sides);
+    components.retain(|c| c.cells.len() > 1);
     components
 }
 
@@ -248,7 +255,7 @@ fn write_report(
         "stated_by_the_fit": { "rms": report.rms, "p95": report.p95, "max": report.max, "bound": report.bound },
         "leaves": audit,
         "components_without_samples": measured.unsupported.iter().map(|c| json!({
-            "inside": c.is_inside, "cells": c.cell_count, "at": c.at.to_array(),
+            "inside": c.is_inside, "cells": c.cells.len(), "at": c.at.to_array(),
         })).collect::<Vec<_>>(),
         "error_ply": { "points": measured.positions.len(), "violet": 0.0, "yellow": full_scale },
         "octree_ply": { "boxes": "edges of the leaves with samples, violet coarse to yellow fine; red: above the \

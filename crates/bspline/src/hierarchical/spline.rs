@@ -267,7 +267,7 @@ impl<T: Real> Field for HierarchicalSpline<T> {
     }
 
     fn bounds(&self, b: &Aabb) -> Interval {
-        bounds::over_lattice_box(self, &b.transformed(&self.lattice_from_world))
+        bounds::over_lattice_box(self, &b.transformed(&self.lattice_from_world), None)
     }
 
     fn frame_values(&self, frame: &Frame, lo: [i64; 3], count: [usize; 3], out: &mut [f64]) {
@@ -275,6 +275,10 @@ impl<T: Real> Field for HierarchicalSpline<T> {
     }
 
     fn frame_bounds(&self, frame: &Frame, lo: [i64; 3], hi: [i64; 3]) -> Interval {
-        bounds::over_lattice_box(self, &grid::lattice_box(self, frame, lo, hi))
+        bounds::over_lattice_box(self, &grid::lattice_box(self, frame, lo, hi), None)
+    }
+
+    fn frame_bounds_about(&self, frame: &Frame, lo: [i64; 3], hi: [i64; 3], level: f64) -> Interval {
+        bounds::over_lattice_box(self, &grid::lattice_box(self, frame, lo, hi), Some(level))
     }
 }

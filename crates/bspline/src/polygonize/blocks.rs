@@ -112,7 +112,7 @@ impl Octant {
 
     /// Whether a node of it may be inside and another outside. An unknown bound (NaN) excludes nothing.
     fn may_hold_surface(&self, field: &dyn Field, frame: &Frame, iso: f64) -> bool {
-        let bounds = field.frame_bounds(frame, self.lo, self.hi);
+        let bounds = field.frame_bounds_about(frame, self.lo, self.hi, iso);
         let all_outside = bounds.hi <= iso;
         let all_inside = bounds.lo > iso && !self.reaches_beyond;
         !(all_outside || all_inside)

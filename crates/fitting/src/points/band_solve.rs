@@ -21,6 +21,8 @@ const CHUNK: usize = 32;
 pub(crate) struct BandSample<T> {
     pub spot: Spot<T>,
     pub weight: T,
+    /// Weight of the gradient condition: `weight`, or 0 for a condition on the value alone.
+    pub gradient_weight: T,
     /// Value asked for.
     pub target: T,
     /// Outward unit normal.
@@ -137,8 +139,8 @@ impl<'a, T: Real> BandProblem<'a, T> {
     fn apply(&self, dense: &[T], scratch: &mut Scratch<T>) -> Vec<T> {
         let gw = self.gradient_weight();
         self.data_halos(dense, &mut scratch.halos, |sample, v, g, out| {
-            let w = sample.weight;
-            scatter(out, sample.spot, STRIDES, w * v, g.map(|g| w * gw * g));
+            let slope = sample.gradient_weight * gw;
+            scatter(out, sample.spot, STRIDES, sample.weight * v, g.map(|g| slope * g));
         });
         self.laplacians(dense, &mut scratch.laplacians);
         self.gathered(scratch, T::one())
@@ -150,9 +152,15 @@ impl<'a, T: Real> BandProblem<'a, T> {
         let h = T::from_f64(0.5f64.powi(self.band.depth as i32));
         let mut scratch = Scratch::default();
         self.data_halos(&self.band.totals, &mut scratch.halos, |sample, v, g, out| {
-            let w = sample.weight;
-            let miss = std::array::from_fn(|a| w * gw * (g[a] + h * sample.normal[a]));
-            scatter(out, sample.spot, STRIDES, w * (v - sample.target), miss);
+            let slope = sample.gradient_weight * gw;
+            let miss = std::array::from_fn(|a| slope * (g[a] + h * sample.normal[a]));
+            scatter(
+                out,
+                sample.spot,
+                STRIDES,
+                sample.weight * (v - sample.target),
+                miss,
+            );
         });
         self.laplacians(&self.band.totals, &mut scratch.laplacians);
         self.gathered(&scratch, -T::one())
@@ -244,8 +252,13 @@ impl<'a, T: Real> BandProblem<'a, T> {
         let gw = self.gradient_weight();
         let mut scratch = Scratch::default();
         self.data_halos(&self.band.totals, &mut scratch.halos, |sample, _, _, out| {
-            let w = sample.weight;
-            scatter_squares(out, sample.spot, STRIDES, w, [w * gw; 3]);
+            scatter_squares(
+                out,
+                sample.spot,
+                STRIDES,
+                sample.weight,
+                [sample.gradient_weight * gw; 3],
+            );
         });
         scratch.laplacians.resize(self.band.totals.len(), T::zero());
         let mut diagonal = self.gathered(&scratch, T::one());

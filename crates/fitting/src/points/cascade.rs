@@ -251,18 +251,22 @@ fn band_samples<T: Real>(
         for i in (cell.start..cell.end).step_by(stride as usize) {
             let q = samples.positions[i as usize] * n;
             let t = std::array::from_fn(|a| T::from_f64(q[a] - cell.at[a] as f64));
+            let i = i as usize;
             let (target, normal) = match &plan.probe {
-                None => (
-                    T::zero(),
-                    samples.normals[i as usize].map(|c| T::from_f64(c as f64)),
-                ),
-                Some(probe) => (T::from_f64(probe[i as usize] as f64), [T::zero(); 3]),
+                None => (samples.targets[i], samples.normals[i]),
+                Some(probe) => (probe[i], [0.0; 3]),
+            };
+            let gradient_weight = if samples.is_sign_condition(i) {
+                T::zero()
+            } else {
+                weight
             };
             list.push(BandSample {
                 spot: Spot { start, t },
                 weight,
-                target,
-                normal,
+                gradient_weight,
+                target: T::from_f64(target as f64),
+                normal: normal.map(|c| T::from_f64(c as f64)),
             });
             owners.push(index as u32);
         }
@@ -308,7 +312,7 @@ fn cell_quality<T: Real>(
             let (v, g) = gather(&values, sample.spot, [HALO * HALO, HALO]);
             let g = g.map(|g| g.as_f64() * n);
             let steepness: f64 = g.iter().map(|g| g * g).sum();
-            let w = sample.weight.as_f64();
+            let w = sample.gradient_weight.as_f64();
             let q = &mut out[owners[i] as usize];
             q.weight += w;
             q.distance += w * v.as_f64().powi(2) / steepness.max(1e-4);

@@ -6,6 +6,7 @@ mod cascade;
 mod clusters;
 mod coarse;
 mod cross_validation;
+mod far_field;
 mod full_grid;
 mod noise;
 mod plan;
@@ -34,6 +35,9 @@ pub struct PointOptions {
     pub smoothing: Option<f64>,
 }
 
+/// Rounds of conditions against pieces that no sample speaks for.
+const REPAIR_ROUNDS: usize = 3;
+
 /// Fits a signed distance, positive inside, to points with outward normals.
 ///
 /// # Errors
@@ -44,42 +48,36 @@ pub fn fit_points<T: Real>(
     control: &mut Control,
 ) -> Result<(HierarchicalSpline<T>, FitReport), FitError> {
     control.step("sorting points", 0.0)?;
-    let samples = Samples::prepare(*cloud)?;
+    let mut samples = Samples::prepare(*cloud)?;
     let tolerance = options.tolerance.unwrap_or(1e-4 * samples.diagonal) / samples.scale;
     let noise = match options.smoothing {
         None => noise::estimate(&samples, tolerance),
         Some(_) => None,
     };
     let mut plan = Plan::new(&samples, options, tolerance, noise);
-    let trace = std::env::var_os("TRACE").is_some();
-    let t0 = std::time::Instant::now();
     control.step("fitting coarse levels", 0.05)?;
     let base = coarse::solve(&samples, plan.beta);
-    if trace {
-        eprintln!("coarse {:?}", t0.elapsed());
-    }
     if let Some(sigma) = noise {
         let mu = cross_validation::choose::<T>(&samples, &base, &plan, sigma, control)?;
         plan.smoothing = Smoothing::Halving(mu);
     }
-    let cascade = cascade::run::<T>(&samples, &base, &plan, control)?;
-    if trace {
-        eprintln!("cascade {:?} {:?}", t0.elapsed(), cascade.iterations);
-    }
-    control.step("building the field", 0.9)?;
-    let field = cascade::assemble(&samples, &base, &cascade.levels);
-    if trace {
-        eprintln!(
-            "assemble {:?} bricks {} coefs {}",
-            t0.elapsed(),
-            field.brick_count(),
-            field.coefficient_count()
-        );
-    }
+    let mut rounds = 0;
+    let (cascade, field) = loop {
+        let cascade = cascade::run::<T>(&samples, &base, &plan, control)?;
+        control.step("building the field", 0.9)?;
+        let field = cascade::assemble(&samples, &base, &cascade.levels);
+        let conditions = far_field::conditions(&field, &samples);
+        if conditions.is_empty() || rounds == REPAIR_ROUNDS {
+            break (cascade, field);
+        }
+        rounds += 1;
+        samples = samples.with_sign_conditions(&conditions);
+        samples.notes.push(format!(
+            "{} cells whose sign no sample speaks for were turned over (round {rounds})",
+            conditions.len()
+        ));
+    };
     control.step("measuring", 0.95)?;
     let report = residual::report(&field, &samples, &cascade, cloud.positions.len(), &plan, noise);
-    if trace {
-        eprintln!("report {:?}", t0.elapsed());
-    }
     Ok((field, report))
 }

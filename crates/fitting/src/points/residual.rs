@@ -42,25 +42,26 @@ pub(crate) fn report<T: Real>(
     plan: &Plan,
     noise: Option<f64>,
 ) -> FitReport {
-    let measured: Vec<(f64, f64)> = samples
-        .positions
-        .par_iter()
+    let measured: Vec<Option<(f64, f64)>> = (0..samples.positions.len())
+        .into_par_iter()
         .with_min_len(4096)
-        .map(|u| newton_distance(field, samples.origin + *u * samples.scale))
+        .map(|i| (!samples.is_sign_condition(i)).then(|| newton_distance(field, samples.world(i))))
         .collect();
     let leaves = cascade.leaves.iter().map(|leaf| {
-        let part = &measured[leaf.start as usize..leaf.end as usize];
-        let square: f64 = part.iter().map(|m| m.0 * m.0).sum();
+        let part = measured[leaf.start as usize..leaf.end as usize].iter().flatten();
+        let (count, square, max) = part.fold((0u32, 0.0, 0.0f64), |(n, s, m), d| {
+            (n + 1, s + d.0 * d.0, m.max(d.0))
+        });
         Leaf {
             level: (leaf.depth - super::samples::BASE_DEPTH) as u8,
             cell: leaf.at,
-            sample_count: part.len() as u32,
-            rms: (square / part.len() as f64).sqrt() as f32,
-            max: part.iter().map(|m| m.0).fold(0.0, f64::max) as f32,
+            sample_count: count,
+            rms: (square / f64::from(count.max(1))).sqrt() as f32,
+            max: max as f32,
             reason: leaf.reason,
         }
     });
-    let mut distances: Vec<f64> = measured.iter().map(|m| m.0).collect();
+    let mut distances: Vec<f64> = measured.iter().flatten().map(|m| m.0).collect();
     let count = distances.len();
     let rms = (distances.iter().map(|d| d * d).sum::<f64>() / count as f64).sqrt();
     let max = distances.iter().copied().fold(0.0, f64::max);
@@ -75,7 +76,7 @@ pub(crate) fn report<T: Real>(
         rms,
         p95,
         max,
-        bound: measured.iter().map(|m| m.1).fold(0.0, f64::max) + field.rounding_bound(),
+        bound: measured.iter().flatten().map(|m| m.1).fold(0.0, f64::max) + field.rounding_bound(),
         noise: noise.map(|sigma| sigma * samples.scale),
         tolerance: plan.tolerance * samples.scale,
         smoothing: match plan.smoothing {

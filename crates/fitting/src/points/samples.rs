@@ -45,8 +45,10 @@ const OUTLIER_SHARE: f64 = 1e-3;
 pub(crate) struct Samples {
     /// Positions in the unit box.
     pub positions: Vec<DVec3>,
-    /// Outward unit normals.
+    /// Outward unit normals; zero for a sign condition.
     pub normals: Vec<[f32; 3]>,
+    /// Values asked for, unit box: 0, but for sign conditions.
+    pub targets: Vec<f32>,
     /// Edge of the (cubic) box in world units.
     pub scale: f64,
     /// Corner of the box in world units.
@@ -127,9 +129,11 @@ impl Samples {
             .collect();
         let unit = |n: DVec3| (n / n.abs().max_element()).normalize().as_vec3().to_array();
         let normals = keyed.iter().map(|k| unit(cloud.normals[k.1 as usize])).collect();
+        let targets = vec![0.0; keyed.len()];
         Ok(Self {
             positions,
             normals,
+            targets,
             scale,
             origin,
             diagonal: size.length(),
@@ -147,6 +151,52 @@ impl Samples {
             },
             cells: [cells; 3],
         }
+    }
+
+    /// Whether sample `index` is a condition on the sign of the field away from the surface, not a point of it.
+    pub fn is_sign_condition(&self, index: usize) -> bool {
+        self.targets[index] != 0.0
+    }
+
+    /// Indices of the points of the cloud.
+    pub fn points(&self) -> impl Iterator<Item = usize> {
+        (0..self.positions.len()).filter(|&i| !self.is_sign_condition(i))
+    }
+
+    /// World position of a sample.
+    pub fn world(&self, index: usize) -> DVec3 {
+        self.origin + self.positions[index] * self.scale
+    }
+
+    /// The same samples with conditions `f(x) = d` (unit box) added, in Morton order.
+    pub fn with_sign_conditions(&self, conditions: &[(DVec3, f32)]) -> Self {
+        let mut keyed: Vec<(u64, usize)> = self
+            .positions
+            .iter()
+            .chain(conditions.iter().map(|c| &c.0))
+            .map(|p| morton(*p))
+            .zip(0..)
+            .collect();
+        keyed.sort_unstable();
+        let n = self.positions.len();
+        let pick = |i: usize| match i.checked_sub(n) {
+            None => (self.positions[i], self.normals[i], self.targets[i]),
+            Some(c) => (conditions[c].0, [0.0; 3], conditions[c].1),
+        };
+        let mut out = Self {
+            positions: Vec::with_capacity(keyed.len()),
+            normals: Vec::with_capacity(keyed.len()),
+            targets: Vec::with_capacity(keyed.len()),
+            notes: self.notes.clone(),
+            ..*self
+        };
+        for (_, i) in keyed {
+            let (position, normal, target) = pick(i);
+            out.positions.push(position);
+            out.normals.push(normal);
+            out.targets.push(target);
+        }
+        out
     }
 
     /// Mean spacing `√(area/N)` of the samples, unit box.

@@ -4,7 +4,7 @@ use bspline::Real;
 use bspline::hierarchical::{BRICK_LEN, HALO_LEN, HierarchicalSpline, Lattice, LevelCorrections};
 use glam::{DAffine3, DVec3};
 
-use super::active::{ActiveSet, Packed};
+use super::active::ActiveSet;
 use super::adaptive::Adaptive;
 use super::assemble::{full_bricks, sparse_bricks};
 use super::axis::Axis;

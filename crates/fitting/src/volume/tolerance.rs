@@ -12,18 +12,24 @@ use super::select::{Cutoff, largest};
 use crate::{Control, FitError};
 
 /// A function is taken in the first place if its score exceeds this multiple of the tolerance.
-const FIRST_THRESHOLD: f64 = 1.6;
+const FIRST_THRESHOLD: f64 = 2.4;
 /// Iterations of the two solves before leaves are looked at, and of those after.
 const ITERATIONS: [usize; 3] = [12, 12, 8];
 /// Rounds of additions to leaves above the tolerance.
 const ROUNDS: usize = 24;
 /// From this round on a failing leaf and its neighbours get all their functions.
-const GENEROUS_ROUND: usize = 5;
+const GENEROUS_ROUND: usize = 10;
 /// Share of the tolerance that additions to a leaf aim at.
-const AIM: f64 = 0.75;
+const AIM: f64 = 0.6;
+/// Factor on it from round to round: the few leaves that resist get ever more.
+const LATER_AIM: f64 = 0.7;
 /// Leaves are held to this share of the tolerance, so that rounding of the stored coefficients cannot
 /// lift one above it.
 const MARGIN: f64 = 0.999;
+
+/// While any leaf is above the tolerance, leaves above this share of it get functions too: the additions
+/// next door may lift them.
+const CAUTION: f64 = 0.95;
 
 /// What ended a fit to a tolerance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,12 +87,14 @@ impl<T: Real> Adaptive<'_, T> {
             if !failing.contains(&true) {
                 return Ok(Outcome::Met);
             }
+            let failing: Vec<bool> = leaves.iter().map(|l| l.rms() > CAUTION * tolerance).collect();
             if self.depth() == 0 {
                 break;
             }
             let generous = round >= GENEROUS_ROUND;
+            let aim = AIM * LATER_AIM.powi(round as i32) * tolerance;
             let free = budget.saturating_sub(self.fit.count());
-            let mut picked = self.pick(grid, &leaves, &failing, tolerance, generous);
+            let mut picked = self.pick(grid, &leaves, &failing, aim, generous);
             let spent = picked.len() > free;
             if spent {
                 picked.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
@@ -94,7 +102,7 @@ impl<T: Real> Adaptive<'_, T> {
             }
             let none_left = picked.is_empty();
             self.add(picked);
-            let iterations = if generous { 4 * later } else { later };
+            let iterations = if generous { 2 * later } else { later };
             self.solve(iterations, control, (at(round), at(round + 1)))?;
             if spent {
                 return Ok(Outcome::BudgetSpent);
@@ -152,7 +160,7 @@ impl<T: Real> Adaptive<'_, T> {
         grid: LeafGrid,
         leaves: &[LeafResidual],
         failing: &[bool],
-        tolerance: f64,
+        aim: f64,
         generous: bool,
     ) -> Vec<(f64, usize)> {
         let domain = self.domain();
@@ -200,10 +208,10 @@ impl<T: Real> Adaptive<'_, T> {
         let mut picked = Vec::new();
         for of_leaf in offered.chunk_by(|a, b| a.0 == b.0) {
             let total: f64 = of_leaf.iter().map(|o| o.1 * o.1).sum();
-            let aim = AIM * tolerance / leaves[of_leaf[0].0].rms();
+            let share = aim / leaves[of_leaf[0].0].rms();
             let mut left = total;
             for &(_, score, index) in of_leaf {
-                if left <= aim * aim * total {
+                if left <= share * share * total {
                     break;
                 }
                 left -= score * score;

@@ -1,6 +1,6 @@
 //! Chunks: type, compression, lengths, CRC-32, payload.
 
-use std::io::{self, Read, Write};
+use std::io::{self, Write};
 
 use super::cursor::Cursor;
 use crate::Fault;
@@ -91,10 +91,17 @@ impl<'a> Chunk<'a> {
         let raw = match self.method {
             STORED => self.payload.to_vec(),
             ZSTD => {
-                // Read up to what was booked, so that a stream longer than it says is seen, not held.
-                let mut raw = Vec::with_capacity(self.raw_length.min(1 << 24) as usize);
-                zstd::stream::read::Decoder::with_buffer(self.payload)
-                    .and_then(|d| d.take(self.raw_length + 1).read_to_end(&mut raw))
+                // In one go into what was booked: a stream longer than it says fails, and no window of the
+                // stream's own choice is allocated.
+                let mut raw = Vec::new();
+                raw.try_reserve_exact(self.raw_length as usize)
+                    .map_err(|_| Fault::Limit {
+                        what: "an unpacked chunk",
+                        needed: self.raw_length,
+                        limit: budget.left(),
+                    })?;
+                zstd::bulk::Decompressor::new()
+                    .and_then(|mut d| d.decompress_to_buffer(self.payload, &mut raw))
                     .map_err(|e| Fault::Damaged {
                         what: format!("chunk {} cannot be unpacked ({e})", excerpt(&self.kind)),
                     })?;

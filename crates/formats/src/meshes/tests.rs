@@ -19,7 +19,7 @@ fn bytes(mesh: &Mesh, format: MeshFormat) -> Vec<u8> {
 #[test]
 fn ply_and_obj_come_back_through_the_readers() {
     let (vertices, triangles) = tetrahedron(DVec3::new(0.1, 0.25, -3.0));
-    let colors = vec![[1, 2, 3]; 4];
+    let colors = [[1, 2, 3]; 4];
     for colors in [None, Some(&colors[..])] {
         let mesh = Mesh {
             vertices: &vertices,

@@ -90,11 +90,15 @@ fn qform(t: &Transforms) -> Option<DAffine3> {
     })
 }
 
-/// Finite, with axes of some length that do not lie in one plane.
+/// Lengths and offsets between 1 / this and this: products of three and their inverses stay finite.
+const LARGEST: f64 = 1e60;
+
+/// Finite, with axes of some length that do not lie in one plane: the inverse exists and is finite.
 pub(crate) fn is_usable(a: &DAffine3) -> bool {
     let m = a.matrix3;
     let lengths = [m.x_axis, m.y_axis, m.z_axis].map(DVec3::length);
-    if !a.is_finite() || lengths.iter().any(|l| !(l.is_finite() && *l > 1e-100)) {
+    let is_sane = |l: &f64| (1.0 / LARGEST..=LARGEST).contains(l);
+    if !a.is_finite() || !lengths.iter().all(is_sane) || a.translation.abs().max_element() > LARGEST {
         return false;
     }
     let unit = DMat3::from_cols(
@@ -148,6 +152,26 @@ mod tests {
             (DVec3::new(2.0, 30.0, 400.0), Orientation::Spacings)
         );
         assert_eq!(notes.len(), 1);
+    }
+
+    #[test]
+    fn every_usable_map_has_a_finite_inverse() {
+        for (scale, offset, expected) in [
+            (1e59, 1e59, true),
+            (1e-59, 1e59, true),
+            (1e61, 0.0, false),
+            (1e-61, 0.0, false),
+            (1.0, 1e61, false),
+            (f64::NAN, 0.0, false),
+            (0.0, 0.0, false),
+        ] {
+            let a = DAffine3 {
+                matrix3: DMat3::from_diagonal(DVec3::splat(scale)),
+                translation: DVec3::splat(offset),
+            };
+            assert_eq!(is_usable(&a), expected, "{scale} {offset}");
+            assert!(!expected || a.inverse().is_finite(), "{scale} {offset}");
+        }
     }
 
     #[test]
