@@ -370,3 +370,66 @@ fn bounds_about_a_level_answer_like_the_bounds() {
     // Only rounding may lose an answer.
     assert!(asked > 4000 && told + 10 >= asked, "{told} of {asked}");
 }
+
+#[test]
+fn batches_have_the_bits_of_single_points_in_any_order() {
+    for seed in 0..5 {
+        let f = random_spline::<f32>(seed, oblique(), [9, 6, 17]);
+        let mut rng = Lcg(100 + seed);
+        // Over the box on all sides, and crowded, so that neighbours share bricks of all levels.
+        let points: Vec<DVec3> = (0..4000)
+            .map(|i| {
+                let q = rng.point(DVec3::splat(-2.0), f.lattice().extent() + 2.0);
+                let q = if i % 2 == 0 { q.floor() } else { q };
+                f.lattice().world_from_lattice.transform_point3(q)
+            })
+            .collect();
+        let order = f.evaluation_order(&points);
+        let mut seen = order.clone();
+        seen.sort_unstable();
+        assert!(
+            seen.iter().copied().eq(0..points.len() as u32),
+            "not a permutation"
+        );
+        let sorted: Vec<DVec3> = order.iter().map(|&i| points[i as usize]).collect();
+        for batch in [points, sorted] {
+            let mut out = vec![(0.0, DVec3::ZERO); batch.len()];
+            f.values_gradients(&batch, &mut out);
+            for (p, (v, g)) in batch.iter().zip(out) {
+                let (value, gradient) = f.value_gradient(*p);
+                assert_eq!(v.to_bits(), value.to_bits(), "{p}");
+                assert_eq!(
+                    g.to_array().map(f64::to_bits),
+                    gradient.to_array().map(f64::to_bits)
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn evaluation_order_keeps_the_points_of_a_cell_together() {
+    let f = random_spline::<f64>(31, DAffine3::IDENTITY, [9, 6, 17]);
+    let mut rng = Lcg(32);
+    // Finest cells are a quarter wide; four points in the middle of each of 500, far from each other in the list.
+    let middles: Vec<DVec3> = (0..500)
+        .map(|_| (rng.point(DVec3::ZERO, f.lattice().extent()) * 4.0).floor() / 4.0 + 0.125)
+        .collect();
+    let points: Vec<DVec3> = (0..4).flat_map(|_| middles.iter().copied()).collect();
+    let order = f.evaluation_order(&points);
+    let runs = order
+        .chunk_by(|&i, &j| points[i as usize] == points[j as usize])
+        .count();
+    let mut distinct: Vec<[u64; 3]> = middles.iter().map(|m| m.to_array().map(f64::to_bits)).collect();
+    distinct.sort_unstable();
+    distinct.dedup();
+    // A cell of a coarser level holds several of the middles, in the order of the list.
+    assert!(
+        runs <= distinct.len() * 2,
+        "{runs} runs of {} places",
+        distinct.len()
+    );
+    for same in order.chunk_by(|&i, &j| points[i as usize] == points[j as usize]) {
+        assert!(same.is_sorted(), "points of one cell keep their order");
+    }
+}

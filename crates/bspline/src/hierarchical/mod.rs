@@ -1,5 +1,6 @@
 //! Dyadic levels of uniform cubic B-splines whose active functions are chosen one by one.
 
+mod batch;
 mod bounds;
 mod brick;
 mod build;

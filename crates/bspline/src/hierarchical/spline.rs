@@ -6,7 +6,7 @@ use sha2::{Digest, Sha256};
 
 use super::brick::{BRICK, Brick, HALO_LEN, NONE};
 use super::build::build_levels;
-use super::{BrickKey, Corrections, Lattice, bounds, grid, kernel};
+use super::{BrickKey, Corrections, Lattice, batch, bounds, grid, kernel};
 use crate::{Aabb, Field, Frame, Interval, Jet, Real};
 
 /// The stored part of a level: bricks with active functions, in key order.
@@ -31,6 +31,8 @@ pub struct HierarchicalSpline<T> {
 pub(super) struct Place<'a, T> {
     pub brick: &'a Brick<T>,
     pub level: usize,
+    /// Place of the brick among those of its level.
+    pub index: u32,
     pub cell: [usize; 3],
     pub t: [T; 3],
 }
@@ -152,37 +154,57 @@ impl<T: Real> HierarchicalSpline<T> {
     /// Where lattice point `q`, inside the box, is evaluated: in the finest brick that covers it.
     #[inline]
     pub(super) fn place(&self, q: DVec3) -> Place<'_, T> {
+        self.place_after(None, q)
+    }
+
+    /// [`Self::place`], without the way down from the coarsest level if `q` lies in the same brick as `last`.
+    #[inline]
+    pub(super) fn place_after<'a>(&'a self, last: Option<&Place<'a, T>>, q: DVec3) -> Place<'a, T> {
         let finest = self.levels.len() - 1;
         let limit = self.lattice.cells_at(finest);
         let scaled = q * (1u64 << finest) as f64;
         let cell: [u32; 3] = std::array::from_fn(|a| (scaled[a] as u32).min(limit[a] - 1));
-        let (brick, level) = self.brick_of(cell);
+        let (level, index) = match last {
+            Some(last) if self.is_finest_over(last, cell) => (last.level, last.index),
+            _ => self.brick_of(cell),
+        };
         let shift = finest - level;
         let scale = (1u64 << level) as f64;
         Place {
-            brick,
+            brick: &self.levels[level][index as usize],
             level,
+            index,
             cell: cell.map(|c| (c >> shift) as usize % BRICK),
             t: std::array::from_fn(|a| T::from_f64(q[a] * scale - (cell[a] >> shift) as f64)),
         }
     }
 
-    /// The finest brick over a cell of the finest level, and its level.
+    /// Whether the brick of `place` is the one that evaluates a cell of the finest level.
     #[inline]
-    fn brick_of(&self, cell: [u32; 3]) -> (&Brick<T>, usize) {
+    fn is_finest_over(&self, place: &Place<'_, T>, cell: [u32; 3]) -> bool {
+        let shift = self.levels.len() - 1 - place.level;
+        let key = cell.map(|c| c >> shift >> BRICK.ilog2());
+        if key != place.brick.key.0 {
+            return false;
+        }
+        shift == 0 || place.brick.children[octant(cell, shift - 1)] == NONE
+    }
+
+    /// The finest brick over a cell of the finest level: its level and its index there.
+    #[inline]
+    fn brick_of(&self, cell: [u32; 3]) -> (usize, u32) {
         let finest = self.levels.len() - 1;
         let counts = self.lattice.cells.map(|n| n.div_ceil(BRICK as u32));
         let b: [u32; 3] = cell.map(|c| c >> (finest + 3));
-        let mut brick = &self.levels[0][((b[0] * counts[1] + b[1]) * counts[2] + b[2]) as usize];
+        let mut index = (b[0] * counts[1] + b[1]) * counts[2] + b[2];
         for level in 1..=finest {
-            let o = cell.map(|c| c >> (finest - level + 3) & 1);
-            let child = brick.children[(4 * o[0] + 2 * o[1] + o[2]) as usize];
+            let child = self.levels[level - 1][index as usize].children[octant(cell, finest - level)];
             if child == NONE {
-                return (brick, level - 1);
+                return (level - 1, index);
             }
-            brick = &self.levels[level][child as usize];
+            index = child;
         }
-        (brick, finest)
+        (finest, index)
     }
 
     /// Lattice coordinates of `p`, clamped to the box, and the clamped-off part in world units.
@@ -206,7 +228,7 @@ impl<T: Real> HierarchicalSpline<T> {
 
     /// Adds the linear fall outside the box to what was found at the clamped point.
     #[inline]
-    fn extend_outside(&self, inside: (f64, DVec3), q: DVec3, beyond: DVec3) -> (f64, DVec3) {
+    pub(super) fn extend_outside(&self, inside: (f64, DVec3), q: DVec3, beyond: DVec3) -> (f64, DVec3) {
         let distance = beyond.length();
         if distance == 0.0 {
             return inside;
@@ -223,6 +245,13 @@ impl<T: Real> HierarchicalSpline<T> {
             follow.transpose() * inside.1 - self.slope * away,
         )
     }
+}
+
+/// Which child holds a cell of the finest level, `shift` levels above it.
+#[inline]
+fn octant(cell: [u32; 3], shift: usize) -> usize {
+    let o = cell.map(|c| (c >> shift >> BRICK.ilog2() & 1) as usize);
+    4 * o[0] + 2 * o[1] + o[2]
 }
 
 impl<T: Real> Field for HierarchicalSpline<T> {
@@ -268,6 +297,10 @@ impl<T: Real> Field for HierarchicalSpline<T> {
 
     fn bounds(&self, b: &Aabb) -> Interval {
         bounds::over_lattice_box(self, &b.transformed(&self.lattice_from_world), None)
+    }
+
+    fn values_gradients(&self, points: &[DVec3], out: &mut [(f64, DVec3)]) {
+        batch::values_gradients(self, points, out);
     }
 
     fn frame_values(&self, frame: &Frame, lo: [i64; 3], count: [usize; 3], out: &mut [f64]) {

@@ -1,0 +1,52 @@
+//! Many points at once: the way down the tree of bricks is saved where the next point lies in the same brick.
+
+use glam::DVec3;
+
+use super::HierarchicalSpline;
+use super::brick::BRICK;
+use super::kernel;
+use crate::Real;
+
+impl<T: Real> HierarchicalSpline<T> {
+    /// The order of `points` by the level, the brick and the cell that evaluate them, as indices into `points`.
+    ///
+    /// Asked in this order, [`values_gradients`](crate::Field::values_gradients) reads each brick once. Points of
+    /// one cell keep their order.
+    ///
+    /// # Panics
+    /// If there are more than `u32::MAX` points.
+    pub fn evaluation_order(&self, points: &[DVec3]) -> Vec<u32> {
+        assert!(
+            u32::try_from(points.len()).is_ok(),
+            "points are numbered with 32 bits"
+        );
+        let mut last = None;
+        let mut keyed: Vec<(u64, u32)> = Vec::with_capacity(points.len());
+        for (i, p) in points.iter().enumerate() {
+            let at = self.place_after(last.as_ref(), self.clamp(*p).0);
+            let brick = (at.level as u64) << 32 | u64::from(at.index);
+            let cell = (at.cell[0] * BRICK + at.cell[1]) * BRICK + at.cell[2];
+            keyed.push((brick << (3 * BRICK.ilog2()) | cell as u64, i as u32));
+            last = Some(at);
+        }
+        keyed.sort_unstable();
+        keyed.into_iter().map(|(_, i)| i).collect()
+    }
+}
+
+/// Value and gradient of each point, with the bits that the single point would have.
+pub(super) fn values_gradients<T: Real>(
+    f: &HierarchicalSpline<T>,
+    points: &[DVec3],
+    out: &mut [(f64, DVec3)],
+) {
+    assert_eq!(points.len(), out.len(), "one output slot per point");
+    let mut last = None;
+    for (p, o) in points.iter().zip(out) {
+        let (q, beyond) = f.clamp(*p);
+        let at = f.place_after(last.as_ref(), q);
+        let (v, g) = kernel::value_gradient(&at.brick.totals, at.cell, at.t);
+        *o = f.extend_outside((v.as_f64(), f.world_gradient(at.level, g)), q, beyond);
+        last = Some(at);
+    }
+}
