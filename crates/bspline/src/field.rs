@@ -155,7 +155,8 @@ pub trait Field: Send + Sync {
     }
 
     /// [`Field::frame_bounds`] for a caller who only asks whether all of the cells lie on one side of `level`
-    /// (`hi <= level` or `lo > level`): sound, but wider wherever that changes no answer and is cheaper.
+    /// (`hi <= level` or `lo > level`): sound, but wider wherever that is cheaper and, but for rounding,
+    /// changes no answer.
     fn frame_bounds_about(&self, frame: &Frame, lo: [i64; 3], hi: [i64; 3], level: f64) -> Interval {
         let _ = level;
         self.frame_bounds(frame, lo, hi)

@@ -14,6 +14,9 @@ pub enum StopReason {
     Budget = 4,
     /// The memory ceiling was reached.
     Memory = 5,
+    /// The residual was below the tolerance when the cell was looked at, and has been moved above it by the
+    /// refinement of cells beside it.
+    Neighbours = 6,
 }
 
 /// A dyadic cell that was not split, with its own error.

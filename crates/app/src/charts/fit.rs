@@ -16,13 +16,15 @@ pub enum Input {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Sweep {
+    /// No option: what the program chooses.
+    Default,
     /// `--tolerance`, single precision.
     Tolerance,
     /// `--tolerance`, double precision.
     ToleranceDouble,
     /// `--max-depth` with a tolerance that is never met.
     Depth,
-    /// `--smoothing`.
+    /// `--smoothing`, for clouds at `--max-depth 7`.
     Smoothing,
     /// `--method interpolate`, both precisions.
     Interpolate,
@@ -32,6 +34,7 @@ impl Sweep {
     /// Name in the legend.
     fn name(self) -> &'static str {
         match self {
+            Self::Default => "default",
             Self::Tolerance => "tolerance, f32",
             Self::ToleranceDouble => "tolerance, f64",
             Self::Depth => "depth, f32",
@@ -74,6 +77,7 @@ pub fn sweeps(input: Input) -> Vec<Configuration> {
             options,
         });
     };
+    add(Sweep::Default, "default".into(), Vec::new());
     let tolerances: &[&str] = match input {
         Input::Cloud => &["1%", "0.5%", "0.2%", "0.1%", "0.05%", "0.02%", "0.01%", "0.005%"],
         Input::Volume => &["8%", "4%", "2%", "1%", "0.5%", "0.25%"],
@@ -89,7 +93,7 @@ pub fn sweeps(input: Input) -> Vec<Configuration> {
     }
     let (depths, never) = match input {
         Input::Cloud => (6..=10, "0.0001%"),
-        Input::Volume => (2..=6, "0.001%"),
+        Input::Volume => (0..=2, "0.001%"),
     };
     for d in depths {
         add(
@@ -98,8 +102,17 @@ pub fn sweeps(input: Input) -> Vec<Configuration> {
             vec![("--max-depth", d.to_string()), ("--tolerance", never.into())],
         );
     }
-    for mu in ["1e-6", "1e-5", "1e-4", "1e-3", "1e-2"] {
-        add(Sweep::Smoothing, mu.into(), vec![("--smoothing", mu.into())]);
+    // The weight of a cloud acts on the finest level, so that level has to be reached.
+    let (weights, fixed): (&[&str], _) = match input {
+        Input::Cloud => (
+            &["1e-6", "1e-5", "1e-4", "1e-3", "1e-2", "1e-1", "1"],
+            Some(("--max-depth", "7".to_string())),
+        ),
+        Input::Volume => (&["1e-4", "1e-3", "1e-2", "1e-1"], None),
+    };
+    for mu in weights {
+        let options = [("--smoothing", mu.to_string())].into_iter().chain(fixed.clone());
+        add(Sweep::Smoothing, mu.to_string(), options.collect());
     }
     if input == Input::Volume {
         for precision in ["f32", "f64"] {

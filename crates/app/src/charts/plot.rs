@@ -26,6 +26,9 @@ pub struct Chart {
 
 type PlotContext<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
+/// Points lower than this share of the highest are named in the legend instead of drawn.
+const DEPTH: f64 = 1e-5;
+
 /// Colours that the colour-blind tell apart (Okabe & Ito 2008).
 const COLORS: [RGBColor; 6] = [
     RGBColor(0, 114, 178),
@@ -47,21 +50,44 @@ impl Chart {
         Ok(text)
     }
 
-    /// Logarithms of the points that can be drawn.
-    fn logarithms(series: &Series) -> Vec<(f64, f64, &str)> {
-        let drawn = series
+    /// Logarithms of the points that can be drawn: those of positive, finite coordinates that are not lower than
+    /// [`DEPTH`] of the highest, which would press all others together.
+    fn logarithms<'a>(&self, series: &'a Series) -> Vec<(f64, f64, &'a str)> {
+        let floor = self.floor();
+        series
             .points
             .iter()
-            .filter(|(x, y, _)| *x > 0.0 && *y > 0.0 && x.is_finite() && y.is_finite());
-        drawn
+            .filter(|(x, y, _)| *x > 0.0 && *y > floor && x.is_finite() && y.is_finite())
             .map(|(x, y, label)| (x.log10(), y.log10(), label.as_str()))
             .collect()
+    }
+
+    fn floor(&self) -> f64 {
+        let all = self.series.iter().flat_map(|s| &s.points).map(|p| p.1);
+        DEPTH * all.filter(|y| y.is_finite()).fold(0.0, f64::max)
+    }
+
+    /// Name of a series, with the figures of its points that lie below the chart.
+    fn legend(&self, series: &Series) -> String {
+        let floor = self.floor();
+        let below = series
+            .points
+            .iter()
+            .filter(|p| p.0 > 0.0 && p.1 > 0.0 && p.1 <= floor);
+        let figures: Vec<String> = below
+            .map(|(x, y, label)| format!("{label}: {y:.0e} at {x:.2}"))
+            .collect();
+        if figures.is_empty() {
+            series.name.clone()
+        } else {
+            format!("{} (below the chart: {})", series.name, figures.join(", "))
+        }
     }
 
     fn draw(&self, text: &mut String) -> Result<(), Box<dyn Error + '_>> {
         let root = SVGBackend::with_string(text, (960, 640)).into_drawing_area();
         root.fill(&WHITE)?;
-        let all: Vec<_> = self.series.iter().flat_map(Self::logarithms).collect();
+        let all: Vec<_> = self.series.iter().flat_map(|s| self.logarithms(s)).collect();
         let (x, y) = (padded(all.iter().map(|p| p.0)), padded(all.iter().map(|p| p.1)));
         let mut chart = ChartBuilder::on(&root)
             .caption(&self.title, ("sans-serif", 22))
@@ -70,25 +96,20 @@ impl Chart {
             .y_label_area_size(84)
             .build_cartesian_2d(x.clone(), y.clone())?;
         self.draw_axes(&mut chart, &x, &y)?;
+        let mut words = Vec::new();
         for (i, series) in self.series.iter().enumerate() {
             let color = COLORS[i % COLORS.len()];
-            let points = Self::logarithms(series);
+            let points = self.logarithms(series);
             let line: Vec<(f64, f64)> = points.iter().map(|p| (p.0, p.1)).collect();
             chart
                 .draw_series(LineSeries::new(line.iter().copied(), color.stroke_width(2)))?
-                .label(&series.name)
+                .label(self.legend(series))
                 .legend(move |(x, y)| PathElement::new([(x, y), (x + 24, y)], color.stroke_width(3)));
             chart.draw_series(line.iter().map(|&p| Circle::new(p, 4, color.filled())))?;
-            // Words of neighbouring series on different sides of their points, so that they cross less.
-            let side = if i % 2 == 0 { (7, -14) } else { (7, 6) };
-            chart.draw_series(points.iter().map(|&(x, y, label)| {
-                EmptyElement::at((x, y))
-                    + Text::new(
-                        label.to_string(),
-                        side,
-                        ("sans-serif", 12).into_font().color(&color),
-                    )
-            }))?;
+            for (x, y, label) in points {
+                let at = chart.backend_coord(&(x, y));
+                words.push((at, label, color));
+            }
         }
         chart
             .configure_series_labels()
@@ -97,6 +118,7 @@ impl Chart {
             .border_style(BLACK.mix(0.3))
             .label_font(("sans-serif", 14))
             .draw()?;
+        write_words(&root, &words)?;
         root.present()?;
         Ok(())
     }
@@ -140,6 +162,40 @@ impl Chart {
         }
         Ok(())
     }
+}
+
+/// Writes the words beside their points where they hide neither a point nor another word; where no side is free,
+/// a point goes without.
+fn write_words(
+    root: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>,
+    words: &[((i32, i32), &str, RGBColor)],
+) -> Result<(), String> {
+    const HEIGHT: i32 = 13;
+    type Bounds = [i32; 4];
+    let touch = |a: &Bounds, b: &Bounds| a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3];
+    let mut taken: Vec<Bounds> = words
+        .iter()
+        .map(|((x, y), ..)| [x - 4, y - 4, x + 4, y + 4])
+        .collect();
+    for ((x, y), word, color) in words {
+        let width = 7 * word.chars().count() as i32;
+        let sides = [
+            (x + 6, y - HEIGHT - 1),
+            (x + 6, y + 2),
+            (x - 6 - width, y - HEIGHT - 1),
+            (x - 6 - width, y + 2),
+            (x - width / 2, y - HEIGHT - 6),
+            (x - width / 2, y + 7),
+        ];
+        let free = sides.into_iter().map(|(x, y)| [x, y, x + width, y + HEIGHT]);
+        if let Some(place) = free.into_iter().find(|p| taken.iter().all(|t| !touch(p, t))) {
+            let font = ("sans-serif", 12).into_font().color(color);
+            root.draw(&Text::new(word.to_string(), (place[0], place[1]), font))
+                .map_err(|e| e.to_string())?;
+            taken.push(place);
+        }
+    }
+    Ok(())
 }
 
 /// The range of `values` and a little more; at least a factor of 3.
@@ -207,6 +263,7 @@ mod tests {
             assert!(svg.contains(word), "{word} is missing");
         }
         assert!(!svg.contains("never"));
+        assert!(svg.contains("below the chart: f64: 1e-12 at 0.20"));
         assert_eq!(svg.matches("<circle").count(), 2);
     }
 

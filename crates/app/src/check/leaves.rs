@@ -73,6 +73,8 @@ pub struct LeafAudit {
     pub at_noise: usize,
     /// Of these, leaves that the coefficient or memory budget stopped.
     pub at_budget: usize,
+    /// Moved above the tolerance when cells beside them were refined.
+    pub moved: usize,
     /// Of these, leaves that the fit believed to be below the tolerance: a wrong statement of the fit.
     pub claimed_below: usize,
     /// Root mean square error of each leaf, 0 without samples.
@@ -114,6 +116,7 @@ pub fn audit_leaves(
             StopReason::Depth => &mut audit.at_depth_limit,
             StopReason::Noise => &mut audit.at_noise,
             StopReason::Budget | StopReason::Memory => &mut audit.at_budget,
+            StopReason::Neighbours => &mut audit.moved,
             StopReason::Tolerance => &mut audit.claimed_below,
         } += 1;
     }

@@ -1,3 +1,4 @@
+use std::ffi::OsString;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -28,13 +29,14 @@ enum Subject {
 
 #[derive(clap::Args)]
 struct FitArgs {
-    /// Clouds and volumes to fit
-    #[arg(default_values = ["data/bunny.obj.gz", "data/head.nii.gz"])]
-    inputs: Vec<PathBuf>,
+    /// Clouds and volumes to fit: files, or phantom:NAME and phantom:NAME:NOISE for 50 000 points of a phantom,
+    /// whose errors are measured against its true surface
+    #[arg(default_values = ["phantom:gyroid", "phantom:tetrahedron:0.5%", "data/bunny.obj.gz", "data/head.nii.gz"])]
+    inputs: Vec<String>,
     /// Directory for the charts fit-NAME-time.svg and fit-NAME-memory.svg; made if missing
     #[arg(short, long, value_name = "DIR", default_value = "docs/charts")]
     output: PathBuf,
-    /// Runs of each configuration; the median of their times is shown
+    /// Runs of each configuration, of which the median time is shown
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u8).range(1..))]
     runs: u8,
     /// Print one JSON object a configuration
@@ -51,8 +53,11 @@ pub fn run(args: &Args) -> Outcome {
         .map_err(|e| anyhow::anyhow!("-o {}: cannot be made ({e})", args.output.display()))
         .or_limit()?;
     let scratch = tempfile::tempdir().or_limit()?;
-    for path in &args.inputs {
-        let subject = Prepared::new(path, scratch.path())?;
+    for input in &args.inputs {
+        let subject = match input.strip_prefix("phantom:") {
+            Some(phantom) => Prepared::phantom(phantom, scratch.path())?,
+            None => Prepared::file(Path::new(input), scratch.path())?,
+        };
         let configurations = sweeps(subject.kind);
         let bar = Bar::new();
         let mut measured = Vec::new();
@@ -107,7 +112,40 @@ struct Prepared {
 const HELD_OUT: usize = 5;
 
 impl Prepared {
-    fn new(path: &Path, scratch: &Path) -> Outcome<Self> {
+    /// `NAME` or `NAME:NOISE`.
+    fn phantom(phantom: &str, scratch: &Path) -> Outcome<Self> {
+        let (name, noise) = phantom
+            .split_once(':')
+            .map_or((phantom, None), |(name, noise)| (name, Some(noise)));
+        let (fitted, measured) = (scratch.join("fitted.ply"), scratch.join("measured.ply"));
+        let make = |path: &Path, options: &[&str]| {
+            let fixed = [name, "--count", "50000", "-o"].map(OsString::from).into_iter();
+            ask(
+                "phantom",
+                fixed
+                    .chain([path.into()])
+                    .chain(options.iter().map(OsString::from)),
+            )
+        };
+        make(&fitted, &noise.map_or(vec![], |n| vec!["--noise", n]))?;
+        // Other points of the true surface.
+        make(&measured, &["--seed", "2"])?;
+        let noisy = noise.map_or(String::new(), |n| format!(" with noise of {n}"));
+        Ok(Self {
+            kind: Input::Cloud,
+            name: if noise.is_some() {
+                format!("{name}-noisy")
+            } else {
+                name.into()
+            },
+            title: format!("50 000 points{noisy}; rms distance from the true surface"),
+            y_title: "rms distance (the solid is about 2 across)".into(),
+            fitted,
+            measured,
+        })
+    }
+
+    fn file(path: &Path, scratch: &Path) -> Outcome<Self> {
         let file = path
             .file_name()
             .map(|n| n.to_string_lossy().into_owned())
@@ -173,7 +211,14 @@ impl Prepared {
         for key in ["seconds", "cpu_seconds", "peak_rss_bytes"] {
             let mut all: Vec<f64> = fits.iter().filter_map(|f| f.get(key)?.as_f64()).collect();
             all.sort_by(f64::total_cmp);
-            fit.insert(key.into(), all.get(all.len() / 2).copied().into());
+            let median = all.get(all.len() / 2).copied();
+            // Whole numbers stay whole.
+            let value = if key.ends_with("bytes") {
+                median.map(|m| m as u64).into()
+            } else {
+                Value::from(median)
+            };
+            fit.insert(key.into(), value);
         }
         fit.remove("output");
         let check = ask(
@@ -204,7 +249,7 @@ fn save_part(path: &Path, cloud: &PointCloud, keep: impl Fn(usize) -> bool) -> O
 }
 
 /// Runs a subcommand with `--json` and reads its last line.
-fn ask(subcommand: &str, arguments: impl Iterator<Item = std::ffi::OsString>) -> Outcome<Map<String, Value>> {
+fn ask(subcommand: &str, arguments: impl Iterator<Item = OsString>) -> Outcome<Map<String, Value>> {
     let program = std::env::current_exe().or_limit()?;
     let out = Command::new(program)
         .arg(subcommand)

@@ -156,7 +156,13 @@ const COMPONENT_CELLS: u32 = 128;
 /// Components that no sample speaks for. A single cell may be a corner of the surface between two nodes.
 fn unsupported(open: &OpenField, samples: &[DVec3]) -> Vec<UnsupportedComponent> {
     let frame = open.frame_of_resolution(COMPONENT_CELLS);
-    let mut components = unsupported_components(open.field(), open.iso(), &frame, samples.iter().copied());
+    // A sample on the surface speaks for both sides of it, whichever of them the centre of its cell is on.
+    let half = frame.world_from_grid.matrix3.x_axis.length() * 0.5;
+    let sides = samples.iter().flat_map(|&p| {
+        let step = open.field().value_gradient(p).1.normalize_or_zero() * half;
+        [p, p - step, p + step]
+    });
+    let mut components = unsupported_components(open.field(), 0.0, &frame, sides);
     components.retain(|c| c.cells.len() > 1);
     components
 }

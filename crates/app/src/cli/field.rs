@@ -143,9 +143,25 @@ impl OpenField {
         self.loaded.meta.unit
     }
 
-    /// Iso-value at which the surface is meant to lie.
-    pub fn iso(&self) -> f64 {
-        self.loaded.meta.iso.unwrap_or(0.0)
+    /// Iso-value at which the surface is meant to lie, if there is one.
+    pub fn iso(&self) -> Option<f64> {
+        self.loaded.meta.iso
+    }
+
+    /// The iso-value that the user `asked` for, or the field's own.
+    ///
+    /// # Errors
+    /// If there is neither.
+    pub fn iso_or(&self, asked: Option<f64>, path: &Path) -> Outcome<f64> {
+        asked.or(self.iso()).ok_or_else(|| {
+            let range = self.field().bounds(&self.lattice().world_box());
+            Failure::input(format!(
+                "{}: the field names no surface of its own; choose one with --iso, between {:.6} and {:.6}",
+                path.display(),
+                range.lo,
+                range.hi
+            ))
+        })
     }
 
     /// The grid with `n` cells in every finest knot interval, along each axis.
@@ -228,7 +244,7 @@ fn record(leaf: &Leaf) -> LeafRecord {
 
 fn leaf(r: &LeafRecord) -> Option<Leaf> {
     use StopReason::*;
-    let reason = [Tolerance, Depth, NoData, Noise, Budget, Memory]
+    let reason = [Tolerance, Depth, NoData, Noise, Budget, Memory, Neighbours]
         .into_iter()
         .find(|s| *s as u8 == r.reason)?;
     Some(Leaf {

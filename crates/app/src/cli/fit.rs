@@ -104,8 +104,8 @@ pub struct Fitted {
     pub unit: Unit,
     /// What it was fitted to.
     pub source: SourceKind,
-    /// Iso-value that meshing takes if the user names none.
-    pub iso: f64,
+    /// Iso-value that meshing takes if the user names none; a constant volume has none.
+    pub iso: Option<f64>,
 }
 
 /// Fits a file and writes the field.
@@ -137,7 +137,7 @@ pub fn run(args: &Args) -> Outcome {
     let meta = FieldMeta {
         source: fitted.source,
         unit: fitted.unit,
-        iso: Some(fitted.iso),
+        iso: fitted.iso,
         provenance: provenance(args),
         ..Default::default()
     };
@@ -211,7 +211,7 @@ fn fit_cloud<T: Stored>(cloud: &PointCloud, choice: &Choice, control: &mut Contr
         report,
         unit,
         source: SourceKind::Cloud,
-        iso: 0.0,
+        iso: Some(0.0),
     })
 }
 

@@ -217,7 +217,12 @@ fn of_field(open: &OpenField) -> Vec<Entry> {
         ),
         corners(&lattice.world_box()),
         entry("unit", "unit", open.unit().symbol(), open.unit().symbol()),
-        entry("iso", "iso-value", human_number(open.iso()), open.iso()),
+        entry(
+            "iso",
+            "iso-value",
+            open.iso().map_or("none".into(), human_number),
+            open.iso(),
+        ),
         count("input_count", "samples given", report.input_count),
         count("used_count", "samples used", report.used_count),
         entry(

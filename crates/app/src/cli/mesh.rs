@@ -58,7 +58,7 @@ pub fn run(args: &Args) -> Outcome {
     interrupt::cancel_on_interrupt(&cancel)?;
     let open = OpenField::load(&args.field)?;
     let options = PolygonizeOptions {
-        iso: args.iso.unwrap_or(open.iso()),
+        iso: open.iso_or(args.iso, &args.field)?,
         open: args.open,
         ..Default::default()
     };

@@ -81,7 +81,7 @@ pub fn run(args: &Args) -> Outcome {
     let open = OpenField::load(&args.field)?;
     let bar = Bar::new();
     let options = PolygonizeOptions {
-        iso: args.iso.unwrap_or(open.iso()),
+        iso: open.iso_or(args.iso, &args.field)?,
         ..Default::default()
     };
     let frame = match args.resolution {

@@ -111,7 +111,16 @@ impl Octant {
     }
 
     /// Whether a node of it may be inside and another outside. An unknown bound (NaN) excludes nothing.
+    ///
+    /// Most octants with surface show it at their corners, which cost less than bounds.
     fn may_hold_surface(&self, field: &dyn Field, frame: &Frame, iso: f64) -> bool {
+        let ends = [self.lo, self.hi];
+        let corner = |c: usize| [0, 1, 2].map(|a| ends[c >> a & 1][a]);
+        let is_inside = |c: usize| field.value(frame.node(corner(c))) > iso;
+        let first = is_inside(0);
+        if (first && self.reaches_beyond) || (1..8).rev().any(|c| is_inside(c) != first) {
+            return true;
+        }
         let bounds = field.frame_bounds_about(frame, self.lo, self.hi, iso);
         let all_outside = bounds.hi <= iso;
         let all_inside = bounds.lo > iso && !self.reaches_beyond;

@@ -44,7 +44,7 @@ impl Default for PolygonizeOptions {
 /// What the mesher did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MeshReport {
-    /// Boxes whose bounds were asked.
+    /// Boxes that were tested, by their corners and then by the bounds.
     pub bounds_queries: u64,
     /// Cells of the frame.
     pub cells: u64,

@@ -41,6 +41,11 @@ impl SplitMix64 {
         DVec3::new(x, y, z)
     }
 
+    /// A standard normal.
+    pub fn normal(&mut self) -> f64 {
+        self.normal_pair().0
+    }
+
     fn normal_pair(&mut self) -> (f64, f64) {
         loop {
             let u = 2.0 * self.uniform() - 1.0;

@@ -167,7 +167,7 @@ pub(crate) fn active_slots(mask: &[u64; BRICK]) -> impl Iterator<Item = usize> {
 }
 
 /// Keys of the bricks that hold a function within two of a central function of a cell, in key order.
-fn bricks_near(depth: usize, cells: &[[u32; 3]]) -> (Vec<BrickKey>, FxHashMap<BrickKey, u32>) {
+pub(crate) fn bricks_near(depth: usize, cells: &[[u32; 3]]) -> (Vec<BrickKey>, FxHashMap<BrickKey, u32>) {
     // Cell c has central functions c and c+1, slots c+1 and c+2; two more on both sides is slots c-1 ..= c+4.
     let last = ((1u32 << depth) + 2) / BRICK as u32;
     let mut keys: Vec<BrickKey> = Vec::new();

@@ -8,6 +8,7 @@
 
 use bspline::{Field, Real};
 
+use super::assemble::assemble;
 use super::cascade;
 use super::full_grid::FullGrid;
 use super::plan::{Plan, Smoothing};
@@ -37,7 +38,7 @@ pub(crate) fn choose<T: Real>(
         if tried.len() == TRIES {
             return Ok(f64::INFINITY);
         }
-        control.step("choosing the smoothing", 0.1 + 0.05 * tried.len() as f64)?;
+        control.step("choosing the smoothing", 0.1 + 0.02 * tried.len() as f64)?;
         let mu = start * 2f64.powi(exponent);
         let gcv = score::<T>(
             samples,
@@ -70,8 +71,8 @@ pub(crate) fn choose<T: Real>(
 fn score<T: Real>(samples: &Samples, base: &FullGrid<f64>, plan: &Plan, noise: f64) -> Result<f64, FitError> {
     let quiet = &mut Control::default();
     let n = samples.positions.len();
-    let cascade = cascade::run::<T>(samples, base, plan, quiet)?;
-    let field = cascade::assemble(samples, base, &cascade.levels);
+    let cascade = cascade::run::<T>(samples, base, plan, 0.0..1.0, quiet)?;
+    let field = assemble(samples, base, &cascade.levels);
     let world = |i: usize| samples.origin + samples.positions[i] * samples.scale;
     let limit = 3.0 * noise * samples.scale;
     let distance = |i: usize| newton_distance(&field, world(i)).0.min(limit);
@@ -83,8 +84,8 @@ fn score<T: Real>(samples: &Samples, base: &FullGrid<f64>, plan: &Plan, noise: f
         probe: Some(signs.clone()),
         ..plan.clone()
     };
-    let answer = cascade::run::<T>(samples, &zero, &probe, quiet)?;
-    let field = cascade::assemble(samples, &zero, &answer.levels);
+    let answer = cascade::run::<T>(samples, &zero, &probe, 0.0..1.0, quiet)?;
+    let field = assemble(samples, &zero, &answer.levels);
     let trace: f64 = (0..n)
         .map(|i| signs[i] as f64 * field.value(world(i)))
         .sum::<f64>()

@@ -11,6 +11,9 @@ const DEPTH: usize = 7;
 /// Components of one cell are left: on thin parts a cell's centre may be inside while the samples of its walls lie
 /// in the cells beside it.
 const CELLS_TO_ACT: usize = 2;
+/// Nor is anything larger than this share of the box: a flat sheet along a plane of cells has all its samples on one
+/// side of it, and the other side is no mistake.
+const LARGEST_SHARE: f64 = 0.1;
 
 /// Conditions of the opposite sign, one cell deep, at the cells of every component that holds no sample: position
 /// and value in the unit box.
@@ -27,10 +30,11 @@ pub(crate) fn conditions<T: Real>(field: &HierarchicalSpline<T>, samples: &Sampl
         ),
         cells: [n; 3],
     };
+    let most = (LARGEST_SHARE * f64::from(n).powi(3)) as usize;
     let points = samples.points().map(|i| samples.world(i));
     unsupported_components(field, 0.0, &frame, points)
         .iter()
-        .filter(|c| c.cells.len() >= CELLS_TO_ACT)
+        .filter(|c| c.cells.len() >= CELLS_TO_ACT && c.cells.len() <= most)
         .flat_map(|c| {
             let target = if c.is_inside { -h } else { h } as f32;
             c.cells.iter().map(move |at| {

@@ -1,8 +1,10 @@
 //! Fits of oriented point clouds.
 
+mod assemble;
 mod band;
 mod band_solve;
 mod cascade;
+mod cells;
 mod clusters;
 mod coarse;
 mod cross_validation;
@@ -38,7 +40,7 @@ pub struct PointOptions {
 }
 
 /// Rounds of conditions against pieces that no sample speaks for.
-const REPAIR_ROUNDS: usize = 3;
+const REPAIR_ROUNDS: i32 = 3;
 
 /// Fits a signed distance, positive inside, to points with outward normals.
 ///
@@ -50,6 +52,7 @@ pub fn fit_points<T: Real>(
     control: &mut Control,
 ) -> Result<(HierarchicalSpline<T>, FitReport), FitError> {
     control.step("sorting points", 0.0)?;
+    control.reserve(cascade::level_bytes::<T>(0, cloud.positions.len()))?;
     let mut samples = Samples::prepare(*cloud)?;
     let tolerance = options.tolerance.unwrap_or(1e-4 * samples.diagonal) / samples.scale;
     let noise = match options.smoothing {
@@ -65,9 +68,11 @@ pub fn fit_points<T: Real>(
     }
     let mut rounds = 0;
     let (cascade, field) = loop {
-        let cascade = cascade::run::<T>(&samples, &base, &plan, control)?;
-        control.step("building the field", 0.9)?;
-        let field = cascade::assemble(&samples, &base, &cascade.levels);
+        // A round of repair costs what the first run did; most clouds need none.
+        let begin = 0.9 - 0.6 * 0.5f64.powi(rounds);
+        let end = 0.9 - 0.3 * 0.5f64.powi(rounds);
+        let cascade = cascade::run::<T>(&samples, &base, &plan, begin..end, control)?;
+        let field = assemble::assemble(&samples, &base, &cascade.levels);
         let conditions = far_field::conditions(&field, &samples);
         if conditions.is_empty() || rounds == REPAIR_ROUNDS {
             break (cascade, field);

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::cascade::Cascade;
 use super::plan::{Plan, Smoothing};
 use super::samples::Samples;
-use crate::{FitReport, Leaf};
+use crate::{FitReport, Leaf, StopReason};
 
 /// Steps of the projection.
 const NEWTON_STEPS: usize = 5;
@@ -52,13 +52,19 @@ pub(crate) fn report<T: Real>(
         let (count, square, max) = part.fold((0u32, 0.0, 0.0f64), |(n, s, m), d| {
             (n + 1, s + d.0 * d.0, m.max(d.0))
         });
+        let rms = (square / f64::from(count.max(1))).sqrt();
+        let moved = leaf.reason == StopReason::Tolerance && rms > plan.tolerance * samples.scale;
         Leaf {
             level: (leaf.depth - super::samples::BASE_DEPTH) as u8,
             cell: leaf.at,
             sample_count: count,
-            rms: (square / f64::from(count.max(1))).sqrt() as f32,
+            rms: rms as f32,
             max: max as f32,
-            reason: leaf.reason,
+            reason: if moved {
+                StopReason::Neighbours
+            } else {
+                leaf.reason
+            },
         }
     });
     let mut distances: Vec<f64> = measured.iter().flatten().map(|m| m.0).collect();

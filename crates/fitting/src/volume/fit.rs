@@ -24,6 +24,10 @@ const LEVELS: usize = 3;
 const CLEAN_TOLERANCE: f64 = 0.005;
 /// The default tolerance over the noise: the rms of 64 values of noise alone stays below it in 99.7 % of leaves.
 const NOISE_TOLERANCE: f64 = 1.25;
+/// Scores below this multiple of σ̂ may be noise. A score of white noise has the standard deviation
+/// `√(2√3)³ · √(1/2)³ σ = 2.28 σ` (gain of the interpolation times norm of the function); 3.5 of these are passed by
+/// one in two thousand.
+const NOISE_SCORE: f64 = 8.0;
 
 /// Fits a field to a volume.
 ///
@@ -96,7 +100,7 @@ fn interpolate<T: Real>(
         corrections,
     );
     let mut report = report(view, domain, &measured, samples.scale.as_f64(), |_| {
-        StopReason::Depth
+        StopReason::Tolerance
     });
     (report.coefficients, report.depth) = (count, finest);
     control.step("done", 1.0)?;
@@ -114,7 +118,7 @@ fn adapt<T: Real>(
     let scale = samples.scale.as_f64();
     let depth = options.max_depth.unwrap_or(domain.finest()).min(domain.finest());
     // Scores below this are rounding of the level before.
-    let floor = 16.0 * T::UNIT_ROUND_OFF;
+    let mut floor = 16.0 * T::UNIT_ROUND_OFF;
     let (budget, budget_reason) = budget(domain, options, control)?;
     let problem = Problem {
         domain,
@@ -142,6 +146,9 @@ fn adapt<T: Real>(
                 let noise = fit.noise() / scale;
                 goal.noise = Some(noise);
                 goal.tolerance = (NOISE_TOLERANCE * noise).max(CLEAN_TOLERANCE * overview.range());
+            }
+            if let Some(noise) = goal.noise {
+                floor = floor.max(NOISE_SCORE * noise * scale);
             }
             goal.outcome = fit.meet(goal.tolerance * scale, budget, floor, control)?;
         }

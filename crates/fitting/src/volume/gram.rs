@@ -135,3 +135,60 @@ fn slab<T: Real>(
     }
     sum
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::phantoms::SplitMix64;
+    use crate::volume::domain::Samples;
+    use crate::volume::residual::{correlations, residual};
+
+    /// Sizes with and without padding, thinner than a coarse cell, and of more than one slab.
+    const SIZES: [[usize; 3]; 4] = [[21, 17, 13], [22, 8, 19], [3, 1, 2], [9, 10, 103]];
+
+    #[test]
+    fn normal_matrix_is_synthesis_and_its_transpose() {
+        for dims in SIZES {
+            let domain = Domain::<f64>::new(dims, 3);
+            let mut random = SplitMix64::new(1);
+            let active: Vec<ActiveSet> = (0..3)
+                .map(|level| {
+                    let picked: Vec<usize> = (0..domain.function_count(level))
+                        .filter(|_| random.uniform() < 0.3)
+                        .collect();
+                    ActiveSet::from_indices(domain.functions(level), picked.into_iter())
+                })
+                .collect();
+            let p: Packed<f64> = active
+                .iter()
+                .map(|a| (0..a.len()).map(|_| random.normal()).collect())
+                .collect();
+            let mut q: Packed<f64> = active.iter().map(|a| vec![0.0; a.len()]).collect();
+            apply_normal_matrix(&domain, &active, &p, &mut q);
+
+            // -f at the samples is the residual of data that are zero.
+            let zeros = vec![0.0; dims.iter().product()];
+            let samples = Samples {
+                values: &zeros,
+                dims,
+                scale: 1.0,
+            };
+            let mut r = vec![0.0; domain.padded().iter().product()];
+            residual(&domain, &samples, &active, &p, &mut r);
+            let dense = correlations(&domain, &r, &active[2]);
+            for level in 0..3 {
+                let expected = if level == 2 {
+                    dense[2].clone()
+                } else {
+                    active[level].gather(&dense[level])
+                };
+                for (got, want) in q[level].iter().zip(expected) {
+                    assert!(
+                        (got + want).abs() < 1e-12,
+                        "{dims:?}, level {level}: {got}, {want}"
+                    );
+                }
+            }
+        }
+    }
+}

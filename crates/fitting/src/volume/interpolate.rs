@@ -40,6 +40,20 @@ pub(crate) fn interpolating_coefficients<T: Real>(domain: &Domain<T>, samples: &
     dense
 }
 
+/// [`interpolating_coefficients`] of unscaled voxels, and their number along each axis.
+pub(crate) fn interpolate_voxels<T: Real>(dims: [usize; 3], values: &[f32]) -> (Vec<T>, [usize; 3]) {
+    let domain = Domain::<T>::new(dims, 3);
+    let dense = interpolating_coefficients(
+        &domain,
+        &Samples {
+            values,
+            dims,
+            scale: T::one(),
+        },
+    );
+    (dense, domain.functions(domain.finest()))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -52,7 +52,7 @@ impl LeafGrid {
     }
 
     /// Leaf of a voxel, x fastest.
-    #[inline(always)]
+    #[cfg(test)]
     pub fn leaf(&self, voxel: [usize; 3]) -> usize {
         let c = [0, 1, 2].map(|a| self.cell(a, voxel[a]));
         (c[2] * self.cells[1] + c[1]) * self.cells[0] + c[0]

@@ -98,7 +98,8 @@ pub(crate) fn measure<T: Real>(
         grid,
         leaves,
         rms: (sum / samples.values.len() as f64).sqrt(),
-        p95: f64::from(p95),
+        // Magnitudes were rounded to f32 for it.
+        p95: f64::from(p95).min(max),
         max,
         bound: (max + rounding).next_up(),
     }

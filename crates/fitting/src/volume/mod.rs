@@ -37,5 +37,6 @@ mod tolerance;
 mod view;
 
 pub use fit::fit_volume;
+pub(crate) use interpolate::interpolate_voxels;
 pub use otsu::otsu_threshold;
 pub use view::{VolumeMethod, VolumeOptions, VolumeView};

@@ -7,15 +7,16 @@ const BINS: usize = 256;
 /// where a surface should lie.
 ///
 /// Maximizes the variance between the classes, `w₀ w₁ (μ₀ - μ₁)²` [Otsu 1979, eq. 14], over 256 thresholds between
-/// the 1st and the 99th percentile; densities beyond them count as the nearer end. Of a constant volume, its value.
+/// the 1st and the 99th percentile; densities beyond them count as the nearer end. `None` where these
+/// percentiles coincide: there is one class.
 ///
 /// # Panics
 /// If `values` is empty.
-pub fn otsu_threshold(values: &[f32]) -> f64 {
+pub fn otsu_threshold(values: &[f32]) -> Option<f64> {
     let [low, high] = quantiles(values, [0.01, 0.99]).map(f64::from);
     let width = (high - low) / BINS as f64;
     if width <= 0.0 {
-        return low;
+        return None;
     }
     let mut histogram = [0u64; BINS];
     for &v in values {
@@ -46,7 +47,7 @@ pub fn otsu_threshold(values: &[f32]) -> f64 {
         }
     }
     // Between two separate heaps every threshold is as good: the middle one.
-    low + width * ((first + last) as f64 * 0.5 + 1.0)
+    Some(low + width * ((first + last) as f64 * 0.5 + 1.0))
 }
 
 #[cfg(test)]
@@ -64,10 +65,10 @@ mod tests {
     }
 
     #[test]
-    fn outliers_do_not_move_the_threshold_and_constants_are_their_own() {
+    fn outliers_do_not_move_the_threshold_and_constants_have_none() {
         let mut values: Vec<f32> = (0..1000).map(|i| if i % 3 == 0 { 10.0 } else { 90.0 }).collect();
         values[5] = 1e9;
-        assert!((otsu_threshold(&values) - 50.0).abs() < 0.5);
-        assert_eq!(otsu_threshold(&[7.0; 20]), 7.0);
+        assert!((otsu_threshold(&values).unwrap() - 50.0).abs() < 0.5);
+        assert_eq!(otsu_threshold(&[7.0; 20]), None);
     }
 }

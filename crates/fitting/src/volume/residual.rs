@@ -194,3 +194,75 @@ fn correlation_slab<T: Real>(
     }
     sum
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::phantoms::SplitMix64;
+    use bspline::cubic;
+
+    /// Value of function `s` of `level` of an axis at sample `k`, from the definition.
+    fn basis(domain: &Domain<f64>, axis: usize, level: usize, s: usize, k: usize) -> f64 {
+        let h = domain.axes[axis].spacing(level);
+        let w = cubic::values((k % h) as f64 / h as f64);
+        // Cell k/h is under the functions s = k/h ..= k/h + 3.
+        s.checked_sub(k / h)
+            .and_then(|j| w.get(j))
+            .copied()
+            .unwrap_or(0.0)
+    }
+
+    #[test]
+    fn residual_and_correlation_are_those_of_the_definition() {
+        let dims = [6, 5, 10];
+        let domain = Domain::<f64>::new(dims, 3);
+        let mut random = SplitMix64::new(2);
+        let values: Vec<f32> = (0..dims.iter().product())
+            .map(|_| random.normal() as f32)
+            .collect();
+        let samples = Samples {
+            values: &values,
+            dims,
+            scale: 1.0,
+        };
+        // One function of each level: its whole column of the matrix.
+        for (level, picked) in [
+            (0, [1, 2, 0]),
+            (0, [3, 3, 4]),
+            (1, [2, 4, 5]),
+            (1, [0, 0, 6]),
+            (2, [3, 1, 10]),
+        ] {
+            let size = domain.functions(level);
+            let index = (picked[2] * size[1] + picked[1]) * size[0] + picked[0];
+            let active: Vec<ActiveSet> = (0..3)
+                .map(|l| match l == level {
+                    true => ActiveSet::from_indices(size, std::iter::once(index)),
+                    false => ActiveSet::empty(domain.functions(l)),
+                })
+                .collect();
+            let packed: Packed<f64> = active.iter().map(|a| vec![1.5; a.len()]).collect();
+            let [nx, ny, nz] = domain.padded();
+            let mut r = vec![0.0; nx * ny * nz];
+            residual(&domain, &samples, &active, &packed, &mut r);
+            let mut correlation = 0.0;
+            for (i, &r) in r.iter().enumerate() {
+                let k = [i % nx, i / nx % ny, i / (nx * ny)];
+                let b: f64 = (0..3)
+                    .map(|a| basis(&domain, a, level, picked[a], k[a]))
+                    .product();
+                let inside: [usize; 3] = std::array::from_fn(|a| k[a].min(dims[a] - 1));
+                let d = f64::from(values[(inside[2] * dims[1] + inside[1]) * dims[0] + inside[0]]);
+                assert!((r - (d - 1.5 * b)).abs() < 1e-14, "level {level}, sample {k:?}");
+                let weight: f64 = (0..3).map(|a| domain.axes[a].weight(k[a])).product();
+                correlation += weight * b * r;
+            }
+            let all = correlations(&domain, &r, &active[2]);
+            let got = if level == 2 { all[2][0] } else { all[level][index] };
+            assert!(
+                (got - correlation).abs() < 1e-13,
+                "level {level}: {got}, {correlation}"
+            );
+        }
+    }
+}

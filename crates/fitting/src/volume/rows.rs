@@ -29,11 +29,6 @@ impl Phases {
         2 * self.half()
     }
 
-    /// Functions of the coarser level along x.
-    pub fn coarse_len(self) -> usize {
-        self.m + 3
-    }
-
     /// Place of fine function `s` in the buffer.
     #[inline(always)]
     pub fn slot(self, s: usize) -> usize {

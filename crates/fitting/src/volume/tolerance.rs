@@ -4,7 +4,7 @@ use bspline::Real;
 use rayon::prelude::*;
 
 use super::active::ActiveSet;
-use super::adaptive::Adaptive;
+use super::adaptive::{Adaptive, Scores};
 use super::detail::DetailLayout;
 use super::domain::SLAB;
 use super::leaves::{LeafGrid, LeafResidual, LeafSums};
@@ -31,6 +31,9 @@ const MARGIN: f64 = 0.999;
 /// next door may lift them.
 const CAUTION: f64 = 0.95;
 
+/// Share of the whole work where a fit to a tolerance begins and ends.
+const SPAN: (f64, f64) = (0.05, 0.88);
+
 /// What ended a fit to a tolerance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Outcome {
@@ -52,9 +55,13 @@ impl<T: Real> Adaptive<'_, T> {
         floor: f64,
         control: &mut Control,
     ) -> Result<Outcome, FitError> {
+        let span = |share: f64| SPAN.0 + (SPAN.1 - SPAN.0) * share;
         let threshold = (FIRST_THRESHOLD * tolerance).max(floor);
         for level in 1..=self.depth() {
-            control.step("choosing functions", 0.05 * level as f64 / self.depth() as f64)?;
+            control.step(
+                "choosing functions",
+                span(0.05 * level as f64 / self.depth() as f64),
+            )?;
             let free = budget.saturating_sub(self.fit.count());
             let cutoff = Cutoff::above(threshold / self.level_weight(level));
             self.grow(level, |scores| match count_kept(&[scores], cutoff) > free {
@@ -66,21 +73,24 @@ impl<T: Real> Adaptive<'_, T> {
             }
         }
         let [first, second, later] = ITERATIONS;
-        self.solve(first, control, (0.05, 0.2))?;
+        self.solve(first, control, (span(0.05), span(0.2)))?;
         if self.depth() > 0 {
-            let scores = self.scores();
-            let cutoff = Cutoff::above(threshold);
+            let mut scores = self.scores();
+            if threshold > FIRST_THRESHOLD * tolerance {
+                self.silence_below(&mut scores, threshold, tolerance);
+            }
+            let cutoff = Cutoff::above(FIRST_THRESHOLD * tolerance);
             let lists: Vec<&[T]> = scores.levels.iter().map(Vec::as_slice).collect();
             if self.fit.active[0].len() + count_kept(&lists, cutoff) > budget {
                 self.discard(scores);
                 return self.spend_instead(budget, floor, control);
             }
             self.activate(scores, cutoff);
-            self.solve(second, control, (0.2, 0.4))?;
+            self.solve(second, control, (span(0.2), span(0.4)))?;
         }
         for round in 0..ROUNDS {
             // Most of the time falls to the first rounds.
-            let at = |r: usize| 0.4 + 0.6 * (1.0 - 0.7_f64.powi(r as i32));
+            let at = |r: usize| span(1.0 - 0.6 * 0.7_f64.powi(r as i32));
             control.step("leaves above the tolerance", at(round))?;
             let (grid, leaves) = self.leaf_residuals();
             let failing: Vec<bool> = leaves.iter().map(|l| l.rms() > MARGIN * tolerance).collect();
@@ -124,7 +134,7 @@ impl<T: Real> Adaptive<'_, T> {
         control: &mut Control,
     ) -> Result<Outcome, FitError> {
         self.restart();
-        self.spend(budget, floor, control, (0.2, 1.0))?;
+        self.spend(budget, floor, control, (SPAN.0 + 0.2 * (SPAN.1 - SPAN.0), SPAN.1))?;
         Ok(Outcome::BudgetSpent)
     }
 
@@ -151,6 +161,50 @@ impl<T: Real> Adaptive<'_, T> {
         (grid, LeafSums::merge(grid, parts))
     }
 
+    /// Takes the scores below `floor` out of the competition, except in leaves above the tolerance and next to them:
+    /// elsewhere they are noise.
+    fn silence_below(&self, scores: &mut Scores<T>, floor: f64, tolerance: f64) {
+        let (grid, leaves) = self.leaf_residuals();
+        let failing: Vec<bool> = leaves.iter().map(|l| l.rms() > CAUTION * tolerance).collect();
+        let heard = dilated(grid, &failing);
+        let floor = T::from_f64(floor);
+        for (layout, list) in scores.layouts.iter().zip(&mut scores.levels) {
+            self.for_each_row(*layout, grid, |start, leaf_row, leaf_of_x| {
+                for (score, x) in list[start..].iter_mut().zip(leaf_of_x) {
+                    if *score < floor && !heard[leaf_row + x] {
+                        *score = T::zero();
+                    }
+                }
+            });
+        }
+    }
+
+    /// Visits the rows of an array of detail: its start in the array, the first leaf of the row of leaves that it is
+    /// centred in, and the leaf along x of each entry.
+    fn for_each_row(
+        &self,
+        layout: DetailLayout,
+        grid: LeafGrid,
+        mut visit: impl FnMut(usize, usize, &[usize]),
+    ) {
+        let domain = self.domain();
+        let leaf_of: [Vec<usize>; 3] = std::array::from_fn(|a| {
+            let axis = domain.axes[a];
+            let voxel = |i: usize| {
+                let s = i + layout.first;
+                (s.saturating_sub(1) * axis.spacing(layout.level)).min(axis.samples - 1)
+            };
+            (0..layout.size[a]).map(|i| grid.cell(a, voxel(i))).collect()
+        });
+        let [nx, ny, nz] = layout.size;
+        for z in 0..nz {
+            for y in 0..ny {
+                let leaf_row = (leaf_of[2][z] * grid.cells[1] + leaf_of[1][y]) * grid.cells[0];
+                visit((z * ny + y) * nx, leaf_row, &leaf_of[0]);
+            }
+        }
+    }
+
     /// Functions of the finest allowed level to add to failing leaves: score and index of each.
     ///
     /// A leaf gets the best of those centred in it until the share of energy left in them is that which the
@@ -174,29 +228,18 @@ impl<T: Real> Adaptive<'_, T> {
         } else {
             failing.to_vec()
         };
+        let [nx, ny, _] = layout.size;
         let functions = domain.functions(level);
-        let leaf_of: [Vec<usize>; 3] = std::array::from_fn(|a| {
-            let axis = domain.axes[a];
-            let voxel = |i: usize| {
-                let s = i + layout.first;
-                (s.saturating_sub(1) * axis.spacing(level)).min(axis.samples - 1)
-            };
-            (0..layout.size[a]).map(|i| grid.cell(a, voxel(i))).collect()
-        });
-        let [nx, ny, nz] = layout.size;
         let mut offered: Vec<(usize, f64, usize)> = Vec::new();
-        for z in 0..nz {
-            for y in 0..ny {
-                let row = (leaf_of[2][z] * grid.cells[1] + leaf_of[1][y]) * grid.cells[0];
-                let start = (z * ny + y) * nx;
-                for (x, &score) in scores[start..start + nx].iter().enumerate() {
-                    let leaf = row + leaf_of[0][x];
-                    if wanted[leaf] && score > T::zero() {
-                        offered.push((leaf, score.as_f64(), layout.function(functions, x, y, z)));
-                    }
+        self.for_each_row(layout, grid, |start, leaf_row, leaf_of_x| {
+            let (y, z) = (start / nx % ny, start / (nx * ny));
+            for ((x, score), leaf) in scores[start..].iter().enumerate().zip(leaf_of_x) {
+                let leaf = leaf_row + leaf;
+                if wanted[leaf] && *score > T::zero() {
+                    offered.push((leaf, score.as_f64(), layout.function(functions, x, y, z)));
                 }
             }
-        }
+        });
         self.recycle(level, scores);
         if generous {
             return offered

@@ -1,0 +1,242 @@
+//! The grammar of the command line, its exit codes, and what goes to stdout.
+
+mod common;
+
+use std::io::{Read, Write};
+use std::process::Stdio;
+
+use common::{Bench, data, number};
+
+#[test]
+fn wrong_usage_ends_with_code_2_and_a_remedy() {
+    let bench = Bench::new();
+    bench.json("phantom sphere -o cloud.ply --count 500");
+    let bunny = data("bunny.obj.gz");
+    let head = data("head.nii.gz");
+    for (arguments, word) in [
+        ("", "Usage"),
+        ("fit", "--output"),
+        ("fit cloud.ply", "--output"),
+        ("fit cloud.ply -o out.iclay --tolerance 1cm", "0.2mm"),
+        ("fit cloud.ply -o out.iclay --tolerance -1", "unexpected"),
+        ("fit cloud.ply -o out.iclay --tolerance 1mm", "--unit"),
+        ("fit cloud.ply -o out.iclay --memory 2Gib", "2GiB"),
+        ("fit cloud.ply -o out.iclay --threads 0", "threads"),
+        ("fit cloud.ply -o out.iclay --method exact", "interpolate"),
+        ("fit cloud.ply -o out.iclay --method interpolate", "volumes"),
+        ("fit cloud.ply -o out.iclay --unit inch", "mm, cm or m"),
+        ("fit cloud.ply -o out.txt", ".iclay"),
+        ("fit cloud.ply -o nowhere/out.iclay", "no directory"),
+        (&format!("fit {head} -o out.iclay --tolerance 1mm"), "density"),
+        (&format!("fit {head} -o out.iclay --unit cm"), "mm"),
+        (
+            &format!("fit {head} -o out.iclay --method interpolate --tolerance 1"),
+            "interpolating",
+        ),
+        (&format!("fit {bunny} -o ."), "directory"),
+        ("mesh field.iclay -o out.stp", ".ply"),
+        (
+            "mesh field.iclay -o out.ply --resolution 8 --tolerance 1",
+            "cannot be used with",
+        ),
+        ("mesh field.iclay -o out.ply --iso nan", "finite"),
+        ("phantom cube -o out.ply", "sphere"),
+        ("charts", "fit"),
+    ] {
+        let run = bench.run(arguments);
+        assert_eq!(run.code, 2, "{arguments}: {}{}", run.stdout, run.stderr);
+        assert!(
+            run.stderr.contains(word),
+            "{arguments}: no {word:?} in {}",
+            run.stderr
+        );
+    }
+    assert_eq!(bench.files(), ["cloud.ply"]);
+}
+
+#[test]
+fn help_names_every_subcommand_and_the_exit_codes() {
+    let bench = Bench::new();
+    let run = bench.run("--help");
+    assert_eq!(run.code, 0);
+    let words = [
+        "fit",
+        "mesh",
+        "sample",
+        "eval",
+        "info",
+        "check",
+        "phantom",
+        "picture",
+        "charts",
+        "Exit codes",
+    ];
+    for word in words {
+        assert!(run.stdout.contains(word), "{word}");
+        if word.chars().all(char::is_lowercase) {
+            assert_eq!(bench.run(&format!("{word} --help")).code, 0, "{word}");
+        }
+    }
+    assert!(bench.run("--version").stdout.starts_with("isoclay "));
+}
+
+#[test]
+fn json_has_the_promised_fields() {
+    let bench = Bench::new();
+    bench.json("phantom torus -o cloud.ply --count 3000");
+    let fit = bench.json("fit cloud.ply -o field.iclay --threads 1 --unit cm --tolerance 1mm");
+    for key in [
+        "input_count",
+        "coefficients",
+        "totals_bytes",
+        "bricks",
+        "depth",
+        "rms",
+        "p95",
+        "max",
+        "bound",
+        "seconds",
+        "cpu_seconds",
+        "peak_rss_bytes",
+    ] {
+        assert!(number(&fit, key) > 0.0, "{key} in {fit}");
+    }
+    assert_eq!(number(&fit, "threads"), 1.0);
+    assert_eq!(
+        number(&fit, "tolerance"),
+        0.1,
+        "a millimetre is a tenth of a centimetre"
+    );
+    assert_eq!(fit["unit"], "cm");
+    assert_eq!(fit["field_sha256"].as_str().unwrap().len(), 64);
+    assert!(number(&fit, "bound") >= number(&fit, "rms"));
+    let info = bench.json("info field.iclay");
+    assert_eq!(info["field_sha256"], fit["field_sha256"]);
+    assert_eq!(info["coefficients"], fit["coefficients"]);
+    assert_eq!(info["rms"], fit["rms"]);
+    let table = bench.run("info field.iclay");
+    assert!(table.code == 0 && table.stdout.contains("coefficients") && table.stderr.is_empty());
+}
+
+#[test]
+fn eval_answers_each_point_in_order_from_file_and_stdin() {
+    let bench = Bench::new();
+    bench.json("phantom sphere -o cloud.ply --count 3000");
+    bench.json("fit cloud.ply -o field.iclay");
+    let mut points = String::new();
+    for i in 0..5000 {
+        let t = i as f64 * 1e-3;
+        points += &format!("{} {} {}\n", 0.9 * t.cos(), 0.9 * t.sin(), 0.05 * t);
+    }
+    bench.write("points.xyz", &points);
+    let run = bench.run("eval field.iclay --points points.xyz");
+    assert_eq!(run.code, 0, "{}", run.stderr);
+    let mut lines = run.stdout.lines();
+    assert_eq!(lines.next(), Some("x,y,z,value,gx,gy,gz"));
+    let mut count = 0;
+    for (line, point) in lines.zip(points.lines()) {
+        let v: Vec<f64> = line.split(',').map(|w| w.parse().unwrap()).collect();
+        let p: Vec<f64> = point.split(' ').map(|w| w.parse().unwrap()).collect();
+        assert_eq!(v.len(), 7);
+        assert_eq!(v[..3], p[..], "points come back as they were");
+        let r = (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]).sqrt();
+        assert!((v[3] - (1.0 - r)).abs() < 0.01, "distance {} at radius {r}", v[3]);
+        assert!(
+            (0..3).all(|a| (v[4 + a] + p[a] / r).abs() < 0.1),
+            "gradient in {line}"
+        );
+        count += 1;
+    }
+    assert_eq!(count, 5000);
+    let mut child = bench
+        .command()
+        .args(["eval", "field.iclay", "--points", "-"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    child.stdin.take().unwrap().write_all(points.as_bytes()).unwrap();
+    assert_eq!(
+        String::from_utf8(child.wait_with_output().unwrap().stdout).unwrap(),
+        run.stdout
+    );
+    bench.write("nan.xyz", "0 0 0\nnan 0 0\n");
+    let run = bench.run("eval field.iclay --points nan.xyz");
+    assert_eq!(run.code, 3);
+    assert!(run.stderr.contains("1 of 2 points"), "{}", run.stderr);
+}
+
+/// A reader that goes away ends the program quietly.
+#[test]
+fn a_broken_pipe_is_no_panic() {
+    let bench = Bench::new();
+    bench.json("phantom sphere -o cloud.ply --count 3000");
+    bench.json("fit cloud.ply -o field.iclay");
+    bench.write("points.xyz", "0.5 0.5 0.5\n".repeat(100_000));
+    let mut child = bench
+        .command()
+        .args(["eval", "field.iclay", "--points", "points.xyz"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut first = [0; 64];
+    let mut stdout = child.stdout.take().unwrap();
+    stdout.read_exact(&mut first).unwrap();
+    drop(stdout);
+    let out = child.wait_with_output().unwrap();
+    assert!(out.stderr.is_empty(), "{}", String::from_utf8_lossy(&out.stderr));
+    assert_eq!(out.status.code(), Some(0));
+}
+
+/// The tolerance of a mesh is met by fewer triangles the looser it is.
+#[test]
+fn mesh_tolerance_chooses_the_resolution() {
+    let bench = Bench::new();
+    bench.json("phantom sphere -o cloud.ply");
+    bench.json("fit cloud.ply -o field.iclay");
+    let mut last = usize::MAX;
+    for tolerance in [1e-4, 1e-3, 1e-2] {
+        let mesh = bench.json(&format!("mesh field.iclay -o mesh.ply --tolerance {tolerance}"));
+        let triangles = number(&mesh, "triangles") as usize;
+        assert!(
+            triangles < last / 3,
+            "{triangles} triangles at {tolerance}, {last} before"
+        );
+        last = triangles;
+        // On a sphere of radius 1 the distance of a triangle's centre is known without the field.
+        let mesh = common::read_mesh(&bench.path("mesh.ply"));
+        let mut errors: Vec<f64> = (0..mesh.triangles.len())
+            .map(|t| {
+                let [a, b, c] = mesh.corners(t);
+                (((a + b + c) / 3.0).length() - 1.0).abs()
+            })
+            .collect();
+        errors.sort_by(f64::total_cmp);
+        let p99 = errors[errors.len() * 99 / 100];
+        assert!(
+            p99 < 1.05 * tolerance && p99 > 0.2 * tolerance,
+            "{p99} for {tolerance}"
+        );
+    }
+}
+
+#[test]
+fn same_bits_with_1_and_2_threads() {
+    let bench = Bench::new();
+    bench.json("phantom tetrahedron -o cloud.ply --noise 0.2%");
+    for input in ["cloud.ply", &data("head.nii.gz")] {
+        for n in [1, 2, 4] {
+            bench.json(&format!("fit {input} -o {n}.iclay --threads {n}"));
+            bench.json(&format!(
+                "mesh {n}.iclay -o {n}.ply --threads {n} --resolution 64"
+            ));
+        }
+        for n in [2, 4] {
+            let field = |n| bench.json(&format!("info {n}.iclay"))["field_sha256"].clone();
+            assert_eq!(field(1), field(n), "{input} with {n} threads");
+            let mesh = |n: i32| std::fs::read(bench.path(&format!("{n}.ply"))).unwrap();
+            assert!(mesh(1) == mesh(n), "{input}: meshes with {n} threads differ");
+        }
+    }
+}

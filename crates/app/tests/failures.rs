@@ -1,0 +1,302 @@
+//! What a careless or hostile world feeds the program: each case ends with a clear message that names the file,
+//! or with a stated repair; never with a panic, a hang, or something half-written.
+
+mod common;
+
+use std::fmt::Write as _;
+
+use common::{Bench, Run, data, number};
+
+/// A cloud as text: `x y z nx ny nz` lines.
+fn xyz(points: impl Iterator<Item = ([f64; 3], [f64; 3])>) -> String {
+    let mut text = String::new();
+    for (p, n) in points {
+        writeln!(text, "{} {} {} {} {} {}", p[0], p[1], p[2], n[0], n[1], n[2]).unwrap();
+    }
+    text
+}
+
+/// Points of the unit sphere with their normals, on a spiral.
+fn sphere(count: usize) -> impl Iterator<Item = ([f64; 3], [f64; 3])> {
+    (0..count).map(move |i| {
+        let z = 1.0 - (2 * i + 1) as f64 / count as f64;
+        let (a, r) = (2.399963229728653 * i as f64, (1.0 - z * z).sqrt());
+        let p = [r * a.cos(), r * a.sin(), z];
+        (p, p)
+    })
+}
+
+/// Fits `input` to `out.iclay`.
+fn fit(bench: &Bench, input: &str) -> Run {
+    bench.run(&format!("fit {input} -o out.iclay --json"))
+}
+
+/// The fit is refused with `code`, names the file, says `words`, and leaves nothing behind.
+fn refused(bench: &Bench, input: &str, code: i32, words: &[&str]) {
+    let before = bench.files();
+    let run = fit(bench, input);
+    assert_eq!(run.code, code, "{input}: {}{}", run.stdout, run.stderr);
+    assert!(run.stderr.starts_with("isoclay: "), "{input}: {}", run.stderr);
+    for word in words.iter().chain([&input.rsplit('/').next().unwrap()]) {
+        assert!(
+            run.stderr.contains(word),
+            "{input}: no {word:?} in {}",
+            run.stderr
+        );
+    }
+    assert!(!run.stderr.contains("panicked"), "{}", run.stderr);
+    assert_eq!(bench.files(), before, "{input}: something was left behind");
+}
+
+#[test]
+fn all_normals_zero() {
+    let bench = Bench::new();
+    bench.write("zero.xyz", xyz(sphere(500).map(|(p, _)| (p, [0.0; 3]))));
+    refused(&bench, "zero.xyz", 3, &["normal", "zero"]);
+}
+
+#[test]
+fn no_normals() {
+    let bench = Bench::new();
+    let text: String = sphere(500)
+        .map(|(p, _)| format!("{} {} {}\n", p[0], p[1], p[2]))
+        .collect();
+    bench.write("bare.xyz", text);
+    refused(&bench, "bare.xyz", 3, &["no normals", "estimate", "faces"]);
+}
+
+#[test]
+fn all_points_equal() {
+    let bench = Bench::new();
+    bench.write(
+        "equal.xyz",
+        xyz((0..500).map(|_| ([1.0, 2.0, 3.0], [0.0, 0.0, 1.0]))),
+    );
+    refused(&bench, "equal.xyz", 3, &["all 500 points"]);
+}
+
+#[test]
+fn collinear_points() {
+    let bench = Bench::new();
+    bench.write(
+        "line.xyz",
+        xyz((0..500).map(|i| ([i as f64, 2.0 * i as f64, 0.0], [0.0, 0.0, 1.0]))),
+    );
+    refused(&bench, "line.xyz", 3, &["line"]);
+}
+
+#[test]
+fn too_few_points() {
+    let bench = Bench::new();
+    bench.write("three.xyz", xyz(sphere(3)));
+    refused(&bench, "three.xyz", 3, &["3", "needed"]);
+}
+
+/// The outlier is left out with a note, and the sphere is fitted as without it.
+#[test]
+fn one_outlier_far_away() {
+    let bench = Bench::new();
+    let outlier = std::iter::once(([1e7, 0.0, 0.0], [1.0, 0.0, 0.0]));
+    bench.write("outlier.xyz", xyz(sphere(2000).chain(outlier)));
+    let fitted = fit(&bench, "outlier.xyz").json();
+    assert_eq!(number(&fitted, "used_count"), 2000.0);
+    assert!(
+        fitted["notes"].to_string().contains("1 of 2001 points left out"),
+        "{}",
+        fitted["notes"]
+    );
+    assert!(number(&fitted, "max") < 1e-3, "{fitted}");
+    // A share of the diagonal is a share of the sphere's, not of the outlier's.
+    let shared = bench
+        .run("fit outlier.xyz -o out.iclay --tolerance 0.1% --json")
+        .json();
+    assert!(number(&shared, "tolerance") < 0.01, "{shared}");
+}
+
+/// Points that are not numbers are left out with a note.
+#[test]
+fn nan_points() {
+    let bench = Bench::new();
+    let odd = [
+        ([f64::NAN, 0.0, 0.0], [1.0, 0.0, 0.0]),
+        ([0.0, f64::INFINITY, 0.0], [1.0, 0.0, 0.0]),
+    ];
+    bench.write("nan.xyz", xyz(sphere(2000).chain(odd)));
+    let fitted = fit(&bench, "nan.xyz").json();
+    assert_eq!(number(&fitted, "used_count"), 2000.0);
+    assert!(fitted["notes"].to_string().contains('2'), "{}", fitted["notes"]);
+    bench.write(
+        "all-nan.xyz",
+        xyz((0..50).map(|_| ([f64::NAN; 3], [1.0, 0.0, 0.0]))),
+    );
+    refused(&bench, "all-nan.xyz", 3, &[]);
+}
+
+#[test]
+fn missing_empty_and_unknown_files() {
+    let bench = Bench::new();
+    refused(&bench, "nowhere.ply", 3, &["check the path"]);
+    bench.write("empty.ply", "");
+    refused(&bench, "empty.ply", 3, &["empty"]);
+    bench.write("text.docx", "hello");
+    refused(&bench, "text.docx", 3, &["supported"]);
+    std::fs::create_dir(bench.path("folder.ply")).unwrap();
+    refused(&bench, "folder.ply", 3, &["directory"]);
+}
+
+#[test]
+fn truncated_files_at_many_lengths() {
+    let bench = Bench::new();
+    bench.json("phantom sphere -o whole.ply --count 400");
+    for (name, bytes) in [
+        ("cut.ply", std::fs::read(bench.path("whole.ply")).unwrap()),
+        ("cut.obj.gz", std::fs::read(data("bunny.obj.gz")).unwrap()),
+        ("cut.nii.gz", std::fs::read(data("head.nii.gz")).unwrap()),
+    ] {
+        for share in [0.02, 0.3, 0.7, 0.999] {
+            bench.write(name, &bytes[..(bytes.len() as f64 * share) as usize]);
+            refused(&bench, name, 3, &[]);
+        }
+    }
+}
+
+/// A damaged compressed file or field is refused wherever the bit is.
+#[test]
+fn flipped_bits() {
+    let bench = Bench::new();
+    bench.json("phantom sphere -o cloud.ply --count 2000");
+    bench.json("fit cloud.ply -o field.iclay --max-depth 6");
+    let field = std::fs::read(bench.path("field.iclay")).unwrap();
+    let cloud = std::fs::read(data("bunny.obj.gz")).unwrap();
+    for i in 1..8 {
+        let mut bytes = cloud.clone();
+        bytes[cloud.len() * i / 8] ^= 0x10;
+        bench.write("flipped.obj.gz", &bytes);
+        refused(&bench, "flipped.obj.gz", 3, &[]);
+        let mut bytes = field.clone();
+        bytes[field.len() * i / 8] ^= 0x10;
+        bench.write("flipped.iclay", &bytes);
+        let run = bench.run("mesh flipped.iclay -o out.ply");
+        assert_eq!(run.code, 3, "byte {}: {}", field.len() * i / 8, run.stderr);
+        assert!(run.stderr.contains("flipped.iclay"), "{}", run.stderr);
+        assert!(!bench.path("out.ply").exists());
+    }
+}
+
+/// The header's word is not taken for the memory to set aside.
+#[test]
+fn a_header_that_promises_too_much() {
+    let bench = Bench::new();
+    let header = "ply\nformat binary_little_endian 1.0\nelement vertex 100000000000\nproperty float x\n\
+                  property float y\nproperty float z\nend_header\n0123456789ab";
+    bench.write("huge.ply", header);
+    refused(&bench, "huge.ply", 3, &["100000000000"]);
+}
+
+#[test]
+fn a_memory_ceiling_is_obeyed() {
+    let bench = Bench::new();
+    bench.json("phantom gyroid -o cloud.ply --count 50000");
+    let run = bench.run("fit cloud.ply -o out.iclay --memory 8MiB");
+    assert_eq!(run.code, 4, "{}", run.stderr);
+    assert!(run.stderr.contains("--memory"), "{}", run.stderr);
+    assert!(!bench.path("out.iclay").exists());
+    let run = bench.run(&format!("fit {} -o out.iclay --memory 8MiB", data("head.nii.gz")));
+    assert_eq!(run.code, 4, "{}", run.stderr);
+    let fitted = bench.json(&format!(
+        "fit {} -o out.iclay --memory 256MiB",
+        data("head.nii.gz")
+    ));
+    assert!(number(&fitted, "peak_rss_bytes") < 256.0 * 1048576.0, "{fitted}");
+}
+
+/// A NIfTI-1 volume of bytes.
+fn nifti(dims: [i16; 3], values: &[u8]) -> Vec<u8> {
+    let mut h = vec![0u8; 352];
+    h[..4].copy_from_slice(&348i32.to_le_bytes());
+    for (i, d) in [3, dims[0], dims[1], dims[2], 1, 1, 1, 1].into_iter().enumerate() {
+        h[40 + 2 * i..42 + 2 * i].copy_from_slice(&d.to_le_bytes());
+    }
+    h[70..72].copy_from_slice(&2i16.to_le_bytes());
+    h[72..74].copy_from_slice(&8i16.to_le_bytes());
+    for i in 0..4 {
+        h[76 + 4 * i..80 + 4 * i].copy_from_slice(&1f32.to_le_bytes());
+    }
+    h[108..112].copy_from_slice(&352f32.to_le_bytes());
+    h[112..116].copy_from_slice(&1f32.to_le_bytes());
+    h[344..348].copy_from_slice(b"n+1\0");
+    h.extend_from_slice(values);
+    h
+}
+
+#[test]
+fn empty_and_constant_volumes() {
+    let bench = Bench::new();
+    bench.write("empty.nii", nifti([0, 4, 4], &[]));
+    refused(&bench, "empty.nii", 3, &[]);
+    bench.write("constant.nii", nifti([20, 18, 16], &[7; 20 * 18 * 16]));
+    let fitted = fit(&bench, "constant.nii").json();
+    assert!(number(&fitted, "max") < 1e-5, "{fitted}");
+    // There is a field, but no surface in it.
+    let run = bench.run("mesh out.iclay -o out.ply");
+    assert_eq!(run.code, 3, "{}", run.stderr);
+    assert!(
+        run.stderr.contains("--iso") && !bench.path("out.ply").exists(),
+        "{}",
+        run.stderr
+    );
+}
+
+/// A device that is always full: code 4, the path and what would help. (That an old file survives a disk that fills
+/// at any byte is tested in `formats`, which can make such a disk.)
+#[test]
+fn a_full_disk() {
+    let bench = Bench::new();
+    bench.json("phantom sphere -o cloud.ply --count 2000");
+    bench.json("fit cloud.ply -o field.iclay");
+    for (name, command) in [
+        ("full.iclay", "fit cloud.ply -o full.iclay"),
+        ("full.ply", "mesh field.iclay -o full.ply"),
+        ("full.png", "picture field.iclay -o full.png --size 64x64"),
+    ] {
+        std::os::unix::fs::symlink("/dev/full", bench.path(name)).unwrap();
+        let run = bench.run(command);
+        assert_eq!(run.code, 4, "{command}: {}", run.stderr);
+        assert!(
+            run.stderr.contains(name) && run.stderr.contains("free some space"),
+            "{command}: {}",
+            run.stderr
+        );
+    }
+}
+
+/// Ctrl-C in the middle of a fit: exit code 4, the old file as it was, nothing beside it.
+#[test]
+fn a_cancelled_fit() {
+    use std::process::Stdio;
+    use std::time::Duration;
+    let bench = Bench::new();
+    bench.json("phantom gyroid -o cloud.ply --count 400000");
+    bench.write("out.iclay", "the old file");
+    let before = bench.files();
+    let arguments = "fit cloud.ply -o out.iclay --tolerance 1e-6 --precision f64 --threads 1";
+    let child = bench
+        .command()
+        .args(arguments.split_whitespace())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // Long enough to be at work, far from long enough to be done.
+    std::thread::sleep(Duration::from_millis(700));
+    let pid = rustix::process::Pid::from_child(&child);
+    rustix::process::kill_process(pid, rustix::process::Signal::INT).unwrap();
+    let run = Run::from(child.wait_with_output().unwrap());
+    assert_eq!(run.code, 4, "{}{}", run.stdout, run.stderr);
+    assert!(run.stderr.contains("cancelled"), "{}", run.stderr);
+    assert_eq!(
+        std::fs::read_to_string(bench.path("out.iclay")).unwrap(),
+        "the old file"
+    );
+    assert_eq!(bench.files(), before);
+}

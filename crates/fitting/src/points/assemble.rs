@@ -1,0 +1,53 @@
+//! From the levels of a cascade to a field.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use bspline::hierarchical::{BRICK, BrickKey, Corrections, LevelCorrections};
+use bspline::{HierarchicalSpline, Real};
+
+use super::band::active_slots;
+use super::cascade::Level;
+use super::full_grid::FullGrid;
+use super::samples::Samples;
+
+/// The field: level 0 is the full base level, the others what the cascade found, scaled to world units.
+pub(crate) fn assemble<T: Real>(
+    samples: &Samples,
+    base: &FullGrid<f64>,
+    levels: &[Level<T>],
+) -> HierarchicalSpline<T> {
+    let mut stored: Vec<LevelCorrections<T>> = Vec::with_capacity(levels.len() + 1);
+    let m = base.width();
+    let mut bottom: BTreeMap<BrickKey, Corrections<T>> = BTreeMap::new();
+    for (i, c) in base.values.iter().enumerate() {
+        let s = [i / (m * m), i / m % m, i % m];
+        let key = BrickKey(s.map(|s| (s / BRICK) as u32));
+        let value = T::from_f64(c * samples.scale);
+        bottom
+            .entry(key)
+            .or_insert_with(Corrections::empty)
+            .set(s.map(|s| s % BRICK), value);
+    }
+    stored.push(bottom.into_iter().map(|(k, c)| (k, Arc::new(c))).collect());
+    let scale = T::from_f64(samples.scale);
+    for level in levels {
+        let mut values = level.x.iter();
+        let mut corrections = LevelCorrections::new();
+        for (key, mask) in level.keys.iter().zip(&level.masks) {
+            if *mask == [0; BRICK] {
+                continue;
+            }
+            let mut brick = Corrections {
+                mask: *mask,
+                ..Corrections::empty()
+            };
+            for (slot, value) in active_slots(mask).zip(values.by_ref()) {
+                brick.values[slot] = *value * scale;
+            }
+            corrections.insert(*key, Arc::new(brick));
+        }
+        stored.push(corrections);
+    }
+    HierarchicalSpline::from_corrections(samples.lattice(), 1.0, stored)
+}

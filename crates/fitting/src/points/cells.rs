@@ -1,0 +1,162 @@
+//! The octree's occupied cells: which are split, and why the others are not.
+
+use bspline::Real;
+use bspline::hierarchical::HALO;
+
+use super::band::Band;
+use super::band_solve::{BandSample, BrickSamples};
+use super::plan::Plan;
+use super::samples::{BASE_DEPTH, Samples};
+use super::stencil::gather;
+use crate::StopReason;
+
+/// A cell is split where the rms of `|∇f + n|` exceeds this, however small `|f|` is: on thin parts opposite
+/// sheets cancel to `f ≈ 0`, `|∇f| ≈ 0`.
+const GRADIENT_LIMIT: f64 = 0.3;
+/// Samples that the cell above must hold for its children to be split: below, the spacing of the coefficients
+/// would fall under half the spacing of the samples.
+const SAMPLES_TO_SPLIT: u32 = 2;
+
+/// A cell that holds samples: `start..end` in Morton order.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cell {
+    pub at: [u32; 3],
+    pub start: u32,
+    pub end: u32,
+    /// Whether this level's functions were made active here: the cell above was split.
+    pub refined: bool,
+    /// Samples of the cell above.
+    pub above: u32,
+}
+
+impl Cell {
+    /// The cell as a leaf.
+    pub fn leaf(&self, depth: usize, reason: StopReason) -> LeafCell {
+        LeafCell {
+            depth,
+            at: self.at,
+            start: self.start,
+            end: self.end,
+            reason,
+        }
+    }
+}
+
+/// A leaf: a cell that was refined to but not split.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LeafCell {
+    pub depth: usize,
+    pub at: [u32; 3],
+    pub start: u32,
+    pub end: u32,
+    pub reason: StopReason,
+}
+
+/// Cells of the base level, all of them to be split.
+pub(crate) fn root_cells(samples: &Samples) -> Vec<(Cell, bool)> {
+    let whole = Cell {
+        at: [0; 3],
+        start: 0,
+        end: samples.positions.len() as u32,
+        refined: true,
+        above: u32::MAX,
+    };
+    let mut level = vec![(whole, true)];
+    for depth in 1..=BASE_DEPTH {
+        level = children(samples, &level, depth)
+            .into_iter()
+            .map(|c| (c, true))
+            .collect();
+    }
+    level
+}
+
+/// Occupied cells of `depth`, in Morton order, from those above and whether they were split.
+pub(crate) fn children(samples: &Samples, above: &[(Cell, bool)], depth: usize) -> Vec<Cell> {
+    let mut cells: Vec<Cell> = Vec::with_capacity(2 * above.len());
+    for (parent, split) in above {
+        let count = parent.end - parent.start;
+        let first = cells.len();
+        for i in parent.start..parent.end {
+            let at = samples.cell(i as usize, depth);
+            match cells[first..].last_mut() {
+                Some(cell) if cell.at == at => cell.end = i + 1,
+                _ => cells.push(Cell {
+                    at,
+                    start: i,
+                    end: i + 1,
+                    refined: *split,
+                    above: count,
+                }),
+            }
+        }
+    }
+    cells
+}
+
+/// Whether a cell is split, or why not.
+pub(crate) fn judge(cell: &Cell, q: &Quality, plan: &Plan, depth: usize) -> Result<(), StopReason> {
+    let fits = q.distance() <= plan.tolerance && q.turn() <= GRADIENT_LIMIT;
+    if fits && !plan.uniform {
+        Err(StopReason::Tolerance)
+    } else if depth == plan.max_depth {
+        Err(if fits {
+            StopReason::Tolerance
+        } else {
+            plan.limited_by
+        })
+    } else if cell.above < SAMPLES_TO_SPLIT {
+        Err(StopReason::NoData)
+    } else {
+        Ok(())
+    }
+}
+
+/// Sums over the samples of a cell.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Quality {
+    weight: f64,
+    distance: f64,
+    turn: f64,
+}
+
+impl Quality {
+    /// Rms of `|f|/|∇f|`, unit box.
+    fn distance(&self) -> f64 {
+        (self.distance / self.weight.max(1e-300)).sqrt()
+    }
+    /// Rms of `|∇f + n|`.
+    fn turn(&self) -> f64 {
+        (self.turn / self.weight.max(1e-300)).sqrt()
+    }
+}
+
+pub(crate) fn cell_quality<T: Real>(
+    band: &Band<T>,
+    list: &[BandSample<T>],
+    bricks: &[BrickSamples],
+    owners: &[u32],
+    cell_count: usize,
+) -> Vec<Quality> {
+    let n = (1u64 << band.depth) as f64;
+    let mut out = vec![Quality::default(); cell_count];
+    let mut values = [T::zero(); HALO * HALO * HALO];
+    for b in bricks {
+        band.halo(&band.totals, b.brick as usize, &mut values);
+        for i in b.start as usize..b.end as usize {
+            let sample = &list[i];
+            let (v, g) = gather(&values, sample.spot, [HALO * HALO, HALO]);
+            let g = g.map(|g| g.as_f64() * n);
+            let steepness: f64 = g.iter().map(|g| g * g).sum();
+            let w = sample.gradient_weight.as_f64();
+            let q = &mut out[owners[i] as usize];
+            q.weight += w;
+            q.distance += w * v.as_f64().powi(2) / steepness.max(1e-4);
+            q.turn += w
+                * (0..3)
+                    .map(|a| (g[a] + sample.normal[a].as_f64()).powi(2))
+                    .sum::<f64>();
+        }
+    }
+    out
+}

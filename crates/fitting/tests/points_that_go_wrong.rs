@@ -1,0 +1,198 @@
+//! Clouds that cannot be fitted, that need a repair, and fits that are stopped.
+
+mod common;
+
+use bspline::Field;
+use common::{cloud, fit, oriented, to_depth};
+use fitting::phantoms::{CloudOptions, SampledCloud, Solid};
+use fitting::points::{PointOptions, fit_points};
+use fitting::{Control, FitError, StopReason};
+use glam::DVec3;
+
+/// A ball of 4000 points in which something is wrong.
+fn spoiled(spoil: impl FnOnce(&mut SampledCloud)) -> SampledCloud {
+    let mut samples = cloud(
+        Solid::Sphere,
+        &CloudOptions {
+            count: 4000,
+            ..CloudOptions::default()
+        },
+    );
+    spoil(&mut samples);
+    samples
+}
+
+fn refusal(samples: &SampledCloud) -> FitError {
+    fit::<f32>(samples, &to_depth(6)).expect_err("a cloud that cannot be fitted")
+}
+
+#[test]
+fn all_normals_zero_is_refused_with_the_remedy() {
+    let error = refusal(&spoiled(|c| c.normals.fill(DVec3::ZERO)));
+    assert!(error.to_string().contains("outward normals"), "{error}");
+}
+
+#[test]
+fn too_few_points_are_refused() {
+    for count in [0, 1, 9] {
+        let error = refusal(&spoiled(|c| {
+            c.positions.truncate(count);
+            c.normals.truncate(count);
+        }));
+        assert_eq!(
+            error,
+            FitError::NotEnoughSamples {
+                found: count,
+                needed: 10
+            }
+        );
+    }
+}
+
+#[test]
+fn all_points_equal_is_refused() {
+    let error = refusal(&spoiled(|c| c.positions.fill(DVec3::new(1.0, 2.0, 3.0))));
+    assert!(matches!(error, FitError::Degenerate(_)), "{error}");
+}
+
+#[test]
+fn collinear_points_are_refused() {
+    let error = refusal(&spoiled(|c| {
+        for (i, p) in c.positions.iter_mut().enumerate() {
+            *p = DVec3::new(1.0, 2.0, -1.0) * i as f64;
+        }
+    }));
+    assert!(error.to_string().contains("line"), "{error}");
+}
+
+#[test]
+fn one_outlier_at_ten_million_is_left_out_and_told() {
+    let samples = spoiled(|c| c.positions[17] = DVec3::splat(1e7));
+    let (field, report) = fit::<f32>(&samples, &to_depth(6)).expect("the rest is a ball");
+    assert_eq!(report.used_count, report.input_count - 1);
+    assert!(
+        report.notes.iter().any(|n| n.contains("left out")),
+        "{:?}",
+        report.notes
+    );
+    assert!(report.rms < 1e-3 && field.lattice().world_box().size().x < 3.0);
+}
+
+#[test]
+fn points_that_are_not_numbers_are_left_out_and_told() {
+    let samples = spoiled(|c| {
+        c.positions[3].x = f64::NAN;
+        c.positions[4].y = f64::INFINITY;
+        c.normals[5].z = f64::NAN;
+        c.positions[6] = DVec3::splat(1e300);
+    });
+    let (_, report) = fit::<f32>(&samples, &to_depth(6)).expect("the rest is a ball");
+    assert_eq!(report.used_count, report.input_count - 4);
+    assert!(report.rms < 1e-3);
+}
+
+#[test]
+fn every_point_twice_gives_the_same_surface() {
+    let samples = spoiled(|c| {
+        c.positions.extend_from_within(..);
+        c.normals.extend_from_within(..);
+    });
+    let (_, report) = fit::<f32>(&samples, &to_depth(7)).expect("a ball, twice");
+    assert!(report.rms < 1e-3, "{}", report.rms);
+}
+
+#[test]
+fn flat_points_are_a_surface_too() {
+    let samples = spoiled(|c| {
+        for (p, n) in c.positions.iter_mut().zip(&mut c.normals) {
+            p.z = 0.0;
+            *n = DVec3::Z;
+        }
+    });
+    let (field, report) = fit::<f32>(&samples, &to_depth(6)).expect("a disk");
+    assert!(report.rms < 1e-3, "{}", report.rms);
+    assert!(field.value(DVec3::new(0.0, 0.0, 0.1)) < 0.0);
+    assert!(field.value(DVec3::new(0.0, 0.0, -0.1)) > 0.0);
+}
+
+#[test]
+fn normals_that_contradict_each_other_give_finite_numbers() {
+    let samples = spoiled(|c| {
+        for n in c.normals.iter_mut().step_by(2) {
+            *n = -*n;
+        }
+    });
+    let (field, report) = fit::<f32>(&samples, &to_depth(7)).expect("a field, if not a ball");
+    assert!(report.rms.is_finite() && field.value(DVec3::ZERO).is_finite());
+}
+
+#[test]
+fn a_cancelled_fit_stops() {
+    let samples = spoiled(|_| ());
+    let mut control = Control::default();
+    let cancel = control.cancel.clone();
+    // Cancelled from within, at the third report.
+    let mut reports = 0;
+    control.on_progress = Box::new(move |_| {
+        reports += 1;
+        if reports == 3 {
+            cancel.cancel();
+        }
+    });
+    let result = fit_points::<f32>(&oriented(&samples), &PointOptions::default(), &mut control);
+    assert_eq!(result.err(), Some(FitError::Cancelled));
+}
+
+#[test]
+fn progress_never_falls() {
+    let samples = cloud(
+        Solid::Torus,
+        &CloudOptions {
+            noise: 0.01,
+            ..CloudOptions::default()
+        },
+    );
+    let mut control = Control::default();
+    let mut last = 0.0;
+    control.on_progress = Box::new(move |p| {
+        assert!(
+            p.fraction >= last && p.fraction <= 1.0,
+            "{} after {last}",
+            p.fraction
+        );
+        last = p.fraction;
+    });
+    fit_points::<f32>(&oriented(&samples), &PointOptions::default(), &mut control).expect("a noisy cloud");
+}
+
+#[test]
+fn a_memory_ceiling_stops_the_refinement_or_refuses() {
+    let samples = cloud(Solid::Torus, &CloudOptions::default());
+    let under = |limit: u64| {
+        let mut control = Control {
+            memory_limit: Some(limit),
+            ..Control::default()
+        };
+        let options = PointOptions {
+            tolerance: Some(1e-7),
+            ..to_depth(9)
+        };
+        fit_points::<f32>(&oriented(&samples), &options, &mut control)
+    };
+    let (_, report) = under(40 << 20).expect("the coarse levels fit in");
+    assert!(report.leaves.iter().any(|l| l.reason == StopReason::Memory));
+    assert!(report.depth < 9);
+    assert!(matches!(under(1 << 20), Err(FitError::MemoryLimit { .. })));
+}
+
+#[test]
+fn a_budget_of_coefficients_stops_the_refinement() {
+    let samples = cloud(Solid::Torus, &CloudOptions::default());
+    let options = PointOptions {
+        coefficients: Some(60_000),
+        tolerance: Some(1e-7),
+        ..PointOptions::default()
+    };
+    let (_, report) = fit::<f32>(&samples, &options).expect("a clean cloud");
+    assert!(report.leaves.iter().any(|l| l.reason == StopReason::Budget));
+}
