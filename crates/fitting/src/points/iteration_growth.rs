@@ -21,8 +21,9 @@ fn iterations(samples: &Samples, depths: [usize; 4]) -> [usize; 4] {
             ..Plan::new(samples, &options, 1e-4, None)
         };
         let base = coarse::solve(samples, plan.beta);
-        let cascade = cascade::run::<f32>(samples, &base, &plan, &mut Control::default()).expect("no limits");
-        let last = cascade.iterations.last().expect("levels below the base");
+        let cascade =
+            cascade::run::<f32>(samples, &base, &plan, 0.0..1.0, &mut Control::default()).expect("no limits");
+        let last = cascade.solves.last().expect("levels below the base");
         assert!(
             last.residual <= 1e-3,
             "depth {depth} stopped at {}",
