@@ -92,7 +92,7 @@ print(f'{os.path.basename(arg.cloud)}: {len(read_cloud(arg.cloud)[0])} points; m
 print('| program | setting | threads | CPU s | wall s | peak MiB | triangles | fwd rms | fwd p95 | fwd max | bwd p95 |')
 print('| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |')
 for r in table:
-    print(f"| {r['program']} | {r['setting'] or 'default'} | {r['threads']} | {r['cpu']:.2f} | {r['wall']:.2f} | {r['peak_mib']:.0f} | {r['triangles'] / 1000:.0f} k "
+    print(f"| {r['program']} | {r['setting'].replace('|', chr(92) + '|') or 'default'} | {r['threads']} | {r['cpu']:.2f} | {r['wall']:.2f} | {r['peak_mib']:.0f} | {r['triangles'] / 1000:.0f} k "
           f"| {r['fwd_rms']:.2f} | {r['fwd_p95']:.2f} | {r['fwd_max']:.1f} | {r['bwd_p95']:.2f} |")
 if arg.json:
     with open(arg.json, 'w') as f:
