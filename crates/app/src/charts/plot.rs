@@ -283,7 +283,8 @@ mod tests {
                 points: vec![
                     (0.1, 1e-3, "1%".into()),
                     (0.5, 1e-4, "0.1%".into()),
-                    (0.0, 1.0, "never".into()),
+                    (0.0, 1e-3, "never".into()),
+                    (0.2, 1e-12, "f64".into()),
                 ],
             }],
         };
@@ -299,7 +300,8 @@ mod tests {
         }
         assert!(!svg.contains("never"));
         assert!(svg.contains("not drawn: f64: 1e-12 at 0.20"));
-        assert_eq!(svg.matches("<circle").count(), 2);
+        // The marker of the legend and the two points.
+        assert_eq!(svg.matches("<circle").count(), 3);
     }
 
     #[test]
