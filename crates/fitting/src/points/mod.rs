@@ -10,6 +10,8 @@ mod coarse;
 mod cross_validation;
 mod far_field;
 mod full_grid;
+#[cfg(test)]
+mod iteration_growth;
 mod noise;
 mod plan;
 mod residual;

@@ -57,8 +57,8 @@ mod tests {
     #[test]
     fn two_heaps_are_parted_in_the_middle() {
         let values: Vec<f32> = (0..1000).map(|i| if i % 3 == 0 { 10.0 } else { 90.0 }).collect();
-        let found = otsu_threshold(&values).unwrap();
-        assert!((found - 50.0).abs() < 0.5, "{found}");
+        let threshold = otsu_threshold(&values).expect("two classes");
+        assert!((threshold - 50.0).abs() < 0.5, "{threshold}");
     }
 
     #[test]
