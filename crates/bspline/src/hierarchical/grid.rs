@@ -7,9 +7,9 @@ use glam::DVec3;
 use super::brick::{BRICK, Brick, HALO, HALO_LEN, NONE};
 use super::spline::HierarchicalSpline;
 use crate::field::values_node_by_node;
-use crate::{Aabb, Field, Frame, Real, cubic};
+use crate::{Aabb, Frame, Real, cubic};
 
-/// [`Field::frame_values`]. Frames that are turned against the lattice fall back to single points.
+/// [`crate::Field::frame_values`]. Frames that are turned against the lattice fall back to single points.
 pub(super) fn frame_values<T: Real>(
     spline: &HierarchicalSpline<T>,
     frame: &Frame,
