@@ -203,3 +203,31 @@ fn holes_are_closed() {
     );
     hold_far_sign(&bench, Solid::Sphere);
 }
+
+/// The head's closed form is met within the tolerance in every leaf, at fewer coefficients than voxels; white noise
+/// is found and not fitted.
+#[test]
+fn head_clean_and_noisy() {
+    let bench = Bench::new();
+    bench.json("phantom head -o head.nii.gz --size 64");
+    let fit = bench.json("fit head.nii.gz -o head.iclay --tolerance 2%");
+    assert_eq!(number(&fit, "leaves_over_tolerance"), 0.0, "{fit}");
+    assert!(number(&fit, "coefficients") < 0.7 * 64f64.powi(3), "{fit}");
+    let check = bench.json("check head.iclay head.nii.gz");
+    assert!(
+        (number(&check, "rms") / number(&fit, "rms") - 1.0).abs() < 0.01,
+        "{check} {fit}"
+    );
+
+    bench.json("phantom head -o noisy.nii.gz --size 64 --noise 0.02");
+    let fit = bench.json("fit noisy.nii.gz -o noisy.iclay");
+    let noise = number(&fit, "noise");
+    assert!((0.015..0.025).contains(&noise), "noise found: {noise}");
+    let clean = bench.json("check noisy.iclay head.nii.gz");
+    assert!(
+        number(&clean, "rms") < 0.02,
+        "the fit is {} off the truth, the voxels 0.02",
+        clean["rms"]
+    );
+    assert_eq!(bench.run("phantom head -o head.nii.gz --holes 3").code, 2);
+}

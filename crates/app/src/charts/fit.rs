@@ -77,7 +77,6 @@ pub fn sweeps(input: Input) -> Vec<Configuration> {
             options,
         });
     };
-    add(Sweep::Default, "default".into(), Vec::new());
     let tolerances: &[&str] = match input {
         Input::Cloud => &["1%", "0.5%", "0.2%", "0.1%", "0.05%", "0.02%", "0.01%", "0.005%"],
         Input::Volume => &["8%", "4%", "2%", "1%", "0.5%", "0.25%"],
@@ -123,6 +122,11 @@ pub fn sweeps(input: Input) -> Vec<Configuration> {
             add(Sweep::Interpolate, precision.into(), options);
         }
     }
+    runs.push(Configuration {
+        sweep: Sweep::Default,
+        label: "default".into(),
+        options: Vec::new(),
+    });
     runs
 }
 

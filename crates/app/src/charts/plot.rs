@@ -1,6 +1,7 @@
 use std::error::Error;
 use std::ops::Range;
 
+use plotters::coord::Shift;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
@@ -26,6 +27,10 @@ pub struct Chart {
 
 type PlotContext<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
+/// Where the legend begins, from the left.
+const LEFT: i32 = 100;
+/// Height of a line of the legend.
+const ROW: i32 = 24;
 /// Points lower than this share of the highest are named in the legend instead of drawn.
 const DEPTH: f64 = 1e-5;
 
@@ -80,16 +85,19 @@ impl Chart {
         if figures.is_empty() {
             series.name.clone()
         } else {
-            format!("{} (below the chart: {})", series.name, figures.join(", "))
+            format!("{}, not drawn: {}", series.name, figures.join(", "))
         }
     }
 
     fn draw(&self, text: &mut String) -> Result<(), Box<dyn Error + '_>> {
-        let root = SVGBackend::with_string(text, (960, 640)).into_drawing_area();
+        let legend = self.legend_places();
+        let depth = legend.last().map_or(0, |p| p.1) + ROW;
+        let root = SVGBackend::with_string(text, (960, 600 + depth as u32)).into_drawing_area();
         root.fill(&WHITE)?;
+        let (above, below) = root.split_vertically(600);
         let all: Vec<_> = self.series.iter().flat_map(|s| self.logarithms(s)).collect();
         let (x, y) = (padded(all.iter().map(|p| p.0)), padded(all.iter().map(|p| p.1)));
-        let mut chart = ChartBuilder::on(&root)
+        let mut chart = ChartBuilder::on(&above)
             .caption(&self.title, ("sans-serif", 22))
             .margin(16)
             .x_label_area_size(52)
@@ -101,29 +109,55 @@ impl Chart {
             let color = COLORS[i % COLORS.len()];
             let points = self.logarithms(series);
             let line: Vec<(f64, f64)> = points.iter().map(|p| (p.0, p.1)).collect();
-            chart
-                .draw_series(LineSeries::new(line.iter().copied(), color.stroke_width(2)))?
-                .label(self.legend(series))
-                .legend(move |(x, y)| PathElement::new([(x, y), (x + 24, y)], color.stroke_width(3)));
-            chart.draw_series(line.iter().map(|&p| Circle::new(p, 4, color.filled())))?;
+            chart.draw_series(LineSeries::new(line.iter().copied(), color.stroke_width(2)))?;
+            // A series of one point would hide under the others.
+            let radius = if line.len() == 1 { 7 } else { 4 };
+            chart.draw_series(line.iter().map(|&p| Circle::new(p, radius, color.filled())))?;
             for (x, y, label) in points {
                 let at = chart.backend_coord(&(x, y));
                 words.push((at, label, color));
             }
         }
-        chart
-            .configure_series_labels()
-            .position(SeriesLabelPosition::UpperRight)
-            .background_style(WHITE.mix(0.9))
-            .border_style(BLACK.mix(0.3))
-            .label_font(("sans-serif", 14))
-            .draw()?;
-        write_words(&root, &words)?;
+        write_words(&above, &words)?;
+        self.draw_legend(&below, &legend)?;
         root.present()?;
         Ok(())
     }
 
-    /// Grid lines and labels at 1, 2 and 5 times the powers of ten.
+    /// Corners of the entries of the legend, set like words on lines.
+    fn legend_places(&self) -> Vec<(i32, i32)> {
+        let (mut x, mut y) = (LEFT, 8);
+        let mut places = Vec::new();
+        for series in &self.series {
+            let width = 60 + 7 * self.legend(series).chars().count() as i32;
+            if x > LEFT && x + width > 950 {
+                (x, y) = (LEFT, y + ROW);
+            }
+            places.push((x, y));
+            x += width;
+        }
+        places
+    }
+
+    /// The names under the chart, where they hide nothing.
+    fn draw_legend(
+        &self,
+        area: &DrawingArea<SVGBackend<'_>, Shift>,
+        places: &[(i32, i32)],
+    ) -> Result<(), String> {
+        for (i, (series, &(x, y))) in self.series.iter().zip(places).enumerate() {
+            let color = COLORS[i % COLORS.len()];
+            let name = Text::new(self.legend(series), (x + 34, y - 7), ("sans-serif", 14));
+            let drawn = area
+                .draw(&PathElement::new([(x, y), (x + 24, y)], color.stroke_width(3)))
+                .and_then(|()| area.draw(&Circle::new((x + 12, y), 4, color.filled())))
+                .and_then(|()| area.draw(&name));
+            drawn.map_err(|e| e.to_string())?;
+        }
+        Ok(())
+    }
+
+    /// Grid lines and labels at round numbers.
     fn draw_axes(
         &self,
         chart: &mut PlotContext<'_, '_>,
@@ -167,7 +201,7 @@ impl Chart {
 /// Writes the words beside their points where they hide neither a point nor another word; where no side is free,
 /// a point goes without.
 fn write_words(
-    root: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>,
+    root: &DrawingArea<SVGBackend<'_>, Shift>,
     words: &[((i32, i32), &str, RGBColor)],
 ) -> Result<(), String> {
     const HEIGHT: i32 = 13;
@@ -210,12 +244,12 @@ fn padded(values: impl Iterator<Item = f64>) -> Range<f64> {
     lo - pad..hi + pad
 }
 
-/// Logarithms of 1, 2 and 5 times the powers of ten inside `range`; of the powers alone if that is plenty.
+/// Logarithms of round numbers inside `range`, the more to a power of ten the fewer of these there are.
 fn ticks(range: &Range<f64>) -> Vec<f64> {
-    let steps: &[f64] = if range.end - range.start > 4.0 {
-        &[1.0]
-    } else {
-        &[1.0, 2.0, 5.0]
+    let steps: &[f64] = match range.end - range.start {
+        width if width > 4.0 => &[1.0],
+        width if width > 1.2 => &[1.0, 2.0, 5.0],
+        _ => &[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0],
     };
     (range.start.floor() as i32..=range.end.ceil() as i32)
         .flat_map(|power| steps.iter().map(move |s| s.log10() + f64::from(power)))
@@ -223,13 +257,14 @@ fn ticks(range: &Range<f64>) -> Vec<f64> {
         .collect()
 }
 
+/// Two digits, with an exponent where the zeros would be many.
 fn plain(logarithm: f64) -> String {
-    let value = 10f64.powf(logarithm);
+    let short = format!("{:.1e}", 10f64.powf(logarithm));
+    let value: f64 = short.parse().expect("a number just written");
     if (1e-3..1e5).contains(&value) {
-        let decimals = (-(logarithm + 1e-9).floor()).max(0.0) as usize;
-        format!("{value:.decimals$}")
+        format!("{value}")
     } else {
-        format!("{value:.0e}")
+        format!("{value:e}")
     }
 }
 
@@ -248,7 +283,8 @@ mod tests {
                 points: vec![
                     (0.1, 1e-3, "1%".into()),
                     (0.5, 1e-4, "0.1%".into()),
-                    (0.0, 1.0, "never".into()),
+                    (0.0, 1e-3, "never".into()),
+                    (0.2, 1e-12, "f64".into()),
                 ],
             }],
         };
@@ -263,14 +299,18 @@ mod tests {
             assert!(svg.contains(word), "{word} is missing");
         }
         assert!(!svg.contains("never"));
-        assert!(svg.contains("below the chart: f64: 1e-12 at 0.20"));
-        assert_eq!(svg.matches("<circle").count(), 2);
+        assert!(svg.contains("not drawn: f64: 1e-12 at 0.20"));
+        // The marker of the legend and the two points.
+        assert_eq!(svg.matches("<circle").count(), 3);
     }
 
     #[test]
     fn ticks_are_round_numbers_inside_the_range() {
         let labels: Vec<String> = ticks(&(-1.1..0.8)).into_iter().map(plain).collect();
         assert_eq!(labels, ["0.1", "0.2", "0.5", "1", "2", "5"]);
-        assert_eq!(plain(-6.0), "1e-6");
+        assert_eq!(
+            [-6.0, 1.5e-4f64.log10(), 1500f64.log10()].map(plain),
+            ["1e-6", "1.5e-4", "1500"]
+        );
     }
 }

@@ -60,7 +60,8 @@ mod tests {
             x = std::hint::black_box(x.wrapping_mul(6364136223846793005).wrapping_add(1));
         }
         assert!(cpu_seconds() > before);
-        assert!(peak_rss_bytes().unwrap() >= rss_bytes().unwrap());
-        assert!(rss_bytes().unwrap() > 100_000);
+        // In this order: other tests of this process go on allocating.
+        let now = rss_bytes().unwrap();
+        assert!(now > 100_000 && peak_rss_bytes().unwrap() >= now);
     }
 }

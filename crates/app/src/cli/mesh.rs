@@ -71,7 +71,7 @@ pub fn run(args: &Args) -> Outcome {
     };
     let mut notes = Vec::new();
     let (mesh, report, frame) = match args.tolerance {
-        Some(tolerance) => mesher.to_tolerance(&open, tolerance, &mut notes)?,
+        Some(tolerance) => mesher.within_tolerance(&open, tolerance, &mut notes)?,
         None => mesher.on(match args.resolution {
             Some(n) => open.frame_of_resolution(n),
             None => open.frame_of_subdivision(2),
@@ -163,7 +163,7 @@ impl Mesher<'_> {
 
     /// Meshes as coarsely as the tolerance allows. The chord error of a triangle falls with the square of its
     /// size, so a trial at the default resolution tells the next one; each result is measured.
-    fn to_tolerance(
+    fn within_tolerance(
         &mut self,
         open: &OpenField,
         tolerance: Tolerance,

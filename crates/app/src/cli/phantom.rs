@@ -2,7 +2,10 @@ use std::path::PathBuf;
 
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
-use fitting::phantoms::{CloudOptions, Solid, sample_cloud};
+use fitting::phantoms::{CloudOptions, Solid, head, sample_cloud};
+use formats::Unit;
+use formats::volumes::StoreAs;
+use glam::{DAffine3, DMat3, DVec3};
 
 use super::cost::Cost;
 use super::failure::{Failure, Outcome};
@@ -16,13 +19,17 @@ pub struct Args {
     /// What to make
     #[arg(value_enum)]
     name: Name,
-    /// Cloud to write (.ply)
+    /// Cloud to write (.ply); for the head, volume (.nii, .nii.gz)
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// Points, before holes are cut
     #[arg(long, value_name = "N", default_value_t = 20_000, value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
     count: u64,
-    /// Standard deviation of the noise on each coordinate: a length, or per cent of the solid's diagonal
+    /// Voxels along each side of the head
+    #[arg(long, value_name = "N", default_value_t = 96, value_parser = clap::value_parser!(u16).range(4..=1024))]
+    size: u16,
+    /// Standard deviation of the noise: on each coordinate, a length or per cent of the solid's diagonal; of the
+    /// head, a density or per cent of the skull's
     #[arg(long, value_name = "S[%]")]
     noise: Option<Tolerance>,
     /// Holes to cut, each with 6 % of the points
@@ -41,19 +48,28 @@ pub struct Args {
 
 /// A phantom's name.
 #[derive(Clone, Copy)]
-struct Name(Solid);
+enum Name {
+    /// A solid, as points on its surface.
+    Solid(Solid),
+    /// A head of ellipsoids, as a volume.
+    Head,
+}
 
 impl ValueEnum for Name {
     fn value_variants<'a>() -> &'a [Self] {
-        static ALL: [Name; 6] = {
+        static ALL: [Name; 7] = {
             let [a, b, c, d, e, f] = Solid::ALL;
-            [Name(a), Name(b), Name(c), Name(d), Name(e), Name(f)]
+            use Name::Solid as S;
+            [S(a), S(b), S(c), S(d), S(e), S(f), Name::Head]
         };
         &ALL
     }
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
-        Some(PossibleValue::new(self.0.name()))
+        Some(PossibleValue::new(match self {
+            Self::Solid(solid) => solid.name(),
+            Self::Head => "head",
+        }))
     }
 }
 
@@ -67,18 +83,31 @@ fn ratio(s: &str) -> Result<f64, String> {
 /// Writes a phantom.
 pub fn run(args: &Args) -> Outcome {
     let cost = Cost::start();
+    let summary = match args.name {
+        Name::Solid(solid) => write_cloud(args, solid)?,
+        Name::Head => write_head(args)?,
+    };
+    Summary {
+        output: Some(args.output.display().to_string()),
+        ..summary
+    }
+    .with_cost(&cost)
+    .print(args.json)
+}
+
+fn noise_of(args: &Args, whole: f64) -> Outcome<f64> {
+    let noise = args.noise.map(|n| n.length(whole, Unit::Unknown)).transpose();
+    let noise =
+        noise.map_err(|_| Failure::usage("--noise: phantoms have no unit; give a number or per cent"))?;
+    Ok(noise.unwrap_or(0.0))
+}
+
+fn write_cloud(args: &Args, solid: Solid) -> Outcome<Summary> {
     check_output(&args.output, &["ply"])?;
-    let solid = args.name.0;
     let (field, within) = (solid.field(), solid.within());
-    let noise = args
-        .noise
-        .map(|n| n.length(within.size().length(), formats::Unit::Unknown))
-        .transpose();
     let options = CloudOptions {
         count: args.count as usize,
-        noise: noise
-            .map_err(|_| Failure::usage("--noise: the phantoms have no unit; give a length or per cent"))?
-            .unwrap_or(0.0),
+        noise: noise_of(args, within.size().length())?,
         hole_count: usize::from(args.holes),
         density_ratio: args.density_ratio,
         seed: args.seed,
@@ -88,17 +117,44 @@ pub fn run(args: &Args) -> Outcome {
         .ok_or_else(|| Failure::limit(format!("{}: no surface was found", solid.name())))?;
     formats::meshes::save_points(&args.output, &cloud.positions, Some(&cloud.normals), None)
         .map_err(writing)?;
-    let notes = cloud
-        .holes
-        .iter()
-        .map(|(c, r)| format!("hole round {c} of radius {r:.4}"))
-        .collect();
-    Summary {
+    Ok(Summary {
         input_count: Some(cloud.positions.len()),
-        output: Some(args.output.display().to_string()),
-        notes,
+        notes: cloud
+            .holes
+            .iter()
+            .map(|(c, r)| format!("hole round {c} of radius {r:.4}"))
+            .collect(),
         ..Default::default()
+    })
+}
+
+fn write_head(args: &Args) -> Outcome<Summary> {
+    check_output(&args.output, &["nii", "nii.gz"])?;
+    if args.holes > 0 || args.density_ratio != 1.0 {
+        return Err(Failure::usage(
+            "--holes and --density-ratio are for clouds; the head is a volume",
+        ));
     }
-    .with_cost(&cost)
-    .print(args.json)
+    let n = usize::from(args.size);
+    let values = head([n; 3], noise_of(args, 1.0)?, args.seed);
+    // The middle of the volume is the origin, its sides are 200 mm long.
+    let step = 200.0 / n as f64;
+    let corner = DVec3::splat(-0.5 * step * (n - 1) as f64);
+    let map = DAffine3 {
+        matrix3: DMat3::from_diagonal(DVec3::splat(step)),
+        translation: corner,
+    };
+    formats::volumes::save(
+        &args.output,
+        [n; 3],
+        &values,
+        &map,
+        Unit::Millimetre,
+        StoreAs::Float32,
+    )
+    .map_err(writing)?;
+    Ok(Summary {
+        input_count: Some(values.len()),
+        ..Default::default()
+    })
 }

@@ -118,7 +118,7 @@ fn shade_row(
             light += weight * (0.55 + 0.45 * toward.dot(up)) * d.visible(p, n, 0);
         }
         let direct = n.dot(sun.axes.row(2)).max(0.0) * sun.visible(p, n, 2);
-        row[x] = CLAY.powf(2.2) * (1.05 * light / all.max(1e-9) + 0.95 * direct);
+        row[x] = CLAY.powf(2.2) * (0.05 + light / all.max(1e-9) + 0.95 * direct);
     }
     row
 }

@@ -1,3 +1,4 @@
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::Real;
@@ -74,6 +75,9 @@ impl<T: Real> Corrections<T> {
         self.mask[..planes].iter().any(|w| w & rows != 0)
     }
 }
+
+/// The stored part of a level: bricks with active functions, in key order.
+pub type LevelCorrections<T> = BTreeMap<BrickKey, Arc<Corrections<T>>>;
 
 /// What evaluation reads of one brick, and what lies below it.
 #[derive(Clone, Debug)]

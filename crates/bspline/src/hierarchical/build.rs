@@ -3,9 +3,8 @@ use std::sync::Arc;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
-use super::brick::{BRICK, Brick, HALO, HALO_LEN, NONE};
+use super::brick::{BRICK, Brick, HALO, HALO_LEN, LevelCorrections, NONE};
 use super::prolong::prolong;
-use super::spline::LevelCorrections;
 use super::{BrickKey, Lattice};
 use crate::Real;
 

@@ -4,13 +4,14 @@ mod batch;
 mod bounds;
 mod brick;
 mod build;
+mod evaluate;
 mod grid;
 mod kernel;
 mod lattice;
 mod prolong;
 mod spline;
 
-pub use brick::{BRICK, BRICK_LEN, BrickKey, Corrections, HALO, HALO_LEN};
+pub use brick::{BRICK, BRICK_LEN, BrickKey, Corrections, HALO, HALO_LEN, LevelCorrections};
 pub use lattice::Lattice;
 pub use prolong::refine_block;
-pub use spline::{HierarchicalSpline, LevelCorrections};
+pub use spline::HierarchicalSpline;

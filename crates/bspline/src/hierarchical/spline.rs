@@ -1,16 +1,10 @@
-use std::collections::BTreeMap;
-use std::sync::Arc;
-
 use glam::{DAffine3, DMat3, DVec3};
 use sha2::{Digest, Sha256};
 
 use super::brick::{BRICK, Brick, HALO_LEN, NONE};
 use super::build::build_levels;
-use super::{BrickKey, Corrections, Lattice, batch, bounds, grid, kernel};
-use crate::{Aabb, Field, Frame, Interval, Jet, Real};
-
-/// The stored part of a level: bricks with active functions, in key order.
-pub type LevelCorrections<T> = BTreeMap<BrickKey, Arc<Corrections<T>>>;
+use super::{Lattice, LevelCorrections};
+use crate::Real;
 
 /// A field of dyadic cubic B-splines, C² everywhere inside its box.
 ///
@@ -252,66 +246,4 @@ impl<T: Real> HierarchicalSpline<T> {
 fn octant(cell: [u32; 3], shift: usize) -> usize {
     let o = cell.map(|c| (c >> shift >> BRICK.ilog2() & 1) as usize);
     4 * o[0] + 2 * o[1] + o[2]
-}
-
-impl<T: Real> Field for HierarchicalSpline<T> {
-    fn value(&self, p: DVec3) -> f64 {
-        let (q, beyond) = self.clamp(p);
-        let at = self.place(q);
-        kernel::value(&at.brick.totals, at.cell, at.t).as_f64() - self.slope * beyond.length()
-    }
-
-    fn value_gradient(&self, p: DVec3) -> (f64, DVec3) {
-        let (q, beyond) = self.clamp(p);
-        let at = self.place(q);
-        let (v, g) = kernel::value_gradient(&at.brick.totals, at.cell, at.t);
-        self.extend_outside((v.as_f64(), self.world_gradient(at.level, g)), q, beyond)
-    }
-
-    /// Inside the box; outside, the Hessian of the extension along the box's faces is left out and 0 is
-    /// returned for it.
-    fn jet(&self, p: DVec3) -> Jet {
-        let (value, gradient) = self.value_gradient(p);
-        let (q, beyond) = self.clamp(p);
-        if beyond != DVec3::ZERO {
-            return Jet {
-                value,
-                gradient,
-                hessian: DMat3::ZERO,
-            };
-        }
-        let at = self.place(q);
-        let s = kernel::second(&at.brick.totals, at.cell, at.t).map(T::as_f64);
-        let h = DMat3::from_cols(
-            DVec3::new(s[0], s[3], s[4]),
-            DVec3::new(s[3], s[1], s[5]),
-            DVec3::new(s[4], s[5], s[2]),
-        );
-        let m = self.lattice_from_world.matrix3 * (1u64 << at.level) as f64;
-        Jet {
-            value,
-            gradient,
-            hessian: m.transpose() * h * m,
-        }
-    }
-
-    fn bounds(&self, b: &Aabb) -> Interval {
-        bounds::over_lattice_box(self, &b.transformed(&self.lattice_from_world), None)
-    }
-
-    fn values_gradients(&self, points: &[DVec3], out: &mut [(f64, DVec3)]) {
-        batch::values_gradients(self, points, out);
-    }
-
-    fn frame_values(&self, frame: &Frame, lo: [i64; 3], count: [usize; 3], out: &mut [f64]) {
-        grid::frame_values(self, frame, lo, count, out);
-    }
-
-    fn frame_bounds(&self, frame: &Frame, lo: [i64; 3], hi: [i64; 3]) -> Interval {
-        bounds::over_lattice_box(self, &grid::lattice_box(self, frame, lo, hi), None)
-    }
-
-    fn frame_bounds_about(&self, frame: &Frame, lo: [i64; 3], hi: [i64; 3], level: f64) -> Interval {
-        bounds::over_lattice_box(self, &grid::lattice_box(self, frame, lo, hi), Some(level))
-    }
 }

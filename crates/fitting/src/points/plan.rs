@@ -44,9 +44,13 @@ pub(crate) enum Smoothing {
 /// Deepest level of a clean cloud when the caller gives none.
 const DEFAULT_DEPTH: usize = 10;
 
+/// Tolerance of a noisy cloud in standard deviations, when the caller gives none.
+const NOISE_FACTOR: f64 = 1.25;
+
 impl Plan {
     /// Clean clouds: `β = 0.6 s` (`s` the mean spacing), refined by residual. Noisy ones: every occupied cell
-    /// down to the last spacing of at least `2σ̂`, `β = 0.3 s`, and `μ` left to cross-validation.
+    /// down to the last spacing of at least `2σ̂`, `β = 0.3 s`, `μ` left to cross-validation, and a tolerance of
+    /// `1.25 σ̂` unless one is given.
     ///
     /// `tolerance` and `noise` in the unit box.
     pub fn new(samples: &Samples, options: &PointOptions, tolerance: f64, noise: Option<f64>) -> Self {
@@ -71,6 +75,11 @@ impl Plan {
         let Some(sigma) = noise else { return clean };
         let justified = ((0.5 / sigma).log2().floor() as usize).clamp(BASE_DEPTH + 1, MAX_DEPTH);
         Self {
+            tolerance: if options.tolerance.is_some() {
+                tolerance
+            } else {
+                NOISE_FACTOR * sigma
+            },
             max_depth: asked.unwrap_or(justified),
             uniform: true,
             beta: 0.3 * spacing,
