@@ -5,11 +5,10 @@ use std::process::Command;
 
 use fitting::Cancel;
 use formats::Kind;
-use formats::points::PointCloud;
 use serde_json::{Map, Value};
 
 use super::failure::{Failure, OrFail, Outcome};
-use super::input::{self, reading, writing};
+use super::input::{reading, writing};
 use super::interrupt;
 use super::progress::Bar;
 use crate::charts::{Chart, Configuration, Input, Measurement, sweeps};
@@ -56,7 +55,7 @@ pub fn run(args: &Args) -> Outcome {
     for input in &args.inputs {
         let subject = match input.strip_prefix("phantom:") {
             Some(phantom) => Prepared::phantom(phantom, scratch.path())?,
-            None => Prepared::file(Path::new(input), scratch.path())?,
+            None => Prepared::file(Path::new(input))?,
         };
         let configurations = sweeps(subject.kind);
         let bar = Bar::new();
@@ -98,7 +97,7 @@ pub fn run(args: &Args) -> Outcome {
     Ok(())
 }
 
-/// An input, parted into what is fitted and what the errors are measured at.
+/// What is fitted, and what the errors are measured at.
 struct Prepared {
     kind: Input,
     name: String,
@@ -107,9 +106,6 @@ struct Prepared {
     fitted: PathBuf,
     measured: PathBuf,
 }
-
-/// Every so many-th point of a cloud is kept from the fit, so that its error shows what smoothing is worth.
-const HELD_OUT: usize = 5;
 
 impl Prepared {
     /// `NAME` or `NAME:NOISE`.
@@ -145,7 +141,7 @@ impl Prepared {
         })
     }
 
-    fn file(path: &Path, scratch: &Path) -> Outcome<Self> {
+    fn file(path: &Path) -> Outcome<Self> {
         let file = path
             .file_name()
             .map(|n| n.to_string_lossy().into_owned())
@@ -161,33 +157,13 @@ impl Prepared {
                 measured: path.into(),
             });
         }
-        let input::Input::Cloud(cloud) = input::read(path, None)? else {
-            return Err(Failure::input(format!(
-                "{}: is neither a cloud nor a volume",
-                path.display()
-            )));
-        };
-        let count = cloud.positions.len();
-        if count < 10 * HELD_OUT {
-            return Err(Failure::input(format!(
-                "{}: {count} points are too few for a chart; give {} or more",
-                path.display(),
-                10 * HELD_OUT
-            )));
-        }
-        let (fitted, measured) = (scratch.join("fitted.ply"), scratch.join("measured.ply"));
-        save_part(&fitted, &cloud, |i| i % HELD_OUT != 0)?;
-        save_part(&measured, &cloud, |i| i % HELD_OUT == 0)?;
         Ok(Self {
             kind: Input::Cloud,
             name,
-            title: format!(
-                "rms distance at the {} of {count} points kept from the fit",
-                count.div_ceil(HELD_OUT)
-            ),
-            y_title: format!("rms distance, {}", cloud.unit),
-            fitted,
-            measured,
+            title: "rms distance at its points".into(),
+            y_title: "rms distance, unit of the file".into(),
+            fitted: path.into(),
+            measured: path.into(),
         })
     }
 
@@ -233,19 +209,6 @@ impl Prepared {
             fit,
         })
     }
-}
-
-/// Writes the points whose index is kept, with their normals.
-fn save_part(path: &Path, cloud: &PointCloud, keep: impl Fn(usize) -> bool) -> Outcome {
-    let part = |all: &[glam::DVec3]| -> Vec<glam::DVec3> {
-        all.iter()
-            .enumerate()
-            .filter(|(i, _)| keep(*i))
-            .map(|(_, p)| *p)
-            .collect()
-    };
-    let normals = cloud.normals.as_deref().map(part);
-    formats::meshes::save_points(path, &part(&cloud.positions), normals.as_deref(), None).map_err(writing)
 }
 
 /// Runs a subcommand with `--json` and reads its last line.
