@@ -133,20 +133,7 @@ pub trait Field: Send + Sync {
     /// # Panics
     /// If `out` is not `count[0]·count[1]·count[2]` long.
     fn frame_values(&self, frame: &Frame, lo: [i64; 3], count: [usize; 3], out: &mut [f64]) {
-        assert_eq!(
-            out.len(),
-            count.iter().product::<usize>(),
-            "one output slot per node"
-        );
-        let mut slot = out.iter_mut();
-        for i in 0..count[0] as i64 {
-            for j in 0..count[1] as i64 {
-                for k in 0..count[2] as i64 {
-                    *slot.next().expect("length checked above") =
-                        self.value(frame.node([lo[0] + i, lo[1] + j, lo[2] + k]));
-                }
-            }
-        }
+        values_node_by_node(self, frame, lo, count, out);
     }
 
     /// [`Field::bounds`] over the cells of `frame` from node `lo` to node `hi`.
@@ -160,5 +147,29 @@ pub trait Field: Send + Sync {
     fn frame_bounds_about(&self, frame: &Frame, lo: [i64; 3], hi: [i64; 3], level: f64) -> Interval {
         let _ = level;
         self.frame_bounds(frame, lo, hi)
+    }
+}
+
+/// [`Field::frame_values`] by asking for one point after the other.
+pub(crate) fn values_node_by_node<F: Field + ?Sized>(
+    field: &F,
+    frame: &Frame,
+    lo: [i64; 3],
+    count: [usize; 3],
+    out: &mut [f64],
+) {
+    assert_eq!(
+        out.len(),
+        count.iter().product::<usize>(),
+        "one output slot per node"
+    );
+    let mut slot = out.iter_mut();
+    for i in 0..count[0] as i64 {
+        for j in 0..count[1] as i64 {
+            for k in 0..count[2] as i64 {
+                let node = frame.node([lo[0] + i, lo[1] + j, lo[2] + k]);
+                *slot.next().expect("length checked above") = field.value(node);
+            }
+        }
     }
 }

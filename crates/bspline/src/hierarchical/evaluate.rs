@@ -48,7 +48,7 @@ impl<T: Real> Field for HierarchicalSpline<T> {
     }
 
     fn bounds(&self, b: &Aabb) -> Interval {
-        bounds::over_lattice_box(self, &b.transformed(&self.lattice_from_world()), None)
+        bounds::over_lattice_box(self, &b.transformed(self.lattice_from_world()), None)
     }
 
     fn values_gradients(&self, points: &[DVec3], out: &mut [(f64, DVec3)]) {

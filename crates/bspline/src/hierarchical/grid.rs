@@ -6,9 +6,10 @@ use glam::DVec3;
 
 use super::brick::{BRICK, Brick, HALO, HALO_LEN, NONE};
 use super::spline::HierarchicalSpline;
-use crate::{Aabb, Field, Frame, Real, cubic};
+use crate::field::values_node_by_node;
+use crate::{Aabb, Frame, Real, cubic};
 
-/// [`Field::frame_values`]. Frames that are turned against the lattice fall back to single points.
+/// [`crate::Field::frame_values`]. Frames that are turned against the lattice fall back to single points.
 pub(super) fn frame_values<T: Real>(
     spline: &HierarchicalSpline<T>,
     frame: &Frame,
@@ -25,16 +26,7 @@ pub(super) fn frame_values<T: Real>(
         return;
     }
     let Some(axes) = aligned_axes(spline, frame, lo, count) else {
-        let mut slot = out.iter_mut();
-        for i in 0..count[0] as i64 {
-            for j in 0..count[1] as i64 {
-                for k in 0..count[2] as i64 {
-                    let p = frame.node([lo[0] + i, lo[1] + j, lo[2] + k]);
-                    *slot.next().expect("length checked above") = spline.value(p);
-                }
-            }
-        }
-        return;
+        return values_node_by_node(spline, frame, lo, count, out);
     };
     let mut block = Block {
         spline,
