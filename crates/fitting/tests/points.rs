@@ -72,7 +72,12 @@ fn a_cup_half_a_coarse_cell_thin_stays_hollow() {
             ..CloudOptions::default()
         },
     );
-    let (field, _) = fit::<f32>(&samples, &to_depth(7)).expect("a clean cloud");
+    let (field, report) = fit::<f32>(&samples, &to_depth(7)).expect("a clean cloud");
+    assert!(
+        report.noise.is_none(),
+        "the other wall is taken for noise: {:?}",
+        report.noise
+    );
     let agreement = sign_agreement(Solid::Cup, &field);
     assert!(agreement >= 0.9999, "{agreement}");
     assert!(
@@ -159,6 +164,27 @@ fn noise_is_found_and_smoothed_away() {
         let rms = (square / 1000.0).sqrt();
         assert!(rms < 0.25 * noise, "rms {rms} of the fit, noise {noise}");
     }
+}
+
+#[test]
+fn a_loose_tolerance_does_not_hide_the_noise() {
+    let samples = cloud(
+        Solid::Sphere,
+        &CloudOptions {
+            noise: 0.01,
+            ..CloudOptions::default()
+        },
+    );
+    let options = PointOptions {
+        tolerance: Some(0.03),
+        ..PointOptions::default()
+    };
+    let (_, report) = fit::<f32>(&samples, &options).expect("a noisy cloud");
+    assert!(
+        report.noise.is_some() && report.depth <= 6,
+        "depth {}",
+        report.depth
+    );
 }
 
 #[test]

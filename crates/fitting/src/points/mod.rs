@@ -54,9 +54,11 @@ pub fn fit_points<T: Real>(
     control.step("sorting points", 0.0)?;
     control.reserve(cascade::level_bytes::<T>(0, cloud.positions.len()))?;
     let mut samples = Samples::prepare(*cloud)?;
-    let tolerance = options.tolerance.unwrap_or(1e-4 * samples.diagonal) / samples.scale;
+    // Below the default tolerance noise does not matter; above, it does even to a caller who asks for less.
+    let default_tolerance = 1e-4 * samples.diagonal / samples.scale;
+    let tolerance = options.tolerance.map_or(default_tolerance, |t| t / samples.scale);
     let noise = match options.smoothing {
-        None => noise::estimate(&samples, tolerance),
+        None => noise::estimate(&samples, default_tolerance.min(tolerance)),
         Some(_) => None,
     };
     let mut plan = Plan::new(&samples, options, tolerance, noise);

@@ -16,6 +16,8 @@ const NEIGHBOURS: [usize; 5] = [30, 60, 120, 240, 480];
 /// residual is the shape's own third order and grows by 1.4 to 2; with noise of 0.5 % it grows by 1.06 to 1.16
 /// once the neighbourhood spans the noise.
 const LEVEL: f64 = 1.17;
+/// Cosine between normals above which two samples lie on the same wall.
+const SAME_WALL: f32 = 0.3;
 /// Growth that shows at once that shape, not noise, is seen.
 const SHAPE: f64 = 1.35;
 
@@ -42,7 +44,14 @@ pub(crate) fn estimate(samples: &Samples, negligible: f64) -> Option<f64> {
                     .nearest_n::<SquaredEuclidean<f64>>(count)
                     .execute();
                 let reach = f64::sqrt(near.last()?.distance);
-                let around: Vec<DVec3> = near.iter().map(|n| samples.positions[n.item as usize]).collect();
+                // The other wall of a thin part is no noise of this one.
+                let same_wall = |j: usize| dot(samples.normals[i], samples.normals[j]) > SAME_WALL;
+                let around: Vec<DVec3> = near
+                    .iter()
+                    .map(|n| n.item as usize)
+                    .filter(|&j| same_wall(j))
+                    .map(|j| samples.positions[j])
+                    .collect();
                 Some((quadric_residual(&around)?, reach))
             })
             .collect();
@@ -74,6 +83,9 @@ pub(crate) fn estimate(samples: &Samples, negligible: f64) -> Option<f64> {
 /// corrected for its six degrees of freedom.
 fn quadric_residual(points: &[DVec3]) -> Option<f64> {
     let n = points.len();
+    if n < 12 {
+        return None;
+    }
     let mean = points.iter().sum::<DVec3>() / n as f64;
     let mut moments = DMat3::ZERO;
     for p in points {
@@ -96,4 +108,8 @@ fn quadric_residual(points: &[DVec3]) -> Option<f64> {
     let heights = DVector::from_fn(n, |i, _| (points[i] - mean).dot(normal));
     let fit = rows.tr_mul(&rows).cholesky()?.solve(&rows.tr_mul(&heights));
     Some(((heights - rows * fit).norm_squared() / (n as f64 - 6.0)).sqrt())
+}
+
+fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
