@@ -5,7 +5,8 @@ use std::io::Read;
 use std::path::Path;
 
 use crate::input::{self, read_fault};
-use crate::{Fault, FormatError, field, volumes};
+use crate::volumes::{self, VolumeFormat};
+use crate::{Fault, FormatError, field};
 
 /// What a file holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,7 +14,7 @@ pub enum Kind {
     /// Points, for [`crate::points::read`].
     Cloud(PointFormat),
     /// A volume, for [`crate::volumes::read`].
-    Volume,
+    Volume(VolumeFormat),
     /// A fitted field, for [`crate::field::load`].
     Field,
 }
@@ -32,10 +33,10 @@ pub enum PointFormat {
 impl fmt::Display for Kind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
+            Self::Volume(format) => return write!(f, "volume ({format})"),
             Self::Cloud(PointFormat::Ply) => "point cloud (PLY)",
             Self::Cloud(PointFormat::Xyz) => "point cloud (XYZ)",
             Self::Cloud(PointFormat::Obj) => "point cloud (OBJ)",
-            Self::Volume => "volume (NIfTI)",
             Self::Field => "field",
         })
     }
@@ -76,15 +77,16 @@ pub(crate) fn kind_of(head: &[u8], path: &Path) -> Result<Kind, Fault> {
     if head.starts_with(&field::MAGIC) {
         return Ok(Kind::Field);
     }
-    if volumes::looks_like_nifti(head) {
-        return Ok(Kind::Volume);
+    if let Some(format) = volumes::nifti_format(head) {
+        return Ok(Kind::Volume(format));
     }
     let extension = extension(path);
     match extension.as_str() {
         "ply" => Ok(Kind::Cloud(PointFormat::Ply)),
         "xyz" | "xyzn" | "txt" | "asc" | "csv" | "pts" => Ok(Kind::Cloud(PointFormat::Xyz)),
         "obj" => Ok(Kind::Cloud(PointFormat::Obj)),
-        "nii" => Ok(Kind::Volume),
+        "nii" => Ok(Kind::Volume(VolumeFormat::Nifti)),
+        "hdr" | "img" => Ok(Kind::Volume(VolumeFormat::NiftiPair)),
         "iclay" => Ok(Kind::Field),
         "" => Err(Fault::UnknownKind {
             found: "a name without an extension".into(),

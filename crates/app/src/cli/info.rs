@@ -2,7 +2,7 @@ use std::io::{self, Write};
 use std::path::PathBuf;
 
 use formats::points::{NormalSource, PointCloud};
-use formats::volumes::VolumeHeader;
+use formats::volumes::{VolumeHeader, VolumeOptions};
 use formats::{Kind, ReadLimits};
 use serde_json::{Map, Value, json};
 
@@ -51,8 +51,10 @@ pub fn run(args: &Args) -> Outcome {
             let cloud = formats::points::read(&args.file, &limits(None)).map_err(reading)?;
             (of_cloud(&cloud), cloud.notes)
         }
-        Kind::Volume => {
-            let volume = formats::volumes::read(&args.file, &ReadLimits::default()).map_err(reading)?;
+        Kind::Volume(_) => {
+            let volume =
+                formats::volumes::read(&args.file, &VolumeOptions::default(), &ReadLimits::default())
+                    .map_err(reading)?;
             let mut entries = of_header(&volume.header);
             entries.extend(of_values(&volume.values));
             (entries, volume.notes)

@@ -2,7 +2,7 @@ use std::path::Path;
 
 use bspline::Aabb;
 use formats::points::PointCloud;
-use formats::volumes::Volume;
+use formats::volumes::{Volume, VolumeOptions};
 use formats::{Fault, FormatError, Kind, ReadLimits};
 use glam::DVec3;
 
@@ -25,7 +25,7 @@ pub fn read(path: &Path, memory: Option<Memory>) -> Outcome<Input> {
         Kind::Cloud(_) => formats::points::read(path, &limits)
             .map_err(reading)
             .map(Input::Cloud),
-        Kind::Volume => formats::volumes::read(path, &limits)
+        Kind::Volume(_) => formats::volumes::read(path, &VolumeOptions::default(), &limits)
             .map_err(reading)
             .map(Input::Volume),
         Kind::Field => Err(Failure::input(format!(

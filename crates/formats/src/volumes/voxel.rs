@@ -76,3 +76,20 @@ impl fmt::Display for VoxelType {
         })
     }
 }
+
+/// How densities are stored.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum StoreAs {
+    /// As they are.
+    Float32,
+    /// As `round((density - intercept) / slope)`, held to the range of an integer type; the header says how to
+    /// get densities back.
+    Integer {
+        /// Type of the voxels; not a float type.
+        voxel: VoxelType,
+        /// Density of one step, finite and not 0.
+        slope: f64,
+        /// Density of a stored 0.
+        intercept: f64,
+    },
+}
