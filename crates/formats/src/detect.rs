@@ -11,8 +11,10 @@ use crate::{Fault, FormatError, field};
 /// What a file holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Points, for [`crate::points::read`].
+    /// Points, for [`crate::points::read`]; PLY and OBJ may hold faces too, for [`crate::meshes::read`].
     Cloud(PointFormat),
+    /// A mesh, for [`crate::meshes::read`]; [`crate::points::read`] takes its vertices.
+    Mesh(MeshFileFormat),
     /// A volume, for [`crate::volumes::read`].
     Volume(VolumeFormat),
     /// A fitted field, for [`crate::field::load`].
@@ -30,6 +32,13 @@ pub enum PointFormat {
     Obj,
 }
 
+/// Formats that hold meshes and nothing else.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MeshFileFormat {
+    /// Stereolithography, ascii or binary.
+    Stl,
+}
+
 impl fmt::Display for Kind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
@@ -37,14 +46,16 @@ impl fmt::Display for Kind {
             Self::Cloud(PointFormat::Ply) => "point cloud (PLY)",
             Self::Cloud(PointFormat::Xyz) => "point cloud (XYZ)",
             Self::Cloud(PointFormat::Obj) => "point cloud (OBJ)",
+            Self::Mesh(MeshFileFormat::Stl) => "mesh (STL)",
             Self::Field => "field",
         })
     }
 }
 
 pub(crate) const CLOUDS: &str = "point clouds .ply .obj .xyz .xyzn .txt .asc .csv .pts, each also .gz";
-const SUPPORTED: &str = "point clouds .ply .obj .xyz .xyzn .txt .asc .csv .pts and volumes .nii, each also .gz, \
-                         and fields .iclay";
+pub(crate) const MESHES: &str = "meshes .ply .obj .stl, each also .gz";
+const SUPPORTED: &str = "point clouds .ply .obj .xyz .xyzn .txt .asc .csv .pts, meshes .ply .obj .stl and \
+                         volumes .nii, each also .gz, and fields .iclay";
 
 /// Bytes that are enough to know every content that can be known.
 const LOOK: usize = 400;
@@ -80,6 +91,9 @@ pub(crate) fn kind_of(head: &[u8], path: &Path) -> Result<Kind, Fault> {
     if let Some(format) = volumes::nifti_format(head) {
         return Ok(Kind::Volume(format));
     }
+    if head.starts_with(b"solid") && memchr::memmem::find(head, b"facet").is_some() {
+        return Ok(Kind::Mesh(MeshFileFormat::Stl));
+    }
     let extension = extension(path);
     match extension.as_str() {
         "ply" => Ok(Kind::Cloud(PointFormat::Ply)),
@@ -87,6 +101,7 @@ pub(crate) fn kind_of(head: &[u8], path: &Path) -> Result<Kind, Fault> {
         "obj" => Ok(Kind::Cloud(PointFormat::Obj)),
         "nii" => Ok(Kind::Volume(VolumeFormat::Nifti)),
         "hdr" | "img" => Ok(Kind::Volume(VolumeFormat::NiftiPair)),
+        "stl" => Ok(Kind::Mesh(MeshFileFormat::Stl)),
         "iclay" => Ok(Kind::Field),
         "" => Err(Fault::UnknownKind {
             found: "a name without an extension".into(),

@@ -57,7 +57,7 @@ pub fn run(args: &Args) -> Outcome {
     let part = args.volume.options(None)?;
     let kind = input::kind(&args.file, &part)?;
     let (entries, notes) = match kind {
-        Kind::Cloud(_) => {
+        Kind::Cloud(_) | Kind::Mesh(_) => {
             let cloud = formats::points::read(&args.file, &limits(args.memory)).map_err(reading)?;
             (of_cloud(&cloud), cloud.notes)
         }

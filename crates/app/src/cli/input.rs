@@ -22,7 +22,7 @@ pub enum Input {
 pub fn read(path: &Path, part: &VolumeOptions, memory: Option<Memory>) -> Outcome<Input> {
     let limits = limits(memory);
     match kind(path, part)? {
-        Kind::Cloud(_) => formats::points::read(path, &limits)
+        Kind::Cloud(_) | Kind::Mesh(_) => formats::points::read(path, &limits)
             .map_err(reading)
             .map(Input::Cloud),
         Kind::Volume(_) => formats::volumes::read(path, part, &limits)
