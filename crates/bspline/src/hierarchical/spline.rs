@@ -1,10 +1,11 @@
-use glam::{DAffine3, DMat3, DVec3};
+use glam::{DAffine3, DVec3};
 use sha2::{Digest, Sha256};
 
 use super::brick::{BRICK, Brick, HALO_LEN, NONE};
 use super::build::build_levels;
 use super::{Lattice, LevelCorrections};
 use crate::Real;
+use crate::placed_box::PlacedBox;
 
 /// A field of dyadic cubic B-splines, C² everywhere inside its box.
 ///
@@ -15,8 +16,7 @@ use crate::Real;
 #[derive(Clone, Debug)]
 pub struct HierarchicalSpline<T> {
     lattice: Lattice,
-    lattice_from_world: DAffine3,
-    slope: f64,
+    pub(super) place: PlacedBox,
     corrections: Vec<LevelCorrections<T>>,
     pub(super) levels: Vec<Vec<Brick<T>>>,
 }
@@ -52,8 +52,13 @@ impl<T: Real> HierarchicalSpline<T> {
         let bricks = build_levels(&lattice, &levels);
         Self {
             lattice,
-            lattice_from_world,
-            slope,
+            place: PlacedBox {
+                min: DVec3::ZERO,
+                max: lattice.extent(),
+                world_from_local: lattice.world_from_lattice,
+                local_from_world: lattice_from_world,
+                slope,
+            },
             corrections: levels,
             levels: bricks,
         }
@@ -71,12 +76,12 @@ impl<T: Real> HierarchicalSpline<T> {
 
     /// World to lattice coordinates.
     pub fn lattice_from_world(&self) -> &DAffine3 {
-        &self.lattice_from_world
+        &self.place.local_from_world
     }
 
     /// Fall of the field per world length outside the box, `> 0`.
     pub fn slope(&self) -> f64 {
-        self.slope
+        self.place.slope
     }
 
     /// Number of levels, at least 1.
@@ -115,7 +120,7 @@ impl<T: Real> HierarchicalSpline<T> {
         for x in self.lattice.world_from_lattice.to_cols_array() {
             hash.update(x.to_le_bytes());
         }
-        hash.update(self.slope.to_le_bytes());
+        hash.update(self.place.slope.to_le_bytes());
         hash.update((self.corrections.len() as u32).to_le_bytes());
         let mut bytes = Vec::new();
         for level in &self.corrections {
@@ -201,43 +206,12 @@ impl<T: Real> HierarchicalSpline<T> {
         (finest, index)
     }
 
-    /// Lattice coordinates of `p`, clamped to the box, and the clamped-off part in world units.
-    #[inline]
-    pub(super) fn clamp(&self, p: DVec3) -> (DVec3, DVec3) {
-        let q = self.lattice_from_world.transform_point3(p);
-        let inside = q.clamp(DVec3::ZERO, self.lattice.extent());
-        (
-            inside,
-            self.lattice.world_from_lattice.transform_vector3(q - inside),
-        )
-    }
-
     /// Gradient by cell coordinates of `level` to gradient by world coordinates.
     #[inline]
     pub(super) fn world_gradient(&self, level: usize, g: [T; 3]) -> DVec3 {
         let scale = (1u64 << level) as f64;
         let g = DVec3::new(g[0].as_f64(), g[1].as_f64(), g[2].as_f64()) * scale;
-        self.lattice_from_world.matrix3.transpose() * g
-    }
-
-    /// Adds the linear fall outside the box to what was found at the clamped point.
-    #[inline]
-    pub(super) fn extend_outside(&self, inside: (f64, DVec3), q: DVec3, beyond: DVec3) -> (f64, DVec3) {
-        let distance = beyond.length();
-        if distance == 0.0 {
-            return inside;
-        }
-        // The clamped point follows x only along the axes that are not clamped.
-        let free = DMat3::from_diagonal(DVec3::from_array(std::array::from_fn(|a| {
-            f64::from(q[a] > 0.0 && q[a] < self.lattice.extent()[a])
-        })));
-        let follow = self.lattice.world_from_lattice.matrix3 * free * self.lattice_from_world.matrix3;
-        let direction = beyond / distance;
-        let away = (DMat3::IDENTITY - follow).transpose() * direction;
-        (
-            inside.0 - self.slope * distance,
-            follow.transpose() * inside.1 - self.slope * away,
-        )
+        self.place.local_from_world.matrix3.transpose() * g
     }
 }
 
