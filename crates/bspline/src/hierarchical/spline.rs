@@ -1,9 +1,11 @@
+use std::sync::Arc;
+
 use glam::{DAffine3, DVec3};
 use sha2::{Digest, Sha256};
 
 use super::brick::{BRICK, Brick, HALO_LEN, NONE};
 use super::build::build_levels;
-use super::{Lattice, LevelCorrections};
+use super::{BrickKey, Lattice, LevelCorrections};
 use crate::Real;
 use crate::placed_box::PlacedBox;
 
@@ -15,9 +17,9 @@ use crate::placed_box::PlacedBox;
 /// [slope](Self::slope)).
 #[derive(Clone, Debug)]
 pub struct HierarchicalSpline<T> {
-    lattice: Lattice,
+    pub(super) lattice: Lattice,
     pub(super) place: PlacedBox,
-    corrections: Vec<LevelCorrections<T>>,
+    pub(super) corrections: Vec<Arc<LevelCorrections<T>>>,
     pub(super) levels: Vec<Vec<Brick<T>>>,
 }
 
@@ -49,6 +51,7 @@ impl<T: Real> HierarchicalSpline<T> {
             lattice_from_world.is_finite(),
             "the map from lattice to world can be inverted"
         );
+        let levels: Vec<_> = levels.into_iter().map(Arc::new).collect();
         let bricks = build_levels(&lattice, &levels);
         Self {
             lattice,
@@ -65,6 +68,9 @@ impl<T: Real> HierarchicalSpline<T> {
     }
 
     /// Bricks of `level` that hold active functions, in key order.
+    ///
+    /// # Panics
+    /// If there is no such level.
     pub fn corrections(&self, level: usize) -> &LevelCorrections<T> {
         &self.corrections[level]
     }
@@ -125,7 +131,7 @@ impl<T: Real> HierarchicalSpline<T> {
         let mut bytes = Vec::new();
         for level in &self.corrections {
             hash.update((level.len() as u32).to_le_bytes());
-            for (key, c) in level {
+            for (key, c) in level.as_ref() {
                 bytes.clear();
                 key.0.iter().for_each(|k| bytes.extend(k.to_le_bytes()));
                 c.mask.iter().for_each(|m| bytes.extend(m.to_le_bytes()));
@@ -148,6 +154,11 @@ impl<T: Real> HierarchicalSpline<T> {
             .map(|b| b.hull[0].as_f64().abs().max(b.hull[1].as_f64().abs()))
             .fold(0.0, f64::max);
         64.0 * T::UNIT_ROUND_OFF * largest
+    }
+
+    /// Index of brick `key` of `level`, if there is one.
+    pub(super) fn find(&self, level: usize, key: BrickKey) -> Option<u32> {
+        find(&self.lattice, &self.levels, level, key)
     }
 
     /// Where lattice point `q`, inside the box, is evaluated: in the finest brick that covers it.
@@ -213,6 +224,29 @@ impl<T: Real> HierarchicalSpline<T> {
         let g = DVec3::new(g[0].as_f64(), g[1].as_f64(), g[2].as_f64()) * scale;
         self.place.local_from_world.matrix3.transpose() * g
     }
+}
+
+/// Index of brick `key` of `level` by the way down from level 0; only the levels above have to be linked.
+pub(super) fn find<T>(
+    lattice: &Lattice,
+    levels: &[Vec<Brick<T>>],
+    level: usize,
+    key: BrickKey,
+) -> Option<u32> {
+    let counts = lattice.cells.map(|n| n.div_ceil(BRICK as u32));
+    let root = key.0.map(|k| k.checked_shr(level as u32).unwrap_or(0));
+    if (0..3).any(|a| root[a] >= counts[a]) {
+        return None;
+    }
+    let mut index = (root[0] * counts[1] + root[1]) * counts[2] + root[2];
+    for above in 0..level {
+        let half = key.0.map(|k| (k >> (level - 1 - above) & 1) as usize);
+        index = levels.get(above)?[index as usize].children[4 * half[0] + 2 * half[1] + half[2]];
+        if index == NONE {
+            return None;
+        }
+    }
+    Some(index)
 }
 
 /// Which child holds a cell of the finest level, `shift` levels above it.
