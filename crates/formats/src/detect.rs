@@ -10,8 +10,10 @@ use crate::{Fault, FormatError, field, volumes};
 /// What a file holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Points, for [`crate::points::read`].
+    /// Points, for [`crate::points::read`]; PLY and OBJ may hold faces too, for [`crate::meshes::read`].
     Cloud(PointFormat),
+    /// A mesh, for [`crate::meshes::read`]; [`crate::points::read`] takes its vertices.
+    Mesh(MeshFileFormat),
     /// A volume, for [`crate::volumes::read`].
     Volume,
     /// A fitted field, for [`crate::field::load`].
@@ -29,12 +31,20 @@ pub enum PointFormat {
     Obj,
 }
 
+/// Formats that hold meshes and nothing else.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MeshFileFormat {
+    /// Stereolithography, ascii or binary.
+    Stl,
+}
+
 impl fmt::Display for Kind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Cloud(PointFormat::Ply) => "point cloud (PLY)",
             Self::Cloud(PointFormat::Xyz) => "point cloud (XYZ)",
             Self::Cloud(PointFormat::Obj) => "point cloud (OBJ)",
+            Self::Mesh(MeshFileFormat::Stl) => "mesh (STL)",
             Self::Volume => "volume (NIfTI)",
             Self::Field => "field",
         })
@@ -42,8 +52,9 @@ impl fmt::Display for Kind {
 }
 
 pub(crate) const CLOUDS: &str = "point clouds .ply .obj .xyz .xyzn .txt .asc .csv .pts, each also .gz";
-const SUPPORTED: &str = "point clouds .ply .obj .xyz .xyzn .txt .asc .csv .pts and volumes .nii, each also .gz, \
-                         and fields .iclay";
+pub(crate) const MESHES: &str = "meshes .ply .obj .stl, each also .gz";
+const SUPPORTED: &str = "point clouds .ply .obj .xyz .xyzn .txt .asc .csv .pts, meshes .ply .obj .stl and \
+                         volumes .nii, each also .gz, and fields .iclay";
 
 /// Bytes that are enough to know every content that can be known.
 const LOOK: usize = 400;
@@ -79,11 +90,15 @@ pub(crate) fn kind_of(head: &[u8], path: &Path) -> Result<Kind, Fault> {
     if volumes::looks_like_nifti(head) {
         return Ok(Kind::Volume);
     }
+    if head.starts_with(b"solid") && memchr::memmem::find(head, b"facet").is_some() {
+        return Ok(Kind::Mesh(MeshFileFormat::Stl));
+    }
     let extension = extension(path);
     match extension.as_str() {
         "ply" => Ok(Kind::Cloud(PointFormat::Ply)),
         "xyz" | "xyzn" | "txt" | "asc" | "csv" | "pts" => Ok(Kind::Cloud(PointFormat::Xyz)),
         "obj" => Ok(Kind::Cloud(PointFormat::Obj)),
+        "stl" => Ok(Kind::Mesh(MeshFileFormat::Stl)),
         "nii" => Ok(Kind::Volume),
         "iclay" => Ok(Kind::Field),
         "" => Err(Fault::UnknownKind {

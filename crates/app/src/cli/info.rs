@@ -47,7 +47,7 @@ fn count(key: &'static str, label: &'static str, n: usize) -> Entry {
 pub fn run(args: &Args) -> Outcome {
     let kind = formats::detect(&args.file).map_err(reading)?;
     let (entries, notes) = match kind {
-        Kind::Cloud(_) => {
+        Kind::Cloud(_) | Kind::Mesh(_) => {
             let cloud = formats::points::read(&args.file, &limits(None)).map_err(reading)?;
             (of_cloud(&cloud), cloud.notes)
         }

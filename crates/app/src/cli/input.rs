@@ -22,7 +22,7 @@ pub enum Input {
 pub fn read(path: &Path, memory: Option<Memory>) -> Outcome<Input> {
     let limits = limits(memory);
     match formats::detect(path).map_err(reading)? {
-        Kind::Cloud(_) => formats::points::read(path, &limits)
+        Kind::Cloud(_) | Kind::Mesh(_) => formats::points::read(path, &limits)
             .map_err(reading)
             .map(Input::Cloud),
         Kind::Volume => formats::volumes::read(path, &limits)
