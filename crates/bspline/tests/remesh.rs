@@ -13,6 +13,9 @@ use bspline::{Aabb, Field, Frame, HierarchicalSpline, Interval, Jet};
 use common::Random;
 use glam::{DAffine3, DMat3, DVec3};
 
+/// Centre of the ball, in coarse cells.
+const CENTER: DVec3 = DVec3::new(6.0, 6.0, 3.9);
+
 /// A ball in a box of 12 coarse cells, with two empty finer levels; it leaves the box at one side.
 fn ball(world_from_lattice: DAffine3) -> HierarchicalSpline<f32> {
     let cells = [12u32; 3];
@@ -20,7 +23,7 @@ fn ball(world_from_lattice: DAffine3) -> HierarchicalSpline<f32> {
     for n in 0..15u32.pow(3) {
         let s = [n / 225, n / 15 % 15, n % 15];
         let knot = DVec3::from_array(s.map(|s| s as f64 - 1.0));
-        let value = 4.4 - (knot - DVec3::new(6.0, 6.0, 3.9)).length();
+        let value = 4.4 - (knot - CENTER).length();
         let brick = bricks
             .entry(BrickKey(s.map(|s| s / 8)))
             .or_insert_with(Corrections::empty);
@@ -35,11 +38,16 @@ fn ball(world_from_lattice: DAffine3) -> HierarchicalSpline<f32> {
     HierarchicalSpline::from_corrections(lattice, 1.0, levels)
 }
 
-/// A few neighbouring functions, most of them on the finest level.
+/// A few neighbouring functions, most of them on the finest level and near the first surface.
 fn random_edit(field: &HierarchicalSpline<f32>, random: &mut Random) -> Vec<LevelEdit<f32>> {
     let level = [2, 2, 2, 2, 2, 1, 1, 0][random.below(8)];
     let n = field.lattice().cells_at(level);
-    let first = n.map(|n| random.below(n as usize + 3) as u32);
+    let out = (random.vector() - 0.5).normalize_or(DVec3::X) * (3.9 + random.unit());
+    let near = ((CENTER + out) * (1 << level) as f64).as_uvec3().to_array();
+    let first: [u32; 3] = match random.below(4) {
+        0 => n.map(|n| random.below(n as usize + 3) as u32),
+        _ => std::array::from_fn(|a| near[a].min(n[a] + 2)),
+    };
     let size = 5.0 / (1 << level) as f64;
     (0..1 + random.below(4))
         .map(|_| LevelEdit {
