@@ -8,6 +8,7 @@ mod budget;
 mod components;
 mod error;
 mod lines;
+pub mod orient;
 pub mod phantoms;
 pub mod points;
 pub mod prefilter;

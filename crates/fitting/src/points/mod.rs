@@ -12,11 +12,11 @@ mod far_field;
 mod full_grid;
 #[cfg(test)]
 mod iteration_growth;
-mod noise;
+pub(crate) mod noise;
 mod plan;
 mod residual;
 pub use residual::newton_distance;
-mod samples;
+pub(crate) mod samples;
 mod stencil;
 
 use bspline::{HierarchicalSpline, Real};
