@@ -5,7 +5,7 @@ use std::io::Read;
 use std::path::Path;
 
 use crate::input::{self, read_fault};
-use crate::{Fault, FormatError, field, volumes};
+use crate::{Fault, FormatError, field, points, volumes};
 
 /// What a file holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,6 +29,8 @@ pub enum PointFormat {
     Xyz,
     /// Wavefront OBJ.
     Obj,
+    /// Point Cloud Library.
+    Pcd,
 }
 
 /// Formats that hold meshes and nothing else.
@@ -44,6 +46,7 @@ impl fmt::Display for Kind {
             Self::Cloud(PointFormat::Ply) => "point cloud (PLY)",
             Self::Cloud(PointFormat::Xyz) => "point cloud (XYZ)",
             Self::Cloud(PointFormat::Obj) => "point cloud (OBJ)",
+            Self::Cloud(PointFormat::Pcd) => "point cloud (PCD)",
             Self::Mesh(MeshFileFormat::Stl) => "mesh (STL)",
             Self::Volume => "volume (NIfTI)",
             Self::Field => "field",
@@ -51,9 +54,9 @@ impl fmt::Display for Kind {
     }
 }
 
-pub(crate) const CLOUDS: &str = "point clouds .ply .obj .xyz .xyzn .txt .asc .csv .pts, each also .gz";
+pub(crate) const CLOUDS: &str = "point clouds .ply .obj .pcd .xyz .xyzn .txt .asc .csv .pts, each also .gz";
 pub(crate) const MESHES: &str = "meshes .ply .obj .stl, each also .gz";
-const SUPPORTED: &str = "point clouds .ply .obj .xyz .xyzn .txt .asc .csv .pts, meshes .ply .obj .stl and \
+const SUPPORTED: &str = "point clouds .ply .obj .pcd .xyz .xyzn .txt .asc .csv .pts, meshes .ply .obj .stl and \
                          volumes .nii, each also .gz, and fields .iclay";
 
 /// Bytes that are enough to know every content that can be known.
@@ -84,6 +87,9 @@ pub(crate) fn kind_of(head: &[u8], path: &Path) -> Result<Kind, Fault> {
     if head.starts_with(b"ply\n") || head.starts_with(b"ply\r") || head.starts_with(b"ply ") {
         return Ok(Kind::Cloud(PointFormat::Ply));
     }
+    if points::looks_like_pcd(head) {
+        return Ok(Kind::Cloud(PointFormat::Pcd));
+    }
     if head.starts_with(&field::MAGIC) {
         return Ok(Kind::Field);
     }
@@ -97,6 +103,7 @@ pub(crate) fn kind_of(head: &[u8], path: &Path) -> Result<Kind, Fault> {
     match extension.as_str() {
         "ply" => Ok(Kind::Cloud(PointFormat::Ply)),
         "xyz" | "xyzn" | "txt" | "asc" | "csv" | "pts" => Ok(Kind::Cloud(PointFormat::Xyz)),
+        "pcd" => Ok(Kind::Cloud(PointFormat::Pcd)),
         "obj" => Ok(Kind::Cloud(PointFormat::Obj)),
         "stl" => Ok(Kind::Mesh(MeshFileFormat::Stl)),
         "nii" => Ok(Kind::Volume),
