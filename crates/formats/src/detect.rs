@@ -5,7 +5,8 @@ use std::io::Read;
 use std::path::Path;
 
 use crate::input::{self, read_fault};
-use crate::{Fault, FormatError, field, points, volumes};
+use crate::volumes::{self, VolumeFormat};
+use crate::{Fault, FormatError, field, points};
 
 /// What a file holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,7 +16,7 @@ pub enum Kind {
     /// A mesh, for [`crate::meshes::read`]; [`crate::points::read`] takes its vertices.
     Mesh(MeshFileFormat),
     /// A volume, for [`crate::volumes::read`].
-    Volume,
+    Volume(VolumeFormat),
     /// A fitted field, for [`crate::field::load`].
     Field,
 }
@@ -43,12 +44,12 @@ pub enum MeshFileFormat {
 impl fmt::Display for Kind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
+            Self::Volume(format) => return write!(f, "volume ({format})"),
             Self::Cloud(PointFormat::Ply) => "point cloud (PLY)",
             Self::Cloud(PointFormat::Xyz) => "point cloud (XYZ)",
             Self::Cloud(PointFormat::Obj) => "point cloud (OBJ)",
             Self::Cloud(PointFormat::Pcd) => "point cloud (PCD)",
             Self::Mesh(MeshFileFormat::Stl) => "mesh (STL)",
-            Self::Volume => "volume (NIfTI)",
             Self::Field => "field",
         })
     }
@@ -93,8 +94,8 @@ pub(crate) fn kind_of(head: &[u8], path: &Path) -> Result<Kind, Fault> {
     if head.starts_with(&field::MAGIC) {
         return Ok(Kind::Field);
     }
-    if volumes::looks_like_nifti(head) {
-        return Ok(Kind::Volume);
+    if let Some(format) = volumes::nifti_format(head) {
+        return Ok(Kind::Volume(format));
     }
     if head.starts_with(b"solid") && memchr::memmem::find(head, b"facet").is_some() {
         return Ok(Kind::Mesh(MeshFileFormat::Stl));
@@ -105,8 +106,9 @@ pub(crate) fn kind_of(head: &[u8], path: &Path) -> Result<Kind, Fault> {
         "xyz" | "xyzn" | "txt" | "asc" | "csv" | "pts" => Ok(Kind::Cloud(PointFormat::Xyz)),
         "pcd" => Ok(Kind::Cloud(PointFormat::Pcd)),
         "obj" => Ok(Kind::Cloud(PointFormat::Obj)),
+        "nii" => Ok(Kind::Volume(VolumeFormat::Nifti)),
+        "hdr" | "img" => Ok(Kind::Volume(VolumeFormat::NiftiPair)),
         "stl" => Ok(Kind::Mesh(MeshFileFormat::Stl)),
-        "nii" => Ok(Kind::Volume),
         "iclay" => Ok(Kind::Field),
         "" => Err(Fault::UnknownKind {
             found: "a name without an extension".into(),

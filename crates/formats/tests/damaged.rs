@@ -25,8 +25,8 @@ fn fixtures() -> Vec<PathBuf> {
 fn read(path: &Path) -> Result<(), formats::FormatError> {
     match detect(path)? {
         Kind::Cloud(_) => points::read(path, &LIMITS).map(drop),
+        Kind::Volume(_) => volumes::read(path, &Default::default(), &LIMITS).map(drop),
         Kind::Mesh(_) => meshes::read(path, &LIMITS).map(drop),
-        Kind::Volume => volumes::read(path, &LIMITS).map(drop),
         Kind::Field => field::load(path, &LIMITS).map(drop),
     }
 }
@@ -102,7 +102,7 @@ fn every_gzipped_fixture_with_any_bit_turned_is_refused_or_the_same() {
         let path = fixtures().into_iter().find(|p| p.ends_with(name)).unwrap();
         let content = |path: &Path| match name {
             "box_trimesh.obj.gz" => points::read(path, &LIMITS).map(|c| format!("{c:?}")),
-            _ => volumes::read(path, &LIMITS).map(|v| format!("{v:?}")),
+            _ => volumes::read(path, &Default::default(), &LIMITS).map(|v| format!("{v:?}")),
         };
         let original = content(&path).unwrap();
         let mut bytes = std::fs::read(&path).unwrap();
@@ -258,7 +258,9 @@ fn a_directory_an_empty_file_no_file_and_a_strange_name_are_named() {
     }
     // A good file given for the wrong purpose.
     let cloud = scratch.file("cloud.xyz", b"1 2 3\n");
-    let e = volumes::read(&cloud, &LIMITS).unwrap_err().to_string();
+    let e = volumes::read(&cloud, &Default::default(), &LIMITS)
+        .unwrap_err()
+        .to_string();
     assert!(e.contains("cloud.xyz"), "{e}");
     let volume = fixtures()
         .into_iter()

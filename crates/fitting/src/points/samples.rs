@@ -141,18 +141,6 @@ impl Samples {
         })
     }
 
-    /// The grids of the fit: level 0 has 32 cells along the box.
-    pub fn lattice(&self) -> Lattice {
-        let cells = 1u32 << BASE_DEPTH;
-        Lattice {
-            world_from_lattice: DAffine3 {
-                matrix3: DMat3::from_diagonal(DVec3::splat(self.scale / cells as f64)),
-                translation: self.origin,
-            },
-            cells: [cells; 3],
-        }
-    }
-
     /// Whether sample `index` is a condition on the sign of the field away from the surface, not a point of it.
     pub fn is_sign_condition(&self, index: usize) -> bool {
         self.targets[index] != 0.0
@@ -222,6 +210,18 @@ impl Samples {
     pub fn cell(&self, index: usize, depth: usize) -> [u32; 3] {
         let n = (1u64 << depth) as f64;
         (self.positions[index] * n).to_array().map(|x| x as u32)
+    }
+}
+
+/// The grids of a fit in the box of edge `scale` at `origin`: level 0 has 32 cells along it.
+pub(crate) fn lattice(origin: DVec3, scale: f64) -> Lattice {
+    let cells = 1u32 << BASE_DEPTH;
+    Lattice {
+        world_from_lattice: DAffine3 {
+            matrix3: DMat3::from_diagonal(DVec3::splat(scale / cells as f64)),
+            translation: origin,
+        },
+        cells: [cells; 3],
     }
 }
 

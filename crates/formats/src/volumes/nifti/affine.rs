@@ -3,17 +3,8 @@
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
 use crate::Fault;
-
-/// Origin of a volume's transform, in order of preference.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Orientation {
-    /// The affine matrix (`sform_code > 0`).
-    Sform,
-    /// The rotation (`qform_code > 0`).
-    Qform,
-    /// Only spacings: axes as stored, origin at the first voxel.
-    Spacings,
-}
+use crate::volumes::Orientation;
+use crate::volumes::geometry::is_usable;
 
 /// The fields of a header that bear on the transform, widened to f64.
 #[derive(Debug)]
@@ -28,9 +19,6 @@ pub(super) struct Transforms {
     /// The three rows of the sform.
     pub rows: [[f64; 4]; 3],
 }
-
-/// Smallest |det| of the unit axes that counts as three directions: 1e-6 is 0.2 arc seconds out of a plane.
-const LEAST_VOLUME: f64 = 1e-6;
 
 /// Chooses the sform, then the qform, then the spacings, as the standard advises; what cannot be used is passed
 /// over with a note.
@@ -90,25 +78,6 @@ fn qform(t: &Transforms) -> Option<DAffine3> {
     })
 }
 
-/// Lengths and offsets between 1 / this and this: products of three and their inverses stay finite.
-const LARGEST: f64 = 1e60;
-
-/// Finite, with axes of some length that do not lie in one plane: the inverse exists and is finite.
-pub(crate) fn is_usable(a: &DAffine3) -> bool {
-    let m = a.matrix3;
-    let lengths = [m.x_axis, m.y_axis, m.z_axis].map(DVec3::length);
-    let is_sane = |l: &f64| (1.0 / LARGEST..=LARGEST).contains(l);
-    if !a.is_finite() || !lengths.iter().all(is_sane) || a.translation.abs().max_element() > LARGEST {
-        return false;
-    }
-    let unit = DMat3::from_cols(
-        m.x_axis / lengths[0],
-        m.y_axis / lengths[1],
-        m.z_axis / lengths[2],
-    );
-    unit.determinant().abs() >= LEAST_VOLUME
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -152,26 +121,6 @@ mod tests {
             (DVec3::new(2.0, 30.0, 400.0), Orientation::Spacings)
         );
         assert_eq!(notes.len(), 1);
-    }
-
-    #[test]
-    fn every_usable_map_has_a_finite_inverse() {
-        for (scale, offset, expected) in [
-            (1e59, 1e59, true),
-            (1e-59, 1e59, true),
-            (1e61, 0.0, false),
-            (1e-61, 0.0, false),
-            (1.0, 1e61, false),
-            (f64::NAN, 0.0, false),
-            (0.0, 0.0, false),
-        ] {
-            let a = DAffine3 {
-                matrix3: DMat3::from_diagonal(DVec3::splat(scale)),
-                translation: DVec3::splat(offset),
-            };
-            assert_eq!(is_usable(&a), expected, "{scale} {offset}");
-            assert!(!expected || a.inverse().is_finite(), "{scale} {offset}");
-        }
     }
 
     #[test]

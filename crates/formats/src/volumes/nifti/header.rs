@@ -3,8 +3,9 @@
 use std::io::Read;
 
 use super::affine::{self, Transforms};
-use super::{VolumeHeader, VoxelType};
 use crate::input::read_fault;
+use crate::volumes::geometry::checked_dims;
+use crate::volumes::{VolumeFormat, VolumeHeader, VoxelType};
 use crate::{Fault, Unit};
 
 pub(super) const SIZE_1: usize = 348;
@@ -16,20 +17,25 @@ pub(super) struct Parsed {
     pub header: VolumeHeader,
     pub notes: Vec<String>,
     pub big_endian: bool,
+    /// The voxels are in a file of their own.
+    pub is_pair: bool,
     /// Byte at which the voxels start.
     pub voxels_at: u64,
     /// Bytes read so far.
     pub consumed: u64,
 }
 
-/// Whether a content starts like a NIfTI header.
-pub(crate) fn looks_like_nifti(head: &[u8]) -> bool {
-    head.len() >= SIZE_1
-        && match sizes(head) {
-            Some((SIZE_1, _)) => matches!(&head[344..347], b"n+1" | b"ni1"),
-            Some(_) => matches!(&head[4..7], b"n+2" | b"ni2"),
-            None => false,
-        }
+/// Which NIfTI a content that starts so is, if any.
+pub(crate) fn nifti_format(head: &[u8]) -> Option<VolumeFormat> {
+    let magic = match sizes(head)?.0 {
+        SIZE_1 => head.get(344..347)?,
+        _ => head.get(4..7)?,
+    };
+    match magic {
+        b"n+1" | b"n+2" => Some(VolumeFormat::Nifti),
+        b"ni1" | b"ni2" => Some(VolumeFormat::NiftiPair),
+        _ => None,
+    }
 }
 
 /// Header size and endianness from the first four bytes.
@@ -112,15 +118,9 @@ pub(super) fn read(source: &mut impl Read) -> Result<Parsed, Fault> {
     } else {
         &raw[4..7]
     };
-    match magic {
-        b"n+1" | b"n+2" => {}
-        b"ni1" | b"ni2" => {
-            return Err(Fault::Value {
-                what: "the magic",
-                value: "that of a header/image pair".into(),
-                remedy: "convert the pair to one .nii file, in nibabel load() and save()",
-            });
-        }
+    let is_pair = match magic {
+        b"n+1" | b"n+2" => false,
+        b"ni1" | b"ni2" => true,
         other => {
             return Err(Fault::Value {
                 what: "the magic",
@@ -128,13 +128,13 @@ pub(super) fn read(source: &mut impl Read) -> Result<Parsed, Fault> {
                 remedy: "a NIfTI file says n+1 or n+2; an ANALYZE file has to be converted to .nii first",
             });
         }
-    }
+    };
     let fields = if size == SIZE_1 {
         version_1(&b)
     } else {
         version_2(&b)
     };
-    let mut parsed = check(fields, size)?;
+    let mut parsed = check(fields, size, is_pair)?;
     parsed.big_endian = big;
     Ok(parsed)
 }
@@ -201,7 +201,7 @@ fn version_2(b: &Bytes) -> Fields {
     }
 }
 
-fn check(f: Fields, size: usize) -> Result<Parsed, Fault> {
+fn check(f: Fields, size: usize, is_pair: bool) -> Result<Parsed, Fault> {
     let axes = f.dim[0];
     if !(1..=7).contains(&axes) {
         return Err(Fault::Value {
@@ -212,11 +212,11 @@ fn check(f: Fields, size: usize) -> Result<Parsed, Fault> {
     }
     // Axes that the header does not count are 1, whatever stands there.
     let extent = |i: usize| if i as i64 <= axes { f.dim[i] } else { 1 };
-    if let Some(n) = (1..8).map(extent).find(|n| *n < 1) {
+    if let Some(n) = (4..8).map(extent).find(|n| *n < 1) {
         return Err(Fault::Value {
             what: "a dimension",
             value: n.to_string(),
-            remedy: "an empty volume cannot be fitted; every dimension is at least 1",
+            remedy: "every dimension is at least 1",
         });
     }
     if let Some(i) = (4..8).find(|i| extent(*i) > 1) {
@@ -226,16 +226,7 @@ fn check(f: Fields, size: usize) -> Result<Parsed, Fault> {
             remedy: "take one out, in nibabel img.slicer[..., 0], and save it as its own file",
         });
     }
-    let count = (1..4)
-        .try_fold(1u64, |n, i| n.checked_mul(extent(i) as u64))
-        .filter(|n| *n <= 1 << 50);
-    if count.is_none() {
-        return Err(Fault::Value {
-            what: "the number of voxels",
-            value: format!("{} x {} x {}", extent(1), extent(2), extent(3)),
-            remedy: "at most 2^50 can be read; is the header damaged?",
-        });
-    }
+    let dims = checked_dims([1, 2, 3].map(extent))?;
     let stored = VoxelType::from_code(f.datatype).ok_or_else(|| Fault::Value {
         what: "the voxel type",
         value: match f.datatype {
@@ -248,7 +239,8 @@ fn check(f: Fields, size: usize) -> Result<Parsed, Fault> {
         remedy: "read are int8 to int64, uint8 to uint64, float32 and float64; convert it to one of these",
     })?;
     // Four bytes after the header tell of extensions; older writers leave them out.
-    if !(f.voxels_at >= size as f64 && f.voxels_at <= 1e12 && f.voxels_at.fract() == 0.0) {
+    let earliest = if is_pair { 0.0 } else { size as f64 };
+    if !(f.voxels_at >= earliest && f.voxels_at <= 1e12 && f.voxels_at.fract() == 0.0) {
         return Err(Fault::Value {
             what: "the start of the voxels (vox_offset)",
             value: f.voxels_at.to_string(),
@@ -283,7 +275,7 @@ fn check(f: Fields, size: usize) -> Result<Parsed, Fault> {
         }
     };
     let header = VolumeHeader {
-        dims: [1, 2, 3].map(|i| extent(i) as usize),
+        dims,
         world_from_voxel,
         unit: if unit == Unit::Unknown {
             unit
@@ -298,6 +290,7 @@ fn check(f: Fields, size: usize) -> Result<Parsed, Fault> {
         header,
         notes,
         big_endian: false,
+        is_pair,
         voxels_at: f.voxels_at as u64,
         consumed: size as u64,
     })

@@ -7,26 +7,9 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use glam::DAffine3;
 
-use super::VoxelType;
 use super::header::SIZE_1;
+use crate::volumes::{StoreAs, VoxelType};
 use crate::{Fault, FormatError, Unit, atomic, detect};
-
-/// How densities are stored.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum StoreAs {
-    /// As they are.
-    Float32,
-    /// As `round((density - intercept) / slope)`, held to the range of an integer type; the header says how to
-    /// get densities back.
-    Integer {
-        /// Type of the voxels; not a float type.
-        voxel: VoxelType,
-        /// Density of one step, finite and not 0.
-        slope: f64,
-        /// Density of a stored 0.
-        intercept: f64,
-    },
-}
 
 /// Deflate level: densities hardly compress, so the higher ones cost time and save a few percent.
 const LEVEL: u32 = 3;
