@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::input::{self, read_fault};
 use crate::volumes::{self, VolumeFormat};
-use crate::{Fault, FormatError, field};
+use crate::{Fault, FormatError, field, points};
 
 /// What a file holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,6 +30,8 @@ pub enum PointFormat {
     Xyz,
     /// Wavefront OBJ.
     Obj,
+    /// Point Cloud Library.
+    Pcd,
 }
 
 /// Formats that hold meshes and nothing else.
@@ -46,15 +48,16 @@ impl fmt::Display for Kind {
             Self::Cloud(PointFormat::Ply) => "point cloud (PLY)",
             Self::Cloud(PointFormat::Xyz) => "point cloud (XYZ)",
             Self::Cloud(PointFormat::Obj) => "point cloud (OBJ)",
+            Self::Cloud(PointFormat::Pcd) => "point cloud (PCD)",
             Self::Mesh(MeshFileFormat::Stl) => "mesh (STL)",
             Self::Field => "field",
         })
     }
 }
 
-pub(crate) const CLOUDS: &str = "point clouds .ply .obj .xyz .xyzn .txt .asc .csv .pts, each also .gz";
+pub(crate) const CLOUDS: &str = "point clouds .ply .obj .pcd .xyz .xyzn .txt .asc .csv .pts, each also .gz";
 pub(crate) const MESHES: &str = "meshes .ply .obj .stl, each also .gz";
-const SUPPORTED: &str = "point clouds .ply .obj .xyz .xyzn .txt .asc .csv .pts, meshes .ply .obj .stl and \
+const SUPPORTED: &str = "point clouds .ply .obj .pcd .xyz .xyzn .txt .asc .csv .pts, meshes .ply .obj .stl and \
                          volumes .nii, each also .gz, and fields .iclay";
 
 /// Bytes that are enough to know every content that can be known.
@@ -85,6 +88,9 @@ pub(crate) fn kind_of(head: &[u8], path: &Path) -> Result<Kind, Fault> {
     if head.starts_with(b"ply\n") || head.starts_with(b"ply\r") || head.starts_with(b"ply ") {
         return Ok(Kind::Cloud(PointFormat::Ply));
     }
+    if points::looks_like_pcd(head) {
+        return Ok(Kind::Cloud(PointFormat::Pcd));
+    }
     if head.starts_with(&field::MAGIC) {
         return Ok(Kind::Field);
     }
@@ -98,6 +104,7 @@ pub(crate) fn kind_of(head: &[u8], path: &Path) -> Result<Kind, Fault> {
     match extension.as_str() {
         "ply" => Ok(Kind::Cloud(PointFormat::Ply)),
         "xyz" | "xyzn" | "txt" | "asc" | "csv" | "pts" => Ok(Kind::Cloud(PointFormat::Xyz)),
+        "pcd" => Ok(Kind::Cloud(PointFormat::Pcd)),
         "obj" => Ok(Kind::Cloud(PointFormat::Obj)),
         "nii" => Ok(Kind::Volume(VolumeFormat::Nifti)),
         "hdr" | "img" => Ok(Kind::Volume(VolumeFormat::NiftiPair)),

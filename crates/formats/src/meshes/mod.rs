@@ -13,6 +13,7 @@ use std::path::Path;
 use glam::DVec3;
 
 pub use ply_write::save_points;
+pub(crate) use ply_write::write_points as write_ply_points;
 pub use triangle_mesh::TriangleMesh;
 
 use crate::detect::{self, Kind, MeshFileFormat, PointFormat};
@@ -187,7 +188,7 @@ pub fn write(out: &mut dyn Write, mesh: &Mesh, format: MeshFormat) -> io::Result
 }
 
 /// Whether rounding to `f32` moves a vertex by more than a millionth of the diagonal.
-fn needs_double(vertices: &[DVec3]) -> bool {
+pub(crate) fn needs_double(vertices: &[DVec3]) -> bool {
     let Some(first) = vertices.first() else {
         return false;
     };
