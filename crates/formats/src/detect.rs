@@ -63,12 +63,23 @@ const SUPPORTED: &str = "point clouds .ply .obj .pcd .xyz .xyzn .txt .asc .csv .
 /// Bytes that are enough to know every content that can be known.
 const LOOK: usize = 400;
 
-/// Tells what `path` holds, inflating gzip as needed. Reads a few hundred bytes.
+/// Tells what `path` holds, inflating gzip as needed. Reads a few hundred bytes, of a
+/// directory those of its files until one is DICOM.
 ///
 /// # Errors
-/// [`Fault::UnknownKind`] with what is supported; [`Fault::Empty`]; [`Fault::Directory`]; I/O.
+/// [`Fault::UnknownKind`] with what is supported; [`Fault::Empty`]; I/O.
 pub fn detect(path: &Path) -> Result<Kind, FormatError> {
     let look = || {
+        if path.is_dir() {
+            if volumes::holds_dicom(path)? {
+                return Ok(Kind::Volume(VolumeFormat::Dicom));
+            }
+            return Err(Fault::UnknownKind {
+                found: "a directory without DICOM files".into(),
+                purpose: "input",
+                supported: SUPPORTED,
+            });
+        }
         let mut input = input::open(path)?;
         let mut head = Vec::with_capacity(LOOK);
         (&mut input.source)
@@ -99,6 +110,9 @@ pub(crate) fn kind_of(head: &[u8], path: &Path) -> Result<Kind, Fault> {
     }
     if head.starts_with(b"solid") && memchr::memmem::find(head, b"facet").is_some() {
         return Ok(Kind::Mesh(MeshFileFormat::Stl));
+    }
+    if volumes::looks_like_dicom(head) {
+        return Ok(Kind::Volume(VolumeFormat::Dicom));
     }
     let extension = extension(path);
     match extension.as_str() {
