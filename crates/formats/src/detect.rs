@@ -6,13 +6,15 @@ use std::path::Path;
 
 use crate::input::{self, read_fault};
 use crate::volumes::{self, VolumeFormat};
-use crate::{Fault, FormatError, field};
+use crate::{Fault, FormatError, field, points};
 
 /// What a file holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Points, for [`crate::points::read`].
+    /// Points, for [`crate::points::read`]; PLY and OBJ may hold faces too, for [`crate::meshes::read`].
     Cloud(PointFormat),
+    /// A mesh, for [`crate::meshes::read`]; [`crate::points::read`] takes its vertices.
+    Mesh(MeshFileFormat),
     /// A volume, for [`crate::volumes::read`].
     Volume(VolumeFormat),
     /// A fitted field, for [`crate::field::load`].
@@ -28,6 +30,15 @@ pub enum PointFormat {
     Xyz,
     /// Wavefront OBJ.
     Obj,
+    /// Point Cloud Library.
+    Pcd,
+}
+
+/// Formats that hold meshes and nothing else.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MeshFileFormat {
+    /// Stereolithography, ascii or binary.
+    Stl,
 }
 
 impl fmt::Display for Kind {
@@ -37,14 +48,17 @@ impl fmt::Display for Kind {
             Self::Cloud(PointFormat::Ply) => "point cloud (PLY)",
             Self::Cloud(PointFormat::Xyz) => "point cloud (XYZ)",
             Self::Cloud(PointFormat::Obj) => "point cloud (OBJ)",
+            Self::Cloud(PointFormat::Pcd) => "point cloud (PCD)",
+            Self::Mesh(MeshFileFormat::Stl) => "mesh (STL)",
             Self::Field => "field",
         })
     }
 }
 
-pub(crate) const CLOUDS: &str = "point clouds .ply .obj .xyz .xyzn .txt .asc .csv .pts, each also .gz";
-const SUPPORTED: &str = "point clouds .ply .obj .xyz .xyzn .txt .asc .csv .pts and volumes .nii, each also .gz, \
-                         and fields .iclay";
+pub(crate) const CLOUDS: &str = "point clouds .ply .obj .pcd .xyz .xyzn .txt .asc .csv .pts, each also .gz";
+pub(crate) const MESHES: &str = "meshes .ply .obj .stl, each also .gz";
+const SUPPORTED: &str = "point clouds .ply .obj .pcd .xyz .xyzn .txt .asc .csv .pts, meshes .ply .obj .stl and \
+                         volumes .nii, each also .gz, and fields .iclay";
 
 /// Bytes that are enough to know every content that can be known.
 const LOOK: usize = 400;
@@ -85,11 +99,17 @@ pub(crate) fn kind_of(head: &[u8], path: &Path) -> Result<Kind, Fault> {
     if head.starts_with(b"ply\n") || head.starts_with(b"ply\r") || head.starts_with(b"ply ") {
         return Ok(Kind::Cloud(PointFormat::Ply));
     }
+    if points::looks_like_pcd(head) {
+        return Ok(Kind::Cloud(PointFormat::Pcd));
+    }
     if head.starts_with(&field::MAGIC) {
         return Ok(Kind::Field);
     }
     if let Some(format) = volumes::nifti_format(head) {
         return Ok(Kind::Volume(format));
+    }
+    if head.starts_with(b"solid") && memchr::memmem::find(head, b"facet").is_some() {
+        return Ok(Kind::Mesh(MeshFileFormat::Stl));
     }
     if volumes::looks_like_dicom(head) {
         return Ok(Kind::Volume(VolumeFormat::Dicom));
@@ -98,9 +118,11 @@ pub(crate) fn kind_of(head: &[u8], path: &Path) -> Result<Kind, Fault> {
     match extension.as_str() {
         "ply" => Ok(Kind::Cloud(PointFormat::Ply)),
         "xyz" | "xyzn" | "txt" | "asc" | "csv" | "pts" => Ok(Kind::Cloud(PointFormat::Xyz)),
+        "pcd" => Ok(Kind::Cloud(PointFormat::Pcd)),
         "obj" => Ok(Kind::Cloud(PointFormat::Obj)),
         "nii" => Ok(Kind::Volume(VolumeFormat::Nifti)),
         "hdr" | "img" => Ok(Kind::Volume(VolumeFormat::NiftiPair)),
+        "stl" => Ok(Kind::Mesh(MeshFileFormat::Stl)),
         "iclay" => Ok(Kind::Field),
         "" => Err(Fault::UnknownKind {
             found: "a name without an extension".into(),

@@ -36,10 +36,13 @@ mod input;
 mod limits;
 pub mod meshes;
 pub mod points;
+mod polygon;
+mod raw;
+mod text;
 mod unit;
 pub mod volumes;
 
-pub use detect::{Kind, PointFormat, detect};
+pub use detect::{Kind, MeshFileFormat, PointFormat, detect};
 pub use error::{Fault, FormatError};
 pub use limits::ReadLimits;
 pub use unit::Unit;

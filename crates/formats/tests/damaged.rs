@@ -4,7 +4,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use formats::{Fault, Kind, PointFormat, ReadLimits, detect, field, points, volumes};
+use formats::{Fault, Kind, PointFormat, ReadLimits, detect, field, meshes, points, volumes};
 
 /// Far above any fixture, far below what a forged count could ask for.
 const LIMITS: ReadLimits = ReadLimits { max_bytes: 8 << 20 };
@@ -26,6 +26,7 @@ fn read(path: &Path) -> Result<(), formats::FormatError> {
     match detect(path)? {
         Kind::Cloud(_) => points::read(path, &LIMITS).map(drop),
         Kind::Volume(_) => volumes::read(path, &Default::default(), &LIMITS).map(drop),
+        Kind::Mesh(_) => meshes::read(path, &LIMITS).map(drop),
         Kind::Field => field::load(path, &LIMITS).map(drop),
     }
 }

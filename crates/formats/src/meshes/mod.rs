@@ -1,17 +1,73 @@
-//! Meshes and coloured points out: PLY, STL and OBJ.
+//! Meshes in and out, and coloured points out.
 
-mod obj;
-mod ply;
+mod obj_write;
+mod ply_write;
 mod stl;
+mod stl_write;
+mod triangle_mesh;
+mod weld;
 
 use std::io::{self, Write};
 use std::path::Path;
 
 use glam::DVec3;
 
-pub use ply::save_points;
+pub use ply_write::save_points;
+pub(crate) use ply_write::write_points as write_ply_points;
+pub use triangle_mesh::TriangleMesh;
 
-use crate::{Fault, FormatError, atomic, detect};
+use crate::detect::{self, Kind, MeshFileFormat, PointFormat};
+use crate::limits::Budget;
+use crate::raw::{RawShape, Wanted};
+use crate::{Fault, FormatError, ReadLimits, Unit, atomic, input, points};
+
+/// Reads a mesh; the format is told by content first, then by name, and `.gz` by its content.
+///
+/// Polygons are cut into triangles. Corners of STL at the same place become one vertex.
+///
+/// # Errors
+/// Every [`Fault`] of reading; [`Fault::Value`] for a file without any face.
+pub fn read(path: &Path, limits: &ReadLimits) -> Result<TriangleMesh, FormatError> {
+    read_faulty(path, limits).map_err(|fault| fault.at(path))
+}
+
+fn read_faulty(path: &Path, limits: &ReadLimits) -> Result<TriangleMesh, Fault> {
+    let mut budget = Budget::new(limits);
+    let bytes = input::open(path)?.read_all(&mut budget)?;
+    let budget = &mut budget;
+    let raw = match detect::kind_of(&bytes, path)? {
+        Kind::Cloud(PointFormat::Ply) => points::ply::parse(&bytes, Wanted::Mesh, budget),
+        Kind::Cloud(PointFormat::Obj) => points::obj::parse(&bytes, Wanted::Mesh, budget),
+        Kind::Mesh(format) => parse(&bytes, format, path, budget),
+        other => Err(Fault::UnknownKind {
+            found: format!("a {other}"),
+            purpose: "mesh",
+            supported: detect::MESHES,
+        }),
+    }?;
+    triangle_mesh::finish(raw, budget)
+}
+
+/// Parses a file that can only be a mesh.
+pub(crate) fn parse(
+    bytes: &[u8],
+    format: MeshFileFormat,
+    _path: &Path,
+    budget: &mut Budget,
+) -> Result<RawShape, Fault> {
+    match format {
+        MeshFileFormat::Stl => stl::parse(bytes, budget),
+    }
+}
+
+/// Reads the bytes of an STL file, ascii or binary.
+///
+/// # Errors
+/// A [`Fault`] with the line for text that is no STL, a length that is not the count's, no usable triangle.
+pub fn parse_stl(bytes: &[u8], limits: &ReadLimits) -> Result<TriangleMesh, Fault> {
+    let mut budget = Budget::new(limits);
+    triangle_mesh::finish(stl::parse(bytes, &mut budget)?, &mut budget)
+}
 
 /// A triangle mesh to be written; triangles are counterclockwise seen from outside.
 #[derive(Clone, Copy, Debug)]
@@ -22,6 +78,8 @@ pub struct Mesh<'a> {
     pub triangles: &'a [[u32; 3]],
     /// Red, green, blue of each vertex; kept by PLY alone.
     pub colors: Option<&'a [[u8; 3]]>,
+    /// Unit of the positions.
+    pub unit: Unit,
 }
 
 /// Formats of meshes.
@@ -123,14 +181,14 @@ pub fn write(out: &mut dyn Write, mesh: &Mesh, format: MeshFormat) -> io::Result
         "one colour per vertex"
     );
     match format {
-        MeshFormat::Ply => ply::write(out, mesh),
-        MeshFormat::Stl => stl::write(out, mesh),
-        MeshFormat::Obj => obj::write(out, mesh),
+        MeshFormat::Ply => ply_write::write(out, mesh),
+        MeshFormat::Stl => stl_write::write(out, mesh),
+        MeshFormat::Obj => obj_write::write(out, mesh),
     }
 }
 
 /// Whether rounding to `f32` moves a vertex by more than a millionth of the diagonal.
-fn needs_double(vertices: &[DVec3]) -> bool {
+pub(crate) fn needs_double(vertices: &[DVec3]) -> bool {
     let Some(first) = vertices.first() else {
         return false;
     };
@@ -153,5 +211,7 @@ fn spill(out: &mut dyn Write, bytes: &mut Vec<u8>) -> io::Result<()> {
     Ok(())
 }
 
+#[cfg(test)]
+mod read_tests;
 #[cfg(test)]
 mod tests;
