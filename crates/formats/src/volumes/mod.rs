@@ -79,7 +79,7 @@ pub struct VolumeHeader {
     pub orientation: Orientation,
     /// Type of the voxels in the file.
     pub stored: VoxelType,
-    /// Density = slope · stored + intercept; `None` if the file asks for no rescaling.
+    /// Density = slope · stored + intercept; `None` if the file asks for no rescaling, or for another in each slice.
     pub rescale: Option<[f64; 2]>,
 }
 

@@ -1,5 +1,6 @@
 //! DICOM series: files that others wrote, and what others read from them (`data/dicom/make.py`).
 
+mod hostile;
 mod odd;
 mod writer;
 
@@ -190,4 +191,28 @@ fn the_peak_of_a_reading_is_what_was_stated() {
         matches!(e.fault, Fault::Limit { needed, .. } if needed == need),
         "{e}"
     );
+}
+
+#[test]
+fn pictures_decoded_at_the_same_time_are_the_same_at_any_thread_count() {
+    let path = data().join("compressed/split.dcm");
+    let with = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        pool.install(|| read(&path).unwrap())
+    };
+    let one = with(1);
+    assert!([2, 3, 8].iter().all(|n| with(*n) == one));
+    // Every other slice: those between are not taken for the next ones.
+    let stride = VolumeOptions {
+        stride: [1, 1, 2],
+        ..Default::default()
+    };
+    let part = volumes::read(&path, &stride, &ReadLimits::default()).unwrap();
+    let slice = one.header.dims[0] * one.header.dims[1];
+    for (k, values) in part.values.chunks_exact(slice).enumerate() {
+        assert_eq!(values, &one.values[2 * k * slice..][..slice]);
+    }
 }

@@ -89,7 +89,8 @@ impl Series {
         };
         let is_whole = |s: &Slice| s.above == 0.0 && s.shift == [0.0; 2];
         let is_resampled = grid.dims[..2] != plane_dims || !grid.slices.iter().all(is_whole);
-        let decoder = Decoder::new(&files, budget)?;
+        let volume_bytes = header.voxel_count() as u64 * 4;
+        let decoder = Decoder::new(&files, volume_bytes, budget)?;
         let copy_pixels = if stack.copies.is_empty() {
             0
         } else {
@@ -142,7 +143,7 @@ fn rescaling(planes: &[Plane], notes: &mut Vec<String>) -> Option<[f64; 2]> {
 impl Planes {
     /// Reads a picture, and those at the same position, which have to show the same.
     fn read(&mut self, index: usize, out: &mut [f32]) -> Result<(), Fault> {
-        self.decoder.read(&self.files, &self.all[index], out)?;
+        self.decoder.read_in_order(&self.files, &self.all, index, out)?;
         let from = self.copies.partition_point(|(i, _)| *i < index);
         for (_, copy) in self.copies[from..].iter().take_while(|(i, _)| *i == index) {
             self.decoder.read(&self.files, copy, &mut self.copy)?;
