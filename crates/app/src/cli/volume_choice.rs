@@ -1,7 +1,7 @@
 use std::str::FromStr;
 
 use formats::Unit;
-use formats::volumes::{RawLayout, VolumeOptions, VoxelType};
+use formats::volumes::{DicomOptions, RawLayout, Tilt, Uneven, VolumeOptions, VoxelType};
 
 use super::failure::{Failure, Outcome};
 
@@ -30,6 +30,16 @@ pub struct VolumeChoice {
     /// The file has no header: bytes before the first voxel
     #[arg(long, value_name = "BYTES", requires = "shape", default_value_t = 0)]
     offset: u64,
+    /// Series of a DICOM directory, by its number or its unique identifier
+    #[arg(long, value_name = "SERIES")]
+    series: Option<String>,
+    /// Slices of a DICOM series at uneven distances, a missing one included, are interpolated, not refused
+    #[arg(long)]
+    resample_uneven: bool,
+    /// Slices of a DICOM series that are tilted against their stack are interpolated onto a grid with right
+    /// angles; without, the grid stays oblique and nothing is lost
+    #[arg(long)]
+    resample_tilt: bool,
 }
 
 impl VolumeChoice {
@@ -72,7 +82,19 @@ impl VolumeChoice {
                 self.spacing.as_ref().map(|s| s.0)
             },
             raw,
-            ..Default::default()
+            dicom: DicomOptions {
+                series: self.series.clone(),
+                uneven: if self.resample_uneven {
+                    Uneven::Resample
+                } else {
+                    Uneven::Refuse
+                },
+                tilt: if self.resample_tilt {
+                    Tilt::Resample
+                } else {
+                    Tilt::Keep
+                },
+            },
         })
     }
 }

@@ -103,6 +103,17 @@ impl VolumeHeader {
         DVec3::new(m.x_axis.length(), m.y_axis.length(), m.z_axis.length())
     }
 
+    /// States the unit of the file and converts the map to millimetres.
+    ///
+    /// # Errors
+    /// [`crate::Fault::Value`] if `stated` is [`Unit::Unknown`] or the volume already is in a known unit.
+    pub fn to_mm(&mut self, stated: Unit) -> Result<(), crate::Fault> {
+        let scale = stated.scale_for("volume", self.unit)?;
+        self.world_from_voxel = DAffine3::from_scale(DVec3::splat(scale)) * self.world_from_voxel;
+        self.unit = Unit::Millimetre;
+        Ok(())
+    }
+
     /// Number of voxels.
     pub fn voxel_count(&self) -> usize {
         self.dims.iter().product()
