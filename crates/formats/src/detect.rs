@@ -43,8 +43,9 @@ impl fmt::Display for Kind {
 }
 
 pub(crate) const CLOUDS: &str = "point clouds .ply .obj .xyz .xyzn .txt .asc .csv .pts, each also .gz";
-const SUPPORTED: &str = "point clouds .ply .obj .xyz .xyzn .txt .asc .csv .pts and volumes .nii, each also .gz, \
-                         and fields .iclay";
+const SUPPORTED: &str = "point clouds .ply .obj .xyz .xyzn .txt .asc .csv .pts and volumes .nii .hdr .nrrd .nhdr .mha \
+                         .mhd .tif, each also .gz, directories of .tif, and fields .iclay; voxels without a header \
+                         need their layout stated";
 
 /// Bytes that are enough to know every content that can be known.
 const LOOK: usize = 400;
@@ -55,6 +56,9 @@ const LOOK: usize = 400;
 /// [`Fault::UnknownKind`] with what is supported; [`Fault::Empty`]; [`Fault::Directory`]; I/O.
 pub fn detect(path: &Path) -> Result<Kind, FormatError> {
     let look = || {
+        if path.is_dir() {
+            return kind_of_directory(path);
+        }
         let mut input = input::open(path)?;
         let mut head = Vec::with_capacity(LOOK);
         (&mut input.source)
@@ -64,6 +68,14 @@ pub fn detect(path: &Path) -> Result<Kind, FormatError> {
         kind_of(&head, path)
     };
     look().map_err(|fault| fault.at(path))
+}
+
+/// What a directory holds, seen by the files in it.
+fn kind_of_directory(path: &Path) -> Result<Kind, Fault> {
+    if volumes::is_stack_folder(path)? {
+        return Ok(Kind::Volume(VolumeFormat::TiffFolder));
+    }
+    Err(Fault::Directory)
 }
 
 /// Kind of a content that starts with `head`, in a file called `path`.
@@ -80,12 +92,24 @@ pub(crate) fn kind_of(head: &[u8], path: &Path) -> Result<Kind, Fault> {
     if let Some(format) = volumes::nifti_format(head) {
         return Ok(Kind::Volume(format));
     }
+    if volumes::looks_like_nrrd(head) {
+        return Ok(Kind::Volume(VolumeFormat::Nrrd));
+    }
+    if volumes::looks_like_metaimage(head) {
+        return Ok(Kind::Volume(VolumeFormat::MetaImage));
+    }
+    if volumes::looks_like_tiff(head) {
+        return Ok(Kind::Volume(VolumeFormat::Tiff));
+    }
     let extension = extension(path);
     match extension.as_str() {
         "ply" => Ok(Kind::Cloud(PointFormat::Ply)),
         "xyz" | "xyzn" | "txt" | "asc" | "csv" | "pts" => Ok(Kind::Cloud(PointFormat::Xyz)),
         "obj" => Ok(Kind::Cloud(PointFormat::Obj)),
         "nii" => Ok(Kind::Volume(VolumeFormat::Nifti)),
+        "nrrd" | "nhdr" => Ok(Kind::Volume(VolumeFormat::Nrrd)),
+        "mha" | "mhd" => Ok(Kind::Volume(VolumeFormat::MetaImage)),
+        "tif" | "tiff" => Ok(Kind::Volume(VolumeFormat::Tiff)),
         "hdr" | "img" => Ok(Kind::Volume(VolumeFormat::NiftiPair)),
         "iclay" => Ok(Kind::Field),
         "" => Err(Fault::UnknownKind {

@@ -1,26 +1,41 @@
 //! Volumes in and out.
 
+mod detached;
+mod encode;
 mod geometry;
+mod metaimage;
 mod nifti;
+mod nrrd;
 mod open;
 mod options;
 mod part;
 mod raw;
+mod save;
 mod slices;
 mod stream;
+mod tiff;
 mod voxel;
+mod vti;
 
 use std::fmt;
 use std::path::Path;
 
 use glam::{DAffine3, DVec3};
 
+pub use encode::Grid;
 pub(crate) use geometry::is_usable as is_usable_affine;
+pub(crate) use metaimage::looks_like_metaimage;
+pub use metaimage::parse_metaimage;
 pub(crate) use nifti::nifti_format;
-pub use nifti::{parse_nifti, save, write_nifti};
+pub use nifti::{parse_nifti, write_nifti};
+pub(crate) use nrrd::looks_like_nrrd;
+pub use nrrd::parse_nrrd;
 pub use options::{DicomOptions, VolumeOptions};
 pub use raw::{RawLayout, parse_raw};
+pub use save::{save, save_slices};
 use slices::SliceSource;
+pub use tiff::parse_tiff;
+pub(crate) use tiff::{is_stack_folder, looks_like_tiff};
 pub use voxel::{StoreAs, VoxelType};
 
 use crate::limits::Budget;
@@ -33,6 +48,14 @@ pub enum VolumeFormat {
     Nifti,
     /// A NIfTI header with its image beside it.
     NiftiPair,
+    /// NRRD, its voxels in the same file or in others.
+    Nrrd,
+    /// MetaImage, its voxels in the same file or in others.
+    MetaImage,
+    /// The pages of a TIFF file.
+    Tiff,
+    /// The TIFF files of a directory, a slice each.
+    TiffFolder,
     /// Voxels without a header, told by [`VolumeOptions::raw`] alone.
     Raw,
 }
@@ -42,6 +65,10 @@ impl fmt::Display for VolumeFormat {
         f.write_str(match self {
             Self::Nifti => "NIfTI",
             Self::NiftiPair => "NIfTI header and image",
+            Self::Nrrd => "NRRD",
+            Self::MetaImage => "MetaImage",
+            Self::Tiff => "TIFF stack",
+            Self::TiffFolder => "directory of TIFF slices",
             Self::Raw => "raw",
         })
     }

@@ -4,12 +4,13 @@ use std::path::Path;
 
 use super::part::Part;
 use super::slices::SliceSource;
-use super::{VolumeFormat, VolumeOptions, nifti, raw};
+use super::{VolumeFormat, VolumeOptions, metaimage, nifti, nrrd, raw, tiff};
 use crate::detect::{self, Kind};
 use crate::limits::Budget;
 use crate::{Fault, FormatError};
 
-pub(crate) const VOLUMES: &str = "volumes .nii, also .gz";
+/// Everything that [`super::read`] reads.
+const VOLUMES: &str = "volumes .nii .hdr .nrrd .nhdr .mha .mhd .tif, directories of .tif";
 
 /// An open volume: its slices as asked, and what it is as a whole.
 pub(super) struct Opened {
@@ -28,8 +29,10 @@ pub(super) fn open(path: &Path, options: &VolumeOptions, budget: &mut Budget) ->
         (VolumeFormat::Raw, Some(layout)) => Box::new(raw::open(path, layout)?),
         (VolumeFormat::Raw, None) => unreachable!("never told from a file"),
         (VolumeFormat::Nifti | VolumeFormat::NiftiPair, _) => Box::new(nifti::open(path)?),
+        (VolumeFormat::Nrrd, _) => nrrd::open(path, budget)?,
+        (VolumeFormat::MetaImage, _) => metaimage::open(path, budget)?,
+        (VolumeFormat::Tiff | VolumeFormat::TiffFolder, _) => tiff::open(path, budget)?,
     };
-    let _ = budget;
     let file_dims = inner.header().dims;
     Ok(Opened {
         source: Part::new(inner, options)?,
