@@ -66,8 +66,9 @@ impl fmt::Display for Kind {
 
 pub(crate) const CLOUDS: &str = "point clouds .ply .obj .pcd .xyz .xyzn .txt .asc .csv .pts, each also .gz";
 pub(crate) const MESHES: &str = "meshes .ply .obj .stl .gltf .glb .3mf .wrl, each also .gz";
-const SUPPORTED: &str = "point clouds .ply .obj .pcd .xyz .xyzn .txt .asc .csv .pts, meshes .ply .obj .stl .gltf .glb .3mf .wrl and \
-                         volumes .nii, each also .gz, and fields .iclay";
+const SUPPORTED: &str = "point clouds .ply .obj .pcd .xyz .xyzn .txt .asc .csv .pts, meshes .ply .obj .stl .gltf .glb \
+                         .3mf .wrl, volumes .nii .hdr .nrrd .nhdr .mha .mhd .tif, each also .gz, directories of DICOM \
+                         or .tif slices, and fields .iclay; voxels without a header need their layout stated";
 
 /// Bytes that are enough to know every content that can be known.
 const LOOK: usize = 400;
@@ -80,14 +81,7 @@ const LOOK: usize = 400;
 pub fn detect(path: &Path) -> Result<Kind, FormatError> {
     let look = || {
         if path.is_dir() {
-            if volumes::holds_dicom(path)? {
-                return Ok(Kind::Volume(VolumeFormat::Dicom));
-            }
-            return Err(Fault::UnknownKind {
-                found: "a directory without DICOM files".into(),
-                purpose: "input",
-                supported: SUPPORTED,
-            });
+            return kind_of_directory(path);
         }
         let mut input = input::open(path)?;
         let mut head = Vec::with_capacity(LOOK);
@@ -98,6 +92,21 @@ pub fn detect(path: &Path) -> Result<Kind, FormatError> {
         kind_of(&head, path)
     };
     look().map_err(|fault| fault.at(path))
+}
+
+/// What a directory holds, seen by the files in it.
+fn kind_of_directory(path: &Path) -> Result<Kind, Fault> {
+    if volumes::is_stack_folder(path)? {
+        return Ok(Kind::Volume(VolumeFormat::TiffFolder));
+    }
+    if volumes::holds_dicom(path)? {
+        return Ok(Kind::Volume(VolumeFormat::Dicom));
+    }
+    Err(Fault::UnknownKind {
+        found: "a directory without slices".into(),
+        purpose: "input",
+        supported: SUPPORTED,
+    })
 }
 
 /// Kind of a content that starts with `head`, in a file called `path`.
@@ -132,6 +141,15 @@ pub(crate) fn kind_of(head: &[u8], path: &Path) -> Result<Kind, Fault> {
     if volumes::looks_like_dicom(head) {
         return Ok(Kind::Volume(VolumeFormat::Dicom));
     }
+    if volumes::looks_like_nrrd(head) {
+        return Ok(Kind::Volume(VolumeFormat::Nrrd));
+    }
+    if volumes::looks_like_metaimage(head) {
+        return Ok(Kind::Volume(VolumeFormat::MetaImage));
+    }
+    if volumes::looks_like_tiff(head) {
+        return Ok(Kind::Volume(VolumeFormat::Tiff));
+    }
     let extension = extension(path);
     match extension.as_str() {
         "ply" => Ok(Kind::Cloud(PointFormat::Ply)),
@@ -139,6 +157,9 @@ pub(crate) fn kind_of(head: &[u8], path: &Path) -> Result<Kind, Fault> {
         "pcd" => Ok(Kind::Cloud(PointFormat::Pcd)),
         "obj" => Ok(Kind::Cloud(PointFormat::Obj)),
         "nii" => Ok(Kind::Volume(VolumeFormat::Nifti)),
+        "nrrd" | "nhdr" => Ok(Kind::Volume(VolumeFormat::Nrrd)),
+        "mha" | "mhd" => Ok(Kind::Volume(VolumeFormat::MetaImage)),
+        "tif" | "tiff" => Ok(Kind::Volume(VolumeFormat::Tiff)),
         "hdr" | "img" => Ok(Kind::Volume(VolumeFormat::NiftiPair)),
         "gltf" | "glb" => Ok(Kind::Mesh(MeshFileFormat::Gltf)),
         "3mf" => Ok(Kind::Mesh(MeshFileFormat::ThreeMf)),

@@ -4,7 +4,7 @@
 //! | what | read | written |
 //! | --- | --- | --- |
 //! | points | PLY (ascii, binary of both endians), XYZ, OBJ; each also gzipped | PLY with colours |
-//! | volumes | NIfTI-1 and NIfTI-2 single files, gzipped or not; DICOM series | NIfTI-1, gzipped or not |
+//! | volumes | NIfTI-1 and -2, NRRD, MetaImage, TIFF stacks, raw voxels, gzipped or not; DICOM series | NIfTI-1, NRRD, MetaImage, VTK ImageData |
 //! | meshes | | PLY, STL, OBJ |
 //! | fields | the native file, `docs/format.md` | the same |
 //!
@@ -25,7 +25,7 @@
 //! ```
 //!
 //! # What it cannot do
-//! No NIfTI header/image pairs, no RGB or complex voxels, no time series, no textures or materials of OBJ.
+//! No RGB or complex voxels, no time series, no textures or materials of OBJ. Of a volume, [`volumes`] says more.
 
 pub mod atomic;
 mod detect;

@@ -196,7 +196,7 @@ fn volumes_that_cannot_be_used_say_why_and_what_helps() {
     let zero_affine = vec![0; 48];
     for (at, change, part) in [
         (0, &b"\0\0\0\0"[..], "first number"),
-        (344, b"ni1", "pair"),
+        (344, b"ni1", "the image of the header/image pair"),
         (344, b"xyz", "magic"),
         (40, &[0, 0], "number of dimensions is 0"),
         (42, &[0, 0], "a dimension is 0"),

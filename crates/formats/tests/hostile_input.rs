@@ -23,6 +23,11 @@ fn read_all(bytes: &[u8]) {
     bounded("xyz", bytes, |b| points::parse_xyz(b, &LIMITS).is_ok());
     bounded("obj", bytes, |b| points::parse_obj(b, &LIMITS).is_ok());
     bounded("nifti", bytes, |b| volumes::parse_nifti(b, &LIMITS).is_ok());
+    bounded("nrrd", bytes, |b| volumes::parse_nrrd(b, &LIMITS).is_ok());
+    bounded("metaimage", bytes, |b| {
+        volumes::parse_metaimage(b, &LIMITS).is_ok()
+    });
+    bounded("tiff", bytes, |b| volumes::parse_tiff(b, &LIMITS).is_ok());
     bounded("field", bytes, |b| field::decode(b, &LIMITS).is_ok());
 }
 
@@ -58,15 +63,19 @@ fn runner() -> TestRunner {
 
 fn seeds() -> Vec<Vec<u8>> {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data");
-    let mut paths: Vec<_> = std::fs::read_dir(folder)
-        .unwrap()
-        .map(|e| e.unwrap().path())
-        .collect();
+    let list = |folder: &str| std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path());
+    let mut paths: Vec<_> = list(folder).chain(list(&format!("{folder}/volumes"))).collect();
+    paths.retain(|p| p.is_file());
     paths.sort();
     let mut all: Vec<_> = paths
         .iter()
         .filter(|p| p.is_file())
-        .filter(|p| !matches!(p.extension().and_then(|e| e.to_str()), Some("py" | "md" | "gz")))
+        .filter(|p| {
+            !matches!(
+                p.extension().and_then(|e| e.to_str()),
+                Some("py" | "md" | "gz" | "json")
+            )
+        })
         .map(|p| std::fs::read(p).unwrap())
         .collect();
     all.push(small_field());
@@ -103,6 +112,12 @@ fn random_bytes_behind_any_magic_are_refused_or_read_within_the_ceiling() {
           property list uchar int vertex_indices\nend_header\n",
         b"v 1 2 3\nf ",
         b"\x5c\x01\0\0",
+        b"NRRD0004\ntype: uchar\ndimension: 3\nsizes: 5 5 5\nencoding: gzip\n",
+        b"NRRD0004\ntype: short\ndimension: 3\nsizes: 3 3 3\nendian: big\nencoding: text\n\n1 2 ",
+        b"ObjectType = Image\nNDims = 3\nDimSize = 4 4 4\nElementType = MET_UCHAR\nCompressedData = True\n\
+          ElementDataFile = LOCAL\n",
+        b"II*\0\x08\0\0\0",
+        b"MM\0+\0\x08\0\0\0\0\0\0\0\0\0\x10",
         &field::MAGIC,
         b"\x89ICLAY\r\n\x01\0\0\0HEAD",
     ];
