@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::input::{self, read_fault};
 use crate::volumes::{self, VolumeFormat};
-use crate::{Fault, FormatError, field, points};
+use crate::{Fault, FormatError, field, meshes, points};
 
 /// What a file holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,6 +39,12 @@ pub enum PointFormat {
 pub enum MeshFileFormat {
     /// Stereolithography, ascii or binary.
     Stl,
+    /// glTF 2.0, text or binary.
+    Gltf,
+    /// 3D Manufacturing Format.
+    ThreeMf,
+    /// VRML97.
+    Vrml,
 }
 
 impl fmt::Display for Kind {
@@ -50,14 +56,17 @@ impl fmt::Display for Kind {
             Self::Cloud(PointFormat::Obj) => "point cloud (OBJ)",
             Self::Cloud(PointFormat::Pcd) => "point cloud (PCD)",
             Self::Mesh(MeshFileFormat::Stl) => "mesh (STL)",
+            Self::Mesh(MeshFileFormat::ThreeMf) => "mesh (3MF)",
+            Self::Mesh(MeshFileFormat::Vrml) => "mesh (VRML)",
+            Self::Mesh(MeshFileFormat::Gltf) => "mesh (glTF)",
             Self::Field => "field",
         })
     }
 }
 
 pub(crate) const CLOUDS: &str = "point clouds .ply .obj .pcd .xyz .xyzn .txt .asc .csv .pts, each also .gz";
-pub(crate) const MESHES: &str = "meshes .ply .obj .stl, each also .gz";
-const SUPPORTED: &str = "point clouds .ply .obj .pcd .xyz .xyzn .txt .asc .csv .pts, meshes .ply .obj .stl and \
+pub(crate) const MESHES: &str = "meshes .ply .obj .stl .gltf .glb .3mf .wrl, each also .gz";
+const SUPPORTED: &str = "point clouds .ply .obj .pcd .xyz .xyzn .txt .asc .csv .pts, meshes .ply .obj .stl .gltf .glb .3mf .wrl and \
                          volumes .nii, each also .gz, and fields .iclay";
 
 /// Bytes that are enough to know every content that can be known.
@@ -108,6 +117,15 @@ pub(crate) fn kind_of(head: &[u8], path: &Path) -> Result<Kind, Fault> {
     if let Some(format) = volumes::nifti_format(head) {
         return Ok(Kind::Volume(format));
     }
+    if meshes::looks_like_gltf(head) {
+        return Ok(Kind::Mesh(MeshFileFormat::Gltf));
+    }
+    if meshes::looks_like_3mf(head) {
+        return Ok(Kind::Mesh(MeshFileFormat::ThreeMf));
+    }
+    if meshes::looks_like_vrml(head) {
+        return Ok(Kind::Mesh(MeshFileFormat::Vrml));
+    }
     if head.starts_with(b"solid") && memchr::memmem::find(head, b"facet").is_some() {
         return Ok(Kind::Mesh(MeshFileFormat::Stl));
     }
@@ -122,6 +140,9 @@ pub(crate) fn kind_of(head: &[u8], path: &Path) -> Result<Kind, Fault> {
         "obj" => Ok(Kind::Cloud(PointFormat::Obj)),
         "nii" => Ok(Kind::Volume(VolumeFormat::Nifti)),
         "hdr" | "img" => Ok(Kind::Volume(VolumeFormat::NiftiPair)),
+        "gltf" | "glb" => Ok(Kind::Mesh(MeshFileFormat::Gltf)),
+        "3mf" => Ok(Kind::Mesh(MeshFileFormat::ThreeMf)),
+        "wrl" | "wrz" => Ok(Kind::Mesh(MeshFileFormat::Vrml)),
         "stl" => Ok(Kind::Mesh(MeshFileFormat::Stl)),
         "iclay" => Ok(Kind::Field),
         "" => Err(Fault::UnknownKind {
