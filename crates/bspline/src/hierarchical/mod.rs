@@ -10,6 +10,7 @@ mod grid;
 mod kernel;
 mod lattice;
 mod prolong;
+mod slopes;
 mod spline;
 mod versions;
 
