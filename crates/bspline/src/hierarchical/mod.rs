@@ -12,6 +12,7 @@ mod lattice;
 mod prolong;
 mod slopes;
 mod spline;
+mod surface;
 mod versions;
 
 pub use brick::{BRICK, BRICK_LEN, BrickKey, Corrections, HALO, HALO_LEN, LevelCorrections};
