@@ -28,6 +28,38 @@ impl Read for Source {
     }
 }
 
+/// A stream of which parts are passed over.
+pub(crate) trait SkipRead: Read {
+    /// Passes over up to `count` bytes; returns how many there were (a file may be sought beyond its end, which
+    /// the next reading notices).
+    fn skip(&mut self, count: u64) -> io::Result<u64>;
+}
+
+/// Reads what is passed over.
+pub(crate) fn skip_by_reading(source: &mut impl Read, count: u64) -> io::Result<u64> {
+    io::copy(&mut source.take(count), &mut io::sink())
+}
+
+impl SkipRead for &[u8] {
+    fn skip(&mut self, count: u64) -> io::Result<u64> {
+        let n = count.min(self.len() as u64);
+        *self = &self[n as usize..];
+        Ok(n)
+    }
+}
+
+impl SkipRead for Source {
+    fn skip(&mut self, count: u64) -> io::Result<u64> {
+        match self {
+            Self::Plain(r) => match i64::try_from(count) {
+                Ok(n) if r.get_ref().metadata()?.is_file() => r.seek_relative(n).map(|()| count),
+                _ => skip_by_reading(r, count),
+            },
+            Self::Gzip(r) => skip_by_reading(r, count),
+        }
+    }
+}
+
 /// An open file: its content and, where known, how many bytes that has.
 pub(crate) struct Input {
     pub source: Source,

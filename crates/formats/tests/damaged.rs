@@ -4,7 +4,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use formats::{Fault, Kind, PointFormat, ReadLimits, detect, field, points, volumes};
+use formats::{Fault, Kind, PointFormat, ReadLimits, detect, field, meshes, points, volumes};
 
 /// Far above any fixture, far below what a forged count could ask for.
 const LIMITS: ReadLimits = ReadLimits { max_bytes: 8 << 20 };
@@ -14,7 +14,7 @@ fn fixtures() -> Vec<PathBuf> {
     let mut all: Vec<_> = std::fs::read_dir(folder)
         .unwrap()
         .map(|e| e.unwrap().path())
-        .filter(|p| !matches!(p.extension().and_then(|e| e.to_str()), Some("py" | "md")))
+        .filter(|p| p.is_file() && !matches!(p.extension().and_then(|e| e.to_str()), Some("py" | "md")))
         .collect();
     all.sort();
     assert!(all.len() >= 15);
@@ -25,7 +25,8 @@ fn fixtures() -> Vec<PathBuf> {
 fn read(path: &Path) -> Result<(), formats::FormatError> {
     match detect(path)? {
         Kind::Cloud(_) => points::read(path, &LIMITS).map(drop),
-        Kind::Volume => volumes::read(path, &LIMITS).map(drop),
+        Kind::Volume(_) => volumes::read(path, &Default::default(), &LIMITS).map(drop),
+        Kind::Mesh(_) => meshes::read(path, &LIMITS).map(drop),
         Kind::Field => field::load(path, &LIMITS).map(drop),
     }
 }
@@ -101,7 +102,7 @@ fn every_gzipped_fixture_with_any_bit_turned_is_refused_or_the_same() {
         let path = fixtures().into_iter().find(|p| p.ends_with(name)).unwrap();
         let content = |path: &Path| match name {
             "box_trimesh.obj.gz" => points::read(path, &LIMITS).map(|c| format!("{c:?}")),
-            _ => volumes::read(path, &LIMITS).map(|v| format!("{v:?}")),
+            _ => volumes::read(path, &Default::default(), &LIMITS).map(|v| format!("{v:?}")),
         };
         let original = content(&path).unwrap();
         let mut bytes = std::fs::read(&path).unwrap();
@@ -231,7 +232,7 @@ fn a_directory_an_empty_file_no_file_and_a_strange_name_are_named() {
     let folder = scratch.directory.path().join("scan.ply");
     std::fs::create_dir(&folder).unwrap();
     for (path, part) in [
-        (folder, "scan.ply: is a directory"),
+        (folder, "scan.ply: a directory without DICOM files is not"),
         (scratch.file("none.ply", b""), "none.ply: is empty"),
         (scratch.file("none.nii.gz", &gzip(b"")), "is empty"),
         (
@@ -257,7 +258,9 @@ fn a_directory_an_empty_file_no_file_and_a_strange_name_are_named() {
     }
     // A good file given for the wrong purpose.
     let cloud = scratch.file("cloud.xyz", b"1 2 3\n");
-    let e = volumes::read(&cloud, &LIMITS).unwrap_err().to_string();
+    let e = volumes::read(&cloud, &Default::default(), &LIMITS)
+        .unwrap_err()
+        .to_string();
     assert!(e.contains("cloud.xyz"), "{e}");
     let volume = fixtures()
         .into_iter()

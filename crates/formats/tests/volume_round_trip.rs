@@ -24,7 +24,7 @@ fn float32_comes_back_to_the_bit_plain_and_gzipped() {
     for name in ["v.nii", "v.nii.gz"] {
         let path = directory.path().join(name);
         volumes::save(&path, DIMS, &values(), &map(), Unit::Millimetre, StoreAs::Float32).unwrap();
-        let v = volumes::read(&path, &ReadLimits::default()).unwrap();
+        let v = volumes::read(&path, &Default::default(), &ReadLimits::default()).unwrap();
         assert_eq!(
             (v.values, v.header.dims, v.header.unit),
             (values(), DIMS, Unit::Millimetre)
@@ -129,10 +129,11 @@ fn the_memory_need_is_known_before_and_the_ceiling_holds() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("v.nii.gz");
     volumes::save(&path, DIMS, &values(), &map(), Unit::Millimetre, StoreAs::Float32).unwrap();
-    let needed = volumes::peek(&path).unwrap().0.read_bytes();
-    assert!(volumes::read(&path, &ReadLimits { max_bytes: needed }).is_ok());
+    let needed = volumes::peek(&path, &Default::default()).unwrap().read_bytes;
+    assert!(volumes::read(&path, &Default::default(), &ReadLimits { max_bytes: needed }).is_ok());
     let e = volumes::read(
         &path,
+        &Default::default(),
         &ReadLimits {
             max_bytes: needed - 1,
         },

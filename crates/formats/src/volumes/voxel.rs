@@ -1,4 +1,5 @@
 use std::fmt;
+use std::str::FromStr;
 
 /// Types of voxels that are read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,4 +76,38 @@ impl fmt::Display for VoxelType {
             Self::F64 => "float64",
         })
     }
+}
+
+impl FromStr for VoxelType {
+    type Err = String;
+
+    /// Reads a name as [`fmt::Display`] writes it.
+    fn from_str(s: &str) -> Result<Self, String> {
+        let of = |t: &(i16, Self)| t.1;
+        Self::CODES
+            .iter()
+            .map(of)
+            .find(|t| t.to_string() == s)
+            .ok_or_else(|| {
+                let names: Vec<_> = Self::CODES.iter().map(|t| of(t).to_string()).collect();
+                format!("{s:?} is no type of voxels; write one of {}", names.join(", "))
+            })
+    }
+}
+
+/// How densities are stored.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum StoreAs {
+    /// As they are.
+    Float32,
+    /// As `round((density - intercept) / slope)`, held to the range of an integer type; the header says how to
+    /// get densities back.
+    Integer {
+        /// Type of the voxels; not a float type.
+        voxel: VoxelType,
+        /// Density of one step, finite and not 0.
+        slope: f64,
+        /// Density of a stored 0.
+        intercept: f64,
+    },
 }
