@@ -28,6 +28,7 @@ pub use csg::{Csg, CsgError};
 pub use field::{Aabb, Field, Frame, Jet};
 pub use hierarchical::HierarchicalSpline;
 pub use interval::Interval;
+pub(crate) use interval::vectors;
 pub use knots::{KnotError, KnotVector};
 pub use primitives::{Primitive, PrimitiveError};
 pub use real::Real;

@@ -10,7 +10,9 @@ mod grid;
 mod kernel;
 mod lattice;
 mod prolong;
+mod slopes;
 mod spline;
+mod surface;
 mod versions;
 
 pub use brick::{BRICK, BRICK_LEN, BrickKey, Corrections, HALO, HALO_LEN, LevelCorrections};
