@@ -462,6 +462,7 @@ impl Octree<'_> {
             tolerance,
             smoothing: BENDING,
             leaves: leaves.collect(),
+            signs: None,
             notes: Vec::new(),
         }
     }
