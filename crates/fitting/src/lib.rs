@@ -10,6 +10,7 @@ mod components;
 mod error;
 mod lines;
 pub mod mesh;
+pub mod orient;
 pub mod phantoms;
 pub mod points;
 pub mod prefilter;

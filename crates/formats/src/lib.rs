@@ -4,7 +4,7 @@
 //! | what | read | written |
 //! | --- | --- | --- |
 //! | points | PLY (ascii, binary of both endians), XYZ, OBJ; each also gzipped | PLY with colours |
-//! | volumes | NIfTI-1 and NIfTI-2 single files, gzipped or not | NIfTI-1, gzipped or not |
+//! | volumes | NIfTI-1 and NIfTI-2 single files, gzipped or not; DICOM series | NIfTI-1, gzipped or not |
 //! | meshes | | PLY, STL, OBJ |
 //! | fields | the native file, `docs/format.md` | the same |
 //!
@@ -31,6 +31,7 @@ pub mod atomic;
 mod detect;
 mod error;
 pub mod field;
+mod foreign;
 mod input;
 mod limits;
 pub mod meshes;

@@ -14,7 +14,7 @@ fn fixtures() -> Vec<PathBuf> {
     let mut all: Vec<_> = std::fs::read_dir(folder)
         .unwrap()
         .map(|e| e.unwrap().path())
-        .filter(|p| !matches!(p.extension().and_then(|e| e.to_str()), Some("py" | "md")))
+        .filter(|p| p.is_file() && !matches!(p.extension().and_then(|e| e.to_str()), Some("py" | "md")))
         .collect();
     all.sort();
     assert!(all.len() >= 15);
@@ -232,7 +232,7 @@ fn a_directory_an_empty_file_no_file_and_a_strange_name_are_named() {
     let folder = scratch.directory.path().join("scan.ply");
     std::fs::create_dir(&folder).unwrap();
     for (path, part) in [
-        (folder, "scan.ply: is a directory"),
+        (folder, "scan.ply: a directory without DICOM files is not"),
         (scratch.file("none.ply", b""), "none.ply: is empty"),
         (scratch.file("none.nii.gz", &gzip(b"")), "is empty"),
         (

@@ -65,6 +65,7 @@ fn seeds() -> Vec<Vec<u8>> {
     paths.sort();
     let mut all: Vec<_> = paths
         .iter()
+        .filter(|p| p.is_file())
         .filter(|p| !matches!(p.extension().and_then(|e| e.to_str()), Some("py" | "md" | "gz")))
         .map(|p| std::fs::read(p).unwrap())
         .collect();

@@ -12,11 +12,11 @@ mod far_field;
 pub(crate) mod full_grid;
 #[cfg(test)]
 mod iteration_growth;
-mod noise;
+pub(crate) mod noise;
 mod plan;
 mod residual;
 pub use residual::newton_distance;
-mod samples;
+pub(crate) mod samples;
 pub(crate) mod stencil;
 
 use bspline::{HierarchicalSpline, Real};

@@ -1,8 +1,10 @@
-//! Point clouds in: PLY, XYZ and OBJ, with the normals that a fit needs.
+//! Point clouds in, with the normals that a fit needs, and out.
 
 mod normals;
 pub(crate) mod obj;
+mod pcd;
 pub(crate) mod ply;
+mod save;
 mod xyz;
 
 use std::path::Path;
@@ -10,8 +12,12 @@ use std::path::Path;
 use glam::DVec3;
 
 pub use obj::parse_obj;
+pub use pcd::parse_pcd;
 pub use ply::parse_ply;
+pub use save::save;
 pub use xyz::parse_xyz;
+
+pub(crate) use pcd::looks_like_pcd;
 
 use crate::detect::{self, Kind, PointFormat};
 use crate::limits::Budget;
@@ -87,6 +93,7 @@ fn read_faulty(path: &Path, limits: &ReadLimits) -> Result<PointCloud, Fault> {
     let raw = match detect::kind_of(&bytes, path)? {
         Kind::Cloud(PointFormat::Ply) => ply::parse(&bytes, Wanted::Cloud, budget),
         Kind::Cloud(PointFormat::Xyz) => xyz::parse(&bytes, budget),
+        Kind::Cloud(PointFormat::Pcd) => pcd::parse(&bytes, budget),
         Kind::Cloud(PointFormat::Obj) => obj::parse(&bytes, Wanted::Cloud, budget),
         Kind::Mesh(format) => meshes::parse(&bytes, format, path, budget),
         other => Err(Fault::UnknownKind {

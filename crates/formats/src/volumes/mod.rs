@@ -1,5 +1,6 @@
 //! Volumes in and out.
 
+mod dicom;
 mod geometry;
 mod nifti;
 mod open;
@@ -15,10 +16,12 @@ use std::path::Path;
 
 use glam::{DAffine3, DVec3};
 
+pub use dicom::{DicomOptions, Tilt, Uneven, parse_dicom};
+pub(crate) use dicom::{holds_dicom, looks_like_dicom};
 pub(crate) use geometry::is_usable as is_usable_affine;
 pub(crate) use nifti::nifti_format;
 pub use nifti::{parse_nifti, save, write_nifti};
-pub use options::{DicomOptions, VolumeOptions};
+pub use options::VolumeOptions;
 pub use raw::{RawLayout, parse_raw};
 use slices::SliceSource;
 pub use voxel::{StoreAs, VoxelType};
@@ -33,6 +36,8 @@ pub enum VolumeFormat {
     Nifti,
     /// A NIfTI header with its image beside it.
     NiftiPair,
+    /// A DICOM series: a directory, one of its files, or one file of several frames.
+    Dicom,
     /// Voxels without a header, told by [`VolumeOptions::raw`] alone.
     Raw,
 }
@@ -42,6 +47,7 @@ impl fmt::Display for VolumeFormat {
         f.write_str(match self {
             Self::Nifti => "NIfTI",
             Self::NiftiPair => "NIfTI header and image",
+            Self::Dicom => "DICOM",
             Self::Raw => "raw",
         })
     }
@@ -73,7 +79,7 @@ pub struct VolumeHeader {
     pub orientation: Orientation,
     /// Type of the voxels in the file.
     pub stored: VoxelType,
-    /// Density = slope · stored + intercept; `None` if the file asks for no rescaling.
+    /// Density = slope · stored + intercept; `None` if the file asks for no rescaling, or for another in each slice.
     pub rescale: Option<[f64; 2]>,
 }
 

@@ -4,12 +4,12 @@ use std::path::Path;
 
 use super::part::Part;
 use super::slices::SliceSource;
-use super::{VolumeFormat, VolumeOptions, nifti, raw};
+use super::{VolumeFormat, VolumeOptions, dicom, nifti, raw};
 use crate::detect::{self, Kind};
 use crate::limits::Budget;
 use crate::{Fault, FormatError};
 
-pub(crate) const VOLUMES: &str = "volumes .nii, also .gz";
+pub(crate) const VOLUMES: &str = "volumes .nii, also .gz, and DICOM series";
 
 /// An open volume: its slices as asked, and what it is as a whole.
 pub(super) struct Opened {
@@ -27,9 +27,9 @@ pub(super) fn open(path: &Path, options: &VolumeOptions, budget: &mut Budget) ->
     let inner: Box<dyn SliceSource> = match (format, &options.raw) {
         (VolumeFormat::Raw, Some(layout)) => Box::new(raw::open(path, layout)?),
         (VolumeFormat::Raw, None) => unreachable!("never told from a file"),
+        (VolumeFormat::Dicom, _) => dicom::open(path, &options.dicom, budget)?,
         (VolumeFormat::Nifti | VolumeFormat::NiftiPair, _) => Box::new(nifti::open(path)?),
     };
-    let _ = budget;
     let file_dims = inner.header().dims;
     Ok(Opened {
         source: Part::new(inner, options)?,
