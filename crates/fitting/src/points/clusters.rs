@@ -19,9 +19,15 @@ pub(crate) struct Cluster {
 
 /// Clusters for the grid with `2^depth` cells: half-cells are cells of `depth + 1`.
 pub(crate) fn clusters(samples: &Samples, depth: usize) -> Vec<Cluster> {
-    let entries = samples.positions.iter().zip(&samples.normals);
+    let entries = samples
+        .positions
+        .iter()
+        .zip(&samples.normals)
+        .zip(&samples.weights);
     merge(
-        entries.map(|(p, n)| (*p, DVec3::from(n.map(f64::from)), 1.0)),
+        entries
+            .filter(|(_, w)| **w > 0.0)
+            .map(|((p, n), w)| (*p, DVec3::from(n.map(f64::from)), f64::from(*w))),
         depth,
     )
 }

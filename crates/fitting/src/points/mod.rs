@@ -9,6 +9,7 @@ mod clusters;
 mod coarse;
 mod cross_validation;
 mod far_field;
+mod feet;
 pub(crate) mod full_grid;
 #[cfg(test)]
 mod iteration_growth;
@@ -65,8 +66,22 @@ pub fn fit_points<T: Real>(
     let mut plan = Plan::new(&samples, options, tolerance, noise);
     control.step("fitting coarse levels", 0.05)?;
     let base = coarse::solve(&samples, plan.beta);
+    if let (Some(sigma), Some(beta)) = (noise, plan.second_beta) {
+        let first = cascade::run::<T>(&samples, &base, &plan, 0.05..0.1, control)?;
+        let field = assemble::assemble(&samples, &base, &first.levels);
+        samples = feet::on_feet(&samples, &field, sigma);
+        let without = samples.weights.iter().filter(|w| **w == 0.0).count();
+        if without > 0 {
+            samples.notes.push(format!(
+                "{without} of {} noisy points lie on no sheet that the first fit found; they are measured, but not fitted",
+                samples.positions.len()
+            ));
+        }
+        plan.beta = beta;
+    }
     if let Some(sigma) = noise {
-        let mu = cross_validation::choose::<T>(&samples, &base, &plan, sigma, control)?;
+        let start = plan.smoothing.at(plan.max_depth, plan.max_depth);
+        let mu = cross_validation::choose::<T>(&samples, &base, &plan, start, sigma, control)?;
         plan.smoothing = Smoothing::Halving(mu);
     }
     let mut rounds = 0;
