@@ -44,15 +44,15 @@ fn main() {
     let l32 = Lattice::<f32>::cube(n, m, rim, 1.0).unwrap();
     let nc = l64.coefficient_count();
     let steps: Vec<_> = nb.directions().iter().map(|d| d.step).collect();
-    let o = VCycleOptions { degree, direct_limit: limit, ..Default::default() };
+    let o = VCycleOptions { degree, direct_limit: limit, blocks: args.get(9).map_or(0, |s| s.parse().unwrap()), stride: args.get(10).map_or(3, |s| s.parse().unwrap()), ..Default::default() };
     let mut v32 = VCycle::new(&l32, &steps, o);
-    let mut v64 = VCycle::new(&l64, &steps, VCycleOptions { degree: 3, ..o });
+    let mut v64 = VCycle::new(&l64, &steps, VCycleOptions { degree: 3, blocks: o.blocks.max(5), ..o });
     println!("{n}/{m} free {nc} levels {} coarsest {}", v32.level_count(), v32.coarsest_count());
     let direct = nc <= 4000;
     let mut galerkin = Galerkin::new(&l64, &steps);
     let mut factor = BandCholesky::<f64>::new(if direct { nc } else { 1 }, if direct { galerkin.band() } else { 0 });
-    let mut cg32 = ConjugateGradients::new(&l32);
-    let mut cg64 = ConjugateGradients::new(&l64);
+    let mut cg32 = ConjugateGradients::new(nc);
+    let mut cg64 = ConjugateGradients::new(nc); let mut sm64=[vec![0.0;l64.sample_count()],vec![0.0;l64.sample_count()]]; let mut sm32=[vec![0f32;l64.sample_count()],vec![0f32;l64.sample_count()]];
     let mut w = TensorWorkspace::new();
     let mut w32 = TensorWorkspace::new();
     for pattern in std::iter::once(Pattern::Uniform).chain(Pattern::PAINTED) {
@@ -93,7 +93,7 @@ fn main() {
                 x.iter_mut().zip(&r).for_each(|(x, r)| *x += r);
                 l64.sample(&x, &mut dx, &mut w);
             } else {
-                let rep = cg64.solve(&l64, &s64, &mut v64, &b, &mut x, &mut dx, 80, 1e-11);
+                let rep = cg64.solve(&mut CoefficientSystem{lattice:&l64,matrix:&s64,preconditioner:&mut v64,samples:&mut sm64,workspace:&mut w}, &b, &mut x, 80, 1e-11); l64.sample(&x,&mut dx,&mut w);
                 refres = refres.max(rep.residual);
             }
             let g32: Vec<f32> = g.iter().map(|&v| v as f32).collect();
@@ -101,7 +101,7 @@ fn main() {
             l32.gather(&g32, &mut b32, &mut w32);
             let (mut x32, mut d32) = (b32.clone(), g32.clone());
             for cap in [1usize, 2, 3, 4, 6, 8] {
-                let rep = cg32.solve(&l32, &s32, &mut v32, &b32, &mut x32, &mut d32, cap, 0.0);
+                let rep = cg32.solve(&mut CoefficientSystem{lattice:&l32,matrix:&s32,preconditioner:&mut v32,samples:&mut sm32,workspace:&mut w32}, &b32, &mut x32, cap, 0.0); l32.sample(&x32,&mut d32,&mut w32);
                 let e = |a: &[f32], b: &[f64]| {
                     let num: f64 = a.iter().zip(b).map(|(a, b)| (*a as f64 - b).powi(2)).sum();
                     let den: f64 = b.iter().map(|b| b * b).sum();
