@@ -14,9 +14,7 @@ fn explicit_limit(l: &Lattice<f64>, springs: &[SpringWeights<f64>]) -> f64 {
     let n = l.coefficient_count();
     let mut w = TensorWorkspace::new();
     let (mut d, mut s) = (vec![0.0; l.sample_count()], vec![0.0; l.sample_count()]);
-    let mut v: Vec<f64> = (0..n)
-        .map(|i| ((i * 7919) % 1013) as f64 / 1013.0 - 0.5)
-        .collect();
+    let mut v: Vec<f64> = (0..n).map(|i| ((i * 7919) % 1013) as f64 / 1013.0 - 0.5).collect();
     let mut q = vec![0.0; n];
     let mut lambda = 0.0;
     for _ in 0..60 {
@@ -41,45 +39,26 @@ fn main() {
     let times: f64 = args[5].parse().unwrap();
     let degree: usize = args.get(6).map_or(2, |s| s.parse().unwrap());
     let limit: usize = args.get(7).map_or(1400, |s| s.parse().unwrap());
-    let nb = if args.get(8).is_some_and(|s| s == "18") {
-        Neighbours::Eighteen
-    } else {
-        Neighbours::Six
-    };
+    let nb = if args.get(8).is_some_and(|s| s == "18") { Neighbours::Eighteen } else { Neighbours::Six };
     let l64 = Lattice::<f64>::cube(n, m, rim, 1.0).unwrap();
     let l32 = Lattice::<f32>::cube(n, m, rim, 1.0).unwrap();
     let nc = l64.coefficient_count();
     let steps: Vec<_> = nb.directions().iter().map(|d| d.step).collect();
-    let o = VCycleOptions {
-        degree,
-        direct_limit: limit,
-        ..Default::default()
-    };
+    let o = VCycleOptions { degree, direct_limit: limit, blocks: args.get(9).map_or(0, |s| s.parse().unwrap()), stride: args.get(10).map_or(3, |s| s.parse().unwrap()), ..Default::default() };
     let mut v32 = VCycle::new(&l32, &steps, o);
-    let mut v64 = VCycle::new(&l64, &steps, VCycleOptions { degree: 3, ..o });
-    println!(
-        "{n}/{m} free {nc} levels {} coarsest {}",
-        v32.level_count(),
-        v32.coarsest_count()
-    );
+    let mut v64 = VCycle::new(&l64, &steps, VCycleOptions { degree: 3, blocks: o.blocks.max(5), ..o });
+    println!("{n}/{m} free {nc} levels {} coarsest {}", v32.level_count(), v32.coarsest_count());
     let direct = nc <= 4000;
     let mut galerkin = Galerkin::new(&l64, &steps);
-    let mut factor = BandCholesky::<f64>::new(
-        if direct { nc } else { 1 },
-        if direct { galerkin.band() } else { 0 },
-    );
-    let mut cg32 = ConjugateGradients::new(&l32);
-    let mut cg64 = ConjugateGradients::new(&l64);
+    let mut factor = BandCholesky::<f64>::new(if direct { nc } else { 1 }, if direct { galerkin.band() } else { 0 });
+    let mut cg32 = ConjugateGradients::new(nc);
+    let mut cg64 = ConjugateGradients::new(nc); let mut sm64=[vec![0.0;l64.sample_count()],vec![0.0;l64.sample_count()]]; let mut sm32=[vec![0f32;l64.sample_count()],vec![0f32;l64.sample_count()]];
     let mut w = TensorWorkspace::new();
     let mut w32 = TensorWorkspace::new();
     for pattern in std::iter::once(Pattern::Uniform).chain(Pattern::PAINTED) {
         let base = spring_weights(pattern, contrast, m, nb, 1.0);
         let dt = times * explicit_limit(&l64, &base);
-        let s64 = StepMatrix::new(
-            l64.sample_dims(),
-            Weights::Constant(1.0),
-            spring_weights(pattern, contrast, m, nb, dt * dt),
-        );
+        let s64 = StepMatrix::new(l64.sample_dims(), Weights::Constant(1.0), spring_weights(pattern, contrast, m, nb, dt * dt));
         let s32: StepMatrix<f32> = s64.convert();
         let t = Instant::now();
         v32.prepare(&s32).unwrap();
@@ -108,14 +87,13 @@ fn main() {
                 let mut q = b.clone();
                 l64.gather(&s, &mut q, &mut w);
                 let mut r: Vec<f64> = b.iter().zip(&q).map(|(b, q)| b - q).collect();
-                let rn: f64 =
-                    r.iter().map(|v| v * v).sum::<f64>().sqrt() / b.iter().map(|v| v * v).sum::<f64>().sqrt();
+                let rn: f64 = r.iter().map(|v| v * v).sum::<f64>().sqrt() / b.iter().map(|v| v * v).sum::<f64>().sqrt();
                 refres = refres.max(rn);
                 factor.solve(&mut r);
                 x.iter_mut().zip(&r).for_each(|(x, r)| *x += r);
                 l64.sample(&x, &mut dx, &mut w);
             } else {
-                let rep = cg64.solve(&l64, &s64, &mut v64, &b, &mut x, &mut dx, 80, 1e-11);
+                let rep = cg64.solve(&mut CoefficientSystem{lattice:&l64,matrix:&s64,preconditioner:&mut v64,samples:&mut sm64,workspace:&mut w}, &b, &mut x, 80, 1e-11); l64.sample(&x,&mut dx,&mut w);
                 refres = refres.max(rep.residual);
             }
             let g32: Vec<f32> = g.iter().map(|&v| v as f32).collect();
@@ -123,7 +101,7 @@ fn main() {
             l32.gather(&g32, &mut b32, &mut w32);
             let (mut x32, mut d32) = (b32.clone(), g32.clone());
             for cap in [1usize, 2, 3, 4, 6, 8] {
-                let rep = cg32.solve(&l32, &s32, &mut v32, &b32, &mut x32, &mut d32, cap, 0.0);
+                let rep = cg32.solve(&mut CoefficientSystem{lattice:&l32,matrix:&s32,preconditioner:&mut v32,samples:&mut sm32,workspace:&mut w32}, &b32, &mut x32, cap, 0.0); l32.sample(&x32,&mut d32,&mut w32);
                 let e = |a: &[f32], b: &[f64]| {
                     let num: f64 = a.iter().zip(b).map(|(a, b)| (*a as f64 - b).powi(2)).sum();
                     let den: f64 = b.iter().map(|b| b * b).sum();
@@ -137,20 +115,10 @@ fn main() {
         let b32: Vec<f32> = (0..nc).map(|i| (i % 17) as f32).collect();
         let mut z = b32.clone();
         let t = Instant::now();
-        for _ in 0..20 {
-            v32.apply(&s32, &b32, &mut z);
-        }
+        for _ in 0..20 { v32.apply(&s32, &b32, &mut z); }
         let tv = t.elapsed().as_secs_f64() * 50.0;
-        print!(
-            "{:10} prep {tp:6.1} ms V {tv:.3} ms ref {refres:.0e} l {:?} ",
-            pattern.name(),
-            v32.eigenvalues()
-                .map(|v| (v * 10.0).round() / 10.0)
-                .collect::<Vec<_>>()
-        );
-        for cap in [1, 2, 3, 4, 6, 8] {
-            print!(" {:.1e}", worst[cap]);
-        }
+        print!("{:10} prep {tp:6.1} ms V {tv:.3} ms ref {refres:.0e} l {:?} ", pattern.name(), v32.eigenvalues().map(|v| (v * 10.0).round() / 10.0).collect::<Vec<_>>());
+        for cap in [1, 2, 3, 4, 6, 8] { print!(" {:.1e}", worst[cap]); }
         println!("  coef@8 {:.1e} res@8 {:.1e}", wc[8], res[8]);
     }
 }

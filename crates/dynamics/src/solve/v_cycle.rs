@@ -7,6 +7,7 @@ use super::dot::dot;
 use super::fast_diagonalization::FastDiagonalization;
 use super::galerkin::Galerkin;
 use super::pcg::{Preconditioner, add_scaled};
+use super::schwarz::Schwarz;
 use crate::lattice::{Lattice, TensorProduct, TensorWorkspace};
 use crate::springs::{StepMatrix, Weights};
 
@@ -19,6 +20,10 @@ pub struct VCycleOptions {
     pub direct_limit: usize,
     /// Lanczos steps for the largest eigenvalue of the smoother.
     pub eigenvalue_steps: usize,
+    /// Size of the overlapping blocks, 0 for none.
+    pub blocks: usize,
+    /// Distance of the blocks.
+    pub stride: usize,
 }
 
 impl Default for VCycleOptions {
@@ -27,6 +32,8 @@ impl Default for VCycleOptions {
             degree: 2,
             direct_limit: 1400,
             eigenvalue_steps: 10,
+            blocks: 0,
+            stride: 3,
         }
     }
 }
@@ -40,6 +47,9 @@ struct Level<T> {
     /// Diagonal of `H` for unit mass, and for unit springs along each axis.
     unit_diagonals: [Vec<f64>; 4],
     largest_eigenvalue: f64,
+    all: Option<Galerkin>,
+    schwarz: Option<Schwarz<T>>,
+    schwarz_eigenvalue: f64,
     prolong: TensorProduct<T>,
     restrict: TensorProduct<T>,
     r: Vec<T>,
@@ -106,6 +116,9 @@ impl<T: Real> VCycle<T> {
                 diagonal: Galerkin::diagonal(&here, steps),
                 unit_diagonals,
                 largest_eigenvalue: 1.0,
+                all: (options.blocks > 0).then(|| Galerkin::new(&here, steps)),
+                schwarz: None,
+                schwarz_eigenvalue: 1.0,
                 prolong,
                 restrict,
                 r: zeros(n),
@@ -176,13 +189,19 @@ impl<T: Real> VCycle<T> {
                     mass * unit[0][i] + along[0] * unit[1][i] + along[1] * unit[2][i] + along[2] * unit[3][i];
                 *scale = T::from_f64((constant / actual[i]).sqrt());
             }
-            self.levels[l].largest_eigenvalue = self.largest_eigenvalue(s, l);
+            self.levels[l].largest_eigenvalue = self.largest_eigenvalue(s, l, false);
+            let level = &mut self.levels[l];
+            if let Some(all) = &mut level.all {
+                all.accumulate(s);
+                level.schwarz = Some(Schwarz::new(all, self.options.blocks, self.options.stride));
+                self.levels[l].schwarz_eigenvalue = self.largest_eigenvalue(s, l, true);
+            }
         }
         Ok(())
     }
 
     /// By preconditioned Lanczos steps (the coefficients of conjugate gradients), from a fixed start; 10 % on top.
-    fn largest_eigenvalue(&mut self, s: &StepMatrix<T>, l: usize) -> f64 {
+    fn largest_eigenvalue(&mut self, s: &StepMatrix<T>, l: usize, blocks: bool) -> f64 {
         let Self {
             levels,
             samples,
@@ -193,6 +212,7 @@ impl<T: Real> VCycle<T> {
         let Level {
             lattice,
             smoother,
+            schwarz,
             r,
             d: p,
             z,
@@ -210,7 +230,10 @@ impl<T: Real> VCycle<T> {
         let (mut diagonal, mut off) = (Vec::new(), Vec::new());
         let (mut before, mut last_alpha, mut beta) = (0.0, 1.0, 0.0);
         for step in 0..options.eigenvalue_steps {
-            smoother.apply(r, z);
+            match schwarz {
+                Some(schwarz) if blocks => schwarz.apply(r, z),
+                _ => smoother.apply(r, z),
+            }
             let rz = dot(r, z);
             if !(rz > 0.0) {
                 break;
@@ -244,6 +267,7 @@ impl<T: Real> VCycle<T> {
         }
         // x = S(b)
         self.smooth(s, l, true);
+        self.block_step(s, l);
         // x += P E⁻¹ Pᵀ (b - Hx)
         self.residual(s, l);
         self.levels[l]
@@ -255,8 +279,22 @@ impl<T: Real> VCycle<T> {
             .prolong
             .apply(&self.solution[l + 1], &mut level.z, &mut self.workspace);
         add_scaled(&mut self.solution[l], T::one(), &level.z);
+        self.block_step(s, l);
         // x += S(b - Hx)
         self.smooth(s, l, false);
+    }
+
+    fn block_step(&mut self, s: &StepMatrix<T>, l: usize) {
+        if self.levels[l].schwarz.is_none() {
+            return;
+        }
+        self.residual(s, l);
+        let level = &mut self.levels[l];
+        let omega = T::from_f64(1.7 / level.schwarz_eigenvalue);
+        if let Some(schwarz) = &mut level.schwarz {
+            schwarz.apply(&level.r, &mut level.z);
+        }
+        add_scaled(&mut self.solution[l], omega, &level.z);
     }
 
     /// `r = b - Hx`.
