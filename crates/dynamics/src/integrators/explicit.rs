@@ -43,6 +43,24 @@ impl<T: Real> System<T> for Stiffness<'_, T> {
     }
 }
 
+/// `√λ_max(M̃⁻¹K̃)` by Lanczos steps; `solver` is prepared for the mass.
+pub(crate) fn largest_frequency<T: Real>(
+    stiffness: &StepMatrix<T>,
+    mass: &StepMatrix<T>,
+    solver: &mut StepSolver<T>,
+) -> f64 {
+    let samples = solver.lattice().sample_count();
+    let mut lanczos = Lanczos::new(solver.lattice().coefficient_count());
+    let mut system = Stiffness {
+        stiffness,
+        mass,
+        solver,
+        samples: [vec![T::zero(); samples], vec![T::zero(); samples]],
+        workspace: TensorWorkspace::new(),
+    };
+    lanczos.largest(&mut system, LANCZOS_STEPS).sqrt()
+}
+
 impl<T: Real> Patch<T> {
     /// The matrix `M + aD`.
     fn mass_matrix(&self, damping: f64) -> StepMatrix<T> {
@@ -86,18 +104,9 @@ impl<T: Real> Patch<T> {
         let stiffness = StepMatrix::new(self.matrix.dims(), self.lumped.ground.scaled(scale), springs.collect());
         let mut solver = self.mass_solver();
         solver.prepare(&mass)?;
-        let zeros = || vec![T::zero(); self.base.len()];
-        let mut lanczos = Lanczos::new(solver.lattice().coefficient_count());
-        let mut system = Stiffness {
-            stiffness: &stiffness,
-            mass: &mass,
-            solver: &mut solver,
-            samples: [zeros(), zeros()],
-            workspace: TensorWorkspace::new(),
-        };
-        let largest = lanczos.largest(&mut system, LANCZOS_STEPS);
+        let largest = largest_frequency(&stiffness, &mass, &mut solver);
         self.mass_solver = Some(solver);
-        let limit = if largest > 0.0 { 2.0 / largest.sqrt() } else { f64::INFINITY };
+        let limit = if largest > 0.0 { 2.0 / largest } else { f64::INFINITY };
         self.limit = Some((self.version, limit));
         Ok(limit)
     }

@@ -5,6 +5,7 @@ mod adaptive;
 mod explicit;
 mod implicit;
 
+pub(crate) use explicit::largest_frequency;
 pub use adaptive::{AdaptiveOptions, AdaptiveReport};
 
 use bspline::Real;

@@ -20,10 +20,14 @@ pub struct VCycleOptions {
     pub direct_limit: usize,
     /// Lanczos steps for the largest eigenvalue of the smoother.
     pub eigenvalue_steps: usize,
-    /// Size of the overlapping blocks, 0 for none.
+    /// Size of the overlapping blocks that are solved exactly where material is painted, 0 for none.
     pub blocks: usize,
     /// Distance of the blocks.
     pub stride: usize,
+    /// Ratio within a block, of the actual diagonal to that of constant material, from which on it is solved.
+    pub block_contrast: f64,
+    /// Coefficients of a level up to which it has blocks: their matrix takes 3 kB a coefficient.
+    pub block_limit: usize,
 }
 
 impl Default for VCycleOptions {
@@ -32,8 +36,10 @@ impl Default for VCycleOptions {
             degree: 2,
             direct_limit: 1400,
             eigenvalue_steps: 10,
-            blocks: 0,
+            blocks: 5,
             stride: 3,
+            block_contrast: 3.0,
+            block_limit: 20_000,
         }
     }
 }
@@ -47,6 +53,8 @@ struct Level<T> {
     /// Diagonal of `H` for unit mass, and for unit springs along each axis.
     unit_diagonals: [Vec<f64>; 4],
     largest_eigenvalue: f64,
+    /// Actual diagonal over that of constant material.
+    variation: Vec<f64>,
     all: Option<Galerkin>,
     schwarz: Option<Schwarz<T>>,
     schwarz_eigenvalue: f64,
@@ -116,7 +124,8 @@ impl<T: Real> VCycle<T> {
                 diagonal: Galerkin::diagonal(&here, steps),
                 unit_diagonals,
                 largest_eigenvalue: 1.0,
-                all: (options.blocks > 0).then(|| Galerkin::new(&here, steps)),
+                variation: vec![1.0; n],
+                all: (options.blocks > 0 && n <= options.block_limit).then(|| Galerkin::new(&here, steps)),
                 schwarz: None,
                 schwarz_eigenvalue: 1.0,
                 lanczos: Lanczos::new(n),
@@ -160,6 +169,14 @@ impl<T: Real> VCycle<T> {
         self.coarsest.coefficient_count()
     }
 
+    /// The smoother of the finest level.
+    ///
+    /// # Panics
+    /// If the finest level is factorized.
+    pub fn smoother(&self) -> &FastDiagonalization<T> {
+        &self.levels[0].smoother
+    }
+
     /// Largest eigenvalue of the smoother times `H`, as estimated, of each level.
     pub fn eigenvalues(&self) -> impl Iterator<Item = f64> + '_ {
         self.levels.iter().map(|l| l.largest_eigenvalue)
@@ -188,14 +205,19 @@ impl<T: Real> VCycle<T> {
                 let unit = &level.unit_diagonals;
                 let constant =
                     mass * unit[0][i] + along[0] * unit[1][i] + along[1] * unit[2][i] + along[2] * unit[3][i];
+                level.variation[i] = actual[i] / constant;
                 *scale = T::from_f64((constant / actual[i]).sqrt());
             }
             self.levels[l].largest_eigenvalue = self.largest_eigenvalue(s, l, false);
             let level = &mut self.levels[l];
             if let Some(all) = &mut level.all {
                 all.accumulate(s);
-                level.schwarz = Some(Schwarz::new(all, self.options.blocks, self.options.stride));
-                self.levels[l].schwarz_eigenvalue = self.largest_eigenvalue(s, l, true);
+                let (size, stride) = (self.options.blocks, self.options.stride);
+                let blocks = Schwarz::new(all, size, stride, &level.variation, self.options.block_contrast);
+                level.schwarz = (blocks.block_count() > 0).then_some(blocks);
+                if level.schwarz.is_some() {
+                    self.levels[l].schwarz_eigenvalue = self.largest_eigenvalue(s, l, true);
+                }
             }
         }
         Ok(())
@@ -226,7 +248,7 @@ impl<T: Real> VCycle<T> {
         }
         // x = S(b)
         self.smooth(s, l, true);
-        self.block_step(s, l);
+        self.solve_blocks(s, l);
         // x += P E⁻¹ Pᵀ (b - Hx)
         self.residual(s, l);
         self.levels[l]
@@ -238,12 +260,13 @@ impl<T: Real> VCycle<T> {
             .prolong
             .apply(&self.solution[l + 1], &mut level.z, &mut self.workspace);
         add_scaled(&mut self.solution[l], T::one(), &level.z);
-        self.block_step(s, l);
+        self.solve_blocks(s, l);
         // x += S(b - Hx)
         self.smooth(s, l, false);
     }
 
-    fn block_step(&mut self, s: &StepMatrix<T>, l: usize) {
+    /// One step over the blocks, where there are any; 1.7 of 2 is what keeps it convergent.
+    fn solve_blocks(&mut self, s: &StepMatrix<T>, l: usize) {
         if self.levels[l].schwarz.is_none() {
             return;
         }
