@@ -12,7 +12,6 @@ const ROWS: usize = 4;
 /// A square matrix and its transpose, padded for products along any axis.
 #[derive(Clone, Debug)]
 pub(crate) struct DenseAxis<T> {
-    pub n: usize,
     /// Row-major, `n × n`.
     pub matrix: Vec<T>,
     /// Row-major, `n × n`.
@@ -36,7 +35,6 @@ impl<T: Real> DenseAxis<T> {
         let (straight, turned) = (|i: usize, j: usize| v[(i, j)], |i: usize, j: usize| v[(j, i)]);
         let width = n.next_multiple_of(PAD);
         Self {
-            n,
             matrix: rows(&straight, n),
             transposed: rows(&turned, n),
             matrix_padded: rows(&straight, width),
@@ -78,48 +76,16 @@ fn strips<T: Real>(
         let rows = m / ROWS * ROWS;
         for i in (0..rows).step_by(ROWS) {
             if size_of::<T>() == 4 {
-                tile::<T, ROWS, 16>(
-                    &a[i * a_stride..],
-                    a_stride,
-                    &b[j..],
-                    b_stride,
-                    &mut c[i * n + j..],
-                    n,
-                    k,
-                );
+                tile::<T, ROWS, 16>(&a[i * a_stride..], a_stride, &b[j..], b_stride, &mut c[i * n + j..], n, k);
             } else {
-                tile::<T, ROWS, PAD>(
-                    &a[i * a_stride..],
-                    a_stride,
-                    &b[j..],
-                    b_stride,
-                    &mut c[i * n + j..],
-                    n,
-                    k,
-                );
+                tile::<T, ROWS, PAD>(&a[i * a_stride..], a_stride, &b[j..], b_stride, &mut c[i * n + j..], n, k);
             }
         }
         for i in rows..m {
             if size_of::<T>() == 4 {
-                tile::<T, 1, 16>(
-                    &a[i * a_stride..],
-                    a_stride,
-                    &b[j..],
-                    b_stride,
-                    &mut c[i * n + j..],
-                    n,
-                    k,
-                );
+                tile::<T, 1, 16>(&a[i * a_stride..], a_stride, &b[j..], b_stride, &mut c[i * n + j..], n, k);
             } else {
-                tile::<T, 1, PAD>(
-                    &a[i * a_stride..],
-                    a_stride,
-                    &b[j..],
-                    b_stride,
-                    &mut c[i * n + j..],
-                    n,
-                    k,
-                );
+                tile::<T, 1, PAD>(&a[i * a_stride..], a_stride, &b[j..], b_stride, &mut c[i * n + j..], n, k);
             }
         }
         j += wide;
@@ -127,26 +93,10 @@ fn strips<T: Real>(
     if j < n {
         let rows = m / ROWS * ROWS;
         for i in (0..rows).step_by(ROWS) {
-            tile::<T, ROWS, PAD>(
-                &a[i * a_stride..],
-                a_stride,
-                &b[j..],
-                b_stride,
-                &mut c[i * n + j..],
-                n,
-                k,
-            );
+            tile::<T, ROWS, PAD>(&a[i * a_stride..], a_stride, &b[j..], b_stride, &mut c[i * n + j..], n, k);
         }
         for i in rows..m {
-            tile::<T, 1, PAD>(
-                &a[i * a_stride..],
-                a_stride,
-                &b[j..],
-                b_stride,
-                &mut c[i * n + j..],
-                n,
-                k,
-            );
+            tile::<T, 1, PAD>(&a[i * a_stride..], a_stride, &b[j..], b_stride, &mut c[i * n + j..], n, k);
         }
     }
 }

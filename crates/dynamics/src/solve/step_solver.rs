@@ -173,6 +173,11 @@ impl<T: Real> StepSolver<T> {
         &self.lattice
     }
 
+    /// The limits.
+    pub fn options(&self) -> SolverOptions {
+        self.options
+    }
+
     /// The method of the matrix that was prepared last.
     pub fn method(&self) -> Method {
         self.method
@@ -271,27 +276,39 @@ impl<T: Real> StepSolver<T> {
             report
         } else {
             self.lattice.gather(g, &mut self.b, &mut self.workspace);
-            let mut run = |preconditioner: &mut dyn Preconditioner<T>| {
-                let mut system = CoefficientSystem {
-                    lattice: &self.lattice,
-                    matrix: s,
-                    preconditioner: &mut Dynamic(preconditioner),
-                    samples: &mut self.samples,
-                    workspace: &mut self.workspace,
-                };
-                self.iteration.solve(&mut system, &self.b, x, cap, tolerance)
-            };
-            let report = match (self.method, &mut self.painted) {
-                (Method::Direct, Painted::Direct(direct)) => run(&mut direct.1),
-                (Method::VCycle, Painted::VCycle(cycle)) => run(&mut **cycle),
-                _ => run(&mut self.diagonalization),
-            };
+            let report = self.iterate(s, x, cap, tolerance);
             self.lattice.sample(x, dx, &mut self.workspace);
             report
         };
         SolveReport {
             method: self.method,
             iteration,
+        }
+    }
+
+    /// The same for forces `b` on the coefficients, of lattices with fewer coefficients than samples.
+    pub(crate) fn solve_coefficients(&mut self, s: &StepMatrix<T>, b: &[T], x: &mut [T]) {
+        debug_assert!(self.inverse.is_none());
+        self.b.copy_from_slice(b);
+        self.iterate(s, x, self.options.iterations, 16.0 * T::UNIT_ROUND_OFF);
+    }
+
+    /// Solves for the right-hand side in `self.b`.
+    fn iterate(&mut self, s: &StepMatrix<T>, x: &mut [T], cap: usize, tolerance: f64) -> PcgReport {
+        let mut run = |preconditioner: &mut dyn Preconditioner<T>| {
+            let mut system = CoefficientSystem {
+                lattice: &self.lattice,
+                matrix: s,
+                preconditioner: &mut Dynamic(preconditioner),
+                samples: &mut self.samples,
+                workspace: &mut self.workspace,
+            };
+            self.iteration.solve(&mut system, &self.b, x, cap, tolerance)
+        };
+        match (self.method, &mut self.painted) {
+            (Method::Direct, Painted::Direct(direct)) => run(&mut direct.1),
+            (Method::VCycle, Painted::VCycle(cycle)) => run(&mut **cycle),
+            _ => run(&mut self.diagonalization),
         }
     }
 }
