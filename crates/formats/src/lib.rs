@@ -31,7 +31,7 @@ pub mod atomic;
 mod detect;
 mod error;
 pub mod field;
-mod foreign;
+mod guard;
 mod input;
 mod limits;
 pub mod meshes;
