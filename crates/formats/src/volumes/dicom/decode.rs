@@ -213,10 +213,6 @@ impl Source {
                 budget,
             )?),
         };
-        let padding = match &data.padding {
-            Some(value) => value.integer(0x0028_0120)?.map(|n| data.format.signed_number(n)),
-            None => None,
-        };
         let shape = Shape {
             rows: data.rows as usize,
             columns: data.columns as usize,
@@ -236,7 +232,7 @@ impl Source {
             at: if fragments.is_some() { 0 } else { pixels.at },
             deflated: data.syntax.deflated,
             fragments,
-            padding,
+            padding: data.padding.map(|n| data.format.signed_number(n)),
         })
     }
 
