@@ -14,7 +14,9 @@ fn explicit_limit(l: &Lattice<f64>, springs: &[SpringWeights<f64>]) -> f64 {
     let n = l.coefficient_count();
     let mut w = TensorWorkspace::new();
     let (mut d, mut s) = (vec![0.0; l.sample_count()], vec![0.0; l.sample_count()]);
-    let mut v: Vec<f64> = (0..n).map(|i| ((i * 7919) % 1013) as f64 / 1013.0 - 0.5).collect();
+    let mut v: Vec<f64> = (0..n)
+        .map(|i| ((i * 7919) % 1013) as f64 / 1013.0 - 0.5)
+        .collect();
     let mut q = vec![0.0; n];
     let mut lambda = 0.0;
     for _ in 0..60 {
@@ -39,18 +41,33 @@ fn main() {
     let times: f64 = args[5].parse().unwrap();
     let degree: usize = args.get(6).map_or(2, |s| s.parse().unwrap());
     let limit: usize = args.get(7).map_or(1400, |s| s.parse().unwrap());
-    let nb = if args.get(8).is_some_and(|s| s == "18") { Neighbours::Eighteen } else { Neighbours::Six };
+    let nb = if args.get(8).is_some_and(|s| s == "18") {
+        Neighbours::Eighteen
+    } else {
+        Neighbours::Six
+    };
     let l64 = Lattice::<f64>::cube(n, m, rim, 1.0).unwrap();
     let l32 = Lattice::<f32>::cube(n, m, rim, 1.0).unwrap();
     let nc = l64.coefficient_count();
     let steps: Vec<_> = nb.directions().iter().map(|d| d.step).collect();
-    let o = VCycleOptions { degree, direct_limit: limit, ..Default::default() };
+    let o = VCycleOptions {
+        degree,
+        direct_limit: limit,
+        ..Default::default()
+    };
     let mut v32 = VCycle::new(&l32, &steps, o);
     let mut v64 = VCycle::new(&l64, &steps, VCycleOptions { degree: 3, ..o });
-    println!("{n}/{m} free {nc} levels {} coarsest {}", v32.level_count(), v32.coarsest_count());
+    println!(
+        "{n}/{m} free {nc} levels {} coarsest {}",
+        v32.level_count(),
+        v32.coarsest_count()
+    );
     let direct = nc <= 4000;
     let mut galerkin = Galerkin::new(&l64, &steps);
-    let mut factor = BandCholesky::<f64>::new(if direct { nc } else { 1 }, if direct { galerkin.band() } else { 0 });
+    let mut factor = BandCholesky::<f64>::new(
+        if direct { nc } else { 1 },
+        if direct { galerkin.band() } else { 0 },
+    );
     let mut cg32 = ConjugateGradients::new(&l32);
     let mut cg64 = ConjugateGradients::new(&l64);
     let mut w = TensorWorkspace::new();
@@ -58,7 +75,11 @@ fn main() {
     for pattern in std::iter::once(Pattern::Uniform).chain(Pattern::PAINTED) {
         let base = spring_weights(pattern, contrast, m, nb, 1.0);
         let dt = times * explicit_limit(&l64, &base);
-        let s64 = StepMatrix::new(l64.sample_dims(), Weights::Constant(1.0), spring_weights(pattern, contrast, m, nb, dt * dt));
+        let s64 = StepMatrix::new(
+            l64.sample_dims(),
+            Weights::Constant(1.0),
+            spring_weights(pattern, contrast, m, nb, dt * dt),
+        );
         let s32: StepMatrix<f32> = s64.convert();
         let t = Instant::now();
         v32.prepare(&s32).unwrap();
@@ -87,7 +108,8 @@ fn main() {
                 let mut q = b.clone();
                 l64.gather(&s, &mut q, &mut w);
                 let mut r: Vec<f64> = b.iter().zip(&q).map(|(b, q)| b - q).collect();
-                let rn: f64 = r.iter().map(|v| v * v).sum::<f64>().sqrt() / b.iter().map(|v| v * v).sum::<f64>().sqrt();
+                let rn: f64 =
+                    r.iter().map(|v| v * v).sum::<f64>().sqrt() / b.iter().map(|v| v * v).sum::<f64>().sqrt();
                 refres = refres.max(rn);
                 factor.solve(&mut r);
                 x.iter_mut().zip(&r).for_each(|(x, r)| *x += r);
@@ -115,10 +137,20 @@ fn main() {
         let b32: Vec<f32> = (0..nc).map(|i| (i % 17) as f32).collect();
         let mut z = b32.clone();
         let t = Instant::now();
-        for _ in 0..20 { v32.apply(&s32, &b32, &mut z); }
+        for _ in 0..20 {
+            v32.apply(&s32, &b32, &mut z);
+        }
         let tv = t.elapsed().as_secs_f64() * 50.0;
-        print!("{:10} prep {tp:6.1} ms V {tv:.3} ms ref {refres:.0e} l {:?} ", pattern.name(), v32.eigenvalues().map(|v| (v * 10.0).round() / 10.0).collect::<Vec<_>>());
-        for cap in [1, 2, 3, 4, 6, 8] { print!(" {:.1e}", worst[cap]); }
+        print!(
+            "{:10} prep {tp:6.1} ms V {tv:.3} ms ref {refres:.0e} l {:?} ",
+            pattern.name(),
+            v32.eigenvalues()
+                .map(|v| (v * 10.0).round() / 10.0)
+                .collect::<Vec<_>>()
+        );
+        for cap in [1, 2, 3, 4, 6, 8] {
+            print!(" {:.1e}", worst[cap]);
+        }
         println!("  coef@8 {:.1e} res@8 {:.1e}", wc[8], res[8]);
     }
 }

@@ -104,10 +104,7 @@ impl<T: Real> FastDiagonalization<T> {
                     p[nz..].fill(T::zero());
                 }
                 multiply(&x.transposed, ping, pong, nx, nx, ny * pad);
-                for (a, b) in pong
-                    .chunks_exact(ny * pad)
-                    .zip(ping.chunks_exact_mut(ny * pad))
-                {
+                for (a, b) in pong.chunks_exact(ny * pad).zip(ping.chunks_exact_mut(ny * pad)) {
                     multiply(&y.transposed, a, b, ny, ny, pad);
                 }
                 // Along z a line is multiplied from the right, so the untransposed matrix gives Vᵀ.
@@ -116,10 +113,7 @@ impl<T: Real> FastDiagonalization<T> {
                     *v *= *i;
                 }
                 multiply_last(pong, pad, &zed.transposed_padded, ping, nz, pad);
-                for (a, b) in ping
-                    .chunks_exact(ny * pad)
-                    .zip(pong.chunks_exact_mut(ny * pad))
-                {
+                for (a, b) in ping.chunks_exact(ny * pad).zip(pong.chunks_exact_mut(ny * pad)) {
                     multiply(&y.matrix, a, b, ny, ny, pad);
                 }
                 multiply(&x.matrix, pong, ping, nx, nx, ny * pad);

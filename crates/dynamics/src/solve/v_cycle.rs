@@ -89,13 +89,14 @@ impl<T: Real> VCycle<T> {
             let unit = |which: usize, diagonal: &mut Galerkin| {
                 let weight = |k: usize| Weights::Constant(if k == which { T::one() } else { T::zero() });
                 let springs = crate::springs::Neighbours::Six.directions();
-                let springs = springs
-                    .iter()
-                    .enumerate()
-                    .map(|(k, &direction)| crate::springs::SpringWeights {
-                        direction,
-                        weights: weight(k + 1),
-                    });
+                let springs =
+                    springs
+                        .iter()
+                        .enumerate()
+                        .map(|(k, &direction)| crate::springs::SpringWeights {
+                            direction,
+                            weights: weight(k + 1),
+                        });
                 let s = StepMatrix::new(here.sample_dims(), weight(0), springs.collect());
                 diagonal.diagonal_of(&s).to_vec()
             };
@@ -201,7 +202,9 @@ impl<T: Real> VCycle<T> {
         // A rough start: any smooth one hides the largest eigenvalues.
         let mut seed = 0x9E37_79B9_7F4A_7C15_u64;
         for v in r.iter_mut() {
-            seed = seed.wrapping_mul(0xD129_42F0_5A3B_4B79).wrapping_add(0x1405_7B7E_F767_814F);
+            seed = seed
+                .wrapping_mul(0xD129_42F0_5A3B_4B79)
+                .wrapping_add(0x1405_7B7E_F767_814F);
             *v = T::from_f64((seed >> 11) as f64 / (1u64 << 53) as f64 - 0.5);
         }
         let (mut diagonal, mut off) = (Vec::new(), Vec::new());
@@ -356,7 +359,11 @@ pub(crate) fn largest_of_tridiagonal(diagonal: &[f64], off: &[f64]) -> f64 {
     let has_above = |t: f64| {
         let mut pivot = 1.0;
         (0..diagonal.len()).any(|i| {
-            let coupling = if i > 0 { off[i - 1] * off[i - 1] / pivot } else { 0.0 };
+            let coupling = if i > 0 {
+                off[i - 1] * off[i - 1] / pivot
+            } else {
+                0.0
+            };
             pivot = diagonal[i] - t - coupling;
             pivot > 0.0
         })
