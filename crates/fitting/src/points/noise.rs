@@ -3,10 +3,11 @@
 use std::num::NonZero;
 
 use glam::{DMat3, DVec3};
-use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use kiddo::SquaredEuclidean;
 use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen};
 
 use super::samples::Samples;
+use super::support::Tree;
 
 /// Points at which a quadric is fitted.
 const QUERIES: usize = 256;
@@ -26,9 +27,8 @@ const SHAPE: f64 = 1.35;
 ///
 /// The neighbourhood has to reach three standard deviations: in a smaller one the noise bends the principal
 /// plane and hides part of itself.
-pub(crate) fn estimate(samples: &Samples, negligible: f64) -> Option<f64> {
-    let points: Vec<[f64; 3]> = samples.positions.iter().map(|p| p.to_array()).collect();
-    let tree = ImmutableKdTree::<f64, 3>::new_from_slice(&points).ok()?;
+pub(crate) fn estimate(samples: &Samples, tree: &Tree, negligible: f64) -> Option<f64> {
+    let points = &samples.positions;
     let stride = points.len().div_ceil(QUERIES);
     let mut previous: Option<f64> = None;
     for k in NEIGHBOURS {
@@ -38,9 +38,10 @@ pub(crate) fn estimate(samples: &Samples, negligible: f64) -> Option<f64> {
         let count = NonZero::new(k).expect("not zero");
         let mut found: Vec<(f64, f64)> = (0..points.len())
             .step_by(stride)
+            .filter(|&i| samples.weights[i] > 0.0)
             .filter_map(|i| {
                 let near = tree
-                    .query(&points[i])
+                    .query(&points[i].to_array())
                     .nearest_n::<SquaredEuclidean<f64>>(count)
                     .execute();
                 let reach = f64::sqrt(near.last()?.distance);
@@ -49,7 +50,7 @@ pub(crate) fn estimate(samples: &Samples, negligible: f64) -> Option<f64> {
                 let around: Vec<DVec3> = near
                     .iter()
                     .map(|n| n.item as usize)
-                    .filter(|&j| same_wall(j))
+                    .filter(|&j| same_wall(j) && samples.weights[j] > 0.0)
                     .map(|j| samples.positions[j])
                     .collect();
                 Some((quadric_residual(&around)?, reach))
