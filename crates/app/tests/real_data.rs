@@ -60,8 +60,8 @@ fn head_is_fitted_within_its_tolerance_and_sampled_back() {
     // Sampled at the voxels and measured against the volume by other code than `check`'s.
     bench.json(&format!("sample head.iclay --like {head} -o again.nii.gz"));
     let limits = formats::ReadLimits::default();
-    let truth = formats::volumes::read(head.as_ref(), &limits).unwrap();
-    let again = formats::volumes::read(&bench.path("again.nii.gz"), &limits).unwrap();
+    let truth = formats::volumes::read(head.as_ref(), &Default::default(), &limits).unwrap();
+    let again = formats::volumes::read(&bench.path("again.nii.gz"), &Default::default(), &limits).unwrap();
     assert_eq!(again.header.dims, truth.header.dims);
     assert!(
         again

@@ -28,6 +28,38 @@ impl Read for Source {
     }
 }
 
+/// A stream of which parts are passed over.
+pub(crate) trait SkipRead: Read {
+    /// Passes over up to `count` bytes; returns how many there were (a file may be sought beyond its end, which
+    /// the next reading notices).
+    fn skip(&mut self, count: u64) -> io::Result<u64>;
+}
+
+/// Reads what is passed over.
+pub(crate) fn skip_by_reading(source: &mut impl Read, count: u64) -> io::Result<u64> {
+    io::copy(&mut source.take(count), &mut io::sink())
+}
+
+impl SkipRead for &[u8] {
+    fn skip(&mut self, count: u64) -> io::Result<u64> {
+        let n = count.min(self.len() as u64);
+        *self = &self[n as usize..];
+        Ok(n)
+    }
+}
+
+impl SkipRead for Source {
+    fn skip(&mut self, count: u64) -> io::Result<u64> {
+        match self {
+            Self::Plain(r) => match i64::try_from(count) {
+                Ok(n) if r.get_ref().metadata()?.is_file() => r.seek_relative(n).map(|()| count),
+                _ => skip_by_reading(r, count),
+            },
+            Self::Gzip(r) => skip_by_reading(r, count),
+        }
+    }
+}
+
 /// An open file: its content and, where known, how many bytes that has.
 pub(crate) struct Input {
     pub source: Source,
@@ -46,6 +78,20 @@ pub(crate) fn io_fault(doing: &'static str) -> impl Fn(io::Error) -> Fault {
 
 /// Opens `path`; gzip is told by its magic bytes, whatever the name.
 pub(crate) fn open(path: &Path) -> Result<Input, Fault> {
+    open_with(path, true)
+}
+
+/// Opens a file of bare voxels, whose first ones may look like any magic: gzip is told by the name.
+pub(crate) fn open_by_name(path: &Path) -> Result<Input, Fault> {
+    open_with(path, crate::detect::is_gz_name(path))
+}
+
+/// Opens `path` as it is.
+pub(crate) fn open_as_it_is(path: &Path) -> Result<Input, Fault> {
+    open_with(path, false)
+}
+
+fn open_with(path: &Path, may_inflate: bool) -> Result<Input, Fault> {
     let mut file = File::open(path).map_err(io_fault("opening"))?;
     let meta = file.metadata().map_err(io_fault("opening"))?;
     if meta.is_dir() {
@@ -61,7 +107,7 @@ pub(crate) fn open(path: &Path) -> Result<Input, Fault> {
         });
     }
     let mut magic = [0; 2];
-    let gzip = meta.len() >= 18 && file.read_exact(&mut magic).is_ok() && magic == GZIP_MAGIC;
+    let gzip = may_inflate && meta.len() >= 18 && file.read_exact(&mut magic).is_ok() && magic == GZIP_MAGIC;
     let (mut length, mut bound) = (meta.len(), meta.len());
     if gzip {
         let mut tail = [0; 4];

@@ -4,7 +4,7 @@
 //! | what | read | written |
 //! | --- | --- | --- |
 //! | points | PLY (ascii, binary of both endians), XYZ, OBJ; each also gzipped | PLY with colours |
-//! | volumes | NIfTI-1 and NIfTI-2 single files, gzipped or not | NIfTI-1, gzipped or not |
+//! | volumes | NIfTI-1 and -2, NRRD, MetaImage, TIFF stacks, raw voxels, gzipped or not; DICOM series | NIfTI-1, NRRD, MetaImage, VTK ImageData |
 //! | meshes | | PLY, STL, OBJ |
 //! | fields | the native file, `docs/format.md` | the same |
 //!
@@ -25,20 +25,24 @@
 //! ```
 //!
 //! # What it cannot do
-//! No NIfTI header/image pairs, no RGB or complex voxels, no time series, no textures or materials of OBJ.
+//! No RGB or complex voxels, no time series, no textures or materials of OBJ. Of a volume, [`volumes`] says more.
 
 pub mod atomic;
 mod detect;
 mod error;
 pub mod field;
+mod guard;
 mod input;
 mod limits;
 pub mod meshes;
 pub mod points;
+mod polygon;
+mod raw;
+mod text;
 mod unit;
 pub mod volumes;
 
-pub use detect::{Kind, PointFormat, detect};
+pub use detect::{Kind, MeshFileFormat, PointFormat, detect};
 pub use error::{Fault, FormatError};
 pub use limits::ReadLimits;
 pub use unit::Unit;

@@ -42,6 +42,16 @@ impl Budget {
         Ok(())
     }
 
+    /// Bytes booked.
+    pub fn used(&self) -> u64 {
+        self.used
+    }
+
+    /// The ceiling.
+    pub fn limit(&self) -> u64 {
+        self.limit
+    }
+
     /// Bytes still free.
     pub fn left(&self) -> u64 {
         self.limit - self.used

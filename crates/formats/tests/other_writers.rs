@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use formats::points::{self, NormalSource};
-use formats::volumes::{self, Orientation, VoxelType};
+use formats::volumes::{self, Orientation, VolumeFormat, VoxelType};
 use formats::{Kind, ReadLimits, Unit, detect};
 use glam::{DMat3, DVec3};
 
@@ -47,9 +47,13 @@ fn volumes_by_nibabel_have_its_voxels_and_its_affine() {
         ),
     ] {
         let path = data(name);
-        assert_eq!(detect(&path).unwrap(), Kind::Volume, "{name}");
-        let (peeked, _) = volumes::peek(&path).unwrap();
-        let volume = volumes::read(&path, &ReadLimits::default()).unwrap();
+        assert_eq!(
+            detect(&path).unwrap(),
+            Kind::Volume(VolumeFormat::Nifti),
+            "{name}"
+        );
+        let peeked = volumes::peek(&path, &Default::default()).unwrap().header;
+        let volume = volumes::read(&path, &Default::default(), &ReadLimits::default()).unwrap();
         let header = &volume.header;
         assert_eq!(&peeked, header, "{name}");
         assert_eq!(

@@ -147,7 +147,7 @@ impl Prepared {
             .map(|n| n.to_string_lossy().into_owned())
             .unwrap_or_default();
         let name = file.split('.').next().unwrap_or("input").to_string();
-        if let Kind::Volume = formats::detect(path).map_err(reading)? {
+        if let Kind::Volume(_) = formats::detect(path).map_err(reading)? {
             return Ok(Self {
                 kind: Input::Volume,
                 name,

@@ -3,7 +3,7 @@ use std::path::PathBuf;
 
 use bspline::{Field, Frame};
 use fitting::Cancel;
-use formats::volumes::StoreAs;
+use formats::volumes::{Preview, StoreAs, VolumeOptions};
 
 use super::cost::Cost;
 use super::failure::Outcome;
@@ -46,7 +46,8 @@ pub fn run(args: &Args) -> Outcome {
     set_threads(args.threads)?;
     let cancel = Cancel::new();
     interrupt::cancel_on_interrupt(&cancel)?;
-    let (header, notes) = formats::volumes::peek(&args.like).map_err(reading)?;
+    let Preview { header, notes, .. } =
+        formats::volumes::peek(&args.like, &VolumeOptions::default()).map_err(reading)?;
     let open = OpenField::load(&args.field)?;
     let dims = header.dims;
     let needed = header.voxel_count() as u64 * 4;

@@ -1,25 +1,25 @@
 //! Fits of oriented point clouds.
 
-mod assemble;
-mod band;
-mod band_solve;
-mod cascade;
+pub(crate) mod assemble;
+pub(crate) mod band;
+pub(crate) mod band_solve;
+pub(crate) mod cascade;
 mod cells;
 mod clusters;
 mod coarse;
 mod cross_validation;
 mod far_field;
 mod feet;
-mod full_grid;
+pub(crate) mod full_grid;
 #[cfg(test)]
 mod iteration_growth;
-mod noise;
+pub(crate) mod noise;
 mod plan;
 mod residual;
 pub use residual::newton_distance;
 mod robust;
-mod samples;
-mod stencil;
+pub(crate) mod samples;
+pub(crate) mod stencil;
 mod support;
 
 use bspline::{HierarchicalSpline, Real};
@@ -28,6 +28,7 @@ use crate::{Control, FitError, FitReport};
 use plan::{Plan, Smoothing};
 pub use samples::OrientedPoints;
 use samples::Samples;
+pub(crate) use samples::{BASE_DEPTH, MAX_DEPTH};
 
 /// What the caller may choose; `None` is chosen from the data.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -62,7 +63,7 @@ pub fn fit_points<T: Real>(
     // Below the default tolerance noise does not matter; above, it does even to a caller who asks for less.
     let default_tolerance = 1e-4 * samples.diagonal / samples.scale;
     let tolerance = options.tolerance.map_or(default_tolerance, |t| t / samples.scale);
-    let tree = support::tree(&samples);
+    let tree = support::tree(&samples.positions);
     if let Some(tree) = tree.as_ref().filter(|_| options.robust) {
         control.step("weighing points", 0.03)?;
         robust::weigh_by_support(&mut samples, tree);

@@ -7,7 +7,7 @@ use kiddo::SquaredEuclidean;
 use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen};
 
 use super::samples::Samples;
-use super::support::Tree;
+use super::support::{self, Tree};
 
 /// Points at which a quadric is fitted.
 const QUERIES: usize = 256;
@@ -28,7 +28,29 @@ const SHAPE: f64 = 1.35;
 /// The neighbourhood has to reach three standard deviations: in a smaller one the noise bends the principal
 /// plane and hides part of itself.
 pub(crate) fn estimate(samples: &Samples, tree: &Tree, negligible: f64) -> Option<f64> {
-    let points = &samples.positions;
+    // The other wall of a thin part is no noise of this one, nor are points without weight.
+    let same_wall = |i: usize, j: usize| {
+        let live = samples.weights[i] > 0.0 && samples.weights[j] > 0.0;
+        live && dot(samples.normals[i], samples.normals[j]) > SAME_WALL
+    };
+    quadrics(&samples.positions, tree, same_wall, negligible)
+}
+
+/// The same of bare positions, where `same_wall(i, j)` tells whether point `j` near point `i` may belong to its surface.
+pub(crate) fn of_positions(
+    positions: &[DVec3],
+    same_wall: impl Fn(usize, usize) -> bool,
+    negligible: f64,
+) -> Option<f64> {
+    quadrics(positions, &support::tree(positions)?, same_wall, negligible)
+}
+
+fn quadrics(
+    points: &[DVec3],
+    tree: &Tree,
+    same_wall: impl Fn(usize, usize) -> bool,
+    negligible: f64,
+) -> Option<f64> {
     let stride = points.len().div_ceil(QUERIES);
     let mut previous: Option<f64> = None;
     for k in NEIGHBOURS {
@@ -38,20 +60,18 @@ pub(crate) fn estimate(samples: &Samples, tree: &Tree, negligible: f64) -> Optio
         let count = NonZero::new(k).expect("not zero");
         let mut found: Vec<(f64, f64)> = (0..points.len())
             .step_by(stride)
-            .filter(|&i| samples.weights[i] > 0.0)
+            .filter(|&i| same_wall(i, i))
             .filter_map(|i| {
                 let near = tree
                     .query(&points[i].to_array())
                     .nearest_n::<SquaredEuclidean<f64>>(count)
                     .execute();
                 let reach = f64::sqrt(near.last()?.distance);
-                // The other wall of a thin part is no noise of this one.
-                let same_wall = |j: usize| dot(samples.normals[i], samples.normals[j]) > SAME_WALL;
                 let around: Vec<DVec3> = near
                     .iter()
                     .map(|n| n.item as usize)
-                    .filter(|&j| same_wall(j) && samples.weights[j] > 0.0)
-                    .map(|j| samples.positions[j])
+                    .filter(|&j| same_wall(i, j))
+                    .map(|j| points[j])
                     .collect();
                 Some((quadric_residual(&around)?, reach))
             })

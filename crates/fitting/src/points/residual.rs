@@ -104,6 +104,7 @@ pub(crate) fn report<T: Real>(
             Smoothing::Halving(mu) => mu,
         },
         leaves: leaves.collect(),
+        signs: None,
         notes: samples.notes.clone(),
     }
 }

@@ -36,9 +36,9 @@ const DOUBTS: [f64; 2] = [1e-3, 0.03];
 /// Nearest neighbours among the points of a cloud.
 pub(crate) type Tree = ImmutableKdTree<f64, 3>;
 
-/// The tree over `samples`; `None` if there are too few.
-pub(crate) fn tree(samples: &Samples) -> Option<Tree> {
-    let points: Vec<[f64; 3]> = samples.positions.iter().map(|p| p.to_array()).collect();
+/// The tree over `positions`; `None` if there are too few.
+pub(crate) fn tree(positions: &[DVec3]) -> Option<Tree> {
+    let points: Vec<[f64; 3]> = positions.iter().map(|p| p.to_array()).collect();
     Tree::new_from_slice(&points).ok()
 }
 

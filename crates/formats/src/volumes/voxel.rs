@@ -1,4 +1,5 @@
 use std::fmt;
+use std::str::FromStr;
 
 /// Types of voxels that are read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,6 +55,32 @@ impl VoxelType {
         }
     }
 
+    /// Whether values are whole numbers.
+    pub fn is_integer(self) -> bool {
+        !matches!(self, Self::F32 | Self::F64)
+    }
+
+    /// Smallest and largest finite value.
+    pub fn range(self) -> (f64, f64) {
+        macro_rules! of {
+            ($t:ty) => {
+                (<$t>::MIN as f64, <$t>::MAX as f64)
+            };
+        }
+        match self {
+            Self::U8 => of!(u8),
+            Self::I8 => of!(i8),
+            Self::U16 => of!(u16),
+            Self::I16 => of!(i16),
+            Self::U32 => of!(u32),
+            Self::I32 => of!(i32),
+            Self::U64 => of!(u64),
+            Self::I64 => of!(i64),
+            Self::F32 => of!(f32),
+            Self::F64 => of!(f64),
+        }
+    }
+
     /// Whether `f32` may have to round a value of this type.
     pub fn exceeds_f32(self) -> bool {
         matches!(self, Self::U32 | Self::I32 | Self::U64 | Self::I64 | Self::F64)
@@ -75,4 +102,38 @@ impl fmt::Display for VoxelType {
             Self::F64 => "float64",
         })
     }
+}
+
+impl FromStr for VoxelType {
+    type Err = String;
+
+    /// Reads a name as [`fmt::Display`] writes it.
+    fn from_str(s: &str) -> Result<Self, String> {
+        let of = |t: &(i16, Self)| t.1;
+        Self::CODES
+            .iter()
+            .map(of)
+            .find(|t| t.to_string() == s)
+            .ok_or_else(|| {
+                let names: Vec<_> = Self::CODES.iter().map(|t| of(t).to_string()).collect();
+                format!("{s:?} is no type of voxels; write one of {}", names.join(", "))
+            })
+    }
+}
+
+/// How densities are stored.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum StoreAs {
+    /// As they are.
+    Float32,
+    /// As `round((density - intercept) / slope)`, held to the range of an integer type; the header says how to
+    /// get densities back.
+    Integer {
+        /// Type of the voxels; not a float type.
+        voxel: VoxelType,
+        /// Density of one step, finite and not 0.
+        slope: f64,
+        /// Density of a stored 0.
+        intercept: f64,
+    },
 }

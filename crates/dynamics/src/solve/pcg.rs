@@ -1,0 +1,145 @@
+//! Preconditioned conjugate gradients for the increment of a step.
+
+use bspline::Real;
+
+use super::dot::dot;
+use crate::lattice::{Lattice, TensorWorkspace};
+use crate::springs::StepMatrix;
+
+/// A symmetric positive definite system.
+pub trait System<T> {
+    /// `q = Hp`; returns `pᵀq`.
+    fn apply(&mut self, p: &[T], q: &mut [T]) -> f64;
+    /// `z ≈ H⁻¹ r`, symmetric and positive definite.
+    fn precondition(&mut self, r: &[T], z: &mut [T]);
+}
+
+/// An approximate inverse of `AᵀSA`, symmetric and positive definite.
+pub trait Preconditioner<T> {
+    /// `z ≈ (AᵀSA)⁻¹ r`.
+    fn apply(&mut self, s: &StepMatrix<T>, r: &[T], z: &mut [T]);
+}
+
+/// No preconditioner: `z = r`. What the source paper does.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Unpreconditioned;
+
+impl<T: Real> Preconditioner<T> for Unpreconditioned {
+    fn apply(&mut self, _: &StepMatrix<T>, r: &[T], z: &mut [T]) {
+        z.copy_from_slice(r);
+    }
+}
+
+/// `AᵀSA` with any preconditioner.
+pub struct CoefficientSystem<'a, T, P> {
+    /// Gives `A`.
+    pub lattice: &'a Lattice<T>,
+    /// `S`.
+    pub matrix: &'a StepMatrix<T>,
+    /// The approximate inverse.
+    pub preconditioner: &'a mut P,
+    /// Two vectors on the samples.
+    pub samples: &'a mut [Vec<T>; 2],
+    /// Scratch.
+    pub workspace: &'a mut TensorWorkspace<T>,
+}
+
+impl<T: Real, P: Preconditioner<T>> System<T> for CoefficientSystem<'_, T, P> {
+    fn apply(&mut self, p: &[T], q: &mut [T]) -> f64 {
+        let [d, s] = &mut *self.samples;
+        self.lattice.sample(p, d, self.workspace);
+        self.matrix.apply(d, s);
+        self.lattice.gather(s, q, self.workspace);
+        dot(d, s)
+    }
+
+    fn precondition(&mut self, r: &[T], z: &mut [T]) {
+        self.preconditioner.apply(self.matrix, r, z);
+    }
+}
+
+/// What a solve did.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PcgReport {
+    /// Iterations made.
+    pub iterations: usize,
+    /// `‖b - Hx‖/‖b‖`, where `b` is the impulse.
+    pub residual: f64,
+    /// Curvature `pᵀHp` that was not positive, if one was met; the solve ended there.
+    pub negative_curvature: Option<f64>,
+}
+
+/// `y += a x`.
+pub(super) fn add_scaled<T: Real>(y: &mut [T], a: T, x: &[T]) {
+    for (y, x) in y.iter_mut().zip(x) {
+        *y += a * *x;
+    }
+}
+
+/// The vectors of the iteration.
+#[derive(Clone, Debug)]
+pub struct ConjugateGradients<T> {
+    r: Vec<T>,
+    z: Vec<T>,
+    p: Vec<T>,
+    q: Vec<T>,
+}
+
+impl<T: Real> ConjugateGradients<T> {
+    /// For systems of `n` unknowns.
+    pub fn new(n: usize) -> Self {
+        let zeros = || vec![T::zero(); n];
+        Self {
+            r: zeros(),
+            z: zeros(),
+            p: zeros(),
+            q: zeros(),
+        }
+    }
+
+    /// Solves `Hx = b` from `x = 0`, at most `cap` iterations, until the residual falls below `tolerance` times the
+    /// impulse `b`.
+    pub fn solve(
+        &mut self,
+        system: &mut impl System<T>,
+        b: &[T],
+        x: &mut [T],
+        cap: usize,
+        tolerance: f64,
+    ) -> PcgReport {
+        let Self { r, z, p, q } = self;
+        x.fill(T::zero());
+        r.copy_from_slice(b);
+        let impulse = dot(b, b).sqrt();
+        let mut report = PcgReport::default();
+        if impulse == 0.0 {
+            return report;
+        }
+        report.residual = 1.0;
+        let mut before = 1.0;
+        while report.iterations < cap && report.residual > tolerance {
+            system.precondition(r, z);
+            let rz = dot(r, z);
+            if report.iterations == 0 {
+                p.copy_from_slice(z);
+            } else {
+                let beta = T::from_f64(rz / before);
+                for (p, z) in p.iter_mut().zip(z.iter()) {
+                    *p = *z + beta * *p;
+                }
+            }
+            before = rz;
+            let curvature = system.apply(p, q);
+            if !(curvature > 0.0 && rz > 0.0) {
+                report.negative_curvature = Some(curvature.min(rz));
+                break;
+            }
+            let alpha = T::from_f64(rz / curvature);
+            add_scaled(x, alpha, p);
+            add_scaled(r, -alpha, q);
+            report.iterations += 1;
+            report.residual = dot(r, r).sqrt() / impulse;
+        }
+        report
+    }
+}

@@ -1,0 +1,390 @@
+//! The V-cycle for painted material: scaled fast diagonalization as smoother, every other knot as coarse space.
+
+use bspline::Real;
+
+use super::band_cholesky::{BandCholesky, NotPositive};
+use super::fast_diagonalization::FastDiagonalization;
+use super::galerkin::Galerkin;
+use super::lanczos::Lanczos;
+use super::pcg::{CoefficientSystem, Preconditioner, add_scaled};
+use super::schwarz::Schwarz;
+use crate::lattice::{Lattice, TensorProduct, TensorWorkspace};
+use crate::springs::{StepMatrix, Weights};
+
+/// How a [`VCycle`] is made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VCycleOptions {
+    /// Degree of the Chebyshev polynomial of the smoother.
+    pub degree: usize,
+    /// Coefficients up to which a level is factorized.
+    pub direct_limit: usize,
+    /// Lanczos steps for the largest eigenvalue of the smoother.
+    pub eigenvalue_steps: usize,
+    /// Size of the overlapping blocks that are solved exactly where material is painted, 0 for none.
+    pub blocks: usize,
+    /// Distance of the blocks.
+    pub stride: usize,
+    /// Ratio within a block, of the actual diagonal to that of constant material, from which on it is solved.
+    pub block_contrast: f64,
+    /// Coefficients of a level up to which it has blocks: their matrix takes 3 kB a coefficient.
+    pub block_limit: usize,
+}
+
+impl Default for VCycleOptions {
+    fn default() -> Self {
+        Self {
+            degree: 2,
+            direct_limit: 1400,
+            eigenvalue_steps: 10,
+            blocks: 5,
+            stride: 3,
+            block_contrast: 3.0,
+            block_limit: 20_000,
+        }
+    }
+}
+
+/// Smoother of one level, and the way to the next.
+#[derive(Clone, Debug)]
+struct Level<T> {
+    lattice: Lattice<T>,
+    smoother: FastDiagonalization<T>,
+    diagonal: Galerkin,
+    /// Diagonal of `H` for unit mass, and for unit springs along each axis.
+    unit_diagonals: [Vec<f64>; 4],
+    largest_eigenvalue: f64,
+    /// Actual diagonal over that of constant material.
+    variation: Vec<f64>,
+    all: Option<Galerkin>,
+    schwarz: Option<Schwarz<T>>,
+    schwarz_eigenvalue: f64,
+    lanczos: Lanczos<T>,
+    prolong: TensorProduct<T>,
+    restrict: TensorProduct<T>,
+    r: Vec<T>,
+    d: Vec<T>,
+    z: Vec<T>,
+    q: Vec<T>,
+}
+
+/// The preconditioner; [`prepare`](VCycle::prepare) it for each matrix.
+#[derive(Clone, Debug)]
+pub struct VCycle<T> {
+    options: VCycleOptions,
+    levels: Vec<Level<T>>,
+    coarsest: Lattice<T>,
+    assembly: Galerkin,
+    factor: BandCholesky<T>,
+    right: Vec<Vec<T>>,
+    solution: Vec<Vec<T>>,
+    samples: [Vec<T>; 2],
+    workspace: TensorWorkspace<T>,
+}
+
+/// Geometric mean of the weights, those far below the largest raised to it by `floor`.
+fn geometric_mean<T: Real>(weights: &Weights<T>, floor: f64) -> f64 {
+    match weights {
+        Weights::Constant(w) => w.as_f64(),
+        Weights::Each(w) => {
+            let largest = w.iter().fold(0.0_f64, |m, w| m.max(w.as_f64()));
+            let low = (floor * largest).max(f64::MIN_POSITIVE);
+            let logs: f64 = w.iter().map(|w| w.as_f64().max(low).ln()).sum();
+            (logs / w.len() as f64).exp()
+        }
+    }
+}
+
+impl<T: Real> VCycle<T> {
+    /// The hierarchy of a lattice for springs of the given steps.
+    pub fn new(lattice: &Lattice<T>, steps: &[[isize; 3]], options: VCycleOptions) -> Self {
+        let mut levels = Vec::new();
+        let mut here = lattice.clone();
+        let zeros = |n: usize| vec![T::zero(); n];
+        while here.coefficient_count() > options.direct_limit {
+            let Some(half) = here.half() else { break };
+            let [prolong, restrict] = here.prolongation(&half);
+            let n = here.coefficient_count();
+            let mut diagonal = Galerkin::diagonal(&here, &steps[..3]);
+            let unit = |which: usize, diagonal: &mut Galerkin| {
+                let weight = |k: usize| Weights::Constant(if k == which { T::one() } else { T::zero() });
+                let springs = crate::springs::Neighbours::Six.directions();
+                let springs =
+                    springs
+                        .iter()
+                        .enumerate()
+                        .map(|(k, &direction)| crate::springs::SpringWeights {
+                            direction,
+                            weights: weight(k + 1),
+                        });
+                let s = StepMatrix::new(here.sample_dims(), weight(0), springs.collect());
+                diagonal.diagonal_of(&s).to_vec()
+            };
+            let unit_diagonals = std::array::from_fn(|which| unit(which, &mut diagonal));
+            levels.push(Level {
+                smoother: FastDiagonalization::new(&here),
+                diagonal: Galerkin::diagonal(&here, steps),
+                unit_diagonals,
+                largest_eigenvalue: 1.0,
+                variation: vec![1.0; n],
+                all: (options.blocks > 0 && n <= options.block_limit).then(|| Galerkin::new(&here, steps)),
+                schwarz: None,
+                schwarz_eigenvalue: 1.0,
+                lanczos: Lanczos::new(n),
+                prolong,
+                restrict,
+                r: zeros(n),
+                d: zeros(n),
+                z: zeros(n),
+                q: zeros(n),
+                lattice: here,
+            });
+            here = half;
+        }
+        let assembly = Galerkin::new(&here, steps);
+        let factor = BandCholesky::new(here.coefficient_count(), assembly.band());
+        let sizes = || {
+            let lattices = levels.iter().map(|l: &Level<T>| &l.lattice).chain([&here]);
+            lattices.map(|l| zeros(l.coefficient_count())).collect::<Vec<_>>()
+        };
+        let samples = || zeros(lattice.sample_count());
+        Self {
+            options,
+            right: sizes(),
+            solution: sizes(),
+            samples: [samples(), samples()],
+            workspace: TensorWorkspace::new(),
+            levels,
+            coarsest: here,
+            assembly,
+            factor,
+        }
+    }
+
+    /// Number of levels, the factorized one included.
+    pub fn level_count(&self) -> usize {
+        self.levels.len() + 1
+    }
+
+    /// Coefficients of the factorized level.
+    pub fn coarsest_count(&self) -> usize {
+        self.coarsest.coefficient_count()
+    }
+
+    /// The smoother of the finest level.
+    ///
+    /// # Panics
+    /// If the finest level is factorized.
+    pub fn smoother(&self) -> &FastDiagonalization<T> {
+        &self.levels[0].smoother
+    }
+
+    /// Largest eigenvalue of the smoother times `H`, as estimated, of each level.
+    pub fn eigenvalues(&self) -> impl Iterator<Item = f64> + '_ {
+        self.levels.iter().map(|l| l.largest_eigenvalue)
+    }
+
+    /// Makes the preconditioner fit a matrix.
+    ///
+    /// # Errors
+    /// [`NotPositive`] if the coarsest level cannot be factorized.
+    pub fn prepare(&mut self, s: &StepMatrix<T>) -> Result<(), NotPositive> {
+        self.assembly.assemble(s, &mut self.factor);
+        self.factor.factorize()?;
+        let mass = geometric_mean(&s.mass, 1e-9);
+        let mut along = [0.0; 3];
+        for spring in &s.springs {
+            let b = geometric_mean(&spring.weights, 1e-9);
+            for (a, step) in along.iter_mut().zip(spring.direction.step) {
+                *a += b * (step * step) as f64;
+            }
+        }
+        for l in 0..self.levels.len() {
+            let level = &mut self.levels[l];
+            level.smoother.set(mass, along);
+            let actual = level.diagonal.diagonal_of(s);
+            for (i, scale) in level.smoother.scale_mut().iter_mut().enumerate() {
+                let unit = &level.unit_diagonals;
+                let constant =
+                    mass * unit[0][i] + along[0] * unit[1][i] + along[1] * unit[2][i] + along[2] * unit[3][i];
+                level.variation[i] = actual[i] / constant;
+                *scale = T::from_f64((constant / actual[i]).sqrt());
+            }
+            self.levels[l].largest_eigenvalue = self.largest_eigenvalue(s, l, false);
+            let level = &mut self.levels[l];
+            if let Some(all) = &mut level.all {
+                all.accumulate(s);
+                let (size, stride) = (self.options.blocks, self.options.stride);
+                let blocks = Schwarz::new(all, size, stride, &level.variation, self.options.block_contrast);
+                level.schwarz = (blocks.block_count() > 0).then_some(blocks);
+                if level.schwarz.is_some() {
+                    self.levels[l].schwarz_eigenvalue = self.largest_eigenvalue(s, l, true);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Of the smoother, or of the blocks, times `H`; 10 % above the estimate.
+    fn largest_eigenvalue(&mut self, s: &StepMatrix<T>, l: usize, blocks: bool) -> f64 {
+        let level = &mut self.levels[l];
+        let mut system = CoefficientSystem {
+            lattice: &level.lattice,
+            matrix: s,
+            preconditioner: &mut Smoothing {
+                diagonalization: &mut level.smoother,
+                blocks: level.schwarz.as_mut().filter(|_| blocks),
+            },
+            samples: &mut self.samples,
+            workspace: &mut self.workspace,
+        };
+        1.1 * level.lanczos.largest(&mut system, self.options.eigenvalue_steps)
+    }
+
+    /// Solves level `l` for its right-hand side by one cycle.
+    fn cycle(&mut self, s: &StepMatrix<T>, l: usize) {
+        if l == self.levels.len() {
+            self.solution[l].copy_from_slice(&self.right[l]);
+            self.factor.solve(&mut self.solution[l]);
+            return;
+        }
+        // x = S(b)
+        self.smooth(s, l, true);
+        self.solve_blocks(s, l);
+        // x += P E⁻¹ Pᵀ (b - Hx)
+        self.residual(s, l);
+        self.levels[l]
+            .restrict
+            .apply(&self.levels[l].r, &mut self.right[l + 1], &mut self.workspace);
+        self.cycle(s, l + 1);
+        let level = &mut self.levels[l];
+        level
+            .prolong
+            .apply(&self.solution[l + 1], &mut level.z, &mut self.workspace);
+        add_scaled(&mut self.solution[l], T::one(), &level.z);
+        self.solve_blocks(s, l);
+        // x += S(b - Hx)
+        self.smooth(s, l, false);
+    }
+
+    /// One step over the blocks, where there are any; 1.7 of 2 is what keeps it convergent.
+    fn solve_blocks(&mut self, s: &StepMatrix<T>, l: usize) {
+        if self.levels[l].schwarz.is_none() {
+            return;
+        }
+        self.residual(s, l);
+        let level = &mut self.levels[l];
+        let omega = T::from_f64(1.7 / level.schwarz_eigenvalue);
+        if let Some(schwarz) = &mut level.schwarz {
+            schwarz.apply(&level.r, &mut level.z);
+        }
+        add_scaled(&mut self.solution[l], omega, &level.z);
+    }
+
+    /// `r = b - Hx`.
+    fn residual(&mut self, s: &StepMatrix<T>, l: usize) {
+        let level = &mut self.levels[l];
+        operator(
+            &level.lattice,
+            s,
+            &self.solution[l],
+            &mut level.q,
+            &mut self.samples,
+            &mut self.workspace,
+        );
+        for ((r, b), q) in level.r.iter_mut().zip(&self.right[l]).zip(&level.q) {
+            *r = *b - *q;
+        }
+    }
+
+    /// Chebyshev smoothing on the upper 12/13 of the spectrum, from zero or from what is there.
+    fn smooth(&mut self, s: &StepMatrix<T>, l: usize, from_zero: bool) {
+        if from_zero {
+            let level = &mut self.levels[l];
+            level.r.copy_from_slice(&self.right[l]);
+            self.solution[l].fill(T::zero());
+        } else {
+            self.residual(s, l);
+        }
+        let Level {
+            lattice,
+            smoother,
+            largest_eigenvalue,
+            r,
+            d,
+            z,
+            q,
+            ..
+        } = &mut self.levels[l];
+        let x = &mut self.solution[l];
+        let (theta, delta) = (
+            *largest_eigenvalue * (1.0 + 1.0 / 12.0) / 2.0,
+            *largest_eigenvalue * (1.0 - 1.0 / 12.0) / 2.0,
+        );
+        let sigma = theta / delta;
+        let mut rho = 1.0 / sigma;
+        for step in 0..self.options.degree {
+            smoother.apply(r, z);
+            let (keep, take) = if step == 0 {
+                (0.0, 1.0 / theta)
+            } else {
+                let next = 1.0 / (2.0 * sigma - rho);
+                let out = (next * rho, 2.0 * next / delta);
+                rho = next;
+                out
+            };
+            let (keep, take) = (T::from_f64(keep), T::from_f64(take));
+            if step == 0 {
+                for (d, z) in d.iter_mut().zip(z.iter()) {
+                    *d = take * *z;
+                }
+            } else {
+                for (d, z) in d.iter_mut().zip(z.iter()) {
+                    *d = keep * *d + take * *z;
+                }
+            }
+            add_scaled(x, T::one(), d);
+            if step + 1 < self.options.degree {
+                operator(lattice, s, d, q, &mut self.samples, &mut self.workspace);
+                add_scaled(r, -T::one(), q);
+            }
+        }
+    }
+}
+
+/// One of the two smoothers.
+struct Smoothing<'a, T> {
+    diagonalization: &'a mut FastDiagonalization<T>,
+    blocks: Option<&'a mut Schwarz<T>>,
+}
+
+impl<T: Real> Preconditioner<T> for Smoothing<'_, T> {
+    fn apply(&mut self, _: &StepMatrix<T>, r: &[T], z: &mut [T]) {
+        match &mut self.blocks {
+            Some(blocks) => blocks.apply(r, z),
+            None => self.diagonalization.apply(r, z),
+        }
+    }
+}
+
+/// `out = AᵀSA x`.
+fn operator<T: Real>(
+    lattice: &Lattice<T>,
+    s: &StepMatrix<T>,
+    x: &[T],
+    out: &mut [T],
+    samples: &mut [Vec<T>; 2],
+    w: &mut TensorWorkspace<T>,
+) {
+    let [a, b] = samples;
+    lattice.sample(x, a, w);
+    s.apply(a, b);
+    lattice.gather(b, out, w);
+}
+
+impl<T: Real> Preconditioner<T> for VCycle<T> {
+    fn apply(&mut self, s: &StepMatrix<T>, r: &[T], z: &mut [T]) {
+        self.right[0].copy_from_slice(r);
+        self.cycle(s, 0);
+        z.copy_from_slice(&self.solution[0]);
+    }
+}

@@ -1,0 +1,117 @@
+//! NIfTI-1 and NIfTI-2, single files and header/image pairs.
+
+mod affine;
+mod header;
+mod write;
+
+use std::path::{Path, PathBuf};
+
+pub(crate) use header::nifti_format;
+pub(super) use write::write;
+pub use write::write_nifti;
+
+use super::Volume;
+use super::slices;
+use super::stream::{StreamSlices, check_length, skip};
+use crate::input::{self, SkipRead};
+use crate::limits::Budget;
+use crate::{Fault, ReadLimits};
+
+/// Reads the (inflated) bytes of a NIfTI file.
+///
+/// # Errors
+/// As [`super::read`], without the path.
+pub fn parse_nifti(bytes: &[u8], limits: &ReadLimits) -> Result<Volume, Fault> {
+    let mut source = single(Box::new(bytes), Some(bytes.len() as u64))?;
+    slices::read(&mut source, &mut Budget::new(limits))
+}
+
+/// Opens `.nii`, or `.hdr` with its `.img`.
+pub(super) fn open(path: &Path) -> Result<StreamSlices<'static>, Fault> {
+    let input = input::open(&header_of(path))?;
+    let (mut source, bound) = (input.source, input.length_bound);
+    let parsed = header::read(&mut source)?;
+    if parsed.is_pair {
+        let image = input::open_by_name(&image_of(path)?)?;
+        return voxels(parsed, 0, Box::new(image.source), image.length_bound);
+    }
+    let consumed = parsed.consumed;
+    voxels(parsed, consumed, Box::new(source), bound)
+}
+
+fn single<'a>(mut source: Box<dyn SkipRead + 'a>, bound: Option<u64>) -> Result<StreamSlices<'a>, Fault> {
+    let parsed = header::read(&mut source)?;
+    if parsed.is_pair {
+        return Err(Fault::Value {
+            what: "the magic",
+            value: "that of a header/image pair".into(),
+            remedy: "name the .hdr file with its .img beside it",
+        });
+    }
+    let consumed = parsed.consumed;
+    voxels(parsed, consumed, source, bound)
+}
+
+/// `source`, of at most `bound` bytes, stands at byte `at`.
+fn voxels(
+    parsed: header::Parsed,
+    at: u64,
+    mut source: Box<dyn SkipRead + '_>,
+    bound: Option<u64>,
+) -> Result<StreamSlices<'_>, Fault> {
+    if let Some(bound) = bound {
+        check_length(&parsed.header, bound.saturating_sub(parsed.voxels_at))?;
+    }
+    skip(&mut *source, parsed.voxels_at - at)?;
+    Ok(StreamSlices::new(
+        parsed.header,
+        parsed.notes,
+        parsed.big_endian,
+        source,
+    ))
+}
+
+/// The file of a pair that has the header.
+fn header_of(path: &Path) -> PathBuf {
+    other_of(path, "img", "hdr").unwrap_or_else(|| path.to_path_buf())
+}
+
+/// The file of a pair that has the voxels.
+fn image_of(path: &Path) -> Result<PathBuf, Fault> {
+    if crate::detect::extension(path) == "img" {
+        return Ok(path.to_path_buf());
+    }
+    other_of(path, "hdr", "img").ok_or_else(|| Fault::Value {
+        what: "the image of the header/image pair",
+        value: "missing".into(),
+        remedy: "the .img or .img.gz file lies beside the .hdr file, under the same name",
+    })
+}
+
+/// `name.to` or `name.to.gz` beside `name.from` or `name.from.gz`, if there.
+fn other_of(path: &Path, from: &str, to: &str) -> Option<PathBuf> {
+    if crate::detect::extension(path) != from {
+        return None;
+    }
+    let plain = if crate::detect::is_gz_name(path) {
+        path.with_extension("")
+    } else {
+        path.to_path_buf()
+    };
+    // Capitals come from systems without small ones; a pair is written by one program, in one case.
+    let is_capital = plain
+        .extension()
+        .is_some_and(|e| e.to_string_lossy().starts_with(char::is_uppercase));
+    let to = if is_capital {
+        to.to_ascii_uppercase()
+    } else {
+        to.to_owned()
+    };
+    let gz = if is_capital { "GZ" } else { "gz" };
+    [
+        plain.with_extension(&to),
+        plain.with_extension(format!("{to}.{gz}")),
+    ]
+    .into_iter()
+    .find(|p| p.is_file())
+}

@@ -1,0 +1,59 @@
+//! From a path to its slices.
+
+use std::path::Path;
+
+use super::part::Part;
+use super::slices::SliceSource;
+use super::{VolumeFormat, VolumeOptions, dicom, metaimage, nifti, nrrd, raw, tiff};
+use crate::detect::{self, Kind};
+use crate::limits::Budget;
+use crate::{Fault, FormatError};
+
+/// Everything that [`super::read`] reads.
+pub(crate) const VOLUMES: &str =
+    "volumes .nii .hdr .nrrd .nhdr .mha .mhd .tif, also .gz, DICOM series, directories of .tif";
+
+/// An open volume: its slices as asked, and what it is as a whole.
+pub(super) struct Opened {
+    pub source: Part<'static>,
+    pub format: VolumeFormat,
+    pub file_dims: [usize; 3],
+}
+
+/// Opens `path` as what its content, then its name tell.
+pub(super) fn open(path: &Path, options: &VolumeOptions, budget: &mut Budget) -> Result<Opened, Fault> {
+    let format = match &options.raw {
+        Some(_) => VolumeFormat::Raw,
+        None => format_of(path)?,
+    };
+    let inner: Box<dyn SliceSource> = match (format, &options.raw) {
+        (VolumeFormat::Raw, Some(layout)) => Box::new(raw::open(path, layout)?),
+        (VolumeFormat::Raw, None) => unreachable!("never told from a file"),
+        (VolumeFormat::Dicom, _) => dicom::open(path, &options.dicom, budget)?,
+        (VolumeFormat::Nifti | VolumeFormat::NiftiPair, _) => Box::new(nifti::open(path)?),
+        (VolumeFormat::Nrrd, _) => nrrd::open(path, budget)?,
+        (VolumeFormat::MetaImage, _) => metaimage::open(path, budget)?,
+        (VolumeFormat::Tiff | VolumeFormat::TiffFolder, _) => tiff::open(path, budget)?,
+    };
+    let file_dims = inner.header().dims;
+    Ok(Opened {
+        source: Part::new(inner, options)?,
+        format,
+        file_dims,
+    })
+}
+
+fn format_of(path: &Path) -> Result<VolumeFormat, Fault> {
+    // What is no file cannot be looked into twice.
+    if path.metadata().is_ok_and(|m| !m.is_file() && !m.is_dir()) {
+        return Ok(VolumeFormat::Nifti);
+    }
+    match detect::detect(path).map_err(|FormatError { fault, .. }| fault)? {
+        Kind::Volume(format) => Ok(format),
+        other => Err(Fault::UnknownKind {
+            found: format!("a {other}"),
+            purpose: "volume",
+            supported: VOLUMES,
+        }),
+    }
+}
