@@ -6,18 +6,23 @@
 //!
 //! Index order is `(x, y, z)` with `z` fastest in memory, everywhere in this crate.
 
+mod banded;
 pub mod basis;
 pub mod csg;
 pub mod cubic;
 mod field;
 pub mod hierarchical;
+pub mod insertion;
 mod interval;
 pub mod knots;
+mod placed_box;
 pub mod polygonize;
 pub mod primitives;
 mod real;
 pub mod restrict;
+pub mod tensor;
 
+pub use banded::BandedRows;
 pub use basis::Basis;
 pub use csg::{Csg, CsgError};
 pub use field::{Aabb, Field, Frame, Jet};
@@ -26,3 +31,4 @@ pub use interval::Interval;
 pub use knots::{KnotError, KnotVector};
 pub use primitives::{Primitive, PrimitiveError};
 pub use real::Real;
+pub use tensor::{TensorError, TensorSpline};

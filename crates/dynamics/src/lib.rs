@@ -1,1 +1,6 @@
-//! Density dynamics of implicit solids: springs, matter, integrators, constraints. Not built yet.
+//! Density dynamics of implicit solids.
+
+pub mod lattice;
+pub mod solve;
+pub mod springs;
+pub mod study;

@@ -1,4 +1,5 @@
-//! Samples in, field out: fits of oriented point clouds ([`points`]) and of voxel grids ([`volume`]).
+//! Samples in, field out: fits of oriented point clouds ([`points`]), of triangle meshes ([`mesh`]) and of voxel
+//! grids ([`volume`]).
 //!
 //! A fit takes plain slices and gives a [`bspline::HierarchicalSpline`] with a [`FitReport`]: residuals of every
 //! leaf, why it was not split, and what was repaired in the input. The caller holds a [`Control`]: progress out,
@@ -8,6 +9,8 @@ mod budget;
 mod components;
 mod error;
 mod lines;
+pub mod mesh;
+pub mod orient;
 pub mod phantoms;
 pub mod points;
 pub mod prefilter;

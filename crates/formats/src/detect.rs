@@ -6,13 +6,15 @@ use std::path::Path;
 
 use crate::input::{self, read_fault};
 use crate::volumes::{self, VolumeFormat};
-use crate::{Fault, FormatError, field};
+use crate::{Fault, FormatError, field, meshes, points};
 
 /// What a file holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Points, for [`crate::points::read`].
+    /// Points, for [`crate::points::read`]; PLY and OBJ may hold faces too, for [`crate::meshes::read`].
     Cloud(PointFormat),
+    /// A mesh, for [`crate::meshes::read`]; [`crate::points::read`] takes its vertices.
+    Mesh(MeshFileFormat),
     /// A volume, for [`crate::volumes::read`].
     Volume(VolumeFormat),
     /// A fitted field, for [`crate::field::load`].
@@ -28,6 +30,21 @@ pub enum PointFormat {
     Xyz,
     /// Wavefront OBJ.
     Obj,
+    /// Point Cloud Library.
+    Pcd,
+}
+
+/// Formats that hold meshes and nothing else.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MeshFileFormat {
+    /// Stereolithography, ascii or binary.
+    Stl,
+    /// glTF 2.0, text or binary.
+    Gltf,
+    /// 3D Manufacturing Format.
+    ThreeMf,
+    /// VRML97.
+    Vrml,
 }
 
 impl fmt::Display for Kind {
@@ -37,23 +54,30 @@ impl fmt::Display for Kind {
             Self::Cloud(PointFormat::Ply) => "point cloud (PLY)",
             Self::Cloud(PointFormat::Xyz) => "point cloud (XYZ)",
             Self::Cloud(PointFormat::Obj) => "point cloud (OBJ)",
+            Self::Cloud(PointFormat::Pcd) => "point cloud (PCD)",
+            Self::Mesh(MeshFileFormat::Stl) => "mesh (STL)",
+            Self::Mesh(MeshFileFormat::ThreeMf) => "mesh (3MF)",
+            Self::Mesh(MeshFileFormat::Vrml) => "mesh (VRML)",
+            Self::Mesh(MeshFileFormat::Gltf) => "mesh (glTF)",
             Self::Field => "field",
         })
     }
 }
 
-pub(crate) const CLOUDS: &str = "point clouds .ply .obj .xyz .xyzn .txt .asc .csv .pts, each also .gz";
-const SUPPORTED: &str = "point clouds .ply .obj .xyz .xyzn .txt .asc .csv .pts and volumes .nii .hdr .nrrd .nhdr .mha \
-                         .mhd .tif, each also .gz, directories of .tif, and fields .iclay; voxels without a header \
-                         need their layout stated";
+pub(crate) const CLOUDS: &str = "point clouds .ply .obj .pcd .xyz .xyzn .txt .asc .csv .pts, each also .gz";
+pub(crate) const MESHES: &str = "meshes .ply .obj .stl .gltf .glb .3mf .wrl, each also .gz";
+const SUPPORTED: &str = "point clouds .ply .obj .pcd .xyz .xyzn .txt .asc .csv .pts, meshes .ply .obj .stl .gltf .glb .3mf .wrl \
+                         and volumes .nii .hdr .nrrd .nhdr .mha .mhd .tif, each also .gz, DICOM series, directories of \
+                         .tif, and fields .iclay; voxels without a header need their layout stated";
 
 /// Bytes that are enough to know every content that can be known.
 const LOOK: usize = 400;
 
-/// Tells what `path` holds, inflating gzip as needed. Reads a few hundred bytes.
+/// Tells what `path` holds, inflating gzip as needed. Reads a few hundred bytes, of a
+/// directory those of its files until one is DICOM.
 ///
 /// # Errors
-/// [`Fault::UnknownKind`] with what is supported; [`Fault::Empty`]; [`Fault::Directory`]; I/O.
+/// [`Fault::UnknownKind`] with what is supported; [`Fault::Empty`]; I/O.
 pub fn detect(path: &Path) -> Result<Kind, FormatError> {
     let look = || {
         if path.is_dir() {
@@ -72,10 +96,17 @@ pub fn detect(path: &Path) -> Result<Kind, FormatError> {
 
 /// What a directory holds, seen by the files in it.
 fn kind_of_directory(path: &Path) -> Result<Kind, Fault> {
+    if volumes::holds_dicom(path)? {
+        return Ok(Kind::Volume(VolumeFormat::Dicom));
+    }
     if volumes::is_stack_folder(path)? {
         return Ok(Kind::Volume(VolumeFormat::TiffFolder));
     }
-    Err(Fault::Directory)
+    Err(Fault::UnknownKind {
+        found: "a directory without DICOM or TIFF files".into(),
+        purpose: "input",
+        supported: SUPPORTED,
+    })
 }
 
 /// Kind of a content that starts with `head`, in a file called `path`.
@@ -85,6 +116,9 @@ pub(crate) fn kind_of(head: &[u8], path: &Path) -> Result<Kind, Fault> {
     }
     if head.starts_with(b"ply\n") || head.starts_with(b"ply\r") || head.starts_with(b"ply ") {
         return Ok(Kind::Cloud(PointFormat::Ply));
+    }
+    if points::looks_like_pcd(head) {
+        return Ok(Kind::Cloud(PointFormat::Pcd));
     }
     if head.starts_with(&field::MAGIC) {
         return Ok(Kind::Field);
@@ -101,16 +135,36 @@ pub(crate) fn kind_of(head: &[u8], path: &Path) -> Result<Kind, Fault> {
     if volumes::looks_like_tiff(head) {
         return Ok(Kind::Volume(VolumeFormat::Tiff));
     }
+    if meshes::looks_like_gltf(head) {
+        return Ok(Kind::Mesh(MeshFileFormat::Gltf));
+    }
+    if meshes::looks_like_3mf(head) {
+        return Ok(Kind::Mesh(MeshFileFormat::ThreeMf));
+    }
+    if meshes::looks_like_vrml(head) {
+        return Ok(Kind::Mesh(MeshFileFormat::Vrml));
+    }
+    if head.starts_with(b"solid") && memchr::memmem::find(head, b"facet").is_some() {
+        return Ok(Kind::Mesh(MeshFileFormat::Stl));
+    }
+    if volumes::looks_like_dicom(head) {
+        return Ok(Kind::Volume(VolumeFormat::Dicom));
+    }
     let extension = extension(path);
     match extension.as_str() {
         "ply" => Ok(Kind::Cloud(PointFormat::Ply)),
         "xyz" | "xyzn" | "txt" | "asc" | "csv" | "pts" => Ok(Kind::Cloud(PointFormat::Xyz)),
+        "pcd" => Ok(Kind::Cloud(PointFormat::Pcd)),
         "obj" => Ok(Kind::Cloud(PointFormat::Obj)),
         "nii" => Ok(Kind::Volume(VolumeFormat::Nifti)),
         "nrrd" | "nhdr" => Ok(Kind::Volume(VolumeFormat::Nrrd)),
         "mha" | "mhd" => Ok(Kind::Volume(VolumeFormat::MetaImage)),
         "tif" | "tiff" => Ok(Kind::Volume(VolumeFormat::Tiff)),
         "hdr" | "img" => Ok(Kind::Volume(VolumeFormat::NiftiPair)),
+        "gltf" | "glb" => Ok(Kind::Mesh(MeshFileFormat::Gltf)),
+        "3mf" => Ok(Kind::Mesh(MeshFileFormat::ThreeMf)),
+        "wrl" | "wrz" => Ok(Kind::Mesh(MeshFileFormat::Vrml)),
+        "stl" => Ok(Kind::Mesh(MeshFileFormat::Stl)),
         "iclay" => Ok(Kind::Field),
         "" => Err(Fault::UnknownKind {
             found: "a name without an extension".into(),

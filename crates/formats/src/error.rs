@@ -91,6 +91,14 @@ pub enum Fault {
         /// Ceiling given by the caller.
         limit: u64,
     },
+    /// One of several files is at fault.
+    #[error("in {file}: {fault}")]
+    Inside {
+        /// Its name, below the path that was asked for.
+        file: String,
+        /// What is wrong with it.
+        fault: Box<Fault>,
+    },
     /// The output has no room for what is to be written.
     #[error("cannot hold {what} of {value}; {remedy}")]
     Output {
@@ -130,6 +138,17 @@ impl Fault {
         FormatError {
             path: path.to_path_buf(),
             fault: self,
+        }
+    }
+
+    /// Adds the name of one of several files. A limit stays as it is: it is a matter of them all.
+    pub(crate) fn inside(self, file: &str) -> Self {
+        match self {
+            Self::Limit { .. } | Self::Inside { .. } => self,
+            fault => Self::Inside {
+                file: file.into(),
+                fault: Box::new(fault),
+            },
         }
     }
 

@@ -4,7 +4,7 @@
 //! | what | read | written |
 //! | --- | --- | --- |
 //! | points | PLY (ascii, binary of both endians), XYZ, OBJ; each also gzipped | PLY with colours |
-//! | volumes | NIfTI-1 and -2, NRRD, MetaImage, TIFF stacks, raw voxels; gzipped or not | NIfTI-1, NRRD, MetaImage, VTK ImageData |
+//! | volumes | NIfTI-1 and -2, NRRD, MetaImage, TIFF stacks, raw voxels, each also gzipped; DICOM series | NIfTI-1, NRRD, MetaImage, VTK ImageData |
 //! | meshes | | PLY, STL, OBJ |
 //! | fields | the native file, `docs/format.md` | the same |
 //!
@@ -31,14 +31,18 @@ pub mod atomic;
 mod detect;
 mod error;
 pub mod field;
+mod foreign;
 mod input;
 mod limits;
 pub mod meshes;
 pub mod points;
+mod polygon;
+mod raw;
+mod text;
 mod unit;
 pub mod volumes;
 
-pub use detect::{Kind, PointFormat, detect};
+pub use detect::{Kind, MeshFileFormat, PointFormat, detect};
 pub use error::{Fault, FormatError};
 pub use limits::ReadLimits;
 pub use unit::Unit;

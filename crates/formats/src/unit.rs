@@ -1,6 +1,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use crate::Fault;
+
 /// Unit of length of a file's coordinates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[repr(u8)]
@@ -41,6 +43,18 @@ impl Unit {
         ]
         .into_iter()
         .find(|u| *u as u8 == code)
+    }
+
+    /// Factor to millimetres of `what`, whose file was in `found`, once the user stated this unit.
+    pub(crate) fn scale_for(self, what: &str, found: Self) -> Result<f64, Fault> {
+        match (found, self.in_mm()) {
+            (Self::Unknown, Some(scale)) => Ok(scale),
+            _ => Err(Fault::Value {
+                what: "the unit",
+                value: format!("stated as {self} for a {what} in {found}"),
+                remedy: "state um, mm, cm or m, once, for a file that names no unit",
+            }),
+        }
     }
 
     /// Symbol: `mm`, `cm`, `m`, `um`, or `file unit`.

@@ -4,7 +4,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use formats::{Fault, Kind, PointFormat, ReadLimits, detect, field, points, volumes};
+use formats::{Fault, Kind, PointFormat, ReadLimits, detect, field, meshes, points, volumes};
 
 /// Far above any fixture, far below what a forged count could ask for.
 const LIMITS: ReadLimits = ReadLimits { max_bytes: 8 << 20 };
@@ -26,6 +26,7 @@ fn read(path: &Path) -> Result<(), formats::FormatError> {
     match detect(path)? {
         Kind::Cloud(_) => points::read(path, &LIMITS).map(drop),
         Kind::Volume(_) => volumes::read(path, &Default::default(), &LIMITS).map(drop),
+        Kind::Mesh(_) => meshes::read(path, &LIMITS).map(drop),
         Kind::Field => field::load(path, &LIMITS).map(drop),
     }
 }
@@ -231,7 +232,7 @@ fn a_directory_an_empty_file_no_file_and_a_strange_name_are_named() {
     let folder = scratch.directory.path().join("scan.ply");
     std::fs::create_dir(&folder).unwrap();
     for (path, part) in [
-        (folder, "scan.ply: is a directory"),
+        (folder, "scan.ply: a directory without DICOM or TIFF files is not"),
         (scratch.file("none.ply", b""), "none.ply: is empty"),
         (scratch.file("none.nii.gz", &gzip(b"")), "is empty"),
         (

@@ -13,6 +13,7 @@ use super::field::OpenField;
 use super::input::{self, Input, writing};
 use super::sample::voxel_frame;
 use super::summary::Summary;
+use super::volume_choice::VolumeChoice;
 use super::{interrupt, set_threads};
 use crate::check::{
     ErrorStatistics, LeafAudit, LeafIndex, audit_leaves, project_points, viridis, voxel_residuals,
@@ -35,6 +36,8 @@ pub struct Args {
     /// Print one JSON object instead of a table
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    volume: VolumeChoice,
 }
 
 /// Samples with their errors, and what their leaves make of them.
@@ -67,7 +70,7 @@ pub fn run(args: &Args) -> Outcome {
     let open = OpenField::load(&args.field)?;
     let leaves = &open.report().leaves;
     let index = LeafIndex::new(open.lattice(), leaves);
-    let measured = match input::read(&args.input, None)? {
+    let measured = match input::read(&args.input, &args.volume.options(None)?, None)? {
         Input::Cloud(cloud) => measure_cloud(&open, &index, &cloud),
         Input::Volume(volume) => measure_volume(&open, &index, &volume),
     };

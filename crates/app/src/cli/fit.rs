@@ -17,6 +17,7 @@ use super::input::{self, Input, check_output, remaining};
 use super::progress::Bar;
 use super::quantity::{Memory, Tolerance, human_bytes, positive};
 use super::summary::Summary;
+use super::volume_choice::VolumeChoice;
 use super::{interrupt, set_threads};
 
 /// Arguments of `isoclay fit`.
@@ -38,6 +39,8 @@ pub struct Args {
     /// Print one JSON object instead of a table
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    volume: VolumeChoice,
 }
 
 /// What the user may choose of a fit; the rest is chosen from the data.
@@ -117,7 +120,7 @@ pub fn run(args: &Args) -> Outcome {
     interrupt::cancel_on_interrupt(&cancel)?;
     let bar = Bar::new();
     bar.show("reading", 0.0);
-    let input = input::read(&args.input, args.memory)?;
+    let input = input::read(&args.input, &args.volume.options(args.choice.unit)?, args.memory)?;
     interrupt::check(&cancel)?;
     let shown = bar.clone();
     let mut control = Control {

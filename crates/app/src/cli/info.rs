@@ -1,25 +1,34 @@
 use std::io::{self, Write};
 use std::path::PathBuf;
 
+use formats::Kind;
 use formats::points::{NormalSource, PointCloud};
 use formats::volumes::{VolumeHeader, VolumeOptions};
-use formats::{Kind, ReadLimits};
 use serde_json::{Map, Value, json};
 
 use super::failure::{OrFail, Outcome};
 use super::field::OpenField;
-use super::input::{bounding_box, limits, reading};
-use super::quantity::{human_bytes, human_count, human_number};
+use super::input::{self, bounding_box, limits, reading};
+use super::quantity::{Memory, human_bytes, human_count, human_number};
 use super::summary::table;
+use super::volume_choice::VolumeChoice;
 
 /// Arguments of `isoclay info`.
 #[derive(clap::Args)]
 pub struct Args {
     /// Cloud, volume or field
     file: PathBuf,
+    /// Of a volume only what its header tells, without a look at the voxels
+    #[arg(long)]
+    header: bool,
+    /// Memory that the process may hold, such as 2GiB
+    #[arg(long, value_name = "SIZE")]
+    memory: Option<Memory>,
     /// Print one JSON object instead of a table
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    volume: VolumeChoice,
 }
 
 /// One line of the table and one entry of the object.
@@ -45,20 +54,14 @@ fn count(key: &'static str, label: &'static str, n: usize) -> Entry {
 
 /// Describes a file.
 pub fn run(args: &Args) -> Outcome {
-    let kind = formats::detect(&args.file).map_err(reading)?;
+    let part = args.volume.options(None)?;
+    let kind = input::kind(&args.file, &part)?;
     let (entries, notes) = match kind {
-        Kind::Cloud(_) => {
-            let cloud = formats::points::read(&args.file, &limits(None)).map_err(reading)?;
+        Kind::Cloud(_) | Kind::Mesh(_) => {
+            let cloud = formats::points::read(&args.file, &limits(args.memory)).map_err(reading)?;
             (of_cloud(&cloud), cloud.notes)
         }
-        Kind::Volume(_) => {
-            let volume =
-                formats::volumes::read(&args.file, &VolumeOptions::default(), &ReadLimits::default())
-                    .map_err(reading)?;
-            let mut entries = of_header(&volume.header);
-            entries.extend(of_values(&volume.values));
-            (entries, volume.notes)
-        }
+        Kind::Volume(_) => of_volume(args, &part)?,
         Kind::Field => {
             let open = OpenField::load(&args.file)?;
             (of_field(&open), open.report().notes.clone())
@@ -162,19 +165,43 @@ fn of_header(h: &VolumeHeader) -> Vec<Entry> {
     ]
 }
 
-fn of_values(values: &[f32]) -> Vec<Entry> {
-    let mut sorted = values.to_vec();
-    let mut rank = |share: f64| {
-        let k = ((share * sorted.len() as f64).ceil() as usize).clamp(1, sorted.len()) - 1;
-        f64::from(*sorted.select_nth_unstable_by(k, f32::total_cmp).1)
-    };
-    let ranks = [0.0, 0.01, 0.5, 0.99, 1.0].map(&mut rank);
-    vec![entry(
-        "percentiles",
-        "min, 1 %, 50 %, 99 %, max",
-        ranks.map(human_number).join(", "),
-        json!(ranks),
-    )]
+/// The header, then the values in one pass that holds a slice at a time.
+fn of_volume(args: &Args, part: &VolumeOptions) -> Outcome<(Vec<Entry>, Vec<String>)> {
+    let preview = formats::volumes::peek(&args.file, part).map_err(reading)?;
+    let mut entries = of_header(&preview.header);
+    if preview.file_dims != preview.header.dims {
+        entries.insert(
+            0,
+            entry(
+                "file_dims",
+                "voxels in the file",
+                preview.file_dims.map(|n| n.to_string()).join(" × "),
+                json!(preview.file_dims),
+            ),
+        );
+    }
+    entries.push(entry(
+        "read_bytes",
+        "memory to read it",
+        human_bytes(preview.read_bytes),
+        preview.read_bytes,
+    ));
+    if !args.header {
+        let range = formats::volumes::range(&args.file, part, &limits(args.memory)).map_err(reading)?;
+        let ends = [range.min, range.max].map(f64::from);
+        entries.push(entry(
+            "range",
+            "smallest, largest value",
+            ends.map(human_number).join(", "),
+            json!(ends),
+        ));
+        entries.push(count(
+            "not_finite",
+            "voxels NaN or infinite",
+            range.replaced_count,
+        ));
+    }
+    Ok((entries, preview.notes))
 }
 
 fn of_field(open: &OpenField) -> Vec<Entry> {

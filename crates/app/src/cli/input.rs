@@ -2,7 +2,7 @@ use std::path::Path;
 
 use bspline::Aabb;
 use formats::points::PointCloud;
-use formats::volumes::{Volume, VolumeOptions};
+use formats::volumes::{Volume, VolumeFormat, VolumeOptions};
 use formats::{Fault, FormatError, Kind, ReadLimits};
 use glam::DVec3;
 
@@ -18,14 +18,14 @@ pub enum Input {
     Volume(Volume),
 }
 
-/// Reads a cloud or a volume, holding no more than `memory` in the whole process.
-pub fn read(path: &Path, memory: Option<Memory>) -> Outcome<Input> {
+/// Reads a cloud or a volume, of a volume what `part` asks for, holding no more than `memory` in the whole process.
+pub fn read(path: &Path, part: &VolumeOptions, memory: Option<Memory>) -> Outcome<Input> {
     let limits = limits(memory);
-    match formats::detect(path).map_err(reading)? {
-        Kind::Cloud(_) => formats::points::read(path, &limits)
+    match kind(path, part)? {
+        Kind::Cloud(_) | Kind::Mesh(_) => formats::points::read(path, &limits)
             .map_err(reading)
             .map(Input::Cloud),
-        Kind::Volume(_) => formats::volumes::read(path, &VolumeOptions::default(), &limits)
+        Kind::Volume(_) => formats::volumes::read(path, part, &limits)
             .map_err(reading)
             .map(Input::Volume),
         Kind::Field => Err(Failure::input(format!(
@@ -33,6 +33,21 @@ pub fn read(path: &Path, memory: Option<Memory>) -> Outcome<Input> {
             path.display()
         ))),
     }
+}
+
+/// What a file is: without a header that is the user's word.
+pub fn kind(path: &Path, part: &VolumeOptions) -> Outcome<Kind> {
+    if part.raw.is_some() {
+        return Ok(Kind::Volume(VolumeFormat::Raw));
+    }
+    let kind = formats::detect(path).map_err(reading)?;
+    if !matches!(kind, Kind::Volume(_)) && *part != VolumeOptions::default() {
+        return Err(Failure::usage(format!(
+            "{}: is a {kind}, and options under «Reading volumes» are for volumes; leave them out",
+            path.display()
+        )));
+    }
+    Ok(kind)
 }
 
 /// What reading may hold: the ceiling of the user less what the process holds already.

@@ -86,6 +86,7 @@ pub fn run(args: &Args) -> Outcome {
         vertices: &mesh.positions,
         triangles: &mesh.triangles,
         colors: None,
+        unit: open.unit(),
     };
     notes.extend(formats::meshes::save(&args.output, &written).map_err(writing)?);
     bar.clear();

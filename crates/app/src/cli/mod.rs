@@ -19,6 +19,7 @@ mod progress;
 mod quantity;
 mod sample;
 mod summary;
+mod volume_choice;
 
 use std::num::NonZeroUsize;
 use std::process::ExitCode;

@@ -23,7 +23,7 @@ impl<T: Real> HierarchicalSpline<T> {
         let mut last = None;
         let mut keyed: Vec<(u64, u32)> = Vec::with_capacity(points.len());
         for (i, p) in points.iter().enumerate() {
-            let at = self.place_after(last.as_ref(), self.clamp(*p).0);
+            let at = self.place_after(last.as_ref(), self.place.clamp(*p).0);
             let brick = (at.level as u64) << 32 | u64::from(at.index);
             let cell = (at.cell[0] * BRICK + at.cell[1]) * BRICK + at.cell[2];
             keyed.push((brick << (3 * BRICK.ilog2()) | cell as u64, i as u32));
@@ -43,10 +43,12 @@ pub(super) fn values_gradients<T: Real>(
     assert_eq!(points.len(), out.len(), "one output slot per point");
     let mut last = None;
     for (p, o) in points.iter().zip(out) {
-        let (q, beyond) = f.clamp(*p);
+        let (q, beyond) = f.place.clamp(*p);
         let at = f.place_after(last.as_ref(), q);
         let (v, g) = kernel::value_gradient(&at.brick.totals, at.cell, at.t);
-        *o = f.extend_outside((v.as_f64(), f.world_gradient(at.level, g)), q, beyond);
+        *o = f
+            .place
+            .extend((v.as_f64(), f.world_gradient(at.level, g)), q, beyond);
         last = Some(at);
     }
 }

@@ -53,7 +53,7 @@ pub(super) fn over_lattice_box<T: Real>(
         max: b.max.clamp(DVec3::ZERO, extent),
     };
     let (snapped, moved) = onto_knots(spline, &inside);
-    let fall = fall(spline, b, &inside);
+    let fall = spline.place.fall(b, &inside);
     let mut hull = Hull {
         lo: f64::INFINITY,
         hi: f64::NEG_INFINITY,
@@ -200,28 +200,4 @@ fn read_range<T: Real>(brick: &Brick<T>, within: &[[f64; 2]; 3]) -> [f64; 2] {
         }
     }
     [lo.as_f64(), hi.as_f64()]
-}
-
-/// Interval of the fall `g·|x - clamp x|` over the box.
-fn fall<T: Real>(spline: &HierarchicalSpline<T>, b: &Aabb, inside: &Aabb) -> Interval {
-    let most = (inside.min - b.min).max(b.max - inside.max).max(DVec3::ZERO);
-    if most == DVec3::ZERO {
-        return Interval::point(0.0);
-    }
-    // Least distance beyond the box on each axis: only where the whole interval lies outside.
-    let extent = spline.lattice().extent();
-    let least = (b.min - extent).max(-b.max).max(DVec3::ZERO);
-    let m = spline.lattice().world_from_lattice.matrix3;
-    let columns = [m.x_axis, m.y_axis, m.z_axis];
-    let tilt = columns[0].dot(columns[1]).abs()
-        + columns[1].dot(columns[2]).abs()
-        + columns[0].dot(columns[2]).abs();
-    let lengths = DVec3::from_array(columns.map(|c| c.length()));
-    let (lo, hi) = if tilt <= 1e-12 * lengths.length_squared() {
-        ((least * lengths).length(), (most * lengths).length())
-    } else {
-        (0.0, (most * lengths).element_sum())
-    };
-    let slack = 1e-12 * hi;
-    Interval::new((lo - slack).max(0.0), hi + slack) * Interval::point(spline.slope())
 }

@@ -11,7 +11,7 @@ use crate::Real;
 /// Bricks of every level, in key order, with totals and children.
 pub(crate) fn build_levels<T: Real>(
     lattice: &Lattice,
-    corrections: &[LevelCorrections<T>],
+    corrections: &[Arc<LevelCorrections<T>>],
 ) -> Vec<Vec<Brick<T>>> {
     let keys = needed_keys(lattice, corrections);
     let mut levels: Vec<Vec<Brick<T>>> = Vec::with_capacity(keys.len());
@@ -22,13 +22,10 @@ pub(crate) fn build_levels<T: Real>(
             .map(|p| p.iter().enumerate().map(|(i, b)| (b.key, i as u32)).collect())
             .unwrap_or_default();
         let make = |key: &BrickKey| {
-            let mut totals = Arc::new([T::zero(); HALO_LEN]);
-            let slots = Arc::get_mut(&mut totals).expect("just made");
-            if let Some(parents) = parents.as_deref() {
-                let parent = &parents[parent_index[&key.parent()] as usize];
-                prolong(&parent.totals, key.octant(), slots);
-            }
-            add_corrections(&corrections[level], *key, slots);
+            let parent = parents
+                .as_deref()
+                .map(|parents| &*parents[parent_index[&key.parent()] as usize].totals);
+            let totals = brick_totals(parent, &corrections[level], *key);
             let hull = min_max(totals.as_slice());
             Brick {
                 key: *key,
@@ -51,8 +48,23 @@ pub(crate) fn build_levels<T: Real>(
     levels
 }
 
+/// `C_ℓ` = prolonged `C_{ℓ-1}` + corrections of one brick.
+pub(super) fn brick_totals<T: Real>(
+    parent: Option<&[T; HALO_LEN]>,
+    corrections: &LevelCorrections<T>,
+    key: BrickKey,
+) -> Arc<[T; HALO_LEN]> {
+    let mut totals = Arc::new([T::zero(); HALO_LEN]);
+    let slots = Arc::get_mut(&mut totals).expect("just made");
+    if let Some(parent) = parent {
+        prolong(parent, key.octant(), slots);
+    }
+    add_corrections(corrections, key, slots);
+    totals
+}
+
 /// Least and largest value.
-fn min_max<T: Real>(values: &[T]) -> [T; 2] {
+pub(super) fn min_max<T: Real>(values: &[T]) -> [T; 2] {
     // Comparisons as written here turn into vector instructions; `Float::min` does not.
     values
         .iter()
@@ -66,26 +78,31 @@ fn gather_hulls<T: Real>(levels: &mut [Vec<Brick<T>>]) {
     for level in (1..levels.len()).rev() {
         let (coarser, finer) = levels.split_at_mut(level);
         for brick in coarser[level - 1].iter_mut().filter(|b| b.has_children()) {
-            if brick.children.iter().all(|&c| c != NONE) {
-                brick.hull = [T::infinity(), T::neg_infinity()];
-            }
-            for &child in brick.children.iter().filter(|&&c| c != NONE) {
-                let below = finer[0][child as usize].hull;
-                brick.hull = [brick.hull[0].min(below[0]), brick.hull[1].max(below[1])];
-            }
+            brick.hull = gathered_hull(brick, brick.hull, &finer[0]);
         }
     }
 }
 
+/// Hull of a brick whose own coefficients lie in `own` and whose children are among `finer`.
+pub(super) fn gathered_hull<T: Real>(brick: &Brick<T>, own: [T; 2], finer: &[Brick<T>]) -> [T; 2] {
+    let nothing = [T::infinity(), T::neg_infinity()];
+    let is_covered = brick.children.iter().all(|&c| c != NONE);
+    let children = brick.children.iter().filter(|&&c| c != NONE);
+    children.fold(if is_covered { nothing } else { own }, |hull, &child| {
+        let below = finer[child as usize].hull;
+        [hull[0].min(below[0]), hull[1].max(below[1])]
+    })
+}
+
 /// Level 0 whole; on finer levels every brick that the support of an active function touches, and the
 /// parents of all bricks below.
-fn needed_keys<T: Real>(lattice: &Lattice, corrections: &[LevelCorrections<T>]) -> Vec<Vec<BrickKey>> {
+fn needed_keys<T: Real>(lattice: &Lattice, corrections: &[Arc<LevelCorrections<T>>]) -> Vec<Vec<BrickKey>> {
     let brick_counts = |level| lattice.cells_at(level).map(|n| n.div_ceil(BRICK as u32));
     let mut keys: Vec<Vec<BrickKey>> = vec![Vec::new(); corrections.len()];
     for level in (1..corrections.len()).rev() {
         let limit = brick_counts(level);
         let mut needed: Vec<BrickKey> = Vec::new();
-        for (key, active) in &corrections[level] {
+        for (key, active) in corrections[level].as_ref() {
             for octant in 0..8usize {
                 let back = [octant >> 2, octant >> 1 & 1, octant & 1];
                 if (0..3).all(|a| key.0[a] as usize >= back[a]) && active.reaches(back) {

@@ -8,31 +8,23 @@ use crate::{Aabb, Field, Frame, Interval, Jet, Real};
 
 impl<T: Real> Field for HierarchicalSpline<T> {
     fn value(&self, p: DVec3) -> f64 {
-        let (q, beyond) = self.clamp(p);
+        let (q, beyond) = self.place.clamp(p);
         let at = self.place(q);
         kernel::value(&at.brick.totals, at.cell, at.t).as_f64() - self.slope() * beyond.length()
     }
 
     fn value_gradient(&self, p: DVec3) -> (f64, DVec3) {
-        let (q, beyond) = self.clamp(p);
+        let (q, beyond) = self.place.clamp(p);
         let at = self.place(q);
         let (v, g) = kernel::value_gradient(&at.brick.totals, at.cell, at.t);
-        self.extend_outside((v.as_f64(), self.world_gradient(at.level, g)), q, beyond)
+        self.place
+            .extend((v.as_f64(), self.world_gradient(at.level, g)), q, beyond)
     }
 
-    /// Inside the box; outside, the Hessian of the extension along the box's faces is left out and 0 is
-    /// returned for it.
     fn jet(&self, p: DVec3) -> Jet {
-        let (value, gradient) = self.value_gradient(p);
-        let (q, beyond) = self.clamp(p);
-        if beyond != DVec3::ZERO {
-            return Jet {
-                value,
-                gradient,
-                hessian: DMat3::ZERO,
-            };
-        }
+        let (q, beyond) = self.place.clamp(p);
         let at = self.place(q);
+        let (value, gradient) = kernel::value_gradient(&at.brick.totals, at.cell, at.t);
         let s = kernel::second(&at.brick.totals, at.cell, at.t).map(T::as_f64);
         let h = DMat3::from_cols(
             DVec3::new(s[0], s[3], s[4]),
@@ -40,11 +32,12 @@ impl<T: Real> Field for HierarchicalSpline<T> {
             DVec3::new(s[4], s[5], s[2]),
         );
         let m = self.lattice_from_world().matrix3 * (1u64 << at.level) as f64;
-        Jet {
-            value,
-            gradient,
+        let inside = Jet {
+            value: value.as_f64(),
+            gradient: self.world_gradient(at.level, gradient),
             hessian: m.transpose() * h * m,
-        }
+        };
+        self.place.extend_jet(inside, q, beyond)
     }
 
     fn bounds(&self, b: &Aabb) -> Interval {
@@ -60,10 +53,10 @@ impl<T: Real> Field for HierarchicalSpline<T> {
     }
 
     fn frame_bounds(&self, frame: &Frame, lo: [i64; 3], hi: [i64; 3]) -> Interval {
-        bounds::over_lattice_box(self, &grid::lattice_box(self, frame, lo, hi), None)
+        bounds::over_lattice_box(self, &self.place.frame_box(frame, lo, hi), None)
     }
 
     fn frame_bounds_about(&self, frame: &Frame, lo: [i64; 3], hi: [i64; 3], level: f64) -> Interval {
-        bounds::over_lattice_box(self, &grid::lattice_box(self, frame, lo, hi), Some(level))
+        bounds::over_lattice_box(self, &self.place.frame_box(frame, lo, hi), Some(level))
     }
 }

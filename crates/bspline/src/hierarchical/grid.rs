@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::brick::{BRICK, Brick, HALO, HALO_LEN, NONE};
 use super::spline::HierarchicalSpline;
 use crate::field::values_node_by_node;
-use crate::{Aabb, Frame, Real, cubic};
+use crate::{Frame, Real, cubic};
 
 /// [`crate::Field::frame_values`]. Frames that are turned against the lattice fall back to single points.
 pub(super) fn frame_values<T: Real>(
@@ -51,43 +51,13 @@ struct Axis {
     leaves_box: bool,
 }
 
-/// Lattice coordinates of node `i` are `start + step·i`, axis by axis, if the frame lies along the lattice.
-fn alignment<T: Real>(spline: &HierarchicalSpline<T>, frame: &Frame) -> Option<(DVec3, DVec3)> {
-    let map = *spline.lattice_from_world() * frame.world_from_grid;
-    let m = map.matrix3;
-    let step = DVec3::new(m.x_axis.x, m.y_axis.y, m.z_axis.z);
-    let turned = [
-        m.x_axis.y, m.x_axis.z, m.y_axis.x, m.y_axis.z, m.z_axis.x, m.z_axis.y,
-    ];
-    let aligned = step.min_element() > 0.0 && turned.iter().all(|x| x.abs() <= 1e-12 * step.min_element());
-    aligned.then_some((map.translation, step))
-}
-
-/// The cells from node `lo` to node `hi` in lattice coordinates; for an aligned frame without any slack, with
-/// the very coordinates that the nodes are evaluated at.
-pub(super) fn lattice_box<T: Real>(
-    spline: &HierarchicalSpline<T>,
-    frame: &Frame,
-    lo: [i64; 3],
-    hi: [i64; 3],
-) -> Aabb {
-    let v = |a: [i64; 3]| DVec3::new(a[0] as f64, a[1] as f64, a[2] as f64);
-    match alignment(spline, frame) {
-        Some((start, step)) => Aabb {
-            min: start + step * v(lo),
-            max: start + step * v(hi),
-        },
-        None => frame.world_box(lo, hi).transformed(spline.lattice_from_world()),
-    }
-}
-
 fn aligned_axes<T: Real>(
     spline: &HierarchicalSpline<T>,
     frame: &Frame,
     lo: [i64; 3],
     count: [usize; 3],
 ) -> Option<[Axis; 3]> {
-    let (start, step) = alignment(spline, frame)?;
+    let (start, step) = spline.place.alignment(frame)?;
     let finest = spline.level_count() - 1;
     let limit = spline.lattice().cells_at(finest);
     let extent = spline.lattice().extent();

@@ -1,10 +1,13 @@
-use glam::{DAffine3, DMat3, DVec3};
+use std::sync::Arc;
+
+use glam::{DAffine3, DVec3};
 use sha2::{Digest, Sha256};
 
 use super::brick::{BRICK, Brick, HALO_LEN, NONE};
 use super::build::build_levels;
-use super::{Lattice, LevelCorrections};
+use super::{BrickKey, Lattice, LevelCorrections};
 use crate::Real;
+use crate::placed_box::PlacedBox;
 
 /// A field of dyadic cubic B-splines, C² everywhere inside its box.
 ///
@@ -14,10 +17,9 @@ use crate::Real;
 /// [slope](Self::slope)).
 #[derive(Clone, Debug)]
 pub struct HierarchicalSpline<T> {
-    lattice: Lattice,
-    lattice_from_world: DAffine3,
-    slope: f64,
-    corrections: Vec<LevelCorrections<T>>,
+    pub(super) lattice: Lattice,
+    pub(super) place: PlacedBox,
+    pub(super) corrections: Vec<Arc<LevelCorrections<T>>>,
     pub(super) levels: Vec<Vec<Brick<T>>>,
 }
 
@@ -49,17 +51,26 @@ impl<T: Real> HierarchicalSpline<T> {
             lattice_from_world.is_finite(),
             "the map from lattice to world can be inverted"
         );
+        let levels: Vec<_> = levels.into_iter().map(Arc::new).collect();
         let bricks = build_levels(&lattice, &levels);
         Self {
             lattice,
-            lattice_from_world,
-            slope,
+            place: PlacedBox {
+                min: DVec3::ZERO,
+                max: lattice.extent(),
+                world_from_local: lattice.world_from_lattice,
+                local_from_world: lattice_from_world,
+                slope,
+            },
             corrections: levels,
             levels: bricks,
         }
     }
 
     /// Bricks of `level` that hold active functions, in key order.
+    ///
+    /// # Panics
+    /// If there is no such level.
     pub fn corrections(&self, level: usize) -> &LevelCorrections<T> {
         &self.corrections[level]
     }
@@ -71,12 +82,12 @@ impl<T: Real> HierarchicalSpline<T> {
 
     /// World to lattice coordinates.
     pub fn lattice_from_world(&self) -> &DAffine3 {
-        &self.lattice_from_world
+        &self.place.local_from_world
     }
 
     /// Fall of the field per world length outside the box, `> 0`.
     pub fn slope(&self) -> f64 {
-        self.slope
+        self.place.slope
     }
 
     /// Number of levels, at least 1.
@@ -115,12 +126,12 @@ impl<T: Real> HierarchicalSpline<T> {
         for x in self.lattice.world_from_lattice.to_cols_array() {
             hash.update(x.to_le_bytes());
         }
-        hash.update(self.slope.to_le_bytes());
+        hash.update(self.place.slope.to_le_bytes());
         hash.update((self.corrections.len() as u32).to_le_bytes());
         let mut bytes = Vec::new();
         for level in &self.corrections {
             hash.update((level.len() as u32).to_le_bytes());
-            for (key, c) in level {
+            for (key, c) in level.as_ref() {
                 bytes.clear();
                 key.0.iter().for_each(|k| bytes.extend(k.to_le_bytes()));
                 c.mask.iter().for_each(|m| bytes.extend(m.to_le_bytes()));
@@ -143,6 +154,11 @@ impl<T: Real> HierarchicalSpline<T> {
             .map(|b| b.hull[0].as_f64().abs().max(b.hull[1].as_f64().abs()))
             .fold(0.0, f64::max);
         64.0 * T::UNIT_ROUND_OFF * largest
+    }
+
+    /// Index of brick `key` of `level`, if there is one.
+    pub(super) fn find(&self, level: usize, key: BrickKey) -> Option<u32> {
+        find(&self.lattice, &self.levels, level, key)
     }
 
     /// Where lattice point `q`, inside the box, is evaluated: in the finest brick that covers it.
@@ -201,44 +217,36 @@ impl<T: Real> HierarchicalSpline<T> {
         (finest, index)
     }
 
-    /// Lattice coordinates of `p`, clamped to the box, and the clamped-off part in world units.
-    #[inline]
-    pub(super) fn clamp(&self, p: DVec3) -> (DVec3, DVec3) {
-        let q = self.lattice_from_world.transform_point3(p);
-        let inside = q.clamp(DVec3::ZERO, self.lattice.extent());
-        (
-            inside,
-            self.lattice.world_from_lattice.transform_vector3(q - inside),
-        )
-    }
-
     /// Gradient by cell coordinates of `level` to gradient by world coordinates.
     #[inline]
     pub(super) fn world_gradient(&self, level: usize, g: [T; 3]) -> DVec3 {
         let scale = (1u64 << level) as f64;
         let g = DVec3::new(g[0].as_f64(), g[1].as_f64(), g[2].as_f64()) * scale;
-        self.lattice_from_world.matrix3.transpose() * g
+        self.place.local_from_world.matrix3.transpose() * g
     }
+}
 
-    /// Adds the linear fall outside the box to what was found at the clamped point.
-    #[inline]
-    pub(super) fn extend_outside(&self, inside: (f64, DVec3), q: DVec3, beyond: DVec3) -> (f64, DVec3) {
-        let distance = beyond.length();
-        if distance == 0.0 {
-            return inside;
-        }
-        // The clamped point follows x only along the axes that are not clamped.
-        let free = DMat3::from_diagonal(DVec3::from_array(std::array::from_fn(|a| {
-            f64::from(q[a] > 0.0 && q[a] < self.lattice.extent()[a])
-        })));
-        let follow = self.lattice.world_from_lattice.matrix3 * free * self.lattice_from_world.matrix3;
-        let direction = beyond / distance;
-        let away = (DMat3::IDENTITY - follow).transpose() * direction;
-        (
-            inside.0 - self.slope * distance,
-            follow.transpose() * inside.1 - self.slope * away,
-        )
+/// Index of brick `key` of `level` by the way down from level 0; only the levels above have to be linked.
+pub(super) fn find<T>(
+    lattice: &Lattice,
+    levels: &[Vec<Brick<T>>],
+    level: usize,
+    key: BrickKey,
+) -> Option<u32> {
+    let counts = lattice.cells.map(|n| n.div_ceil(BRICK as u32));
+    let root = key.0.map(|k| k.checked_shr(level as u32).unwrap_or(0));
+    if (0..3).any(|a| root[a] >= counts[a]) {
+        return None;
     }
+    let mut index = (root[0] * counts[1] + root[1]) * counts[2] + root[2];
+    for above in 0..level {
+        let half = key.0.map(|k| (k >> (level - 1 - above) & 1) as usize);
+        index = levels.get(above)?[index as usize].children[4 * half[0] + 2 * half[1] + half[2]];
+        if index == NONE {
+            return None;
+        }
+    }
+    Some(index)
 }
 
 /// Which child holds a cell of the finest level, `shift` levels above it.

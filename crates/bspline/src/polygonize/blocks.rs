@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use rayon::prelude::*;
 
 use super::{PolygonizeError, PolygonizeOptions};
-use crate::{Field, Frame};
+use crate::{Aabb, Field, Frame};
 
 /// Cells along a block's edge. 8, because the crossed edges of one layer then fill one 64-bit word, and between
 /// more values and more bounds: a sphere of 410 cells across, with exact bounds, takes 49 k blocks of 4³ cells and
@@ -128,16 +128,83 @@ impl Octant {
     }
 }
 
+/// Blocks in which a field may have changed, and the octants above them: sorted keys for each level, finest first.
+pub(super) struct Dirty(Vec<Vec<BlockKey>>);
+
+/// Most blocks that are told apart; with more of them all are taken to be dirty.
+const MAX_DIRTY: u64 = 1 << 21;
+
+/// Share of a cell by which a changed box is widened: the rounding of positions stays far below.
+const MARGIN: f64 = 1e-6;
+
+impl Dirty {
+    /// The blocks whose closed boxes meet one of `boxes` (world coordinates). `None`: all blocks.
+    pub fn new(grid: &BlockGrid, boxes: &[Aabb]) -> Option<Self> {
+        let grid_from_world = grid.frame.world_from_grid.inverse();
+        let mut keys: Vec<BlockKey> = Vec::new();
+        let mut ranges: Vec<[[i32; 2]; 3]> = Vec::with_capacity(boxes.len());
+        let mut count = 0;
+        for b in boxes {
+            let b = b.transformed(&grid_from_world);
+            if !(b.min.is_finite() && b.max.is_finite()) {
+                return None;
+            }
+            let range: [[i32; 2]; 3] = std::array::from_fn(|a| {
+                let [first, end] = grid.range(a);
+                let blocks = [b.min[a] - MARGIN, b.max[a] + MARGIN].map(|x| x / CELLS as f64);
+                // A block holds the nodes at both of its ends.
+                let lo = (blocks[0].ceil() - 1.0).max(first as f64) as i32;
+                let hi = (blocks[1].floor() + 1.0).min(end as f64) as i32;
+                [lo, hi.max(lo)]
+            });
+            count += range.iter().map(|[lo, hi]| (hi - lo) as u64).product::<u64>();
+            if count > MAX_DIRTY {
+                return None;
+            }
+            ranges.push(range);
+        }
+        // Neighbouring bricks share most of their blocks.
+        ranges.sort_unstable();
+        ranges.dedup();
+        for [x, y, z] in ranges {
+            keys.extend(
+                (x[0]..x[1])
+                    .flat_map(|i| (y[0]..y[1]).flat_map(move |j| (z[0]..z[1]).map(move |k| [i, j, k]))),
+            );
+        }
+        let mut levels = Vec::new();
+        loop {
+            keys.sort_unstable();
+            keys.dedup();
+            let parents = keys.iter().map(|k| k.map(|b| b >> 1)).collect();
+            let done = keys.iter().all(|k| k.iter().all(|b| (-1..=0).contains(b)));
+            levels.push(std::mem::replace(&mut keys, parents));
+            if done {
+                return Some(Self(levels));
+            }
+        }
+    }
+
+    /// Whether a block of the octant `key` of `level` may have changed.
+    pub fn contains(&self, level: u32, key: BlockKey) -> bool {
+        // Above the last level the octants are the eight about the origin, as on it.
+        let keys = &self.0[(level as usize).min(self.0.len() - 1)];
+        keys.binary_search(&key).is_ok()
+    }
+}
+
 /// Octants tested between two looks at the caller's wish to stop.
 const STRIDE: usize = 1 << 14;
 
-/// Blocks whose closed box the field's bounds cannot exclude, sorted; and how many bounds were asked.
+/// Blocks, only `dirty` ones if given, whose closed box the field's bounds cannot exclude, sorted; and how many bounds
+/// were asked.
 ///
 /// Descends the octree of blocks level by level, so that the list stays proportional to the surface.
 pub(super) fn find_blocks(
     field: &dyn Field,
     grid: &BlockGrid,
     options: &PolygonizeOptions,
+    dirty: Option<&Dirty>,
     mut go_on: impl FnMut(f64) -> ControlFlow<()>,
 ) -> Result<(Vec<BlockKey>, u64), PolygonizeError> {
     let blocks = (0..3).map(|a| grid.range(a)[1] as u32).max().expect("three axes");
@@ -152,6 +219,7 @@ pub(super) fn find_blocks(
             let tested: Vec<(BlockKey, bool)> = part
                 .par_iter()
                 .with_min_len(16)
+                .filter(|key| dirty.is_none_or(|d| d.contains(level, **key)))
                 .filter_map(|&key| Some((key, Octant::new(grid, key, level)?)))
                 .map(|(key, octant)| (key, octant.may_hold_surface(field, grid.frame, options.iso)))
                 .collect();

@@ -1,17 +1,16 @@
 //! One mesh from the surfaces of all blocks.
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use glam::DVec3;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 use super::blocks::{BlockGrid, BlockKey, CELLS, NODES};
-use super::placement::edge_point;
 use super::surface::{BlockSurface, for_each_crossed_cell};
 use super::table::{CaseTable, edge_place};
 use super::{Mesh, PolygonizeError, PolygonizeOptions};
-use crate::{Field, Frame};
 
 /// Blocks written between two looks at the caller's wish to stop.
 const STRIDE: usize = 1 << 12;
@@ -20,10 +19,9 @@ const STRIDE: usize = 1 << 12;
 ///
 /// `surfaces` are sorted by key, so that the numbering depends on nothing else.
 pub(super) fn stitch(
-    field: &dyn Field,
     grid: &BlockGrid,
     options: &PolygonizeOptions,
-    surfaces: &[BlockSurface],
+    surfaces: &[Arc<BlockSurface>],
     mut go_on: impl FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Mesh, PolygonizeError> {
     let vertices: u64 = surfaces.iter().map(|s| s.t.len() as u64).sum();
@@ -84,9 +82,6 @@ pub(super) fn stitch(
             || vec![0; 3 * NODES * NODES * NODES],
             |table, mut job| {
                 all.write_vertices(&mut job, table);
-                if options.normals {
-                    all.write_normals(field, &mut job);
-                }
                 all.write_triangles(&mut job, table)
             },
         )?;
@@ -108,7 +103,7 @@ struct Job<'a> {
 /// All surfaces and where to find them.
 struct Blocks<'a> {
     grid: &'a BlockGrid<'a>,
-    surfaces: &'a [BlockSurface],
+    surfaces: &'a [Arc<BlockSurface>],
     /// Index of each block's first vertex.
     first: Vec<u32>,
     place: FxHashMap<BlockKey, u32>,
@@ -121,34 +116,16 @@ const fn slot(node: [usize; 3], axis: usize) -> usize {
 }
 
 impl Blocks<'_> {
-    /// Positions of a block's vertices; their indices go into the table.
+    /// A block's vertices; their indices go into the table.
     fn write_vertices(&self, job: &mut Job, table: &mut [u32]) {
         let surface = &self.surfaces[job.index];
-        let origin = self.grid.origin(surface.key);
         for (n, (node, axis)) in surface.edges().enumerate() {
             table[slot(node, axis)] = self.first[job.index] + n as u32;
-            job.positions[n] = edge_point(self.grid.frame, origin, node, axis, surface.t[n]);
         }
-    }
-
-    /// Normals at the final positions.
-    fn write_normals(&self, field: &dyn Field, job: &mut Job) {
-        let surface = &self.surfaces[job.index];
-        let origin = self.grid.origin(surface.key);
-        let mut answers = vec![(0.0, DVec3::ZERO); job.positions.len()];
-        field.values_gradients(job.positions, &mut answers);
-        for (n, (node, axis)) in surface.edges().enumerate() {
-            let at = origin[axis] + node[axis] as i64;
-            let cap = at < 0 || at == self.grid.frame.cells[axis] as i64;
-            let inside_first = surface.row(node[0], node[1]) >> node[2] & 1 == 1;
-            let slope = answers[n].1.try_normalize().map(|g| -g);
-            job.normals[n] = match slope {
-                Some(normal) if !cap => normal,
-                // The cap lies in the frame's face; where the gradient vanishes, the way out of the solid
-                // is at least known along the edge.
-                _ => face_normal(self.grid.frame, axis) * if inside_first { 1.0 } else { -1.0 },
-            };
+        for (position, p) in job.positions.iter_mut().zip(surface.positions(self.grid)) {
+            *position = p;
         }
+        job.normals.copy_from_slice(&surface.normals);
     }
 
     /// Triangles of a block's cells, after completing the table with the neighbours' vertices.
@@ -230,11 +207,4 @@ impl Blocks<'_> {
         }
         Ok(())
     }
-}
-
-/// Unit normal of the frame's faces across an axis, on the side of the axis.
-fn face_normal(frame: &Frame, axis: usize) -> DVec3 {
-    let m = frame.world_from_grid.matrix3;
-    let normal = m.col((axis + 1) % 3).cross(m.col((axis + 2) % 3)).normalize();
-    normal * normal.dot(m.col(axis)).signum()
 }

@@ -1,10 +1,12 @@
 //! The surface inside one block: which edges it crosses, and where.
 
+use glam::DVec3;
+
 use super::PolygonizeOptions;
 use super::blocks::{BlockGrid, BlockKey, CELLS, NODES};
-use super::placement::{PlacementScratch, SampledNodes, place_vertices};
+use super::placement::{PlacementScratch, SampledNodes, edge_point, place_vertices};
 use super::table::CaseTable;
-use crate::Field;
+use crate::{Field, Frame};
 
 /// First node of an edge, counted from its block's first node, and its axis.
 pub(super) type Edge = ([usize; 3], usize);
@@ -23,6 +25,8 @@ pub(super) struct BlockSurface {
     before: [u16; WORDS],
     /// Edge parameter of each vertex, in the order of the bits of `crossed`.
     pub t: Vec<f64>,
+    /// Normal at each vertex, if asked for.
+    pub normals: Vec<DVec3>,
     /// Triangles of the block's cells.
     pub triangle_count: u32,
     /// What it cost.
@@ -117,16 +121,56 @@ impl BlockSurface {
             placement,
             &mut counts,
         );
-        let surface = Self {
+        let mut surface = Self {
             key,
             rows,
             crossed,
             before,
             t,
+            normals: Vec::new(),
             triangle_count,
             counts,
         };
+        if options.normals {
+            surface.normals = surface.find_normals(field, grid);
+        }
         (Some(surface), nan_nodes)
+    }
+
+    /// Outward unit normals at the vertices.
+    fn find_normals(&self, field: &dyn Field, grid: &BlockGrid) -> Vec<DVec3> {
+        let positions: Vec<DVec3> = self.positions(grid).collect();
+        let mut answers = vec![(0.0, DVec3::ZERO); positions.len()];
+        field.values_gradients(&positions, &mut answers);
+        let origin = grid.origin(self.key);
+        self.edges()
+            .zip(answers)
+            .map(|((node, axis), (_, gradient))| {
+                let at = origin[axis] + node[axis] as i64;
+                let cap = at < 0 || at == grid.frame.cells[axis] as i64;
+                let inside_first = self.row(node[0], node[1]) >> node[2] & 1 == 1;
+                match gradient.try_normalize() {
+                    Some(slope) if !cap => -slope,
+                    // The cap lies in the frame's face; where the gradient vanishes, the way out of the solid
+                    // is at least known along the edge.
+                    _ => face_normal(grid.frame, axis) * if inside_first { 1.0 } else { -1.0 },
+                }
+            })
+            .collect()
+    }
+
+    /// World position of the vertex of that number.
+    pub fn position(&self, grid: &BlockGrid, vertex: usize) -> DVec3 {
+        let (node, axis) = self.edges().nth(vertex).expect("a vertex of the block");
+        edge_point(grid.frame, grid.origin(self.key), node, axis, self.t[vertex])
+    }
+
+    /// World positions of the vertices.
+    pub fn positions(&self, grid: &BlockGrid) -> impl Iterator<Item = DVec3> {
+        let (frame, origin) = (grid.frame, grid.origin(self.key));
+        self.edges()
+            .zip(&self.t)
+            .map(move |((node, axis), t)| edge_point(frame, origin, node, axis, *t))
     }
 
     /// Edges with a vertex, in the order of the vertices.
@@ -242,4 +286,11 @@ fn count_triangles(rows: &[u16; NODES * NODES], cells: [usize; 3]) -> (u32, u32)
         },
     );
     (crossed, triangles)
+}
+
+/// Unit normal of the frame's faces across an axis, on the side of the axis.
+fn face_normal(frame: &Frame, axis: usize) -> DVec3 {
+    let m = frame.world_from_grid.matrix3;
+    let normal = m.col((axis + 1) % 3).cross(m.col((axis + 2) % 3)).normalize();
+    normal * normal.dot(m.col(axis)).signum()
 }

@@ -5,15 +5,26 @@ use std::sync::Arc;
 
 use bspline::hierarchical::{BRICK, BrickKey, Corrections, LevelCorrections};
 use bspline::{HierarchicalSpline, Real};
+use glam::DVec3;
 
 use super::band::active_slots;
 use super::cascade::Level;
 use super::full_grid::FullGrid;
-use super::samples::Samples;
+use super::samples::{Samples, lattice};
 
 /// The field: level 0 is the full base level, the others what the cascade found, scaled to world units.
 pub(crate) fn assemble<T: Real>(
     samples: &Samples,
+    base: &FullGrid<f64>,
+    levels: &[Level<T>],
+) -> HierarchicalSpline<T> {
+    assemble_in(samples.origin, samples.scale, base, levels)
+}
+
+/// The same for the box of edge `scale` at `origin`.
+pub(crate) fn assemble_in<T: Real>(
+    origin: DVec3,
+    scale: f64,
     base: &FullGrid<f64>,
     levels: &[Level<T>],
 ) -> HierarchicalSpline<T> {
@@ -23,14 +34,14 @@ pub(crate) fn assemble<T: Real>(
     for (i, c) in base.values.iter().enumerate() {
         let s = [i / (m * m), i / m % m, i % m];
         let key = BrickKey(s.map(|s| (s / BRICK) as u32));
-        let value = T::from_f64(c * samples.scale);
+        let value = T::from_f64(c * scale);
         bottom
             .entry(key)
             .or_insert_with(Corrections::empty)
             .set(s.map(|s| s % BRICK), value);
     }
     stored.push(bottom.into_iter().map(|(k, c)| (k, Arc::new(c))).collect());
-    let scale = T::from_f64(samples.scale);
+    let unit = T::from_f64(scale);
     for level in levels {
         let mut values = level.x.iter();
         let mut corrections = LevelCorrections::new();
@@ -43,11 +54,11 @@ pub(crate) fn assemble<T: Real>(
                 ..Corrections::empty()
             };
             for (slot, value) in active_slots(mask).zip(values.by_ref()) {
-                brick.values[slot] = *value * scale;
+                brick.values[slot] = *value * unit;
             }
             corrections.insert(*key, Arc::new(brick));
         }
         stored.push(corrections);
     }
-    HierarchicalSpline::from_corrections(samples.lattice(), 1.0, stored)
+    HierarchicalSpline::from_corrections(lattice(origin, scale), 1.0, stored)
 }

@@ -6,6 +6,8 @@ use rustc_hash::FxHashMap;
 
 use super::full_grid::FullGrid;
 
+/// How far the penalty of an active function reaches.
+pub(crate) const REACH: u32 = 2;
 /// No brick there.
 pub(crate) const NONE: u32 = u32::MAX;
 
@@ -38,7 +40,12 @@ impl<T: Real> Band<T> {
     /// A band whose active functions are the eight central ones of each of `cells` (sorted or not), with
     /// bricks for all functions within two of an active one, and totals prolonged from `coarser`.
     pub fn around(depth: usize, cells: &[[u32; 3]], coarser: &Coarser<'_, T>) -> Self {
-        let (keys, index) = bricks_near(depth, cells);
+        Self::around_reaching(depth, cells, REACH, coarser)
+    }
+
+    /// [`Band::around`], with bricks for all functions within `reach` of an active one.
+    pub fn around_reaching(depth: usize, cells: &[[u32; 3]], reach: u32, coarser: &Coarser<'_, T>) -> Self {
+        let (keys, index) = bricks_near(depth, cells, reach);
         let mut masks = vec![[0u64; BRICK]; keys.len()];
         for cell in cells {
             for corner in 0..8u32 {
@@ -166,17 +173,21 @@ pub(crate) fn active_slots(mask: &[u64; BRICK]) -> impl Iterator<Item = usize> {
     })
 }
 
-/// Keys of the bricks that hold a function within two of a central function of a cell, in key order.
-pub(crate) fn bricks_near(depth: usize, cells: &[[u32; 3]]) -> (Vec<BrickKey>, FxHashMap<BrickKey, u32>) {
-    // Cell c has central functions c and c+1, slots c+1 and c+2; two more on both sides is slots c-1 ..= c+4.
+/// Keys of the bricks that hold a function within `reach` of a central function of a cell, in key order.
+pub(crate) fn bricks_near(
+    depth: usize,
+    cells: &[[u32; 3]],
+    reach: u32,
+) -> (Vec<BrickKey>, FxHashMap<BrickKey, u32>) {
+    // Cell c has central functions c and c+1, slots c+1 and c+2.
     let last = ((1u32 << depth) + 2) / BRICK as u32;
     let mut keys: Vec<BrickKey> = Vec::new();
     let mut previous = [[u32::MAX; 2]; 3];
     for cell in cells {
         let range: [[u32; 2]; 3] = std::array::from_fn(|a| {
             [
-                cell[a].saturating_sub(1) / BRICK as u32,
-                ((cell[a] + 4) / BRICK as u32).min(last),
+                (cell[a] + 1).saturating_sub(reach) / BRICK as u32,
+                ((cell[a] + 2 + reach) / BRICK as u32).min(last),
             ]
         });
         if range == previous {

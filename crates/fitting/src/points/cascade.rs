@@ -5,7 +5,7 @@ use std::ops::Range;
 use bspline::Real;
 use bspline::hierarchical::{BRICK, BrickKey, HALO};
 
-use super::band::{Band, Coarser, bricks_near};
+use super::band::{Band, Coarser, REACH, bricks_near};
 use super::band_solve::{BandProblem, BandSample, BrickSamples, SolveReport};
 use super::cells::{Cell, LeafCell, cell_quality, children, judge, root_cells};
 use super::full_grid::FullGrid;
@@ -115,7 +115,7 @@ fn no_room<T: Real>(
     }
     // The bricks are counted only where someone asks.
     control.memory_limit?;
-    let (keys, _) = bricks_near(depth, refined);
+    let (keys, _) = bricks_near(depth, refined, REACH);
     control
         .reserve(level_bytes::<T>(keys.len(), samples.positions.len()))
         .is_err()

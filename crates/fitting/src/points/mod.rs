@@ -1,23 +1,23 @@
 //! Fits of oriented point clouds.
 
-mod assemble;
-mod band;
-mod band_solve;
-mod cascade;
+pub(crate) mod assemble;
+pub(crate) mod band;
+pub(crate) mod band_solve;
+pub(crate) mod cascade;
 mod cells;
 mod clusters;
 mod coarse;
 mod cross_validation;
 mod far_field;
-mod full_grid;
+pub(crate) mod full_grid;
 #[cfg(test)]
 mod iteration_growth;
-mod noise;
+pub(crate) mod noise;
 mod plan;
 mod residual;
 pub use residual::newton_distance;
-mod samples;
-mod stencil;
+pub(crate) mod samples;
+pub(crate) mod stencil;
 
 use bspline::{HierarchicalSpline, Real};
 
@@ -25,6 +25,7 @@ use crate::{Control, FitError, FitReport};
 use plan::{Plan, Smoothing};
 pub use samples::OrientedPoints;
 use samples::Samples;
+pub(crate) use samples::{BASE_DEPTH, MAX_DEPTH};
 
 /// What the caller may choose; `None` is chosen from the data.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

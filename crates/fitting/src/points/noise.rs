@@ -27,7 +27,18 @@ const SHAPE: f64 = 1.35;
 /// The neighbourhood has to reach three standard deviations: in a smaller one the noise bends the principal
 /// plane and hides part of itself.
 pub(crate) fn estimate(samples: &Samples, negligible: f64) -> Option<f64> {
-    let points: Vec<[f64; 3]> = samples.positions.iter().map(|p| p.to_array()).collect();
+    // The other wall of a thin part is no noise of this one.
+    let same_wall = |i: usize, j: usize| dot(samples.normals[i], samples.normals[j]) > SAME_WALL;
+    of_positions(&samples.positions, same_wall, negligible)
+}
+
+/// The same, where `same_wall(i, j)` tells whether point `j` near point `i` may belong to its surface.
+pub(crate) fn of_positions(
+    positions: &[DVec3],
+    same_wall: impl Fn(usize, usize) -> bool,
+    negligible: f64,
+) -> Option<f64> {
+    let points: Vec<[f64; 3]> = positions.iter().map(|p| p.to_array()).collect();
     let tree = ImmutableKdTree::<f64, 3>::new_from_slice(&points).ok()?;
     let stride = points.len().div_ceil(QUERIES);
     let mut previous: Option<f64> = None;
@@ -44,13 +55,11 @@ pub(crate) fn estimate(samples: &Samples, negligible: f64) -> Option<f64> {
                     .nearest_n::<SquaredEuclidean<f64>>(count)
                     .execute();
                 let reach = f64::sqrt(near.last()?.distance);
-                // The other wall of a thin part is no noise of this one.
-                let same_wall = |j: usize| dot(samples.normals[i], samples.normals[j]) > SAME_WALL;
                 let around: Vec<DVec3> = near
                     .iter()
                     .map(|n| n.item as usize)
-                    .filter(|&j| same_wall(j))
-                    .map(|j| samples.positions[j])
+                    .filter(|&j| same_wall(i, j))
+                    .map(|j| positions[j])
                     .collect();
                 Some((quadric_residual(&around)?, reach))
             })

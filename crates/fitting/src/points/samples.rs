@@ -141,18 +141,6 @@ impl Samples {
         })
     }
 
-    /// The grids of the fit: level 0 has 32 cells along the box.
-    pub fn lattice(&self) -> Lattice {
-        let cells = 1u32 << BASE_DEPTH;
-        Lattice {
-            world_from_lattice: DAffine3 {
-                matrix3: DMat3::from_diagonal(DVec3::splat(self.scale / cells as f64)),
-                translation: self.origin,
-            },
-            cells: [cells; 3],
-        }
-    }
-
     /// Whether sample `index` is a condition on the sign of the field away from the surface, not a point of it.
     pub fn is_sign_condition(&self, index: usize) -> bool {
         self.targets[index] != 0.0
@@ -225,15 +213,27 @@ impl Samples {
     }
 }
 
+/// The grids of a fit in the box of edge `scale` at `origin`: level 0 has 32 cells along it.
+pub(crate) fn lattice(origin: DVec3, scale: f64) -> Lattice {
+    let cells = 1u32 << BASE_DEPTH;
+    Lattice {
+        world_from_lattice: DAffine3 {
+            matrix3: DMat3::from_diagonal(DVec3::splat(scale / cells as f64)),
+            translation: origin,
+        },
+        cells: [cells; 3],
+    }
+}
+
 fn usable_normal(n: DVec3) -> bool {
     n.is_finite() && n.abs().max_element() > 0.0
 }
 
-fn finite(p: &DVec3) -> bool {
+pub(crate) fn finite(p: &DVec3) -> bool {
     p.is_finite() && p.abs().max_element() < 1e150
 }
 
-fn extent(positions: &[DVec3], kept: &[u32]) -> (DVec3, DVec3) {
+pub(crate) fn extent(positions: &[DVec3], kept: &[u32]) -> (DVec3, DVec3) {
     kept.iter()
         .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), &i| {
             let p = positions[i as usize];
@@ -242,7 +242,7 @@ fn extent(positions: &[DVec3], kept: &[u32]) -> (DVec3, DVec3) {
 }
 
 /// Removes points far beyond the bulk, when they are few: one such point would take all resolution away.
-fn drop_far_outliers(positions: &[DVec3], kept: &mut Vec<u32>) {
+pub(crate) fn drop_far_outliers(positions: &[DVec3], kept: &mut Vec<u32>) {
     if kept.len() < 100 {
         return;
     }
@@ -272,7 +272,7 @@ fn drop_far_outliers(positions: &[DVec3], kept: &mut Vec<u32>) {
 }
 
 /// Whether all points lie within `1e-9` of the extent from the line through the two farthest found.
-fn is_collinear(positions: &[DVec3], kept: &[u32], longest: f64) -> bool {
+pub(crate) fn is_collinear(positions: &[DVec3], kept: &[u32], longest: f64) -> bool {
     let p = |i: u32| positions[i as usize];
     let first = p(kept[0]);
     let farthest = |from: DVec3| {
@@ -288,7 +288,7 @@ fn is_collinear(positions: &[DVec3], kept: &[u32], longest: f64) -> bool {
 }
 
 /// Interleaved bits of the cell at [`MAX_DEPTH`], x highest.
-fn morton(unit: DVec3) -> u64 {
+pub(crate) fn morton(unit: DVec3) -> u64 {
     let n = (1u64 << MAX_DEPTH) as f64;
     let spread = |x: f64| {
         let mut v = (x * n).clamp(0.0, n - 1.0) as u64;

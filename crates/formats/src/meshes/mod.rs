@@ -1,17 +1,115 @@
-//! Meshes and coloured points out: PLY, STL and OBJ.
+//! Meshes in and out, and coloured points out.
 
-mod obj;
-mod ply;
+mod gltf;
+mod gltf_write;
+mod obj_write;
+mod ply_write;
 mod stl;
+mod stl_write;
+mod threemf;
+mod threemf_write;
+mod triangle_mesh;
+mod vrml;
+mod vrml_write;
+mod weld;
 
 use std::io::{self, Write};
 use std::path::Path;
 
 use glam::DVec3;
 
-pub use ply::save_points;
+pub(crate) use gltf::looks_like_gltf;
+pub use ply_write::save_points;
+pub(crate) use ply_write::write_points as write_ply_points;
+pub(crate) use threemf::looks_like_3mf;
+pub use triangle_mesh::TriangleMesh;
+pub(crate) use vrml::looks_like_vrml;
 
-use crate::{Fault, FormatError, atomic, detect};
+use crate::detect::{self, Kind, MeshFileFormat, PointFormat};
+use crate::limits::Budget;
+use crate::raw::{RawShape, Wanted};
+use crate::{Fault, FormatError, ReadLimits, Unit, atomic, input, points};
+
+/// Reads a mesh; the format is told by content first, then by name, and `.gz` by its content.
+///
+/// Polygons are cut into triangles. Corners of STL at the same place become one vertex.
+///
+/// # Errors
+/// Every [`Fault`] of reading; [`Fault::Value`] for a file without any face.
+pub fn read(path: &Path, limits: &ReadLimits) -> Result<TriangleMesh, FormatError> {
+    read_faulty(path, limits).map_err(|fault| fault.at(path))
+}
+
+fn read_faulty(path: &Path, limits: &ReadLimits) -> Result<TriangleMesh, Fault> {
+    let mut budget = Budget::new(limits);
+    let bytes = input::open(path)?.read_all(&mut budget)?;
+    let budget = &mut budget;
+    let raw = match detect::kind_of(&bytes, path)? {
+        Kind::Cloud(PointFormat::Ply) => points::ply::parse(&bytes, Wanted::Mesh, budget),
+        Kind::Cloud(PointFormat::Obj) => points::obj::parse(&bytes, Wanted::Mesh, budget),
+        Kind::Mesh(format) => parse(&bytes, format, path, budget),
+        other => Err(Fault::UnknownKind {
+            found: format!("a {other}"),
+            purpose: "mesh",
+            supported: detect::MESHES,
+        }),
+    }?;
+    triangle_mesh::finish(raw, budget)
+}
+
+/// Parses a file that can only be a mesh.
+pub(crate) fn parse(
+    bytes: &[u8],
+    format: MeshFileFormat,
+    path: &Path,
+    budget: &mut Budget,
+) -> Result<RawShape, Fault> {
+    match format {
+        MeshFileFormat::Gltf => gltf::parse(bytes, Some(path), budget),
+        MeshFileFormat::ThreeMf => threemf::parse(bytes, budget),
+        MeshFileFormat::Vrml => vrml::parse(bytes, budget),
+        MeshFileFormat::Stl => stl::parse(bytes, budget),
+    }
+}
+
+/// Reads the bytes of a glTF file, binary or text, whose buffers are in it.
+///
+/// # Errors
+/// A [`Fault`] naming the node or accessor that contradicts the rest, a part that ends too early, or something
+/// that is not read (sparse accessors, compressed buffers).
+pub fn parse_gltf(bytes: &[u8], limits: &ReadLimits) -> Result<TriangleMesh, Fault> {
+    let mut budget = Budget::new(limits);
+    triangle_mesh::finish(gltf::parse(bytes, None, &mut budget)?, &mut budget)
+}
+
+/// Reads the bytes of a 3MF package.
+///
+/// # Errors
+/// A [`Fault`] with the byte of the XML, the object or the part of the package that does not hold, components of
+/// themselves or without end, a required extension that is not read.
+pub fn parse_threemf(bytes: &[u8], limits: &ReadLimits) -> Result<TriangleMesh, Fault> {
+    let mut budget = Budget::new(limits);
+    triangle_mesh::finish(threemf::parse(bytes, &mut budget)?, &mut budget)
+}
+
+/// Reads the text of a VRML97 file.
+///
+/// # Errors
+/// A [`Fault`] with the line for text that breaks the format, an index beyond the points, nodes too deep or too
+/// many, a file of VRML 1.0.
+pub fn parse_vrml(bytes: &[u8], limits: &ReadLimits) -> Result<TriangleMesh, Fault> {
+    let mut budget = Budget::new(limits);
+    triangle_mesh::finish(vrml::parse(bytes, &mut budget)?, &mut budget)
+}
+
+/// Reads the bytes of an STL file, ascii or binary.
+///
+/// # Errors
+/// A [`Fault`] with the line for text that is no STL, a length that is not the count's, no usable triangle.
+pub fn parse_stl(bytes: &[u8], limits: &ReadLimits) -> Result<TriangleMesh, Fault> {
+    let mut budget = Budget::new(limits);
+    triangle_mesh::finish(stl::parse(bytes, &mut budget)?, &mut budget)
+}
 
 /// A triangle mesh to be written; triangles are counterclockwise seen from outside.
 #[derive(Clone, Copy, Debug)]
@@ -20,8 +118,10 @@ pub struct Mesh<'a> {
     pub vertices: &'a [DVec3],
     /// Indices of the corners, from 0.
     pub triangles: &'a [[u32; 3]],
-    /// Red, green, blue of each vertex; kept by PLY alone.
+    /// Red, green, blue of each vertex; kept by PLY and glTF.
     pub colors: Option<&'a [[u8; 3]]>,
+    /// Unit of the positions.
+    pub unit: Unit,
 }
 
 /// Formats of meshes.
@@ -33,6 +133,14 @@ pub enum MeshFormat {
     Stl,
     /// Wavefront OBJ: text.
     Obj,
+    /// Binary glTF 2.0: single precision about an origin, in metres.
+    Glb,
+    /// glTF 2.0 as text, with the same content in base64.
+    Gltf,
+    /// 3MF: text in a zip package, with the unit.
+    ThreeMf,
+    /// VRML97: text.
+    Vrml,
 }
 
 impl MeshFormat {
@@ -50,6 +158,10 @@ impl MeshFormat {
             "ply" => Ok(Self::Ply),
             "stl" => Ok(Self::Stl),
             "obj" => Ok(Self::Obj),
+            "glb" => Ok(Self::Glb),
+            "gltf" => Ok(Self::Gltf),
+            "3mf" => Ok(Self::ThreeMf),
+            "wrl" => Ok(Self::Vrml),
             other => Err(Fault::UnknownKind {
                 found: if other.is_empty() {
                     "a name without an extension".into()
@@ -57,7 +169,7 @@ impl MeshFormat {
                     format!(".{other}")
                 },
                 purpose: "mesh output",
-                supported: ".ply, .stl and .obj",
+                supported: ".ply, .stl, .obj, .glb, .gltf, .3mf and .wrl",
             }
             .at(path)),
         }
@@ -67,8 +179,9 @@ impl MeshFormat {
 /// Writes a mesh in the format of its name, atomically.
 ///
 /// Coordinates are single precision, unless that would move vertices by more than a millionth of the mesh's
-/// diagonal (a small thing far from the origin): then PLY says `double` and OBJ prints all digits. STL has
-/// single precision alone; the returned notes say when that hurts.
+/// diagonal (a small thing far from the origin): then PLY says `double`, the text formats print all digits and the
+/// node of a glTF file holds the offset. STL has single precision alone. The returned notes say what the format
+/// cannot hold. glTF is in metres, 3MF names the unit.
 ///
 /// # Errors
 /// [`Fault::UnknownKind`], [`Fault::Output`] for more triangles than the format counts, I/O.
@@ -77,17 +190,18 @@ impl MeshFormat {
 /// If an index is out of range or the colours are not one a vertex.
 pub fn save(path: &Path, mesh: &Mesh) -> Result<Vec<String>, FormatError> {
     let format = MeshFormat::from_path(path)?;
-    if mesh.vertices.len() > i32::MAX as usize || mesh.triangles.len() > u32::MAX as usize {
-        let value = format!(
-            "{} vertices and {} triangles",
-            mesh.vertices.len(),
-            mesh.triangles.len()
-        );
-        let remedy = "mesh at a lower resolution";
+    // The counts of PLY, STL and the lengths of a binary glTF container.
+    let is_too_long =
+        format == MeshFormat::Glb && gltf_write::buffer_bytes(mesh) > u64::from(u32::MAX) - 4096;
+    if mesh.vertices.len() > i32::MAX as usize || mesh.triangles.len() > u32::MAX as usize || is_too_long {
         return Err(Fault::Output {
             what: "a mesh",
-            value,
-            remedy,
+            value: format!(
+                "{} vertices and {} triangles",
+                mesh.vertices.len(),
+                mesh.triangles.len()
+            ),
+            remedy: "mesh at a lower resolution",
         }
         .at(path));
     }
@@ -96,10 +210,28 @@ pub fn save(path: &Path, mesh: &Mesh) -> Result<Vec<String>, FormatError> {
     if needs_double(mesh.vertices) {
         notes.push(match format {
             MeshFormat::Stl => "the mesh lies far from the origin for its size; STL rounds it visibly, \
-                                PLY and OBJ keep it"
+                                the other formats keep it"
                 .into(),
+            MeshFormat::Glb | MeshFormat::Gltf => {
+                "the mesh lies far from the origin for its size; its node holds the \
+                                offset in double precision"
+                    .into()
+            }
             _ => "the mesh lies far from the origin for its size; written in double precision".to_owned(),
         });
+    }
+    let taken_for = match format {
+        MeshFormat::Glb | MeshFormat::Gltf => "metres",
+        MeshFormat::ThreeMf => "millimetres",
+        _ => "",
+    };
+    if mesh.unit == Unit::Unknown && !taken_for.is_empty() {
+        notes.push(format!(
+            "the unit of the mesh is not known; the file's numbers mean {taken_for}"
+        ));
+    }
+    if mesh.colors.is_some() && !matches!(format, MeshFormat::Ply | MeshFormat::Glb | MeshFormat::Gltf) {
+        notes.push("the colours were left out; PLY and glTF keep them".into());
     }
     Ok(notes)
 }
@@ -123,14 +255,18 @@ pub fn write(out: &mut dyn Write, mesh: &Mesh, format: MeshFormat) -> io::Result
         "one colour per vertex"
     );
     match format {
-        MeshFormat::Ply => ply::write(out, mesh),
-        MeshFormat::Stl => stl::write(out, mesh),
-        MeshFormat::Obj => obj::write(out, mesh),
+        MeshFormat::Ply => ply_write::write(out, mesh),
+        MeshFormat::Stl => stl_write::write(out, mesh),
+        MeshFormat::Obj => obj_write::write(out, mesh),
+        MeshFormat::Glb => gltf_write::write_binary(out, mesh),
+        MeshFormat::Gltf => gltf_write::write_text(out, mesh),
+        MeshFormat::ThreeMf => threemf_write::write(out, mesh),
+        MeshFormat::Vrml => vrml_write::write(out, mesh),
     }
 }
 
 /// Whether rounding to `f32` moves a vertex by more than a millionth of the diagonal.
-fn needs_double(vertices: &[DVec3]) -> bool {
+pub(crate) fn needs_double(vertices: &[DVec3]) -> bool {
     let Some(first) = vertices.first() else {
         return false;
     };
@@ -153,5 +289,7 @@ fn spill(out: &mut dyn Write, bytes: &mut Vec<u8>) -> io::Result<()> {
     Ok(())
 }
 
+#[cfg(test)]
+mod read_tests;
 #[cfg(test)]
 mod tests;

@@ -25,6 +25,7 @@ fn ply_and_obj_come_back_through_the_readers() {
             vertices: &vertices,
             triangles: &triangles,
             colors,
+            unit: Unit::Unknown,
         };
         let limits = ReadLimits::default();
         let ply = points::parse_ply(&bytes(&mesh, MeshFormat::Ply), &limits).unwrap();
@@ -52,6 +53,7 @@ fn the_bytes_of_a_ply_are_those_that_simple_readers_take() {
             vertices: &vertices,
             triangles: &triangles[..1],
             colors: None,
+            unit: Unit::Unknown,
         },
         MeshFormat::Ply,
     );
@@ -71,6 +73,7 @@ fn stl_holds_normals_and_corners() {
             vertices: &vertices,
             triangles: &triangles,
             colors: None,
+            unit: Unit::Unknown,
         },
         MeshFormat::Stl,
     );
@@ -91,6 +94,7 @@ fn far_from_the_origin_coordinates_are_double() {
         vertices: &vertices,
         triangles: &triangles,
         colors: None,
+        unit: Unit::Unknown,
     };
     let ply = points::parse_ply(&bytes(&mesh, MeshFormat::Ply), &ReadLimits::default()).unwrap();
     let obj = points::parse_obj(&bytes(&mesh, MeshFormat::Obj), &ReadLimits::default()).unwrap();
@@ -122,9 +126,9 @@ fn points_with_colours_and_normals_come_back() {
 
 #[test]
 fn an_unknown_name_says_what_is_supported() {
-    for name in ["a.3mf", "a", "a.ply.gz"] {
+    for name in ["a.step", "a", "a.ply.gz"] {
         let e = MeshFormat::from_path(Path::new(name)).unwrap_err().to_string();
-        assert!(e.starts_with(name) && e.contains(".ply, .stl and .obj"), "{e}");
+        assert!(e.starts_with(name) && e.contains(".ply, .stl, .obj, .glb"), "{e}");
     }
 }
 
@@ -135,6 +139,7 @@ fn a_disk_that_fills_at_any_offset_keeps_the_old_mesh() {
         vertices: &vertices,
         triangles: &triangles,
         colors: None,
+        unit: Unit::Unknown,
     };
     for format in [MeshFormat::Ply, MeshFormat::Stl, MeshFormat::Obj] {
         survives_a_full_disk(|out| write(out, &mesh, format));
@@ -150,6 +155,7 @@ fn an_index_out_of_range_is_a_broken_invariant() {
             vertices: &vertices,
             triangles: &[[0, 1, 4]],
             colors: None,
+            unit: Unit::Unknown,
         },
         MeshFormat::Ply,
     );

@@ -1,9 +1,10 @@
-//! Point clouds in: PLY, XYZ and OBJ, with the normals that a fit needs.
+//! Point clouds in, with the normals that a fit needs, and out.
 
 mod normals;
-mod obj;
-mod ply;
-mod text;
+pub(crate) mod obj;
+mod pcd;
+pub(crate) mod ply;
+mod save;
 mod xyz;
 
 use std::path::Path;
@@ -11,12 +12,17 @@ use std::path::Path;
 use glam::DVec3;
 
 pub use obj::parse_obj;
+pub use pcd::parse_pcd;
 pub use ply::parse_ply;
+pub use save::save;
 pub use xyz::parse_xyz;
+
+pub(crate) use pcd::looks_like_pcd;
 
 use crate::detect::{self, Kind, PointFormat};
 use crate::limits::Budget;
-use crate::{Fault, FormatError, ReadLimits, Unit, input};
+use crate::raw::Wanted;
+use crate::{Fault, FormatError, ReadLimits, Unit, input, meshes};
 
 /// Points of a scan, in the file's own unit unless a unit was stated.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -27,7 +33,7 @@ pub struct PointCloud {
     pub normals: Option<Vec<DVec3>>,
     /// Where the normals come from.
     pub normal_source: NormalSource,
-    /// Unit of the positions. No point format names one.
+    /// Unit of the positions: millimetres where the file names any, otherwise unknown.
     pub unit: Unit,
     /// Points in the file, kept or not.
     pub file_count: usize,
@@ -63,13 +69,7 @@ impl PointCloud {
     /// # Errors
     /// [`Fault::Value`] if `stated` is [`Unit::Unknown`] or the cloud already is in a known unit.
     pub fn to_mm(&mut self, stated: Unit) -> Result<(), Fault> {
-        let (Unit::Unknown, Some(scale)) = (self.unit, stated.in_mm()) else {
-            return Err(Fault::Value {
-                what: "the unit",
-                value: format!("stated as {stated} for a cloud in {}", self.unit),
-                remedy: "state um, mm, cm or m, once",
-            });
-        };
+        let scale = stated.scale_for("cloud", self.unit)?;
         for p in &mut self.positions {
             *p *= scale;
         }
@@ -89,33 +89,18 @@ pub fn read(path: &Path, limits: &ReadLimits) -> Result<PointCloud, FormatError>
 fn read_faulty(path: &Path, limits: &ReadLimits) -> Result<PointCloud, Fault> {
     let mut budget = Budget::new(limits);
     let bytes = input::open(path)?.read_all(&mut budget)?;
-    match detect::kind_of(&bytes, path)? {
-        Kind::Cloud(PointFormat::Ply) => ply::parse(&bytes, &mut budget),
-        Kind::Cloud(PointFormat::Xyz) => xyz::parse(&bytes, &mut budget),
-        Kind::Cloud(PointFormat::Obj) => obj::parse(&bytes, &mut budget),
+    let budget = &mut budget;
+    let raw = match detect::kind_of(&bytes, path)? {
+        Kind::Cloud(PointFormat::Ply) => ply::parse(&bytes, Wanted::Cloud, budget),
+        Kind::Cloud(PointFormat::Xyz) => xyz::parse(&bytes, budget),
+        Kind::Cloud(PointFormat::Pcd) => pcd::parse(&bytes, budget),
+        Kind::Cloud(PointFormat::Obj) => obj::parse(&bytes, Wanted::Cloud, budget),
+        Kind::Mesh(format) => meshes::parse(&bytes, format, path, budget),
         other => Err(Fault::UnknownKind {
             found: format!("a {other}"),
             purpose: "point cloud",
             supported: detect::CLOUDS,
         }),
-    }
+    }?;
+    normals::finish(raw, budget)
 }
-
-/// What the parsers hand to [`normals::finish`].
-#[derive(Debug, Default)]
-struct RawCloud {
-    positions: Vec<DVec3>,
-    /// As stored, of any length, finite or not.
-    normals: Option<Vec<DVec3>>,
-    /// Fans of the faces; indices are below `positions.len()`.
-    triangles: Vec<[u32; 3]>,
-    /// For each triangle the normal of each corner, [`NO_NORMAL`] where it has none.
-    corner_normals: Option<(Vec<[u32; 3]>, Vec<DVec3>)>,
-    face_count: usize,
-    /// Faces of fewer than three corners, never made into triangles.
-    short_faces: usize,
-    notes: Vec<String>,
-}
-
-/// Marks a corner of a face without a normal of its own.
-const NO_NORMAL: u32 = u32::MAX;

@@ -2,9 +2,10 @@
 
 use glam::DVec3;
 
-use super::{NO_NORMAL, NormalSource, PointCloud, RawCloud};
+use super::{NormalSource, PointCloud};
 use crate::Fault;
 use crate::limits::Budget;
+use crate::raw::{NO_NORMAL, RawShape};
 
 /// Length of an angle-weighted sum that counts as zero. Angles around a vertex add up to some radians, their
 /// rounding to 1e-15; a corner of a true needle is still far above.
@@ -13,19 +14,21 @@ const CANCELLED: f64 = 1e-12;
 /// Cleans `raw`.
 ///
 /// Vertex normals from faces are `Σ angle · n_face`, normalized, over the corners at the vertex
-/// [Thürmer & Wüthrich 1998]; polygons count as fans, which leaves the sum unchanged for flat convex ones.
+/// [Thürmer & Wüthrich 1998]; how a flat polygon is cut does not change the sum.
 ///
 /// # Errors
 /// [`Fault::Value`] if no point is left.
-pub(super) fn finish(raw: RawCloud, budget: &mut Budget) -> Result<PointCloud, Fault> {
-    let RawCloud {
+pub(super) fn finish(raw: RawShape, budget: &mut Budget) -> Result<PointCloud, Fault> {
+    let RawShape {
         mut positions,
         normals,
         triangles,
         corner_normals,
         face_count,
         short_faces,
+        unit,
         notes,
+        ..
     } = raw;
     let file_count = positions.len();
     let has_faces = face_count > 0;
@@ -34,6 +37,7 @@ pub(super) fn finish(raw: RawCloud, budget: &mut Budget) -> Result<PointCloud, F
         file_count,
         face_count,
         invalid_dropped,
+        unit,
         notes,
         ..Default::default()
     };
@@ -211,12 +215,12 @@ mod tests {
     use super::*;
     use crate::ReadLimits;
 
-    fn clean(raw: RawCloud) -> PointCloud {
+    fn clean(raw: RawShape) -> PointCloud {
         finish(raw, &mut Budget::new(&ReadLimits::default())).unwrap()
     }
 
     /// Octahedron: by symmetry the normal of each vertex points away from the centre.
-    fn octahedron() -> RawCloud {
+    fn octahedron() -> RawShape {
         let positions = vec![
             DVec3::X,
             DVec3::NEG_X,
@@ -238,7 +242,7 @@ mod tests {
                 }
             }
         }
-        RawCloud {
+        RawShape {
             positions,
             face_count: triangles.len(),
             triangles,
@@ -265,7 +269,7 @@ mod tests {
                 triangles = vec![[0, 1, 4], [0, 4, 2], [0, 2, 3], [0, 3, 1]];
             }
             let face_count = triangles.len();
-            clean(RawCloud {
+            clean(RawShape {
                 positions,
                 triangles,
                 face_count,
@@ -309,7 +313,7 @@ mod tests {
             DVec3::new(0.11, 1.7, 0.3),
         ];
         let triangles = vec![[0, 1, 2], [2, 1, 0], [0, 2, 3], [3, 2, 0], [1, 0, 3], [0, 1, 3]];
-        let cloud = clean(RawCloud {
+        let cloud = clean(RawShape {
             positions,
             triangles,
             face_count: 6,
@@ -320,7 +324,7 @@ mod tests {
 
     #[test]
     fn zero_and_nan_normals_become_zero_and_are_counted() {
-        let cloud = clean(RawCloud {
+        let cloud = clean(RawShape {
             positions: vec![DVec3::ZERO; 4],
             normals: Some(vec![
                 DVec3::ZERO,
@@ -342,7 +346,7 @@ mod tests {
 
     #[test]
     fn a_cloud_of_nan_alone_is_an_error() {
-        let raw = RawCloud {
+        let raw = RawShape {
             positions: vec![DVec3::NAN; 3],
             ..Default::default()
         };

@@ -1,11 +1,12 @@
 //! OBJ in: `v`, `vn` and `f`; everything else is skipped.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
-use super::text::{Lines, integer, number};
-use super::{NO_NORMAL, PointCloud, RawCloud, normals};
+use super::{PointCloud, normals};
 use crate::error::excerpt;
 use crate::limits::{Budget, Counted};
+use crate::raw::{Faces, NO_NORMAL, RawShape, Wanted};
+use crate::text::{Lines, integer, number};
 use crate::{Fault, ReadLimits};
 
 /// Reads the text of an OBJ file.
@@ -17,24 +18,26 @@ use crate::{Fault, ReadLimits};
 /// # Errors
 /// A [`Fault`] with the line for a word that is no number or an index beyond the vertices or normals.
 pub fn parse_obj(bytes: &[u8], limits: &ReadLimits) -> Result<PointCloud, Fault> {
-    parse(bytes, &mut Budget::new(limits))
+    let mut budget = Budget::new(limits);
+    normals::finish(parse(bytes, Wanted::Cloud, &mut budget)?, &mut budget)
 }
 
 const INDEX_REMEDY: &str =
     "indices count from 1, or from -1 backwards, and stay within what the file defines";
 
-pub(super) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<PointCloud, Fault> {
+pub(crate) fn parse(bytes: &[u8], wanted: Wanted, budget: &mut Budget) -> Result<RawShape, Fault> {
     if bytes.is_empty() {
         return Err(Fault::Empty);
     }
     let mut positions = Counted::new("points");
     let mut vertex_normals = Counted::new("normals");
-    let mut triangles = Counted::new("triangles of the faces");
+    let mut faces = Faces::new();
+    let mut colors = Counted::new("colours");
     let mut corner_normals = Counted::new("normals of corners");
     let mut names_normals = false;
     // Largest index that no vertex or normal so far has: faces may stand before what they name.
     let mut furthest = [(0u32, 0u64); 2];
-    let mut raw = RawCloud::default();
+    let mut raw = RawShape::default();
     let mut corners: Vec<[u32; 2]> = Vec::new();
     let mut joined = Vec::new();
     let mut lines = Lines::new(bytes);
@@ -55,7 +58,13 @@ pub(super) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<PointCloud, Fau
         }
         let mut words = text.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty());
         match words.next() {
-            Some(b"v") => positions.push(three(words, line)?, budget)?,
+            Some(b"v") => {
+                let colored = words.clone().skip(3);
+                positions.push(three(words, line)?, budget)?;
+                if wanted == Wanted::Mesh && colored.clone().nth(2).is_some() {
+                    colors.push(three(colored, line)?.as_vec3(), budget)?;
+                }
+            }
             Some(b"vn") => vertex_normals.push(three(words, line)?, budget)?,
             Some(b"f") => {
                 corners.clear();
@@ -69,14 +78,16 @@ pub(super) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<PointCloud, Fau
                     }
                     corners.push(corner);
                 }
-                raw.face_count += 1;
-                raw.short_faces += usize::from(corners.len() < 3);
+                faces.push(corners.iter().map(|c| c[0]), budget)?;
+                if wanted == Wanted::Mesh {
+                    continue;
+                }
                 for i in 2..corners.len() {
                     let fan = [corners[0], corners[i - 1], corners[i]];
-                    triangles.push(fan.map(|c| c[0]), budget)?;
                     if !names_normals && fan.iter().any(|c| c[1] != NO_NORMAL) {
                         names_normals = true;
-                        for _ in corner_normals.items.len()..triangles.items.len() - 1 {
+                        let earlier = faces.triangles.items.len() + i - corners.len();
+                        for _ in 0..earlier {
                             corner_normals.push([NO_NORMAL; 3], budget)?;
                         }
                     }
@@ -109,7 +120,7 @@ pub(super) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<PointCloud, Fau
             remedy: "an OBJ file holds a line \"v x y z\" for each; is this one?",
         });
     }
-    if raw.face_count == 0 && !vertex_normals.items.is_empty() {
+    if faces.count == 0 && !vertex_normals.items.is_empty() {
         if vertex_normals.items.len() == positions.items.len() {
             raw.normals = Some(std::mem::take(&mut vertex_normals.items));
         } else {
@@ -124,8 +135,19 @@ pub(super) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<PointCloud, Fau
         raw.corner_normals = Some((corner_normals.items, vertex_normals.items));
     }
     raw.positions = positions.items;
-    raw.triangles = triangles.items;
-    normals::finish(raw, budget)
+    raw.colors = (colors.items.len() == raw.positions.len()).then(|| bytes_of(&colors.items));
+    faces.finish(&mut raw);
+    Ok(raw)
+}
+
+/// Colours are written from 0 to 1 by most programs, from 0 to 255 by some.
+fn bytes_of(colors: &[Vec3]) -> Vec<[u8; 3]> {
+    let is_unit = colors.iter().all(|c| c.max_element() <= 1.0);
+    let scale = if is_unit { 255.0 } else { 1.0 };
+    colors
+        .iter()
+        .map(|c| c.to_array().map(|x| (x * scale).round() as u8))
+        .collect()
 }
 
 fn three<'a>(words: impl Iterator<Item = &'a [u8]>, line: u64) -> Result<DVec3, Fault> {

@@ -2,10 +2,11 @@
 
 use glam::DVec3;
 
-use super::text::{Lines, integer, number};
-use super::{PointCloud, RawCloud, normals};
+use super::{PointCloud, normals};
 use crate::error::excerpt;
 use crate::limits::{Budget, Counted};
+use crate::raw::RawShape;
+use crate::text::{Lines, integer, number};
 use crate::{Fault, ReadLimits};
 
 /// How far the length of a stored normal may be from 1 to be taken for a normal and not, say, a colour.
@@ -21,10 +22,11 @@ const UNIT_LENGTH_SLACK: f64 = 0.05;
 /// # Errors
 /// A [`Fault`] with the line for a word that is no number or a line with another number of columns.
 pub fn parse_xyz(bytes: &[u8], limits: &ReadLimits) -> Result<PointCloud, Fault> {
-    parse(bytes, &mut Budget::new(limits))
+    let mut budget = Budget::new(limits);
+    normals::finish(parse(bytes, &mut budget)?, &mut budget)
 }
 
-pub(super) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<PointCloud, Fault> {
+pub(super) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<RawShape, Fault> {
     let mut notes = Vec::new();
     let mut positions = Counted::new("points");
     let mut normals = Counted::new("normals");
@@ -108,13 +110,12 @@ pub(super) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<PointCloud, Fau
         )),
         _ => {}
     }
-    let raw = RawCloud {
+    Ok(RawShape {
         positions: positions.items,
         normals: stored.then_some(normals.items),
         notes,
         ..Default::default()
-    };
-    normals::finish(raw, budget)
+    })
 }
 
 /// Whether a line holds words only, as `X,Y,Z` does.

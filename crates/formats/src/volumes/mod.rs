@@ -1,6 +1,7 @@
 //! Volumes in and out.
 
 mod detached;
+mod dicom;
 mod encode;
 mod geometry;
 mod metaimage;
@@ -22,6 +23,8 @@ use std::path::Path;
 
 use glam::{DAffine3, DVec3};
 
+pub use dicom::{DicomOptions, Tilt, Uneven, parse_dicom};
+pub(crate) use dicom::{holds_dicom, looks_like_dicom};
 pub use encode::Grid;
 pub(crate) use geometry::is_usable as is_usable_affine;
 pub(crate) use metaimage::looks_like_metaimage;
@@ -30,7 +33,7 @@ pub(crate) use nifti::nifti_format;
 pub use nifti::{parse_nifti, write_nifti};
 pub(crate) use nrrd::looks_like_nrrd;
 pub use nrrd::parse_nrrd;
-pub use options::{DicomOptions, VolumeOptions};
+pub use options::VolumeOptions;
 pub use raw::{RawLayout, parse_raw};
 pub use save::{save, save_slices};
 use slices::SliceSource;
@@ -56,6 +59,8 @@ pub enum VolumeFormat {
     Tiff,
     /// The TIFF files of a directory, a slice each.
     TiffFolder,
+    /// A DICOM series: a directory, one of its files, or one file of several frames.
+    Dicom,
     /// Voxels without a header, told by [`VolumeOptions::raw`] alone.
     Raw,
 }
@@ -69,6 +74,7 @@ impl fmt::Display for VolumeFormat {
             Self::MetaImage => "MetaImage",
             Self::Tiff => "TIFF stack",
             Self::TiffFolder => "directory of TIFF slices",
+            Self::Dicom => "DICOM",
             Self::Raw => "raw",
         })
     }
@@ -100,7 +106,7 @@ pub struct VolumeHeader {
     pub orientation: Orientation,
     /// Type of the voxels in the file.
     pub stored: VoxelType,
-    /// Density = slope · stored + intercept; `None` if the file asks for no rescaling.
+    /// Density = slope · stored + intercept; `None` if the file asks for no rescaling, or for another in each slice.
     pub rescale: Option<[f64; 2]>,
 }
 

@@ -4,13 +4,14 @@ use std::path::Path;
 
 use super::part::Part;
 use super::slices::SliceSource;
-use super::{VolumeFormat, VolumeOptions, metaimage, nifti, nrrd, raw, tiff};
+use super::{VolumeFormat, VolumeOptions, dicom, metaimage, nifti, nrrd, raw, tiff};
 use crate::detect::{self, Kind};
 use crate::limits::Budget;
 use crate::{Fault, FormatError};
 
 /// Everything that [`super::read`] reads.
-const VOLUMES: &str = "volumes .nii .hdr .nrrd .nhdr .mha .mhd .tif, directories of .tif";
+const VOLUMES: &str =
+    "volumes .nii .hdr .nrrd .nhdr .mha .mhd .tif, each also .gz, DICOM series, directories of .tif";
 
 /// An open volume: its slices as asked, and what it is as a whole.
 pub(super) struct Opened {
@@ -28,6 +29,7 @@ pub(super) fn open(path: &Path, options: &VolumeOptions, budget: &mut Budget) ->
     let inner: Box<dyn SliceSource> = match (format, &options.raw) {
         (VolumeFormat::Raw, Some(layout)) => Box::new(raw::open(path, layout)?),
         (VolumeFormat::Raw, None) => unreachable!("never told from a file"),
+        (VolumeFormat::Dicom, _) => dicom::open(path, &options.dicom, budget)?,
         (VolumeFormat::Nifti | VolumeFormat::NiftiPair, _) => Box::new(nifti::open(path)?),
         (VolumeFormat::Nrrd, _) => nrrd::open(path, budget)?,
         (VolumeFormat::MetaImage, _) => metaimage::open(path, budget)?,

@@ -1,6 +1,6 @@
 //! What a caller may ask of a volume before it is read.
 
-use super::RawLayout;
+use super::{DicomOptions, RawLayout};
 
 /// Which part of a volume is read, and what its file does not say.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,8 +31,3 @@ impl Default for VolumeOptions {
         }
     }
 }
-
-/// Choices for DICOM series.
-#[derive(Clone, Debug, Default, PartialEq)]
-#[non_exhaustive]
-pub struct DicomOptions {}

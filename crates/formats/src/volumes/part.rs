@@ -149,6 +149,10 @@ impl SliceSource for Part<'_> {
         self.inner.working_bytes().saturating_add(scratch)
     }
 
+    fn may_have_gaps(&self) -> bool {
+        self.inner.may_have_gaps()
+    }
+
     /// Also passes over what follows the region: damage there is found as in a whole reading.
     fn finish(&mut self) -> Result<(), Fault> {
         while self.passed < self.inner.header().dims[2] {

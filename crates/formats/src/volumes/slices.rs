@@ -25,6 +25,11 @@ pub(crate) trait SliceSource {
     /// Bytes that the source holds while it reads, besides `out` and what was booked when it was opened.
     fn working_bytes(&self) -> u64;
 
+    /// Whether densities may be NaN though the stored numbers cannot: where there is no data to resample.
+    fn may_have_gaps(&self) -> bool {
+        false
+    }
+
     /// Called after the last slice: checks what follows it, such as a checksum.
     fn finish(&mut self) -> Result<(), Fault>;
 }
@@ -42,7 +47,7 @@ pub(super) fn read(source: &mut dyn SliceSource, budget: &mut Budget) -> Result<
     budget.reserve("the volume", count as u64, size_of::<f32>())?;
     budget.reserve("the reading buffers", source.working_bytes(), 1)?;
     let mut values = zeros(count, budget.limit())?;
-    let mut seen = Finite::of(&header);
+    let mut seen = Finite::of(source);
     for slice in values.chunks_exact_mut(header.dims[0] * header.dims[1]) {
         source.next_slice(slice)?;
         seen.look_at(slice);
@@ -106,9 +111,11 @@ struct Finite {
 }
 
 impl Finite {
-    fn of(header: &VolumeHeader) -> Self {
+    fn of(source: &dyn SliceSource) -> Self {
+        let header = source.header();
         Self {
-            can_be_infinite: header.rescale.is_some()
+            can_be_infinite: source.may_have_gaps()
+                || header.rescale.is_some()
                 || matches!(header.stored, VoxelType::F32 | VoxelType::F64),
             replaced_count: 0,
         }

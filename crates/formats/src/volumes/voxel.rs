@@ -1,4 +1,5 @@
 use std::fmt;
+use std::str::FromStr;
 
 /// Types of voxels that are read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,6 +75,23 @@ impl fmt::Display for VoxelType {
             Self::F32 => "float32",
             Self::F64 => "float64",
         })
+    }
+}
+
+impl FromStr for VoxelType {
+    type Err = String;
+
+    /// Reads a name as [`fmt::Display`] writes it.
+    fn from_str(s: &str) -> Result<Self, String> {
+        let of = |t: &(i16, Self)| t.1;
+        Self::CODES
+            .iter()
+            .map(of)
+            .find(|t| t.to_string() == s)
+            .ok_or_else(|| {
+                let names: Vec<_> = Self::CODES.iter().map(|t| of(t).to_string()).collect();
+                format!("{s:?} is no type of voxels; write one of {}", names.join(", "))
+            })
     }
 }
 

@@ -3,7 +3,7 @@
 use super::header::{Element, Encoding, Header, Scalar, Shape};
 use crate::Fault;
 use crate::error::{Place, excerpt};
-use crate::points::text::{Words, integer, number};
+use crate::text::{Words, integer, number};
 
 /// Numbers one after the other. Each fits an `f64` exactly.
 pub(super) trait Values {
@@ -174,12 +174,12 @@ pub(super) fn walk<V: Values>(
     element: &Element,
     slots: &[Option<usize>],
     wanted: Option<usize>,
-    mut row_done: impl FnMut(u64, &[f64; 6], &[f64]) -> Result<(), Fault>,
+    mut row_done: impl FnMut(u64, &[f64; 9], &[f64]) -> Result<(), Fault>,
 ) -> Result<(), Fault> {
     if element.properties.is_empty() {
         return Ok(());
     }
-    let mut row_values = [0.0; 6];
+    let mut row_values = [0.0; 9];
     let mut entries = Vec::new();
     for row in 0..element.count {
         for (p, property) in element.properties.iter().enumerate() {

@@ -2,7 +2,7 @@
 
 use crate::Fault;
 use crate::error::excerpt;
-use crate::points::text::{Lines, integer};
+use crate::text::{Lines, integer};
 
 /// Type of a stored number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -7,10 +7,11 @@ use glam::DVec3;
 
 use self::body::{Binary, Values, check_count, walk};
 use self::header::{Element, Encoding, Header, Scalar, Shape};
-use super::text::Words;
-use super::{PointCloud, RawCloud, normals};
+use super::{PointCloud, normals};
 use crate::error::Place;
-use crate::limits::{Budget, Counted};
+use crate::limits::Budget;
+use crate::raw::{Faces, RawShape, Wanted};
+use crate::text::Words;
 use crate::{Fault, ReadLimits};
 
 /// Reads the text or bytes of a PLY file.
@@ -22,34 +23,41 @@ use crate::{Fault, ReadLimits};
 /// A [`Fault`] with line, row or byte for a broken header, missing coordinates, a count beyond the bytes there
 /// are, an index beyond the vertices, or no usable point.
 pub fn parse_ply(bytes: &[u8], limits: &ReadLimits) -> Result<PointCloud, Fault> {
-    parse(bytes, &mut Budget::new(limits))
+    let mut budget = Budget::new(limits);
+    normals::finish(parse(bytes, Wanted::Cloud, &mut budget)?, &mut budget)
 }
 
-pub(super) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<PointCloud, Fault> {
+pub(crate) fn parse(bytes: &[u8], wanted: Wanted, budget: &mut Budget) -> Result<RawShape, Fault> {
     if bytes.is_empty() {
         return Err(Fault::Empty);
     }
     let header = header::read(bytes)?;
     let body = &bytes[header.body..];
-    let raw = match header.encoding {
+    match header.encoding {
         Encoding::Ascii => read_elements(
             Words::new(body, header.lines + 1),
             &header,
+            wanted,
             budget,
             Words::left,
             None,
         ),
-        Encoding::Little => binary::<false>(body, &header, budget),
-        Encoding::Big => binary::<true>(body, &header, budget),
-    }?;
-    normals::finish(raw, budget)
+        Encoding::Little => binary::<false>(body, &header, wanted, budget),
+        Encoding::Big => binary::<true>(body, &header, wanted, budget),
+    }
 }
 
-fn binary<const BIG: bool>(body: &[u8], header: &Header, budget: &mut Budget) -> Result<RawCloud, Fault> {
+fn binary<const BIG: bool>(
+    body: &[u8],
+    header: &Header,
+    wanted: Wanted,
+    budget: &mut Budget,
+) -> Result<RawShape, Fault> {
     let fast: Gather<Binary<'_, BIG>> = gather_vertices;
     read_elements(
         Binary::<BIG> { bytes: body, at: 0 },
         header,
+        wanted,
         budget,
         |v| v.bytes.len() - v.at,
         Some(fast),
@@ -57,15 +65,16 @@ fn binary<const BIG: bool>(body: &[u8], header: &Header, budget: &mut Budget) ->
 }
 
 /// A quick way through an element whose rows all have the same length.
-type Gather<V> = fn(&mut V, &Element, &Columns, usize, &mut RawCloud);
+type Gather<V> = fn(&mut V, &Element, &Columns, usize, &mut RawShape);
 
 fn read_elements<V: Values>(
     mut values: V,
     header: &Header,
+    wanted: Wanted,
     budget: &mut Budget,
     left: impl Fn(&V) -> usize,
     gather: Option<Gather<V>>,
-) -> Result<RawCloud, Fault> {
+) -> Result<RawShape, Fault> {
     let vertex = header
         .elements
         .iter()
@@ -75,9 +84,9 @@ fn read_elements<V: Values>(
             value: names(&header.elements),
             remedy: "a point cloud needs an element \"vertex\"",
         })?;
-    let columns = Columns::of(vertex)?;
-    let mut raw = RawCloud::default();
-    let mut triangles = Counted::new("triangles of the faces");
+    let columns = Columns::of(vertex, wanted)?;
+    let mut raw = RawShape::default();
+    let mut faces = Faces::new();
     for element in &header.elements {
         check_count(element, header, left(&values))?;
         let none = vec![None; element.properties.len()];
@@ -91,17 +100,26 @@ fn read_elements<V: Values>(
                     });
                 }
                 let row = size_of::<DVec3>() * if columns.has_normals { 2 } else { 1 };
+                let row = row + if columns.has_colors { 3 } else { 0 };
                 budget.reserve("points", element.count, row)?;
                 raw.positions.reserve_exact(element.count as usize);
                 if columns.has_normals {
                     raw.normals = Some(Vec::with_capacity(element.count as usize));
                 }
+                if columns.has_colors {
+                    raw.colors = Some(Vec::with_capacity(element.count as usize));
+                }
                 match (gather, element.fixed_stride()) {
-                    (Some(gather), Some(stride)) => gather(&mut values, element, &columns, stride, &mut raw),
+                    (Some(gather), Some(stride)) if !columns.has_colors => {
+                        gather(&mut values, element, &columns, stride, &mut raw)
+                    }
                     _ => walk(&mut values, element, &columns.slots, None, |_, v, _| {
                         raw.positions.push(DVec3::new(v[0], v[1], v[2]));
                         if let Some(n) = &mut raw.normals {
                             n.push(DVec3::new(v[3], v[4], v[5]));
+                        }
+                        if let Some(c) = &mut raw.colors {
+                            c.push([v[6], v[7], v[8]].map(|x| (x * columns.color_scale).round() as u8));
                         }
                         Ok(())
                     })?,
@@ -116,17 +134,11 @@ fn read_elements<V: Values>(
                     raw.notes.push(
                         "the element \"face\" has no list \"vertex_indices\"; faces were not used".into(),
                     );
-                } else {
-                    raw.face_count += element.count as usize;
                 }
                 walk(&mut values, element, &none, list, |row, _, corners| {
                     if list.is_some() {
                         check_corners(corners, vertex.count, "face", row)?;
-                        raw.short_faces += usize::from(corners.len() < 3);
-                        for i in 2..corners.len() {
-                            let fan = [corners[0], corners[i - 1], corners[i]].map(|v| v as u32);
-                            triangles.push(fan, budget)?;
-                        }
+                        faces.push(corners.iter().map(|v| *v as u32), budget)?;
                     }
                     Ok(())
                 })?;
@@ -147,8 +159,7 @@ fn read_elements<V: Values>(
                             let tri = [run[a], run[b], run[i]].map(|v| v as u32);
                             // A repeated corner is how a strip turns, not a broken face.
                             if tri[0] != tri[1] && tri[1] != tri[2] && tri[2] != tri[0] {
-                                raw.face_count += 1;
-                                triangles.push(tri, budget)?;
+                                faces.push(tri.into_iter(), budget)?;
                             }
                         }
                     }
@@ -158,7 +169,7 @@ fn read_elements<V: Values>(
             _ => walk(&mut values, element, &none, None, |_, _, _| Ok(()))?,
         }
     }
-    raw.triangles = triangles.items;
+    faces.finish(&mut raw);
     Ok(raw)
 }
 
@@ -190,7 +201,7 @@ fn gather_vertices<const BIG: bool>(
     element: &Element,
     columns: &Columns,
     stride: usize,
-    raw: &mut RawCloud,
+    raw: &mut RawShape,
 ) {
     let rows = element.count as usize;
     let at = columns.at;
@@ -207,22 +218,26 @@ fn gather_vertices<const BIG: bool>(
 
 /// Which properties of `vertex` are coordinates and normals.
 struct Columns {
-    /// For each property its place in `x y z nx ny nz`.
+    /// For each property its place in `x y z nx ny nz red green blue`.
     slots: Vec<Option<usize>>,
     /// Byte offset and type of each of the six in a row without lists.
     at: [(usize, Scalar); 6],
     has_normals: bool,
+    has_colors: bool,
+    /// Of a stored colour to a byte.
+    color_scale: f64,
 }
 
 impl Columns {
-    fn of(vertex: &Element) -> Result<Self, Fault> {
-        let wanted = ["x", "y", "z", "nx", "ny", "nz"].map(|name| {
+    fn of(vertex: &Element, wanted: Wanted) -> Result<Self, Fault> {
+        let names = ["x", "y", "z", "nx", "ny", "nz", "red", "green", "blue"];
+        let found = names.map(|name| {
             vertex.find(name).and_then(|p| match vertex.properties[p].shape {
                 Shape::One(kind) => Some((p, kind)),
                 Shape::List { .. } => None,
             })
         });
-        if wanted[..3].iter().any(Option::is_none) {
+        if found[..3].iter().any(Option::is_none) {
             let names: Vec<_> = vertex
                 .properties
                 .iter()
@@ -235,20 +250,36 @@ impl Columns {
                 remedy: "a point cloud needs x, y and z",
             });
         }
-        let has_normals = wanted[3..].iter().all(Option::is_some);
+        let has_all = |slots: &[Option<(usize, Scalar)>]| slots.iter().all(Option::is_some);
+        let has_normals = wanted == Wanted::Cloud && has_all(&found[3..6]);
+        let has_colors = wanted == Wanted::Mesh && has_all(&found[6..]);
+        let color_scale = match found[6] {
+            Some((_, Scalar::F32 | Scalar::F64)) => 255.0,
+            Some((_, Scalar::U16)) => 255.0 / 65535.0,
+            _ => 1.0,
+        };
         let mut columns = Self {
             slots: vec![None; vertex.properties.len()],
             at: [(0, Scalar::F32); 6],
             has_normals,
+            has_colors,
+            color_scale,
         };
-        for (slot, found) in wanted.iter().enumerate() {
-            if let (Some((p, kind)), true) = (*found, slot < 3 || has_normals) {
+        for (slot, found) in found.iter().enumerate() {
+            let is_wanted = match slot {
+                0..3 => true,
+                3..6 => has_normals,
+                _ => has_colors,
+            };
+            if let (Some((p, kind)), true) = (*found, is_wanted) {
                 let before = vertex.properties[..p].iter().map(|q| match q.shape {
                     Shape::One(s) => s.size(),
                     Shape::List { .. } => 0,
                 });
                 columns.slots[p] = Some(slot);
-                columns.at[slot] = (before.sum(), kind);
+                if slot < 6 {
+                    columns.at[slot] = (before.sum(), kind);
+                }
             }
         }
         Ok(columns)

@@ -4,7 +4,7 @@ use crate::Fault;
 use crate::error::excerpt;
 
 /// Whitespace-separated words of a text, counting lines.
-pub(super) struct Words<'a> {
+pub(crate) struct Words<'a> {
     bytes: &'a [u8],
     at: usize,
     /// Line of the last word, from 1.
@@ -42,7 +42,7 @@ impl<'a> Words<'a> {
 }
 
 /// Lines of a text without their ends (`\n`, `\r\n`).
-pub(super) struct Lines<'a> {
+pub(crate) struct Lines<'a> {
     rest: &'a [u8],
     /// Number of the last line, from 1.
     pub line: u64,
@@ -77,7 +77,7 @@ impl<'a> Lines<'a> {
 }
 
 /// A number; `nan` and `inf` in any case are numbers too.
-pub(super) fn number(word: &[u8], line: u64) -> Result<f64, Fault> {
+pub(crate) fn number(word: &[u8], line: u64) -> Result<f64, Fault> {
     fast_float2::parse(word).map_err(|_| {
         Fault::line(
             line,
@@ -88,7 +88,7 @@ pub(super) fn number(word: &[u8], line: u64) -> Result<f64, Fault> {
 }
 
 /// A whole number.
-pub(super) fn integer(word: &[u8]) -> Option<i64> {
+pub(crate) fn integer(word: &[u8]) -> Option<i64> {
     let (negative, digits) = match word {
         [b'-', d @ ..] => (true, d),
         [b'+', d @ ..] => (false, d),

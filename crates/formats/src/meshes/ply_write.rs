@@ -33,7 +33,17 @@ pub fn save_points(
         }
         .at(path));
     }
-    atomic::replace(path, |out| write_vertices(out, points, normals, colors, None))
+    atomic::replace(path, |out| write_points(out, points, normals, colors))
+}
+
+/// [`save_points`] to a stream.
+pub(crate) fn write_points(
+    out: &mut dyn Write,
+    points: &[DVec3],
+    normals: Option<&[DVec3]>,
+    colors: Option<&[[u8; 3]]>,
+) -> io::Result<()> {
+    write_vertices(out, points, normals, colors, None)
 }
 
 pub(super) fn write(out: &mut dyn Write, mesh: &Mesh) -> io::Result<()> {

@@ -1,0 +1,101 @@
+//! Fields from triangle meshes: signed distance, sign by the generalized winding number.
+
+mod base;
+mod crossings;
+mod defects;
+mod distance;
+mod levels;
+mod nearest;
+mod pieces;
+mod probes;
+mod surface;
+mod topology;
+mod tree;
+mod winding;
+
+use bspline::{HierarchicalSpline, Real};
+use glam::DVec3;
+
+pub use defects::MeshDefects;
+pub use distance::MeshDistance;
+
+use crate::points::{BASE_DEPTH, MAX_DEPTH};
+use crate::{Control, FitError, FitReport};
+
+/// What the caller may choose; `None` is chosen from the data.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MeshOptions {
+    /// Largest error of the signed distance in the band, world units; 1e-4 of the diagonal if not given.
+    pub tolerance: Option<f64>,
+    /// No level is begun once so many coefficients are spent.
+    pub coefficients: Option<usize>,
+    /// Deepest level: `2^max_depth` cells along the box; 10 if not given.
+    pub max_depth: Option<usize>,
+    /// Half the width of the band round the surface in which the tolerance holds, world units; 16 tolerances if not
+    /// given. Beyond it the error may grow by a quarter of the way out.
+    pub band: Option<f64>,
+}
+
+/// Deepest level when the caller gives none.
+const DEFAULT_DEPTH: usize = 10;
+/// Tolerance when the caller gives none, in diagonals.
+const DEFAULT_TOLERANCE: f64 = 1e-4;
+/// Half the width of the band when the caller gives none, in tolerances. Cells at sharp edges end about eight
+/// tolerances wide, so these are two of the finest cells.
+const DEFAULT_BAND: f64 = 16.0;
+
+/// Lengths of a fit in the unit box.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Plan {
+    pub tolerance: f64,
+    pub band: f64,
+    pub max_depth: usize,
+    pub coefficients: Option<usize>,
+}
+
+impl Plan {
+    /// Error allowed at so far from the surface. Beyond the band it grows by a quarter of the way, so the sign is
+    /// right everywhere farther from the surface than the tolerance.
+    pub fn allowed(&self, distance: f64) -> f64 {
+        self.tolerance + 0.25 * (distance - self.band).max(0.0)
+    }
+}
+
+/// Fits the signed distance of a mesh, positive inside.
+///
+/// # Errors
+/// [`FitError::Degenerate`] for coordinates that are not finite, indices out of range, no area, or a mesh that
+/// encloses nothing; [`FitError::Option`], [`FitError::Cancelled`], [`FitError::MemoryLimit`].
+pub fn fit_mesh<T: Real>(
+    vertices: &[DVec3],
+    triangles: &[[u32; 3]],
+    options: &MeshOptions,
+    control: &mut Control,
+) -> Result<(HierarchicalSpline<T>, FitReport, MeshDefects), FitError> {
+    for (option, value) in [("tolerance", options.tolerance), ("band", options.band)] {
+        if let Some(value) = value.filter(|v| !(v.is_finite() && *v > 0.0)) {
+            let requirement = "it has to be a length above 0";
+            return Err(FitError::Option {
+                option,
+                value,
+                requirement,
+            });
+        }
+    }
+    control.step("sorting triangles", 0.0)?;
+    control.reserve(levels::bytes::<T>(0, 0, triangles.len(), vertices.len()))?;
+    let (mesh, defects) = MeshDistance::new(vertices, triangles)?;
+    let tolerance = options.tolerance.unwrap_or(DEFAULT_TOLERANCE * mesh.diagonal) / mesh.scale;
+    let plan = Plan {
+        tolerance,
+        band: options.band.map_or(DEFAULT_BAND * tolerance, |b| b / mesh.scale),
+        max_depth: options
+            .max_depth
+            .unwrap_or(DEFAULT_DEPTH)
+            .clamp(BASE_DEPTH + 1, MAX_DEPTH),
+        coefficients: options.coefficients,
+    };
+    let (field, mut report) = levels::fit(&mesh, &plan, triangles.len(), vertices.len(), control)?;
+    report.notes = defects.notes();
+    Ok((field, report, defects))
+}

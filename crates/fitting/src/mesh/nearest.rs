@@ -1,0 +1,110 @@
+//! The nearest point of a set of triangles.
+
+use glam::DVec3;
+
+use super::tree::TriangleTree;
+
+/// Deepest tree: 2³² triangles halved down to four.
+pub(crate) const STACK: usize = 40;
+
+/// The nearest point found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Nearest {
+    /// Square of the distance.
+    pub distance_squared: f64,
+    pub point: DVec3,
+    /// Index in the tree's order.
+    pub triangle: u32,
+    /// Whether the point is inside the triangle, not on an edge or a corner.
+    pub on_face: bool,
+}
+
+impl TriangleTree {
+    /// Nearest point to `p`. A `hint` (a triangle likely to be near) makes the search shorter and, up to the choice
+    /// between equally near triangles, changes nothing.
+    pub fn nearest(&self, p: DVec3, hint: u32) -> Nearest {
+        let mut best = self.candidate(p, hint);
+        let mut stack = [(0u32, 0.0f64); STACK];
+        stack[0] = (0, self.nodes[0].distance_squared(p));
+        let mut height = 1;
+        while height > 0 {
+            height -= 1;
+            let (mut at, bound) = stack[height];
+            if bound > best.distance_squared {
+                continue;
+            }
+            loop {
+                let node = &self.nodes[at as usize];
+                if node.count > 0 {
+                    for t in node.first..node.first + node.count {
+                        let found = self.candidate(p, t);
+                        if found.distance_squared < best.distance_squared
+                            || (found.distance_squared == best.distance_squared && t < best.triangle)
+                        {
+                            best = found;
+                        }
+                    }
+                    break;
+                }
+                let children = [at + 1, node.first];
+                let bounds = children.map(|c| self.nodes[c as usize].distance_squared(p));
+                let near = usize::from(bounds[1] < bounds[0]);
+                if bounds[near] > best.distance_squared {
+                    break;
+                }
+                if bounds[1 - near] <= best.distance_squared {
+                    stack[height] = (children[1 - near], bounds[1 - near]);
+                    height += 1;
+                }
+                at = children[near];
+            }
+        }
+        best
+    }
+
+    #[inline]
+    fn candidate(&self, p: DVec3, triangle: u32) -> Nearest {
+        let (point, on_face) = closest_point(p, &self.corners[triangle as usize]);
+        Nearest {
+            distance_squared: p.distance_squared(point),
+            point,
+            triangle,
+            on_face,
+        }
+    }
+}
+
+/// Nearest point of a triangle, by the seven regions of its plane (Ericson, *Real-Time Collision Detection*, 2005,
+/// §5.1.5), and whether it is inside the triangle.
+#[inline]
+pub(crate) fn closest_point(p: DVec3, &[a, b, c]: &[DVec3; 3]) -> (DVec3, bool) {
+    let (ab, ac, ap) = (b - a, c - a, p - a);
+    let (d1, d2) = (ab.dot(ap), ac.dot(ap));
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return (a, false);
+    }
+    let bp = p - b;
+    let (d3, d4) = (ab.dot(bp), ac.dot(bp));
+    if d3 >= 0.0 && d4 <= d3 {
+        return (b, false);
+    }
+    let vc = d1 * d4 - d3 * d2;
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        return (a + ab * (d1 / (d1 - d3)), false);
+    }
+    let cp = p - c;
+    let (d5, d6) = (ab.dot(cp), ac.dot(cp));
+    if d6 >= 0.0 && d5 <= d6 {
+        return (c, false);
+    }
+    let vb = d5 * d2 - d1 * d6;
+    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        return (a + ac * (d2 / (d2 - d6)), false);
+    }
+    let va = d3 * d6 - d5 * d4;
+    if va <= 0.0 && d4 >= d3 && d5 >= d6 {
+        return (b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6))), false);
+    }
+    let share = 1.0 / (va + vb + vc);
+    (a + ab * (vb * share) + ac * (vc * share), true)
+}

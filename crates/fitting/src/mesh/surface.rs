@@ -1,0 +1,279 @@
+//! Which triangles bound the solid `{ w > 1/2 }`, and which way they face.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::MeshDefects;
+use super::crossings::crossings;
+use super::pieces::boundary_pieces;
+use super::topology::{Faces, area_vector};
+use super::tree::TriangleTree;
+use super::winding::WindingTree;
+use crate::FitError;
+
+/// How far from a triangle its two sides are looked at, unit box.
+const ASIDE: f64 = 1e-7;
+/// Triangles of a sheet or patch whose sides are looked at.
+const LOOKS: usize = 32;
+/// Rounds of turning sheets over; each sees the sheets as the one before left them.
+const ROUNDS: usize = 4;
+/// An open sheet bounds something where the mean of the winding number on its two sides keeps so far from 0 and 1: of a
+/// lone sheet it is 0, of a closed surface 1/2, in the middle of half a sphere 0.35.
+const BOUNDS_SOMETHING: f64 = 0.1;
+
+/// The surface of the solid, and what tells inside from outside.
+pub(crate) struct Surface {
+    /// Triangles and parts of triangles that have the solid on one side and not on the other.
+    pub boundary: Arc<TriangleTree>,
+    /// Whether each triangle of `boundary` is a whole triangle of the mesh that crosses no other.
+    pub certain: Vec<bool>,
+    /// All triangles that count for the winding number.
+    pub winding: WindingTree,
+    /// Whether the winding number is a whole number off the surface.
+    pub is_closed: bool,
+}
+
+/// Sides of a triangle at one of its points.
+pub(crate) struct Sides {
+    /// Winding number in front of and behind it.
+    front: f64,
+    back: f64,
+}
+
+impl Sides {
+    pub fn at(winding: &WindingTree, p: DVec3, normal: DVec3) -> Self {
+        Self {
+            front: winding.at(p + normal * ASIDE),
+            back: winding.at(p - normal * ASIDE),
+        }
+    }
+    fn middle(&self) -> f64 {
+        0.5 * (self.front + self.back)
+    }
+    pub fn is_boundary(&self) -> bool {
+        self.back > 0.5 && self.front <= 0.5
+    }
+}
+
+/// Turns whole sheets the right way out, leaves out what bounds nothing, and finds the boundary of the solid.
+///
+/// # Errors
+/// [`FitError::Degenerate`] if no triangle bounds a solid.
+pub(crate) fn surface(faces: &mut Faces, defects: &mut MeshDefects) -> Result<Surface, FitError> {
+    let mut face_of: Vec<u32> = (0..faces.corners.len() as u32)
+        .filter(|&f| faces.has_area(f as usize))
+        .collect();
+    let by_sheet = grouped(&face_of, faces.sheet_count, |f| faces.sheets[f as usize]);
+    let open = open_sheets(faces);
+    let mut winding = winding_of(faces, &face_of);
+    for _ in 0..ROUNDS {
+        let wrong: Vec<usize> = (0..faces.sheet_count)
+            .into_par_iter()
+            .filter(|&s| mean_side(faces, &winding, &by_sheet[s]) < -BOUNDS_SOMETHING)
+            .collect();
+        if wrong.is_empty() {
+            break;
+        }
+        defects.inside_out += wrong.len();
+        let mut turn = vec![false; faces.sheet_count];
+        for &s in &wrong {
+            turn[s] = true;
+        }
+        for f in 0..faces.corners.len() {
+            if turn[faces.sheets[f] as usize] {
+                faces.flip(f);
+            }
+        }
+        winding = winding_of(faces, &face_of);
+    }
+    let idle: Vec<bool> = (0..faces.sheet_count)
+        .into_par_iter()
+        .map(|s| {
+            let middle = mean_side(faces, &winding, &by_sheet[s]);
+            open[s] && !(BOUNDS_SOMETHING..=1.0 - BOUNDS_SOMETHING).contains(&middle)
+        })
+        .collect();
+    if idle.contains(&true) {
+        let before = face_of.len();
+        face_of.retain(|&f| !idle[faces.sheets[f as usize] as usize]);
+        defects.unbounding_faces = before - face_of.len();
+        if face_of.is_empty() {
+            return Err(bounds_nothing(defects));
+        }
+        winding = winding_of(faces, &face_of);
+    }
+    let is_closed = idle.iter().all(|i| !i) && faces.is_closed();
+    let tree_faces: Vec<u32> = winding.tree.ids.iter().map(|&i| face_of[i as usize]).collect();
+    let found = crossings(faces, &winding.tree, &tree_faces);
+    defects.self_intersections = found.pairs;
+    defects.intersections_sampled = found.sampled;
+    let boundary = boundary(faces, &face_of, &winding, &found.partners, defects);
+    let (triangles, certain): (Vec<_>, Vec<_>) = boundary.into_iter().unzip();
+    if triangles.is_empty() {
+        return Err(bounds_nothing(defects));
+    }
+    let all = triangles.len() == face_of.len() && defects.interior_faces == 0;
+    let tree = if all {
+        Arc::clone(&winding.tree)
+    } else {
+        Arc::new(TriangleTree::new(&triangles))
+    };
+    let certain = tree.ids.iter().map(|&i| certain[i as usize]).collect();
+    Ok(Surface {
+        boundary: tree,
+        certain,
+        winding,
+        is_closed,
+    })
+}
+
+fn bounds_nothing(defects: &MeshDefects) -> FitError {
+    FitError::Degenerate(format!(
+        "the {} triangles enclose nothing: their winding number is nowhere above 1/2; close the surface, or fit it as \
+         a cloud (--as cloud)",
+        defects.triangles
+    ))
+}
+
+fn winding_of(faces: &Faces, face_of: &[u32]) -> WindingTree {
+    let triangles: Vec<[DVec3; 3]> = face_of.par_iter().map(|&f| faces.points(f as usize)).collect();
+    WindingTree::new(Arc::new(TriangleTree::new(&triangles)))
+}
+
+/// Triangles by group.
+fn grouped(list: &[u32], groups: usize, group_of: impl Fn(u32) -> u32) -> Vec<Vec<u32>> {
+    let mut out = vec![Vec::new(); groups];
+    for &f in list {
+        out[group_of(f) as usize].push(f);
+    }
+    out
+}
+
+/// Which sheets have a rim, or an edge that joins them to others.
+fn open_sheets(faces: &Faces) -> Vec<bool> {
+    let mut open = vec![false; faces.sheet_count];
+    for edge in faces.sides().chunk_by(|a, b| a.0 == b.0) {
+        if edge.len() != 2 {
+            for side in edge {
+                open[faces.sheets[side.1 as usize] as usize] = true;
+            }
+        }
+    }
+    open
+}
+
+/// Mean over some triangles of a group of the winding number between their two sides; 1/2 without any.
+fn mean_side(faces: &Faces, winding: &WindingTree, group: &[u32]) -> f64 {
+    let stride = group.len().div_ceil(LOOKS).max(1);
+    let looks = group.iter().step_by(stride);
+    let count = looks.len();
+    if count == 0 {
+        return 0.5;
+    }
+    looks
+        .map(|&f| sides_of(winding, &faces.points(f as usize)).middle())
+        .sum::<f64>()
+        / count as f64
+}
+
+fn sides_of(winding: &WindingTree, points: &[DVec3; 3]) -> Sides {
+    let middle = (points[0] + points[1] + points[2]) / 3.0;
+    Sides::at(winding, middle, area_vector(points).normalize_or_zero())
+}
+
+/// Triangles with the solid behind them alone, and whether each is a whole triangle of the mesh. Triangles that
+/// cross others are cut where they do.
+fn boundary(
+    faces: &Faces,
+    face_of: &[u32],
+    winding: &WindingTree,
+    partners: &BTreeMap<u32, Vec<u32>>,
+    defects: &mut MeshDefects,
+) -> Vec<([DVec3; 3], bool)> {
+    let tree = &winding.tree;
+    let mut crosses = vec![false; faces.corners.len()];
+    for &t in partners.keys() {
+        crosses[face_of[tree.ids[t as usize] as usize] as usize] = true;
+    }
+    // From crossing to crossing the sides of a sheet do not change.
+    let (patch_of, patch_count) = patches(faces, face_of, &crosses);
+    if patch_count == 1 && partners.is_empty() {
+        return face_of
+            .iter()
+            .map(|&f| (faces.points(f as usize), true))
+            .collect();
+    }
+    let uncut: Vec<u32> = face_of
+        .iter()
+        .copied()
+        .filter(|&f| !crosses[f as usize])
+        .collect();
+    let members = grouped(&uncut, patch_count, |f| patch_of[f as usize]);
+    let kept: Vec<bool> = members
+        .par_iter()
+        .map(|group| {
+            let stride = group.len().div_ceil(LOOKS).max(1);
+            let looks = group.iter().step_by(stride);
+            let count = looks.len();
+            let votes = looks.filter(|&&f| sides_of(winding, &faces.points(f as usize)).is_boundary());
+            2 * votes.count() >= count
+        })
+        .collect();
+    let mut out: Vec<([DVec3; 3], bool)> = uncut
+        .iter()
+        .filter(|&&f| kept[patch_of[f as usize] as usize])
+        .map(|&f| (faces.points(f as usize), true))
+        .collect();
+    defects.interior_faces = uncut.len() - out.len();
+    let cuts: Vec<(Vec<[DVec3; 3]>, bool)> = partners
+        .par_iter()
+        .map(|(t, with)| {
+            let with: Vec<[DVec3; 3]> = with.iter().map(|&p| tree.corners[p as usize]).collect();
+            boundary_pieces(winding, &tree.corners[*t as usize], &with)
+        })
+        .collect();
+    for (pieces, whole) in cuts {
+        defects.interior_faces += usize::from(!whole);
+        out.extend(pieces.into_iter().map(|p| (p, false)));
+    }
+    out
+}
+
+/// Numbers the parts of sheets that no crossing divides.
+fn patches(faces: &Faces, face_of: &[u32], crosses: &[bool]) -> (Vec<u32>, usize) {
+    const NONE: u32 = u32::MAX;
+    let mut root: Vec<u32> = (0..faces.corners.len() as u32).collect();
+    fn find(root: &mut [u32], mut v: u32) -> u32 {
+        while root[v as usize] != v {
+            root[v as usize] = root[root[v as usize] as usize];
+            v = root[v as usize];
+        }
+        v
+    }
+    for edge in faces.sides().chunk_by(|a, b| a.0 == b.0) {
+        if let [a, b] = edge
+            && !crosses[a.1 as usize]
+            && !crosses[b.1 as usize]
+        {
+            let (p, q) = (find(&mut root, a.1), find(&mut root, b.1));
+            root[p.max(q) as usize] = p.min(q);
+        }
+    }
+    let mut number = vec![NONE; root.len()];
+    let mut count = 0;
+    for &f in face_of {
+        if crosses[f as usize] {
+            continue;
+        }
+        let r = find(&mut root, f) as usize;
+        if number[r] == NONE {
+            number[r] = count;
+            count += 1;
+        }
+        number[f as usize] = number[r];
+    }
+    (number, count as usize)
+}

@@ -1,0 +1,306 @@
+//! Outward normals for points that come without any.
+//!
+//! The direction of a normal is read from the neighbours of its point; its sign is a question about the whole
+//! cloud, answered on one of two [`Route`]s. What is not certain is told: a confidence for every point, the points
+//! that belong to no surface, and where the doubtful ones lie.
+
+mod band;
+mod cloud;
+mod confidence;
+mod kernel;
+mod local;
+mod outliers;
+mod sampling;
+mod tagging;
+mod tree;
+mod winding;
+
+use glam::DVec3;
+
+use crate::points::noise;
+use crate::{Control, FitError};
+use cloud::Cloud;
+pub use confidence::leaf_confidence;
+use kernel::{Gradient, Target};
+use local::{Neighbours, Surroundings};
+use tree::Tree;
+use winding::Widths;
+
+/// How inside is told from outside.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Route {
+    /// Consistency of the winding number with the normals (Lin, Shi & Liu 2024).
+    #[default]
+    WindingNumber,
+    /// Unsigned distance on an octree, the exterior tagged from outside (Zhao, Osher & Fedkiw 2001).
+    Tagging,
+}
+
+impl Route {
+    /// Its name in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::WindingNumber => "winding number",
+            Self::Tagging => "tagging",
+        }
+    }
+}
+
+/// What the caller may choose.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct OrientOptions {
+    /// How inside is told from outside.
+    pub route: Route,
+}
+
+/// Normals, and how far to trust them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Orientation {
+    /// Outward unit normals, one a point; zero where none could be given, which are outliers too.
+    pub normals: Vec<DVec3>,
+    /// Confidence in the sign of each, 0 to 1: how far the winding number is from ½ on both sides of the point, on
+    /// the right side each.
+    pub confidence: Vec<f32>,
+    /// Points that no surface passes through.
+    pub outlier: Vec<bool>,
+    /// How it was done.
+    pub route: Route,
+    /// Standard deviation of the noise, if any was found; world units.
+    pub noise: Option<f64>,
+    /// Points that are no outliers and whose confidence is below [`UNSURE`].
+    pub unsure_count: usize,
+    /// Repairs and doubts, each a sentence with its figures.
+    pub notes: Vec<String>,
+}
+
+/// Confidence below which a sign is called unsure.
+pub const UNSURE: f32 = 0.3;
+
+/// Bytes held at once for a point: neighbour lists, two trees, normals.
+const BYTES_PER_POINT: u64 = 500;
+/// Neighbours of a clean point.
+const NEIGHBOURS: usize = 16;
+/// Neighbours of a noisy point, fewest and most; between, a disc of four standard deviations.
+const NOISY_NEIGHBOURS: [f64; 2] = [30.0, 400.0];
+/// Share of the diagonal below which noise does not matter; as for fits.
+const NEGLIGIBLE_NOISE: f64 = 1e-4;
+/// Widths of the first and the last round and of the whole cloud's field, as multiples of the local spacing.
+const WIDTHS_BY_SPACING: [f64; 3] = [4.0, 0.7, 0.7];
+/// The same by the standard deviation of the noise; the larger counts.
+const WIDTHS_BY_NOISE: [f64; 3] = [10.0, 2.5, 2.5];
+/// Rounds with all points.
+const FULL_ROUNDS: usize = 2;
+
+/// Estimates outward normals.
+///
+/// # Errors
+/// [`FitError::NotEnoughSamples`] if fewer than 10 different points are usable, [`FitError::Degenerate`] if they lie
+/// on one line, [`FitError::MemoryLimit`], [`FitError::Cancelled`].
+pub fn orient_points(
+    positions: &[DVec3],
+    options: &OrientOptions,
+    control: &mut Control,
+) -> Result<Orientation, FitError> {
+    control.step("looking at neighbours", 0.0)?;
+    control.reserve(BYTES_PER_POINT * positions.len() as u64)?;
+    let cloud = Cloud::prepare(positions)?;
+    let is_lone = outliers::lone(&cloud.positions);
+    let kept: Vec<usize> = (0..is_lone.len()).filter(|&i| !is_lone[i]).collect();
+    let points: Vec<DVec3> = kept.iter().map(|&i| cloud.positions[i]).collect();
+    control.step("looking at neighbours", 0.1)?;
+    let surface = Surface::estimate(&points);
+    let signed = match options.route {
+        Route::WindingNumber => by_winding(&points, &surface, control)?,
+        Route::Tagging => by_tagging(&points, &surface, control)?,
+    };
+    control.step("measuring confidence", 0.9)?;
+    let confidence = confidence::of_signs(&points, &signed, &surface);
+    Ok(assemble(
+        &cloud,
+        &kept,
+        &signed,
+        &confidence,
+        &surface,
+        options.route,
+    ))
+}
+
+/// What is known of the surface before any sign.
+struct Surface {
+    around: Vec<Surroundings>,
+    /// Area that each point stands for, unit box.
+    areas: Vec<f32>,
+    /// Standard deviation of the noise, unit box.
+    noise: Option<f64>,
+}
+
+impl Surface {
+    fn estimate(points: &[DVec3]) -> Self {
+        let near = Neighbours::new(points);
+        let first = near.surroundings(NEIGHBOURS);
+        let spacing = (total(&areas(&first, NEIGHBOURS)) / points.len() as f64).sqrt();
+        let diagonal = {
+            let (low, high) = points
+                .iter()
+                .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), &p| {
+                    (l.min(p), h.max(p))
+                });
+            (high - low).length()
+        };
+        // Without signs the other wall of a thin part cannot be told from this one, but for its slant.
+        let same_wall = |i: usize, j: usize| first[i].normal.dot(first[j].normal).abs() > 0.3;
+        let noise = noise::of_positions(points, same_wall, NEGLIGIBLE_NOISE * diagonal);
+        let count = noise.map_or(NEIGHBOURS, |sigma| {
+            let disc = std::f64::consts::PI * (4.0 * sigma / spacing).powi(2);
+            disc.clamp(NOISY_NEIGHBOURS[0], NOISY_NEIGHBOURS[1]) as usize
+        });
+        let around = if count == NEIGHBOURS {
+            first
+        } else {
+            near.surroundings(count)
+        };
+        let count = count.min(points.len() - 1);
+        Self {
+            areas: areas(&around, count),
+            around,
+            noise,
+        }
+    }
+
+    /// One of the smoothing widths for a point that stands for `area`.
+    fn width(&self, which: usize, area: f32) -> f32 {
+        let by_spacing = WIDTHS_BY_SPACING[which] as f32 * area.sqrt();
+        by_spacing.max(WIDTHS_BY_NOISE[which] as f32 * self.noise.unwrap_or(0.0) as f32)
+    }
+}
+
+/// `k` points in a disc of radius `r` have a mean square distance of `r²/2` from its centre.
+fn areas(around: &[Surroundings], count: usize) -> Vec<f32> {
+    let of = |s: &Surroundings| (std::f64::consts::TAU * s.spread / count as f64) as f32;
+    around.iter().map(of).collect()
+}
+
+fn total(areas: &[f32]) -> f64 {
+    areas.iter().map(|&a| f64::from(a)).sum()
+}
+
+/// Normals from the winding field of representatives, then of all points.
+fn by_winding(points: &[DVec3], surface: &Surface, control: &mut Control) -> Result<Vec<DVec3>, FitError> {
+    let n = points.len();
+    let single: Vec<[f32; 3]> = points.iter().map(|p| p.as_vec3().to_array()).collect();
+    let (chosen, areas) = sampling::representatives(&surface.areas);
+    let few = Tree::new(chosen.iter().map(|&i| single[i]).collect(), &areas);
+    let widths = |which| areas.iter().map(|&a| surface.width(which, a)).collect();
+    let schedule = Widths {
+        first: widths(0),
+        last: widths(1),
+    };
+    let normals = winding::iterate(&few, &areas, &schedule, 0.2..0.7, control)?;
+    // Their field at all points.
+    let share = total(&areas) / areas.len() as f64 / (total(&surface.areas) / n as f64);
+    let at = |which: usize, factor: f64| -> Vec<Target> {
+        single
+            .iter()
+            .zip(&surface.areas)
+            .map(|(&position, &a)| Target {
+                position,
+                width: surface.width(which, a * factor as f32),
+            })
+            .collect()
+    };
+    let all = Tree::new(single.clone(), &surface.areas);
+    let strengths = winding::weighted(&normals, &areas);
+    let mut down = few.sum(&Gradient, &strengths, &at(1, share), all.leaves());
+    let targets = at(2, 1.0);
+    let mut signed = vec![DVec3::ZERO; n];
+    for round in 0..=FULL_ROUNDS {
+        control.step("orienting", 0.7 + 0.2 * round as f64 / (FULL_ROUNDS + 1) as f64)?;
+        for i in 0..n {
+            let along = DVec3::from_array(down[i].map(f64::from)).normalize_or_zero();
+            let local = surface.around[i].normal;
+            let local = if local.dot(along) < 0.0 { -local } else { local };
+            // With noise the field is the better average, and both together better than each.
+            signed[i] = match surface.noise {
+                Some(_) => (local + along).normalize_or(local),
+                None => local,
+            };
+        }
+        if round < FULL_ROUNDS {
+            let strengths: Vec<[f32; 3]> = signed
+                .iter()
+                .zip(&surface.areas)
+                .map(|(v, &a)| (v.as_vec3() * a).to_array())
+                .collect();
+            down = all.sum(&Gradient, &strengths, &targets, all.leaves());
+            // A point's own share always agrees with it.
+            for (g, (s, t)) in down.iter_mut().zip(strengths.iter().zip(&targets)) {
+                let own = 1.0 / (4.0 * std::f32::consts::PI * t.width * t.width * t.width);
+                (0..3).for_each(|k| g[k] -= s[k] * own);
+            }
+        }
+    }
+    Ok(signed)
+}
+
+/// Normals by the tags of the cells round each point.
+fn by_tagging(points: &[DVec3], surface: &Surface, control: &mut Control) -> Result<Vec<DVec3>, FitError> {
+    let spacing = (total(&surface.areas) / points.len() as f64).sqrt();
+    let cell =
+        (tagging::CELL_BY_SPACING * spacing).max(tagging::CELL_BY_NOISE * surface.noise.unwrap_or(0.0));
+    let band = band::Band::new(points, cell);
+    control.step("tagging the exterior", 0.5)?;
+    let tags = tagging::tag(&band);
+    let normals: Vec<DVec3> = surface.around.iter().map(|s| s.normal).collect();
+    let signs = tagging::signs(&band, &tags, points, &normals);
+    Ok(normals.iter().zip(signs).map(|(n, s)| *n * s).collect())
+}
+
+/// Back in the order of the points given.
+fn assemble(
+    cloud: &Cloud,
+    kept: &[usize],
+    signed: &[DVec3],
+    confidence: &[f32],
+    surface: &Surface,
+    route: Route,
+) -> Orientation {
+    let given = cloud.source.len() + cloud.doubles.len() + cloud.left_out;
+    let mut out = Orientation {
+        normals: vec![DVec3::ZERO; given],
+        confidence: vec![0.0; given],
+        outlier: vec![true; given],
+        route,
+        noise: surface.noise.map(|s| s * cloud.scale),
+        unsure_count: 0,
+        notes: cloud.notes.clone(),
+    };
+    for ((&i, n), c) in kept.iter().zip(signed).zip(confidence) {
+        let at = cloud.source[i] as usize;
+        out.normals[at] = *n;
+        out.confidence[at] = *c;
+        out.outlier[at] = false;
+    }
+    for &(double, i) in &cloud.doubles {
+        let (at, first) = (double as usize, cloud.source[i as usize] as usize);
+        out.normals[at] = out.normals[first];
+        out.confidence[at] = out.confidence[first];
+        out.outlier[at] = out.outlier[first];
+    }
+    out.unsure_count = (0..given)
+        .filter(|&i| !out.outlier[i] && out.confidence[i] < UNSURE)
+        .count();
+    let lone = cloud.source.len() - kept.len();
+    if lone > 0 {
+        out.notes.push(format!(
+            "{lone} of {given} points lie on no surface and were given no normal"
+        ));
+    }
+    out.notes.push(format!(
+        "normals estimated and oriented by {}; the sign of {} of {given} ({:.2} %) is unsure",
+        route.name(),
+        out.unsure_count,
+        100.0 * out.unsure_count as f64 / given as f64
+    ));
+    out.notes.extend(confidence::places(cloud, kept, confidence));
+    out
+}

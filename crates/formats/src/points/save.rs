@@ -1,0 +1,134 @@
+//! Point clouds out.
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use super::{PointCloud, pcd};
+use crate::meshes::{needs_double, write_ply_points};
+use crate::{Fault, FormatError, atomic, detect};
+
+/// Formats of point clouds to be written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Format {
+    Ply,
+    Xyz,
+    Pcd,
+}
+
+const SUPPORTED: &str = ".ply, .pcd, .xyz, .xyzn and .txt";
+
+/// Writes a cloud in the format of its name, atomically; normals go with the points where there are any.
+///
+/// Coordinates are single precision in PLY and PCD, unless that would move points by more than a millionth of the
+/// cloud's diagonal (a small thing far from the origin): then they are double. The others keep all digits.
+/// The returned notes say what the format cannot hold.
+///
+/// # Errors
+/// [`Fault::UnknownKind`] with what is supported, [`Fault::Output`] for what the format has no room for, I/O.
+///
+/// # Panics
+/// If the normals are not one a point.
+pub fn save(path: &Path, cloud: &PointCloud) -> Result<Vec<String>, FormatError> {
+    let (points, normals) = (&cloud.positions, cloud.normals.as_deref());
+    assert!(
+        normals.is_none_or(|n| n.len() == points.len()),
+        "one normal per point"
+    );
+    let format = format_of(path).map_err(|fault| fault.at(path))?;
+    let double = needs_double(points);
+    let notes = Vec::new();
+    match format {
+        Format::Ply => atomic::replace(path, |out| write_ply_points(out, points, normals, None))?,
+        Format::Pcd => atomic::replace(path, |out| pcd::write(out, cloud, double))?,
+        Format::Xyz => atomic::replace(path, |out| write_xyz(out, cloud))?,
+    }
+    Ok(notes)
+}
+
+fn format_of(path: &Path) -> Result<Format, Fault> {
+    let extension = detect::extension(path);
+    match extension.as_str() {
+        _ if detect::is_gz_name(path) => {}
+        "ply" => return Ok(Format::Ply),
+        "pcd" => return Ok(Format::Pcd),
+        "xyz" | "xyzn" | "txt" => return Ok(Format::Xyz),
+        _ => {}
+    }
+    let found = path.extension().map(|e| format!(".{}", e.to_string_lossy()));
+    Err(Fault::UnknownKind {
+        found: found.unwrap_or_else(|| "a name without an extension".into()),
+        purpose: "point output",
+        supported: SUPPORTED,
+    })
+}
+
+/// A line a point, with the fewest digits that give every number back.
+fn write_xyz(out: &mut dyn Write, cloud: &PointCloud) -> io::Result<()> {
+    let mut digits = zmij::Buffer::new();
+    for (i, p) in cloud.positions.iter().enumerate() {
+        let normal = cloud.normals.as_ref().map(|n| n[i].to_array());
+        for (k, x) in p
+            .to_array()
+            .into_iter()
+            .chain(normal.into_iter().flatten())
+            .enumerate()
+        {
+            if k > 0 {
+                out.write_all(b" ")?;
+            }
+            out.write_all(digits.format(x).as_bytes())?;
+        }
+        out.write_all(b"\n")?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::ReadLimits;
+    use crate::points::read;
+
+    fn cloud(offset: DVec3) -> PointCloud {
+        PointCloud {
+            positions: (0..40)
+                .map(|i| offset + DVec3::new(0.001, -0.25, 0.5) * f64::from(i))
+                .collect(),
+            normals: Some(vec![DVec3::new(0.6, 0.0, -0.8); 40]),
+            ..Default::default()
+        }
+    }
+
+    /// Millimetres in map coordinates, in metres: single precision would round by 0.25 there.
+    #[test]
+    fn points_come_back_near_and_far_from_the_origin_with_and_without_normals() {
+        let directory = tempfile::tempdir().unwrap();
+        for name in ["a.ply", "a.pcd", "a.xyz"] {
+            let path = directory.path().join(name);
+            for (offset, slack) in [(DVec3::ZERO, 1e-6), (DVec3::new(1e6, 5_400_000.0, 12.0), 0.0)] {
+                for with_normals in [true, false] {
+                    let mut written = cloud(offset);
+                    written.normals = written.normals.filter(|_| with_normals);
+                    save(&path, &written).unwrap();
+                    let back = read(&path, &ReadLimits::default()).unwrap();
+                    assert_eq!(back.positions.len(), 40);
+                    for (a, b) in back.positions.iter().zip(&written.positions) {
+                        assert!((*a - *b).abs().max_element() <= slack, "{name}: {a} for {b}");
+                    }
+                    assert_eq!(back.normals.is_some(), with_normals, "{name}");
+                    for n in back.normals.iter().flatten() {
+                        assert!((*n - DVec3::new(0.6, 0.0, -0.8)).length() < 1e-7);
+                    }
+                }
+            }
+        }
+        let e = save(&directory.path().join("a.step"), &cloud(DVec3::ZERO)).unwrap_err();
+        assert!(
+            e.to_string().contains(".step is not a supported point output"),
+            "{e}"
+        );
+        assert!(save(&directory.path().join("a.ply.gz"), &cloud(DVec3::ZERO)).is_err());
+    }
+}

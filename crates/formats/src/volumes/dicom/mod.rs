@@ -1,0 +1,88 @@
+//! DICOM series: many files of one slice, or one of many.
+//!
+//! A directory is read with what lies in it; with the directories below it, up to eight deep, if it holds a
+//! `DICOMDIR` or no DICOM picture itself. A file stands for its series in its directory, a file of several frames
+//! for itself. What is no DICOM is passed over. Positions and orientations decide on order, spacing and axes; world
+//! coordinates are RAS millimetres. `docs/guide.md` has a table of the odd cases.
+
+mod check;
+mod codec;
+mod dataset;
+mod decode;
+mod element;
+mod fragments;
+mod pixels;
+mod plane;
+mod resample;
+mod scan;
+mod series;
+mod stack;
+mod stream;
+mod syntax;
+mod value;
+
+use std::path::Path;
+use std::sync::Arc;
+
+pub(crate) use dataset::looks_like_dicom;
+pub(crate) use scan::holds_dicom;
+
+use super::slices;
+use super::{SliceSource, Volume};
+use crate::limits::Budget;
+use crate::{Fault, ReadLimits};
+
+/// Choices for DICOM series.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct DicomOptions {
+    /// Which series, by its number or its unique identifier; needed where there are several volumes.
+    pub series: Option<String>,
+    /// What to do about slices at uneven distances, a missing one included.
+    pub uneven: Uneven,
+    /// What to do about slices that are tilted against their stack.
+    pub tilt: Tilt,
+}
+
+/// What to do about slices at uneven distances.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Uneven {
+    /// An error that says where.
+    #[default]
+    Refuse,
+    /// Linear interpolation along the stack, at the smallest distance that occurs.
+    Resample,
+}
+
+/// What to do about a tilted gantry.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Tilt {
+    /// The voxels stay where they were measured, on a grid with an oblique axis: nothing is lost.
+    #[default]
+    Keep,
+    /// Linear interpolation onto a grid with right angles, for formats and programs that need them.
+    Resample,
+}
+
+/// Opens the series that `path` stands for.
+pub(super) fn open(
+    path: &Path,
+    options: &DicomOptions,
+    budget: &mut Budget,
+) -> Result<Box<dyn SliceSource>, Fault> {
+    let found = scan::find(path, options, budget)?;
+    Ok(Box::new(series::Series::new(found, options, budget)?))
+}
+
+/// Reads the bytes of one file.
+///
+/// # Errors
+/// As [`super::read`], without the path.
+pub fn parse_dicom(bytes: &[u8], options: &DicomOptions, limits: &ReadLimits) -> Result<Volume, Fault> {
+    let mut budget = Budget::new(limits);
+    budget.reserve("the file's content", bytes.len() as u64, 1)?;
+    let found = scan::one(Arc::from(bytes), &mut budget)?;
+    slices::read(
+        &mut series::Series::new(found, options, &mut budget)?,
+        &mut budget,
+    )
+}
