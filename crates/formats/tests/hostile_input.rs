@@ -76,7 +76,6 @@ fn seeds() -> Vec<Vec<u8>> {
     paths.sort();
     let mut all: Vec<_> = paths
         .iter()
-        .filter(|p| p.is_file())
         .filter(|p| {
             !matches!(
                 p.extension().and_then(|e| e.to_str()),
