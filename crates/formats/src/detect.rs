@@ -103,11 +103,11 @@ pub fn detect(path: &Path) -> Result<Kind, FormatError> {
 
 /// What a directory holds, seen by the files in it.
 fn kind_of_directory(path: &Path) -> Result<Kind, Fault> {
-    if volumes::is_stack_folder(path)? {
-        return Ok(Kind::Volume(VolumeFormat::TiffFolder));
-    }
     if volumes::holds_dicom(path)? {
         return Ok(Kind::Volume(VolumeFormat::Dicom));
+    }
+    if volumes::is_stack_folder(path)? {
+        return Ok(Kind::Volume(VolumeFormat::TiffFolder));
     }
     Err(Fault::UnknownKind {
         found: "a directory without slices".into(),

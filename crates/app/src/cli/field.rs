@@ -182,6 +182,14 @@ impl OpenField {
         self.frame(self.lattice().cells_at(finest).map(|c| c.saturating_mul(n)))
     }
 
+    /// The grid with two cells in every knot interval of the level that holds the surface `{ f = iso }`: the finest one
+    /// on which, or on finer ones, at least a tenth of the surface's area lies; and how many finer levels there are.
+    pub fn frame_of_surface(&self, iso: f64) -> (Frame, usize) {
+        let level = either!(&self.loaded.field, f => f.level_of_surface(iso, 0.1));
+        let frame = self.frame(self.lattice().cells_at(level).map(|c| c.saturating_mul(2)));
+        (frame, self.level_count() - 1 - level)
+    }
+
     /// The grid with `n` cells along the longest side of the box and as many on the others as their lengths ask.
     pub fn frame_of_resolution(&self, n: u32) -> Frame {
         let sides = self.lattice().spacing(0) * self.lattice().extent();

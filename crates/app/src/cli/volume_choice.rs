@@ -1,5 +1,6 @@
 use std::str::FromStr;
 
+use clap::ValueEnum;
 use formats::Unit;
 use formats::volumes::{DicomOptions, RawLayout, Tilt, Uneven, VolumeOptions, VoxelType};
 
@@ -30,16 +31,35 @@ pub struct VolumeChoice {
     /// The file has no header: bytes before the first voxel
     #[arg(long, value_name = "BYTES", requires = "shape", default_value_t = 0)]
     offset: u64,
-    /// Series of a DICOM directory, by its number or its unique identifier
-    #[arg(long, value_name = "SERIES")]
+    /// DICOM: the series to read, by its number or its identifier, where there are several
+    #[arg(long, value_name = "NUMBER|UID")]
     series: Option<String>,
-    /// Slices of a DICOM series at uneven distances, a missing one included, are interpolated, not refused
-    #[arg(long)]
-    resample_uneven: bool,
-    /// Slices of a DICOM series that are tilted against their stack are interpolated onto a grid with right
-    /// angles; without, the grid stays oblique and nothing is lost
-    #[arg(long)]
-    resample_tilt: bool,
+    /// DICOM: what to do about slices at uneven distances or missing ones
+    #[arg(long, value_enum, default_value_t)]
+    uneven: UnevenChoice,
+    /// DICOM: what to do about slices of a tilted gantry
+    #[arg(long, value_enum, default_value_t)]
+    tilt: TiltChoice,
+}
+
+/// Slices at uneven distances.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum UnevenChoice {
+    /// Say where and stop.
+    #[default]
+    Refuse,
+    /// Interpolate along the stack, at the smallest distance.
+    Resample,
+}
+
+/// Slices of a tilted gantry.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum TiltChoice {
+    /// Leave every voxel where it was measured.
+    #[default]
+    Keep,
+    /// Interpolate onto a grid with right angles.
+    Resample,
 }
 
 impl VolumeChoice {
@@ -84,15 +104,13 @@ impl VolumeChoice {
             raw,
             dicom: DicomOptions {
                 series: self.series.clone(),
-                uneven: if self.resample_uneven {
-                    Uneven::Resample
-                } else {
-                    Uneven::Refuse
+                uneven: match self.uneven {
+                    UnevenChoice::Refuse => Uneven::Refuse,
+                    UnevenChoice::Resample => Uneven::Resample,
                 },
-                tilt: if self.resample_tilt {
-                    Tilt::Resample
-                } else {
-                    Tilt::Keep
+                tilt: match self.tilt {
+                    TiltChoice::Keep => Tilt::Keep,
+                    TiltChoice::Resample => Tilt::Resample,
                 },
             },
         })

@@ -41,7 +41,7 @@ pub(crate) fn on_feet(samples: &Samples, field: &dyn Field, noise: f64) -> Sampl
 }
 
 fn foot_entry(samples: &Samples, field: &dyn Field, reach: f64, index: usize) -> Option<Entry> {
-    if samples.is_sign_condition(index) {
+    if samples.is_sign_condition(index) || samples.weights[index] == 0.0 {
         return None;
     }
     let normal = DVec3::from(samples.normals[index].map(f64::from));

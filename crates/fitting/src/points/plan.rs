@@ -30,6 +30,8 @@ pub(crate) struct Plan {
     pub thin: bool,
     /// Why cells of the deepest level are not split.
     pub limited_by: StopReason,
+    /// Whether points without weight are outliers, which no figure counts.
+    pub robust: bool,
     /// Value targets in the place of 0, and no normals: for the trace of the smoother.
     pub probe: Option<Vec<f32>>,
 }
@@ -92,6 +94,7 @@ impl Plan {
             iterations: 8,
             thin: true,
             limited_by: StopReason::Depth,
+            robust: options.robust,
             probe: None,
         };
         let Some(sigma) = noise else { return clean };

@@ -167,9 +167,9 @@ impl Samples {
         self.normals[index] == [0.0; 3]
     }
 
-    /// Indices of the points of the cloud.
-    pub fn points(&self) -> impl Iterator<Item = usize> {
-        (0..self.positions.len()).filter(|&i| !self.is_sign_condition(i))
+    /// Indices of the points of the cloud that have weight.
+    pub fn live_points(&self) -> impl Iterator<Item = usize> {
+        (0..self.positions.len()).filter(|&i| !self.is_sign_condition(i) && self.weights[i] > 0.0)
     }
 
     /// World position at which a sample was measured.
@@ -236,10 +236,10 @@ impl Samples {
     /// The area is that of the occupied cells, `cells·h²/1.5`, on the grid where a cell holds about six points, or
     /// where it is `band` wide: noise fills a band round the surface that smaller cells would count.
     pub fn mean_spacing(&self, band: f64) -> f64 {
-        let n = self.positions.len();
+        let n = self.live_points().count().max(1);
         let occupied = |depth: usize| {
             let mut last = [u32::MAX; 3];
-            (0..n)
+            self.live_points()
                 .filter(|&i| std::mem::replace(&mut last, self.cell(i, depth)) != last)
                 .count()
         };

@@ -1,7 +1,7 @@
 //! Volumes in and out.
 
-mod dicom;
 mod detached;
+mod dicom;
 mod encode;
 mod geometry;
 mod metaimage;

@@ -109,20 +109,16 @@ pub(super) fn chain(
     })
 }
 
-fn open_share(
+/// Opens a file with `share` bytes of voxels, where these start.
+pub(super) fn open_share(
     header: &VolumeHeader,
     layout: Layout,
     path: &Path,
     share: u64,
-) -> Result<Box<dyn SkipRead>, Fault> {
+) -> Result<Content<'static>, Fault> {
     let open = || decoded(header, layout, input::open_as_it_is(path)?.into(), share);
-    open()
-        .map(|content| content.source)
-        .map_err(|fault| Fault::Value {
-            what: "the data file",
-            value: format!("{}, which {fault}", path.display()),
-            remedy: "every file of the list has to be there and whole",
-        })
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    open().map_err(|fault| fault.inside(&name))
 }
 
 struct Chain {
@@ -149,10 +145,10 @@ impl Chain {
         let Some(path) = self.paths.get(self.next) else {
             return Ok(None);
         };
-        let file = open_share(&self.header, self.layout, path, self.share).map_err(io::Error::other)?;
+        let content = open_share(&self.header, self.layout, path, self.share).map_err(io::Error::other)?;
         self.next += 1;
         self.left = self.share;
-        Ok(Some(file))
+        Ok(Some(content.source))
     }
 
     fn cut(&self) -> io::Error {

@@ -114,15 +114,7 @@ pub(super) fn in_files(
         });
     }
     let content = match <[_; 1]>::try_from(paths) {
-        Ok([path]) => {
-            let needed = stored_bytes(&header);
-            decoded(
-                &header,
-                layout,
-                crate::input::open_as_it_is(&path)?.into(),
-                needed,
-            )?
-        }
+        Ok([path]) => files::open_share(&header, layout, &path, stored_bytes(&header))?,
         Err(paths) => files::chain(&header, layout, paths)?,
     };
     Ok(voxels(header, notes, layout, content))

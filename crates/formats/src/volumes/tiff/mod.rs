@@ -175,7 +175,8 @@ impl FolderSlices {
         let names: u64 = folder.paths.iter().map(|p| p.as_os_str().len() as u64 + 32).sum();
         budget.reserve("the list of files", names, 1)?;
         let mut notes = folder.notes;
-        let mut first = one_page(&folder.paths[0], budget)?;
+        let path = &folder.paths[0];
+        let mut first = one_page(path, budget).map_err(|fault| fault.inside(&name_of(path)))?;
         let described = first.description()?;
         let header = described.header(&first.first, folder.paths.len(), &mut notes)?;
         Ok(Self {
@@ -199,6 +200,14 @@ impl FolderSlices {
         }
         stack.decode(0, &mut self.raw)
     }
+}
+
+/// Name of a file in the directory.
+fn name_of(path: &Path) -> String {
+    path.file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned()
 }
 
 /// A file that has one page.
@@ -227,11 +236,9 @@ impl SliceSource for FolderSlices {
     fn next_slice(&mut self, out: &mut [f32]) -> Result<(), Fault> {
         let path = self.paths[self.next].clone();
         self.next += 1;
-        let is_big_endian = self.decode(&path).map_err(|fault| Fault::Value {
-            what: "a file of the stack",
-            value: format!("{}: {fault}", path.display()),
-            remedy: "mend it or take it out",
-        })?;
+        let is_big_endian = self
+            .decode(&path)
+            .map_err(|fault| fault.inside(&name_of(&path)))?;
         voxels(&self.raw, is_big_endian, &self.header, out);
         Ok(())
     }
