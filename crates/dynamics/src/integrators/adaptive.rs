@@ -35,15 +35,20 @@ impl<T: Real> Patch<T> {
     ///
     /// # Errors
     /// As [`step`](Patch::step).
-    pub fn adaptive_step(&mut self, dt: f64, options: &AdaptiveOptions) -> Result<AdaptiveReport, PatchError> {
+    pub fn adaptive_step(
+        &mut self,
+        dt: f64,
+        options: &AdaptiveOptions,
+    ) -> Result<AdaptiveReport, PatchError> {
         let before = self.energy().total();
         let mut dt = dt.clamp(options.shortest, options.longest);
         let mut rejected = 0;
         loop {
             let step = self.step(Integrator::TrBdf2, dt)?;
             let error = step.error.unwrap_or(0.0);
-            let gained = step.energy.total() - before - step.work;
-            let scale = before.abs().max(step.energy.total().abs()).max(step.work.abs());
+            let after = self.energy().total();
+            let gained = after - before - step.work;
+            let scale = before.max(after).max(step.work.abs());
             let unbalanced = gained > options.energy_gain * scale;
             let fast = options.acceleration.is_some_and(|a| self.acceleration(dt) > a);
             // Of a method of second order the error of a step falls with its cube.
@@ -59,7 +64,11 @@ impl<T: Real> Patch<T> {
             }
             self.restore();
             rejected += 1;
-            let factor = if unbalanced || fast || !error.is_finite() { 0.5 } else { factor.clamp(0.1, 0.9) };
+            let factor = if unbalanced || fast || !error.is_finite() {
+                0.5
+            } else {
+                factor.clamp(0.1, 0.9)
+            };
             dt = (dt * factor).max(options.shortest);
         }
     }
@@ -67,6 +76,8 @@ impl<T: Real> Patch<T> {
     /// Largest mean acceleration of a density over the last step.
     fn acceleration(&self, dt: f64) -> f64 {
         let rates = self.state.w.iter().zip(&self.work.before.w);
-        rates.map(|(now, then)| (*now - *then).as_f64().abs() / dt).fold(0.0, f64::max)
+        rates
+            .map(|(now, then)| (*now - *then).as_f64().abs() / dt)
+            .fold(0.0, f64::max)
     }
 }

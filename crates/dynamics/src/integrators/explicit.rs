@@ -80,7 +80,11 @@ impl<T: Real> Patch<T> {
     fn mass_solver(&mut self) -> Box<StepSolver<T>> {
         self.mass_solver.take().unwrap_or_else(|| {
             let steps = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
-            Box::new(StepSolver::new(self.solver.lattice().clone(), &steps, self.solver.options()))
+            Box::new(StepSolver::new(
+                self.solver.lattice().clone(),
+                &steps,
+                self.solver.options(),
+            ))
         })
     }
 
@@ -101,12 +105,21 @@ impl<T: Real> Patch<T> {
             direction: s.direction,
             weights: s.weights.scaled(scale),
         });
-        let stiffness = StepMatrix::new(self.matrix.dims(), self.lumped.ground.scaled(scale), springs.collect());
+        let stiffness = StepMatrix::new(
+            self.matrix.dims(),
+            self.lumped.ground.scaled(scale),
+            springs.collect(),
+        );
         let mut solver = self.mass_solver();
+        self.mass_matrix = None;
         solver.prepare(&mass)?;
         let largest = largest_frequency(&stiffness, &mass, &mut solver);
         self.mass_solver = Some(solver);
-        let limit = if largest > 0.0 { 2.0 / largest } else { f64::INFINITY };
+        let limit = if largest > 0.0 {
+            2.0 / largest
+        } else {
+            f64::INFINITY
+        };
         self.limit = Some((self.version, limit));
         Ok(limit)
     }
@@ -122,13 +135,24 @@ impl<T: Real> Patch<T> {
         for (i, g) in self.work.g.iter_mut().enumerate() {
             *g = t(dt) * (self.work.force[i] - self.lumped.damping.at(i) * self.state.w[i]);
         }
-        let matrix = self.mass_matrix(dt);
         let mut solver = self.mass_solver();
-        let prepared = solver.prepare(&matrix);
+        let kept = self
+            .mass_matrix
+            .take()
+            .filter(|m| (m.0, m.1) == (self.version, dt));
+        let (matrix, prepared) = match kept {
+            Some((.., matrix)) => (matrix, Ok(())),
+            None => {
+                let matrix = self.mass_matrix(dt);
+                let prepared = solver.prepare(&matrix);
+                (matrix, prepared)
+            }
+        };
         let work = &mut self.work;
         let report = prepared.map(|()| solver.solve(&matrix, &work.g, &mut work.x, &mut work.dx));
         self.mass_solver = Some(solver);
         let report = report?;
+        self.mass_matrix = Some((self.version, dt, matrix));
         let state = &mut self.state;
         for ((p, v), x) in state.p.iter_mut().zip(&mut state.v).zip(&work.x) {
             *v += *x;

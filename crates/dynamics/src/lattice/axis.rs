@@ -129,8 +129,8 @@ impl Axis {
         let diagonal: Vec<f64> = (0..n).map(|i| gram[(i, i)]).collect();
         for j in 0..n {
             let pivot = gram[(j, j)] / diagonal[j];
-            // Negated so that NaN, from an empty column, is refused too.
-            if !(pivot > 1e-12) {
+            // NaN comes from an empty column.
+            if pivot.is_nan() || pivot <= 1e-12 {
                 return Err(LatticeError::Undetermined {
                     axis,
                     index: j,
@@ -223,7 +223,10 @@ impl Axis {
         keep[..=p].fill(start);
         keep.extend(std::iter::repeat_n(end, p + 1));
         let knots = KnotVector::new(p, keep).ok()?;
-        let out = Self { knots, ..self.clone() };
+        let out = Self {
+            knots,
+            ..self.clone()
+        };
         (out.knots.coefficient_count() > 2 * out.first_free()).then_some(out)
     }
 
@@ -251,7 +254,8 @@ impl Axis {
             a
         };
         let (fine, target) = (matrix(&self.knots), matrix(&coarse.knots));
-        let gram = Cholesky::new(fine.transpose() * &fine).expect("functions on their own spans are independent");
+        let gram =
+            Cholesky::new(fine.transpose() * &fine).expect("functions on their own spans are independent");
         let all = gram.solve(&(fine.transpose() * target));
         let (rows, columns) = (self.first_free(), coarse.first_free());
         let row = |i: usize| {
