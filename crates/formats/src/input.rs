@@ -78,6 +78,20 @@ pub(crate) fn io_fault(doing: &'static str) -> impl Fn(io::Error) -> Fault {
 
 /// Opens `path`; gzip is told by its magic bytes, whatever the name.
 pub(crate) fn open(path: &Path) -> Result<Input, Fault> {
+    open_with(path, true)
+}
+
+/// Opens a file of bare voxels, whose first ones may look like any magic: gzip is told by the name.
+pub(crate) fn open_by_name(path: &Path) -> Result<Input, Fault> {
+    open_with(path, crate::detect::is_gz_name(path))
+}
+
+/// Opens `path` as it is.
+pub(crate) fn open_as_it_is(path: &Path) -> Result<Input, Fault> {
+    open_with(path, false)
+}
+
+fn open_with(path: &Path, may_inflate: bool) -> Result<Input, Fault> {
     let mut file = File::open(path).map_err(io_fault("opening"))?;
     let meta = file.metadata().map_err(io_fault("opening"))?;
     if meta.is_dir() {
@@ -93,7 +107,7 @@ pub(crate) fn open(path: &Path) -> Result<Input, Fault> {
         });
     }
     let mut magic = [0; 2];
-    let gzip = meta.len() >= 18 && file.read_exact(&mut magic).is_ok() && magic == GZIP_MAGIC;
+    let gzip = may_inflate && meta.len() >= 18 && file.read_exact(&mut magic).is_ok() && magic == GZIP_MAGIC;
     let (mut length, mut bound) = (meta.len(), meta.len());
     if gzip {
         let mut tail = [0; 4];

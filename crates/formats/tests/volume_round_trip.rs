@@ -160,6 +160,123 @@ fn what_nifti_cannot_hold_is_refused_and_no_file_is_left() {
     assert!(save("v.nii", [40_000, 1, 1], StoreAs::Float32).contains("dimension of 40000"));
     assert!(save("v.nii", DIMS, integer(VoxelType::U8, 0.0)).contains("slope 0"));
     assert!(save("v.nii", DIMS, integer(VoxelType::F64, 1.0)).contains("float64"));
-    assert!(save("v.mha", DIMS, StoreAs::Float32).contains("supported: .nii and .nii.gz"));
+    assert!(save("v.mhd", DIMS, StoreAs::Float32).contains("supported: .nii, .nii.gz, .nrrd"));
+    for name in ["v.mha", "v.nrrd", "v.vti"] {
+        assert!(save(name, DIMS, integer(VoxelType::I16, 0.5)).contains("slope 0.5"));
+        assert!(save(name, DIMS, integer(VoxelType::F64, 1.0)).contains("float64"));
+        assert!(save(name, [0, 1, 1], StoreAs::Float32).contains("dimension of 0"));
+    }
     assert_eq!(std::fs::read_dir(&directory).unwrap().count(), 0);
+}
+
+/// Any map, any unit, floats and integers; what is written in double precision comes back to its last digits.
+mod maps {
+    use super::*;
+    use formats::FormatError;
+    use formats::volumes::{Grid, VolumeFormat};
+    use proptest::prelude::*;
+
+    fn any_map() -> impl Strategy<Value = DAffine3> {
+        let axis = || prop::array::uniform3(-1.0..1.0);
+        let spacing = prop::array::uniform3(0.01..10.0);
+        (
+            axis(),
+            -3.0..3.0,
+            spacing,
+            any::<bool>(),
+            prop::array::uniform3(-1e6..1e6),
+        )
+            .prop_map(|(axis, angle, spacing, is_mirrored, offset)| {
+                let axis = DVec3::from_array(axis) + DVec3::new(0.0, 0.0, 1.5);
+                let turn = DMat3::from_axis_angle(axis.normalize(), angle);
+                let flip = DVec3::new(1.0, 1.0, if is_mirrored { -1.0 } else { 1.0 });
+                DAffine3 {
+                    matrix3: turn * DMat3::from_diagonal(DVec3::from_array(spacing) * flip),
+                    translation: DVec3::from_array(offset),
+                }
+            })
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..Default::default() })]
+
+        #[test]
+        fn double_precision_formats_keep_any_map(map in any_map(), unit in 0u8..5, as_integer in any::<bool>()) {
+            let unit = Unit::from_code(unit).unwrap();
+            let scale = unit.in_mm().unwrap_or(1.0);
+            let directory = tempfile::tempdir().unwrap();
+            for (name, format) in [("v.nrrd", VolumeFormat::Nrrd), ("v.mha", VolumeFormat::MetaImage)] {
+                let path = directory.path().join(name);
+                let grid = Grid { dims: DIMS, world_from_voxel: map, unit };
+                let store = if as_integer {
+                    StoreAs::Integer { voxel: VoxelType::I16, slope: 1.0, intercept: 0.0 }
+                } else {
+                    StoreAs::Float32
+                };
+                let mut asked = Vec::new();
+                volumes::save_slices(&path, &grid, store, |z, out| {
+                    asked.push(z);
+                    out.copy_from_slice(&values()[21 * z..][..21]);
+                    Ok::<(), FormatError>(())
+                })
+                .unwrap();
+                prop_assert_eq!(asked, [0, 1]);
+                prop_assert_eq!(std::fs::read_dir(&directory).unwrap().count(), 1, "scratch files are gone");
+                let v = volumes::read(&path, &Default::default(), &ReadLimits::default()).unwrap();
+                let preview = volumes::peek(&path, &Default::default()).unwrap();
+                prop_assert_eq!(preview.format, format);
+                let stored: Vec<f32> =
+                    values().iter().map(|v| if as_integer { v.round() } else { *v }).collect();
+                prop_assert_eq!(&v.values, &stored);
+                let expected = if unit == Unit::Unknown { unit } else { Unit::Millimetre };
+                prop_assert_eq!(v.header.unit, expected);
+                // Axes within 4 roundings of theirs; 1e-6 mm at the far corner.
+                let corner = DVec3::new(6.0, 2.0, 1.0);
+                for p in [DVec3::ZERO, corner] {
+                    let there = map.transform_point3(p) * scale;
+                    let found = v.header.world_from_voxel.transform_point3(p);
+                    prop_assert!((there - found).length() <= 1e-15 * there.length() + 1e-13 * scale, "{} {}", there, found);
+                }
+                std::fs::remove_file(&path).unwrap();
+            }
+        }
+    }
+
+    #[test]
+    fn an_error_of_the_slices_is_handed_on_and_leaves_the_old_file() {
+        #[derive(Debug, PartialEq)]
+        enum Stop {
+            Here(usize),
+            Format,
+        }
+        impl From<FormatError> for Stop {
+            fn from(_: FormatError) -> Self {
+                Self::Format
+            }
+        }
+        let directory = tempfile::tempdir().unwrap();
+        let grid = Grid {
+            dims: DIMS,
+            world_from_voxel: map(),
+            unit: Unit::Millimetre,
+        };
+        for name in ["v.nii", "v.nii.gz", "v.nrrd", "v.mha", "v.vti"] {
+            let path = directory.path().join(name);
+            std::fs::write(&path, "old").unwrap();
+            let stopped = volumes::save_slices(&path, &grid, StoreAs::Float32, |z, _| match z {
+                1 => Err(Stop::Here(z)),
+                _ => Ok(()),
+            });
+            assert_eq!(stopped, Err(Stop::Here(1)), "{name}");
+            assert_eq!(std::fs::read(&path).unwrap(), b"old", "{name}");
+        }
+        let nowhere = volumes::save_slices(
+            &directory.path().join("v.txt"),
+            &grid,
+            StoreAs::Float32,
+            |_, _| Ok(()),
+        );
+        assert_eq!(nowhere, Err(Stop::Format));
+        assert_eq!(std::fs::read_dir(&directory).unwrap().count(), 5);
+    }
 }

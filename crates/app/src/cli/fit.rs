@@ -17,6 +17,7 @@ use super::input::{self, Input, check_output, remaining};
 use super::progress::Bar;
 use super::quantity::{Memory, Tolerance, human_bytes, positive};
 use super::summary::Summary;
+use super::unoriented::{Oriented, Unoriented};
 use super::volume_choice::VolumeChoice;
 use super::{interrupt, set_threads};
 
@@ -64,6 +65,10 @@ pub struct Choice {
     /// Weight of the bending energy [default: chosen from the data]
     #[arg(long, value_name = "μ", value_parser = positive)]
     pub smoothing: Option<f64>,
+    /// Estimate the normals of a cloud that has none (or not those of its file), and how to tell inside from outside
+    #[arg(long, value_enum, value_name = "ROUTE", num_args = 0..=1, require_equals = true,
+          default_missing_value = "winding")]
+    pub unoriented: Option<Unoriented>,
     /// Unit of the coordinates, where the file does not tell: mm, cm or m
     #[arg(long, value_parser = unit)]
     pub unit: Option<Unit>,
@@ -182,19 +187,14 @@ fn fit_cloud<T: Stored>(cloud: &PointCloud, choice: &Choice, control: &mut Contr
             "--method interpolate is for volumes; leave it out for a point cloud",
         ));
     }
-    let Some(normals) = &cloud.normals else {
-        return Err(Failure::input(
-            "the points have no normals, which tell inside from outside; give a file with columns nx ny nz \
-             (estimate and orient them with a tool such as MeshLab, CloudCompare or Open3D), or a mesh with faces",
-        ));
-    };
     if cloud.positions.is_empty() {
         return Err(FitError::NotEnoughSamples { found: 0, needed: 10 }.into());
     }
+    let oriented = Oriented::new(cloud, choice.unoriented, control)?.map_err(|e| explain(e, control))?;
     let unit = stated_unit(cloud.unit, choice.unit)?;
     let points = OrientedPoints {
-        positions: &cloud.positions,
-        normals,
+        positions: oriented.positions(),
+        normals: oriented.normals(),
     };
     let diagonal = points.diagonal();
     let options = PointOptions {
@@ -206,8 +206,10 @@ fn fit_cloud<T: Stored>(cloud: &PointCloud, choice: &Choice, control: &mut Contr
         coefficients: choice.coefficients.map(NonZeroUsize::get),
         max_depth: choice.max_depth.map(usize::from),
         smoothing: choice.smoothing,
+        ..Default::default()
     };
     let (field, mut report) = fit_points::<T>(&points, &options, control).map_err(|e| explain(e, control))?;
+    oriented.complete(&mut report, field.lattice());
     report.notes.splice(0..0, cloud.notes.iter().cloned());
     Ok(Fitted {
         field: T::any(field),
@@ -219,6 +221,11 @@ fn fit_cloud<T: Stored>(cloud: &PointCloud, choice: &Choice, control: &mut Contr
 }
 
 fn fit_voxels<T: Stored>(volume: &Volume, choice: &Choice, control: &mut Control) -> Outcome<Fitted> {
+    if choice.unoriented.is_some() {
+        return Err(Failure::usage(
+            "--unoriented is for point clouds; leave it out for a volume",
+        ));
+    }
     let header = &volume.header;
     let unit = stated_unit(header.unit, choice.unit)?;
     let view = VolumeView {
@@ -321,6 +328,10 @@ impl Fitted {
                     .filter(|l| l.reason == StopReason::NoData)
                     .count()
             }),
+            oriented_by: r.signs.as_ref().map(|s| s.route.name().into()),
+            outliers: r.signs.as_ref().map(|s| s.outlier_count),
+            unsure_signs: r.signs.as_ref().map(|s| s.unsure_count),
+            leaves_of_unsure_sign: r.signs.as_ref().map(|s| s.unsure_leaves()),
             notes: r.notes.clone(),
             ..Default::default()
         }

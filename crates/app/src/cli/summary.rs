@@ -62,6 +62,18 @@ pub struct Summary {
     /// Leaves above the tolerance that were not split for lack of data.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub leaves_without_data: Option<usize>,
+    /// How inside was told from outside, where the cloud had no normals.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub oriented_by: Option<String>,
+    /// Points that no surface passes through.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub outliers: Option<usize>,
+    /// Points whose estimated normal may point the wrong way.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unsure_signs: Option<usize>,
+    /// Leaves where that is so on the mean of their points.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub leaves_of_unsure_sign: Option<usize>,
     /// Points that Newton's method could not bring to the surface.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unprojected: Option<usize>,
@@ -134,6 +146,10 @@ impl Summary {
                     .filter(|n| Some(*n) != self.input_count)
                     .map(count),
             ),
+            ("oriented by", self.oriented_by.clone()),
+            ("  outliers", self.outliers.map(count)),
+            ("  unsure signs", self.unsure_signs.map(count)),
+            ("  leaves of unsure sign", self.leaves_of_unsure_sign.map(count)),
             ("tolerance", self.tolerance.map(size)),
             ("noise found", self.noise.map(size)),
             ("smoothing", self.smoothing.map(human_number)),

@@ -37,6 +37,9 @@ pub enum Route {
 }
 
 impl Route {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::WindingNumber, Self::Tagging];
+
     /// Its name in reports.
     pub fn name(self) -> &'static str {
         match self {

@@ -3,10 +3,11 @@
 use std::num::NonZero;
 
 use glam::{DMat3, DVec3};
-use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use kiddo::SquaredEuclidean;
 use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen};
 
 use super::samples::Samples;
+use super::support::{self, Tree};
 
 /// Points at which a quadric is fitted.
 const QUERIES: usize = 256;
@@ -26,20 +27,30 @@ const SHAPE: f64 = 1.35;
 ///
 /// The neighbourhood has to reach three standard deviations: in a smaller one the noise bends the principal
 /// plane and hides part of itself.
-pub(crate) fn estimate(samples: &Samples, negligible: f64) -> Option<f64> {
-    // The other wall of a thin part is no noise of this one.
-    let same_wall = |i: usize, j: usize| dot(samples.normals[i], samples.normals[j]) > SAME_WALL;
-    of_positions(&samples.positions, same_wall, negligible)
+pub(crate) fn estimate(samples: &Samples, tree: &Tree, negligible: f64) -> Option<f64> {
+    // The other wall of a thin part is no noise of this one, nor are points without weight.
+    let same_wall = |i: usize, j: usize| {
+        let live = samples.weights[i] > 0.0 && samples.weights[j] > 0.0;
+        live && dot(samples.normals[i], samples.normals[j]) > SAME_WALL
+    };
+    quadrics(&samples.positions, tree, same_wall, negligible)
 }
 
-/// The same, where `same_wall(i, j)` tells whether point `j` near point `i` may belong to its surface.
+/// The same of bare positions, where `same_wall(i, j)` tells whether point `j` near point `i` may belong to its surface.
 pub(crate) fn of_positions(
     positions: &[DVec3],
     same_wall: impl Fn(usize, usize) -> bool,
     negligible: f64,
 ) -> Option<f64> {
-    let points: Vec<[f64; 3]> = positions.iter().map(|p| p.to_array()).collect();
-    let tree = ImmutableKdTree::<f64, 3>::new_from_slice(&points).ok()?;
+    quadrics(positions, &support::tree(positions)?, same_wall, negligible)
+}
+
+fn quadrics(
+    points: &[DVec3],
+    tree: &Tree,
+    same_wall: impl Fn(usize, usize) -> bool,
+    negligible: f64,
+) -> Option<f64> {
     let stride = points.len().div_ceil(QUERIES);
     let mut previous: Option<f64> = None;
     for k in NEIGHBOURS {
@@ -49,9 +60,10 @@ pub(crate) fn of_positions(
         let count = NonZero::new(k).expect("not zero");
         let mut found: Vec<(f64, f64)> = (0..points.len())
             .step_by(stride)
+            .filter(|&i| same_wall(i, i))
             .filter_map(|i| {
                 let near = tree
-                    .query(&points[i])
+                    .query(&points[i].to_array())
                     .nearest_n::<SquaredEuclidean<f64>>(count)
                     .execute();
                 let reach = f64::sqrt(near.last()?.distance);
@@ -59,7 +71,7 @@ pub(crate) fn of_positions(
                     .iter()
                     .map(|n| n.item as usize)
                     .filter(|&j| same_wall(i, j))
-                    .map(|j| positions[j])
+                    .map(|j| points[j])
                     .collect();
                 Some((quadric_residual(&around)?, reach))
             })

@@ -1,15 +1,22 @@
 //! Volumes in and out.
 
+mod detached;
 mod dicom;
+mod encode;
 mod geometry;
+mod metaimage;
 mod nifti;
+mod nrrd;
 mod open;
 mod options;
 mod part;
 mod raw;
+mod save;
 mod slices;
 mod stream;
+mod tiff;
 mod voxel;
+mod vti;
 
 use std::fmt;
 use std::path::Path;
@@ -18,12 +25,20 @@ use glam::{DAffine3, DVec3};
 
 pub use dicom::{DicomOptions, Tilt, Uneven, parse_dicom};
 pub(crate) use dicom::{holds_dicom, looks_like_dicom};
+pub use encode::Grid;
 pub(crate) use geometry::is_usable as is_usable_affine;
+pub(crate) use metaimage::looks_like_metaimage;
+pub use metaimage::parse_metaimage;
 pub(crate) use nifti::nifti_format;
-pub use nifti::{parse_nifti, save, write_nifti};
+pub use nifti::{parse_nifti, write_nifti};
+pub(crate) use nrrd::looks_like_nrrd;
+pub use nrrd::parse_nrrd;
 pub use options::VolumeOptions;
 pub use raw::{RawLayout, parse_raw};
+pub use save::{save, save_slices};
 use slices::SliceSource;
+pub use tiff::parse_tiff;
+pub(crate) use tiff::{is_stack_folder, looks_like_tiff};
 pub use voxel::{StoreAs, VoxelType};
 
 use crate::limits::Budget;
@@ -38,6 +53,14 @@ pub enum VolumeFormat {
     NiftiPair,
     /// A DICOM series: a directory, one of its files, or one file of several frames.
     Dicom,
+    /// NRRD, its voxels in the same file or in others.
+    Nrrd,
+    /// MetaImage, its voxels in the same file or in others.
+    MetaImage,
+    /// The pages of a TIFF file.
+    Tiff,
+    /// The TIFF files of a directory, a slice each.
+    TiffFolder,
     /// Voxels without a header, told by [`VolumeOptions::raw`] alone.
     Raw,
 }
@@ -48,6 +71,10 @@ impl fmt::Display for VolumeFormat {
             Self::Nifti => "NIfTI",
             Self::NiftiPair => "NIfTI header and image",
             Self::Dicom => "DICOM",
+            Self::Nrrd => "NRRD",
+            Self::MetaImage => "MetaImage",
+            Self::Tiff => "TIFF stack",
+            Self::TiffFolder => "directory of TIFF slices",
             Self::Raw => "raw",
         })
     }
@@ -101,6 +128,17 @@ impl VolumeHeader {
     pub fn spacing(&self) -> DVec3 {
         let m = self.world_from_voxel.matrix3;
         DVec3::new(m.x_axis.length(), m.y_axis.length(), m.z_axis.length())
+    }
+
+    /// States the unit of the file and converts the map to millimetres.
+    ///
+    /// # Errors
+    /// [`crate::Fault::Value`] if `stated` is [`Unit::Unknown`] or the volume already is in a known unit.
+    pub fn to_mm(&mut self, stated: Unit) -> Result<(), crate::Fault> {
+        let scale = stated.scale_for("volume", self.unit)?;
+        self.world_from_voxel = DAffine3::from_scale(DVec3::splat(scale)) * self.world_from_voxel;
+        self.unit = Unit::Millimetre;
+        Ok(())
     }
 
     /// Number of voxels.

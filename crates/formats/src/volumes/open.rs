@@ -4,12 +4,14 @@ use std::path::Path;
 
 use super::part::Part;
 use super::slices::SliceSource;
-use super::{VolumeFormat, VolumeOptions, dicom, nifti, raw};
+use super::{VolumeFormat, VolumeOptions, dicom, metaimage, nifti, nrrd, raw, tiff};
 use crate::detect::{self, Kind};
 use crate::limits::Budget;
 use crate::{Fault, FormatError};
 
-pub(crate) const VOLUMES: &str = "volumes .nii, also .gz, and DICOM series";
+/// Everything that [`super::read`] reads.
+pub(crate) const VOLUMES: &str =
+    "volumes .nii .hdr .nrrd .nhdr .mha .mhd .tif, also .gz, DICOM series, directories of .tif";
 
 /// An open volume: its slices as asked, and what it is as a whole.
 pub(super) struct Opened {
@@ -29,6 +31,9 @@ pub(super) fn open(path: &Path, options: &VolumeOptions, budget: &mut Budget) ->
         (VolumeFormat::Raw, None) => unreachable!("never told from a file"),
         (VolumeFormat::Dicom, _) => dicom::open(path, &options.dicom, budget)?,
         (VolumeFormat::Nifti | VolumeFormat::NiftiPair, _) => Box::new(nifti::open(path)?),
+        (VolumeFormat::Nrrd, _) => nrrd::open(path, budget)?,
+        (VolumeFormat::MetaImage, _) => metaimage::open(path, budget)?,
+        (VolumeFormat::Tiff | VolumeFormat::TiffFolder, _) => tiff::open(path, budget)?,
     };
     let file_dims = inner.header().dims;
     Ok(Opened {

@@ -21,7 +21,7 @@ pub struct RawLayout {
     pub voxel: VoxelType,
     /// Order of the bytes of a voxel.
     pub big_endian: bool,
-    /// Bytes before the first voxel, of the inflated content if the file is gzipped.
+    /// Bytes before the first voxel, of the inflated content if the name ends in `.gz`.
     pub offset: u64,
     /// Distances between neighbouring voxels, in `unit`.
     pub spacing: [f64; 3],
@@ -43,7 +43,7 @@ pub fn parse_raw(bytes: &[u8], layout: &RawLayout, limits: &ReadLimits) -> Resul
 }
 
 pub(super) fn open(path: &Path, layout: &RawLayout) -> Result<StreamSlices<'static>, Fault> {
-    let input = input::open(path)?;
+    let input = input::open_by_name(path)?;
     let is_plain = matches!(input.source, input::Source::Plain(_));
     voxels(layout, Box::new(input.source), input.length_bound, is_plain)
 }

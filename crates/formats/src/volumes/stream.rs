@@ -43,7 +43,9 @@ impl<'a> StreamSlices<'a> {
     }
 
     fn refill(&mut self) -> Result<(), Fault> {
-        self.buffer.resize(BUFFER, 0);
+        if self.buffer.is_empty() {
+            self.buffer = vec![0; BUFFER];
+        }
         let want = (BUFFER as u64).min(self.left) as usize;
         let mut got = 0;
         while got < want {

@@ -14,7 +14,7 @@ use super::scan::File;
 use super::stream::Stream;
 use super::syntax::Codec;
 use crate::Fault;
-use crate::foreign::guarded;
+use crate::guard;
 use crate::limits::Budget;
 
 /// Reads pictures, compressed ones several at a time.
@@ -188,7 +188,9 @@ impl Worker {
                 fragments.read(&mut stream, plane.frame, &mut self.compressed)?;
                 let (compressed, raw) = (&self.compressed, &mut self.raw);
                 let decode = || codec::decode(source.codec, compressed, &source.shape, raw);
-                source.layout.decoded(guarded("compressed pixels", decode)?)
+                source
+                    .layout
+                    .decoded(guard::decode("decoder of compressed pixels", decode)?)
             }
         };
         self.open = Some((plane.file, stream));

@@ -7,7 +7,8 @@ mod write;
 use std::path::{Path, PathBuf};
 
 pub(crate) use header::nifti_format;
-pub use write::{save, write_nifti};
+pub(super) use write::write;
+pub use write::write_nifti;
 
 use super::Volume;
 use super::slices;
@@ -31,7 +32,7 @@ pub(super) fn open(path: &Path) -> Result<StreamSlices<'static>, Fault> {
     let (mut source, bound) = (input.source, input.length_bound);
     let parsed = header::read(&mut source)?;
     if parsed.is_pair {
-        let image = input::open(&image_of(path)?)?;
+        let image = input::open_by_name(&image_of(path)?)?;
         return voxels(parsed, 0, Box::new(image.source), image.length_bound);
     }
     let consumed = parsed.consumed;

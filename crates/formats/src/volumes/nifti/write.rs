@@ -1,6 +1,6 @@
 //! Volumes out: NIfTI-1 single files, little endian.
 
-use std::io::{self, Write};
+use std::io::Write;
 use std::path::Path;
 
 use flate2::Compression;
@@ -8,59 +8,34 @@ use flate2::write::GzEncoder;
 use glam::DAffine3;
 
 use super::header::SIZE_1;
-use crate::volumes::{StoreAs, VoxelType};
-use crate::{Fault, FormatError, Unit, atomic, detect};
+use crate::volumes::encode::Slices;
+use crate::volumes::save::LEVEL;
+use crate::volumes::{Grid, StoreAs, VoxelType};
+use crate::{Fault, FormatError, Unit, atomic};
 
-/// Deflate level: densities hardly compress, so the higher ones cost time and save a few percent.
-const LEVEL: u32 = 3;
-
-/// Writes a volume as `.nii`, or `.nii.gz` if `path` ends so, atomically.
-///
-/// `values` are in file order, `values[x + nx·(y + ny·z)]`. The transform becomes the sform, in single precision,
-/// which is all that NIfTI-1 has.
-///
-/// # Errors
-/// [`Fault::Output`] if a dimension exceeds 32767 or `store` cannot be used, I/O.
-///
-/// # Panics
-/// If `values` is not `nx·ny·nz` long.
-pub fn save(
-    path: &Path,
-    dims: [usize; 3],
-    values: &[f32],
-    world_from_voxel: &DAffine3,
-    unit: Unit,
-    store: StoreAs,
-) -> Result<(), FormatError> {
-    let gzip = detect::is_gz_name(path);
-    if detect::extension(path) != "nii" {
-        let found = format!(".{}", detect::extension(path));
-        return Err(Fault::UnknownKind {
-            found,
-            purpose: "volume output",
-            supported: ".nii and .nii.gz",
-        }
-        .at(path));
-    }
-    let header = header(dims, world_from_voxel, unit, store).map_err(|f| f.at(path))?;
+/// Writes `path`.
+pub(in crate::volumes) fn write(path: &Path, mut slices: Slices, gzip: bool) -> Result<(), FormatError> {
+    let header = header(slices.grid, slices.store).map_err(|f| f.at(path))?;
     atomic::replace(path, |out| {
         if gzip {
             let mut gz = GzEncoder::new(out, Compression::new(LEVEL));
-            voxels(&mut gz, &header, dims, values, store)?;
+            gz.write_all(&header)?;
+            slices.write_to(&mut gz)?;
             gz.finish().map(drop)
         } else {
-            voxels(out, &header, dims, values, store)
+            out.write_all(&header)?;
+            slices.write_to(out)
         }
     })
 }
 
-/// Writes the bytes of a `.nii` file: see [`save`].
+/// Writes the bytes of a `.nii` file: see [`save`](crate::volumes::save).
 ///
 /// # Errors
-/// As [`save`].
+/// As [`save`](crate::volumes::save).
 ///
 /// # Panics
-/// As [`save`].
+/// As [`save`](crate::volumes::save).
 pub fn write_nifti(
     out: &mut impl Write,
     dims: [usize; 3],
@@ -69,14 +44,36 @@ pub fn write_nifti(
     unit: Unit,
     store: StoreAs,
 ) -> Result<(), Fault> {
-    let header = header(dims, world_from_voxel, unit, store)?;
-    voxels(out, &header, dims, values, store).map_err(|source| Fault::Io {
+    assert_eq!(
+        values.len(),
+        dims.iter().product::<usize>(),
+        "one value per voxel"
+    );
+    let grid = Grid {
+        dims,
+        world_from_voxel: *world_from_voxel,
+        unit,
+    };
+    let header = header(&grid, store)?;
+    let slice = dims[0] * dims[1];
+    let mut slices = Slices {
+        grid: &grid,
+        store,
+        next: &mut |z, to: &mut [f32]| {
+            to.copy_from_slice(&values[z * slice..][..slice]);
+            Ok(())
+        },
+        scratch: Path::new("."),
+    };
+    let result = out.write_all(&header).and_then(|()| slices.write_to(out));
+    result.map_err(|source| Fault::Io {
         doing: "writing",
         source,
     })
 }
 
-fn header(dims: [usize; 3], map: &DAffine3, unit: Unit, store: StoreAs) -> Result<[u8; 352], Fault> {
+fn header(grid: &Grid, store: StoreAs) -> Result<[u8; 352], Fault> {
+    let dims = grid.dims;
     let (voxel, slope, intercept) = match store {
         StoreAs::Float32 => (VoxelType::F32, 1.0, 0.0),
         StoreAs::Integer {
@@ -112,11 +109,10 @@ fn header(dims: [usize; 3], map: &DAffine3, unit: Unit, store: StoreAs) -> Resul
     }
     put(70, &voxel.code().to_le_bytes());
     put(72, &(8 * voxel.size() as i16).to_le_bytes());
-    // Files hold millimetres or nothing: other units are scaled.
-    let scale = unit.in_mm().unwrap_or(1.0);
-    let m = map.matrix3 * scale;
+    let map = grid.map_mm();
+    let m = map.matrix3;
     let columns = [m.x_axis, m.y_axis, m.z_axis];
-    let offset = map.translation * scale;
+    let offset = map.translation;
     put(76, &1f32.to_le_bytes());
     for (i, c) in columns.iter().enumerate() {
         put(80 + 4 * i, &(c.length() as f32).to_le_bytes());
@@ -124,7 +120,7 @@ fn header(dims: [usize; 3], map: &DAffine3, unit: Unit, store: StoreAs) -> Resul
     put(108, &352f32.to_le_bytes());
     put(112, &slope.to_le_bytes());
     put(116, &intercept.to_le_bytes());
-    put(123, &[if unit == Unit::Unknown { 0 } else { 2 }]);
+    put(123, &[if grid.unit == Unit::Unknown { 0 } else { 2 }]);
     put(148, b"isoclay");
     // 2: aligned to some other scan, the code for "a transform, and no standard space is claimed".
     put(254, &2i16.to_le_bytes());
@@ -136,53 +132,4 @@ fn header(dims: [usize; 3], map: &DAffine3, unit: Unit, store: StoreAs) -> Resul
     }
     put(344, b"n+1\0");
     Ok(h)
-}
-
-fn voxels(
-    out: &mut (impl Write + ?Sized),
-    header: &[u8; 352],
-    dims: [usize; 3],
-    values: &[f32],
-    store: StoreAs,
-) -> io::Result<()> {
-    assert_eq!(
-        values.len(),
-        dims.iter().product::<usize>(),
-        "one value per voxel"
-    );
-    out.write_all(header)?;
-    let mut bytes = Vec::with_capacity(1 << 17);
-    for part in values.chunks(1 << 14) {
-        bytes.clear();
-        match store {
-            StoreAs::Float32 => bytes.extend(part.iter().flat_map(|v| v.to_le_bytes())),
-            StoreAs::Integer {
-                voxel,
-                slope,
-                intercept,
-            } => {
-                // What the header holds, so that reading inverts it.
-                let (s, i) = (f64::from(slope as f32), f64::from(intercept as f32));
-                let steps = part.iter().map(|v| ((f64::from(*v) - i) / s).round());
-                macro_rules! put {
-                    ($t:ty) => {
-                        bytes.extend(steps.flat_map(|v| (v as $t).to_le_bytes()))
-                    };
-                }
-                match voxel {
-                    VoxelType::U8 => put!(u8),
-                    VoxelType::I8 => put!(i8),
-                    VoxelType::U16 => put!(u16),
-                    VoxelType::I16 => put!(i16),
-                    VoxelType::U32 => put!(u32),
-                    VoxelType::I32 => put!(i32),
-                    VoxelType::U64 => put!(u64),
-                    VoxelType::I64 => put!(i64),
-                    VoxelType::F32 | VoxelType::F64 => unreachable!("refused with the header"),
-                }
-            }
-        }
-        out.write_all(&bytes)?;
-    }
-    Ok(())
 }

@@ -1,0 +1,53 @@
+//! MetaImage: `.mha`, or `.mhd` with its voxels beside it.
+
+mod header;
+mod write;
+
+use std::path::Path;
+
+use super::Volume;
+use super::detached::{Content, attached, in_files};
+use super::slices::{self, SliceSource};
+use crate::limits::Budget;
+use crate::{Fault, ReadLimits, input};
+
+pub(super) use write::write;
+
+/// Whether a content starts like a MetaImage header.
+pub(crate) fn looks_like_metaimage(head: &[u8]) -> bool {
+    let line = head.split(|b| *b == b'\n').next().unwrap_or_default();
+    let mut parts = line.splitn(2, |b| *b == b'=');
+    let key = parts.next().unwrap_or_default().trim_ascii();
+    let value = parts.next().map(<[u8]>::trim_ascii);
+    match key {
+        b"ObjectType" => value == Some(b"Image"),
+        b"NDims" => value.is_some_and(|v| !v.is_empty() && v.iter().all(u8::is_ascii_digit)),
+        _ => false,
+    }
+}
+
+/// Reads the bytes of a MetaImage file whose voxels follow the header.
+///
+/// # Errors
+/// As [`super::read`], without the path.
+pub fn parse_metaimage(bytes: &[u8], limits: &ReadLimits) -> Result<Volume, Fault> {
+    let mut budget = Budget::new(limits);
+    let mut source = slices(Content::of_bytes(bytes), None, &mut budget)?;
+    slices::read(&mut *source, &mut budget)
+}
+
+pub(super) fn open(path: &Path, budget: &mut Budget) -> Result<Box<dyn SliceSource>, Fault> {
+    slices(input::open(path)?.into(), Some(path), budget)
+}
+
+fn slices<'a>(
+    mut content: Content<'a>,
+    path: Option<&Path>,
+    budget: &mut Budget,
+) -> Result<Box<dyn SliceSource + 'a>, Fault> {
+    let parsed = header::read(&mut content, path, budget)?;
+    match parsed.files {
+        None => attached(parsed.header, parsed.notes, parsed.layout, content),
+        Some(paths) => in_files(parsed.header, parsed.notes, parsed.layout, paths),
+    }
+}
