@@ -25,6 +25,8 @@ fn wrong_usage_ends_with_code_2_and_a_remedy() {
         ("fit cloud.ply -o out.iclay --method exact", "interpolate"),
         ("fit cloud.ply -o out.iclay --method interpolate", "volumes"),
         ("fit cloud.ply -o out.iclay --unit inch", "mm, cm or m"),
+        ("fit cloud.ply -o out.iclay --unoriented=guess", "tagging"),
+        (&format!("fit {head} -o out.iclay --unoriented"), "point clouds"),
         ("fit cloud.ply -o out.txt", ".iclay"),
         ("fit cloud.ply -o nowhere/out.iclay", "no directory"),
         (&format!("fit {head} -o out.iclay --tolerance 1mm"), "density"),
