@@ -13,7 +13,9 @@ fn a_mesh_keeps_its_triangles_through_every_format() {
     let said = bench.json(&format!("convert {bunny} 0.ply"));
     let counts = (said["vertices"].as_u64(), said["triangles"].as_u64());
     assert_eq!(counts.0, Some(1839));
-    let chain = ["0.ply", "1.stl", "2.obj", "3.glb", "4.gltf", "5.3mf", "6.wrl", "7.ply"];
+    let chain = [
+        "0.ply", "1.stl", "2.obj", "3.glb", "4.gltf", "5.3mf", "6.wrl", "7.ply",
+    ];
     for pair in chain.windows(2) {
         let (from, to) = (pair[0], pair[1]);
         // Formats of metres and millimetres keep the size of what they are told the size of.
@@ -22,7 +24,11 @@ fn a_mesh_keeps_its_triangles_through_every_format() {
             _ => "--unit mm",
         };
         let said = bench.json(&format!("convert {from} {to} {unit}"));
-        assert_eq!((said["vertices"].as_u64(), said["triangles"].as_u64()), counts, "{to}");
+        assert_eq!(
+            (said["vertices"].as_u64(), said["triangles"].as_u64()),
+            counts,
+            "{to}"
+        );
     }
     let corners = |name: &str| bench.json(&format!("info {name}"))["box"].clone();
     close(&corners("0.ply"), &corners("7.ply"), 1e-6);
@@ -45,7 +51,9 @@ fn a_cloud_keeps_points_and_normals_through_every_format() {
 fn a_volume_keeps_voxels_type_and_place_through_every_format() {
     let bench = Bench::new();
     let head = data("head.nii.gz");
-    bench.json(&format!("convert {head} 0.nii.gz --region 20:50,30:60,10:30 --stride 1,2,1"));
+    bench.json(&format!(
+        "convert {head} 0.nii.gz --region 20:50,30:60,10:30 --stride 1,2,1"
+    ));
     for pair in ["0.nii.gz", "1.nrrd", "2.mha", "3.nii"].windows(2) {
         bench.json(&format!("convert {} {}", pair[0], pair[1]));
     }
@@ -79,7 +87,11 @@ fn what_makes_no_sense_is_refused_with_the_remedy() {
     ] {
         let run = bench.run(&format!("convert {arguments}"));
         assert_eq!(run.code, 2, "{arguments}: {}{}", run.stdout, run.stderr);
-        assert!(run.stderr.contains(word), "{arguments}: no {word:?} in {}", run.stderr);
+        assert!(
+            run.stderr.contains(word),
+            "{arguments}: no {word:?} in {}",
+            run.stderr
+        );
     }
     assert_eq!(bench.files(), ["cloud.ply", "cloud.xyz", "field.iclay"]);
 }
