@@ -71,8 +71,7 @@ const ORDER: usize = MAX_DEGREE + 1;
 impl KnotVector {
     /// How often `u` occurs.
     pub fn multiplicity(&self, u: f64) -> usize {
-        let knots = self.knots();
-        knots.partition_point(|k| *k <= u) - knots.partition_point(|k| *k < u)
+        occurrences(self.knots(), u)
     }
 
     /// The knots with `new` ones among them, given in any order, repeated to insert them more than once.
@@ -90,9 +89,9 @@ impl KnotVector {
         }
         let degree = self.degree();
         let mut knots: Vec<f64> = self.knots().iter().chain(new).copied().collect();
-        knots.sort_by(f64::total_cmp);
+        knots.sort_by(|a, b| a.partial_cmp(b).expect("checked to be numbers"));
         for &knot in new {
-            let wanted = self.multiplicity(knot) + new.iter().filter(|u| **u == knot).count();
+            let wanted = occurrences(&knots, knot);
             if wanted > degree {
                 return Err(InsertionError::Multiplicity { knot, wanted, degree });
             }
@@ -132,6 +131,11 @@ impl KnotVector {
         }
         Ok(new)
     }
+}
+
+/// How often `u` is among sorted `knots`.
+fn occurrences(knots: &[f64], u: f64) -> usize {
+    knots.partition_point(|k| *k <= u) - knots.partition_point(|k| *k < u)
 }
 
 /// Inserts `u` once: the new knots, and the matrix from old to new coefficients.

@@ -103,6 +103,16 @@ pub struct State<T> {
     pub w: Vec<T>,
 }
 
+impl<T: Copy> State<T> {
+    /// Overwrites this state by one of the same patch.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.p.copy_from_slice(&other.p);
+        self.v.copy_from_slice(&other.v);
+        self.d.copy_from_slice(&other.d);
+        self.w.copy_from_slice(&other.w);
+    }
+}
+
 /// A region of a field that moves.
 #[derive(Clone, Debug)]
 pub struct Patch<T> {
@@ -117,6 +127,8 @@ pub struct Patch<T> {
     pub(crate) solver: StepSolver<T>,
     /// For the mass alone, made by the first explicit step.
     pub(crate) mass_solver: Option<Box<StepSolver<T>>>,
+    /// `M + ΔtD` with the version and the step it was made for.
+    pub(crate) mass_matrix: Option<(u64, f64, StepMatrix<T>)>,
     pub(crate) matrix: StepMatrix<T>,
     /// What the matrix and the solver were made for.
     pub(crate) prepared: Option<Prepared>,
@@ -202,6 +214,7 @@ impl<T: Real> Patch<T> {
             external: zeros(m),
             solver: StepSolver::new(lattice, &steps, options),
             mass_solver: None,
+            mass_matrix: None,
             matrix,
             prepared: None,
             version: 0,

@@ -98,7 +98,7 @@ fn meshes_are_what_their_writers_say() {
         assert_eq!(cloud.zero_normals, 0);
         count += 1;
     }
-    assert_eq!(count, 15);
+    assert_eq!(count, 13);
 }
 
 /// In the file from 0 to 1, as floats or bytes.

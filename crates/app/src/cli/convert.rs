@@ -51,7 +51,7 @@ pub enum Shape {
 }
 
 /// Names that a volume can be written under.
-const VOLUMES: [&str; 5] = ["nii", "nii.gz", "nrrd", "mha", "vti"];
+pub const VOLUMES: [&str; 5] = ["nii", "nii.gz", "nrrd", "mha", "vti"];
 /// Names that a cloud can be written under.
 const CLOUDS: [&str; 8] = ["ply", "xyz", "xyzn", "txt", "pcd", "las", "laz", "e57"];
 /// Names that a mesh can be written under.

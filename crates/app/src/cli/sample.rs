@@ -3,8 +3,10 @@ use std::path::PathBuf;
 
 use bspline::{Field, Frame};
 use fitting::Cancel;
-use formats::volumes::{Preview, StoreAs, VolumeOptions};
+use formats::FormatError;
+use formats::volumes::{Grid, Preview, StoreAs, save_slices};
 
+use super::convert::VOLUMES;
 use super::cost::Cost;
 use super::failure::Outcome;
 use super::field::OpenField;
@@ -12,6 +14,7 @@ use super::input::{check_output, reading, remaining, writing};
 use super::progress::Bar;
 use super::quantity::{Memory, human_bytes};
 use super::summary::Summary;
+use super::volume_choice::VolumeChoice;
 use super::{Failure, interrupt, set_threads};
 
 /// Arguments of `isoclay sample`.
@@ -19,10 +22,10 @@ use super::{Failure, interrupt, set_threads};
 pub struct Args {
     /// Field (.iclay)
     field: PathBuf,
-    /// Volume whose grid is taken (.nii, .nii.gz); its densities are not read
+    /// Volume whose grid is taken; its densities are not read
     #[arg(long, value_name = "VOLUME")]
     like: PathBuf,
-    /// Volume to write: .nii or .nii.gz, 32-bit floats
+    /// Volume to write, 32-bit floats (.nii, .nii.gz, .nrrd, .mha, .vti)
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
     /// Memory that the process may hold, such as 2GiB
@@ -34,57 +37,61 @@ pub struct Args {
     /// Print one JSON object instead of a table
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    volume: VolumeChoice,
 }
 
-/// Voxels along x that are evaluated at a time.
+/// Slices that are evaluated at a time: enough for the threads to share, few enough to hold.
 const SLAB: usize = 16;
 
-/// Writes the field at the voxel centres of another volume.
+/// Writes the field at the voxel centres of another volume and holds no more than a few slices of it.
 pub fn run(args: &Args) -> Outcome {
     let cost = Cost::start();
-    check_output(&args.output, &["nii", "nii.gz"])?;
+    check_output(&args.output, &VOLUMES)?;
     set_threads(args.threads)?;
     let cancel = Cancel::new();
     interrupt::cancel_on_interrupt(&cancel)?;
     let Preview { header, notes, .. } =
-        formats::volumes::peek(&args.like, &VolumeOptions::default()).map_err(reading)?;
+        formats::volumes::peek(&args.like, &args.volume.options(None)?).map_err(reading)?;
     let open = OpenField::load(&args.field)?;
-    let dims = header.dims;
-    let needed = header.voxel_count() as u64 * 4;
+    let [nx, ny, nz] = header.dims;
+    let depth = SLAB.min(nz);
+    let needed = (nx * ny * depth) as u64 * size_of::<f64>() as u64;
     if args.memory.is_some_and(|m| needed > remaining(m)) {
         return Err(Failure::limit(format!(
-            "{}: {} × {} × {} voxels need {}, more than --memory leaves; raise it",
+            "{}: {depth} slices of {nx} × {ny} voxels need {}, more than --memory leaves; raise it",
             args.like.display(),
-            dims[0],
-            dims[1],
-            dims[2],
             human_bytes(needed)
         )));
     }
     let frame = voxel_frame(&header);
+    let grid = Grid {
+        dims: header.dims,
+        world_from_voxel: header.world_from_voxel,
+        unit: header.unit,
+    };
     let bar = Bar::new();
-    let mut values = vec![0f32; header.voxel_count()];
-    let mut slab = vec![0f64; SLAB.min(dims[0]) * dims[1] * dims[2]];
-    for x0 in (0..dims[0]).step_by(SLAB) {
-        interrupt::check(&cancel)?;
-        bar.show("sampling", x0 as f64 / dims[0] as f64);
-        let thick = SLAB.min(dims[0] - x0);
-        let slab = &mut slab[..thick * dims[1] * dims[2]];
-        slab_values(open.field(), &frame, x0, [thick, dims[1], dims[2]], slab);
-        for (row, line) in values.chunks_exact_mut(dims[0]).enumerate() {
-            let (y, z) = (row % dims[1], row / dims[1]);
-            for x in 0..thick {
-                line[x0 + x] = slab[(x * dims[1] + y) * dims[2] + z] as f32;
+    let mut slab = vec![0f64; nx * ny * depth];
+    let fill = |z: usize, slice: &mut [f32]| {
+        let first = z - z % depth;
+        let thick = depth.min(nz - first);
+        let slab = &mut slab[..nx * ny * thick];
+        if z == first {
+            interrupt::check(&cancel)?;
+            bar.show("sampling", z as f64 / nz as f64);
+            slab_values(open.field(), &frame, first, [nx, ny, thick], slab);
+        }
+        for (y, row) in slice.chunks_exact_mut(nx).enumerate() {
+            for (x, value) in row.iter_mut().enumerate() {
+                *value = slab[(x * ny + y) * thick + (z - first)] as f32;
             }
         }
-    }
-    bar.show("writing", 0.99);
-    let map = header.world_from_voxel;
-    formats::volumes::save(&args.output, dims, &values, &map, header.unit, StoreAs::Float32)
-        .map_err(writing)?;
+        Ok::<(), Stopped>(())
+    };
+    save_slices(&args.output, &grid, StoreAs::Float32, fill).map_err(|e| e.0)?;
     bar.clear();
     Summary {
-        input_count: Some(values.len()),
+        input_count: Some(header.voxel_count()),
         field_sha256: Some(open.sha256()),
         output: Some(args.output.display().to_string()),
         notes,
@@ -92,6 +99,21 @@ pub fn run(args: &Args) -> Outcome {
     }
     .with_cost(&cost)
     .print(args.json)
+}
+
+/// What ended the writing.
+struct Stopped(Failure);
+
+impl From<Failure> for Stopped {
+    fn from(f: Failure) -> Self {
+        Self(f)
+    }
+}
+
+impl From<FormatError> for Stopped {
+    fn from(e: FormatError) -> Self {
+        Self(writing(e))
+    }
 }
 
 /// The grid whose nodes are the voxel centres.
@@ -103,16 +125,16 @@ pub fn voxel_frame(header: &formats::volumes::VolumeHeader) -> Frame {
     }
 }
 
-/// [`Field::frame_values`] of one slab, its rows shared among the threads.
-fn slab_values(field: &dyn Field, frame: &Frame, x0: usize, count: [usize; 3], out: &mut [f64]) {
+/// [`Field::frame_values`] of the slices from `z0` on, their sheets of x shared among the threads.
+fn slab_values(field: &dyn Field, frame: &Frame, z0: usize, count: [usize; 3], out: &mut [f64]) {
     use rayon::prelude::*;
     // Whole sheets of x, so that parts lie together in memory.
     let sheets = count[0].div_ceil(rayon::current_num_threads()).max(1);
     out.par_chunks_mut(sheets * count[1] * count[2])
         .enumerate()
         .for_each(|(part, out)| {
-            let first = x0 + part * sheets;
+            let first = [(part * sheets) as i64, 0, z0 as i64];
             let thick = out.len() / (count[1] * count[2]);
-            field.frame_values(frame, [first as i64, 0, 0], [thick, count[1], count[2]], out);
+            field.frame_values(frame, first, [thick, count[1], count[2]], out);
         });
 }

@@ -80,6 +80,18 @@ pub struct Summary {
     /// Components of the solid or of its complement that hold no sample, larger than a cell of 1/128 of the box.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unsupported_components: Option<usize>,
+    /// 95th percentile of the distances from points of the zero set to the mesh that was fitted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub back_p95: Option<f64>,
+    /// Largest of them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub back_max: Option<f64>,
+    /// Wrong signs at points of the box farther from the mesh than the tolerance.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wrong_signs: Option<usize>,
+    /// Defects of the mesh that was fitted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub defects: Option<serde_json::Value>,
     /// Vertices of the mesh.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub vertices: Option<usize>,
@@ -165,6 +177,9 @@ impl Summary {
                 "parts without samples",
                 self.unsupported_components.filter(|n| *n > 0).map(count),
             ),
+            ("back to the mesh p95", self.back_p95.map(size)),
+            ("back to the mesh max", self.back_max.map(size)),
+            ("wrong signs", self.wrong_signs.map(count)),
             ("leaves", self.leaves.map(count)),
             ("  over tolerance", self.leaves_over_tolerance.map(count)),
             ("  refused for lack of data", self.leaves_without_data.map(count)),

@@ -46,8 +46,9 @@ impl<T: Real> Patch<T> {
         loop {
             let step = self.step(Integrator::TrBdf2, dt)?;
             let error = step.error.unwrap_or(0.0);
-            let gained = step.energy.total() - before - step.work;
-            let scale = before.abs().max(step.energy.total().abs()).max(step.work.abs());
+            let after = self.energy().total();
+            let gained = after - before - step.work;
+            let scale = before.max(after).max(step.work.abs());
             let unbalanced = gained > options.energy_gain * scale;
             let fast = options.acceleration.is_some_and(|a| self.acceleration(dt) > a);
             // Of a method of second order the error of a step falls with its cube.

@@ -111,6 +111,7 @@ impl<T: Real> Patch<T> {
             springs.collect(),
         );
         let mut solver = self.mass_solver();
+        self.mass_matrix = None;
         solver.prepare(&mass)?;
         let largest = largest_frequency(&stiffness, &mass, &mut solver);
         self.mass_solver = Some(solver);
@@ -134,13 +135,24 @@ impl<T: Real> Patch<T> {
         for (i, g) in self.work.g.iter_mut().enumerate() {
             *g = t(dt) * (self.work.force[i] - self.lumped.damping.at(i) * self.state.w[i]);
         }
-        let matrix = self.mass_matrix(dt);
         let mut solver = self.mass_solver();
-        let prepared = solver.prepare(&matrix);
+        let kept = self
+            .mass_matrix
+            .take()
+            .filter(|m| (m.0, m.1) == (self.version, dt));
+        let (matrix, prepared) = match kept {
+            Some((.., matrix)) => (matrix, Ok(())),
+            None => {
+                let matrix = self.mass_matrix(dt);
+                let prepared = solver.prepare(&matrix);
+                (matrix, prepared)
+            }
+        };
         let work = &mut self.work;
         let report = prepared.map(|()| solver.solve(&matrix, &work.g, &mut work.x, &mut work.dx));
         self.mass_solver = Some(solver);
         let report = report?;
+        self.mass_matrix = Some((self.version, dt, matrix));
         let state = &mut self.state;
         for ((p, v), x) in state.p.iter_mut().zip(&mut state.v).zip(&work.x) {
             *v += *x;

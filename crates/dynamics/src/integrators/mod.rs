@@ -10,7 +10,7 @@ pub(crate) use explicit::largest_frequency;
 
 use bspline::Real;
 
-use crate::patch::{Energy, Patch, PatchError};
+use crate::patch::{Patch, PatchError};
 use crate::solve::SolveReport;
 
 /// How a step is made.
@@ -18,8 +18,8 @@ use crate::solve::SolveReport;
 pub enum Integrator {
     /// Implicit Euler in displacements with the damping in the middle [DIS eq. 12], first order.
     Paper,
-    /// Implicit in all forces, explicit in none: the velocity first, then the position. First order, symplectic where
-    /// nothing damps, stable up to a bound.
+    /// The velocity from the present forces, then the position from the new velocity; only the damping is implicit.
+    /// First order, symplectic where nothing damps, stable up to a bound.
     Symplectic,
     /// Trapezoidal rule to `2 - √2` of the step, then backward differences: second order, L-stable [R. E. Bank et
     /// al., *Transient simulation of silicon devices and circuits*, 1985].
@@ -46,8 +46,6 @@ pub struct StepReport {
     pub solve: SolveReport,
     /// Springs whose negative tangent was taken as 0.
     pub clamped: usize,
-    /// Energies after the step.
-    pub energy: Energy,
     /// Work of the external forces over the step.
     pub work: f64,
     /// Estimate of the step's error in the densities, root mean square; of TR-BDF2 only.
@@ -64,7 +62,7 @@ impl<T: Real> Patch<T> {
         if !(dt.is_finite() && dt > 0.0) {
             return Err(PatchError::TimeStep { dt });
         }
-        self.work.before.clone_from(&self.state);
+        self.work.before.copy_from(&self.state);
         let moved = match integrator {
             Integrator::Paper => self.paper_step(dt),
             Integrator::Symplectic => self.symplectic_step(dt),
@@ -74,7 +72,6 @@ impl<T: Real> Patch<T> {
             self.restore();
         }
         let (solve, clamped, error) = moved?;
-        let energy = self.energy();
         let before = &self.work.before;
         let path = self.state.d.iter().zip(&before.d).zip(&self.external);
         let work = path
@@ -84,7 +81,6 @@ impl<T: Real> Patch<T> {
             dt,
             solve,
             clamped,
-            energy,
             work,
             error,
         })
@@ -92,6 +88,6 @@ impl<T: Real> Patch<T> {
 
     /// Back to the state before the step.
     pub(crate) fn restore(&mut self) {
-        self.state.clone_from(&self.work.before);
+        self.state.copy_from(&self.work.before);
     }
 }

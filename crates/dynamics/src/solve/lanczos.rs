@@ -41,7 +41,7 @@ impl<T: Real> Lanczos<T> {
         for step in 0..steps {
             system.precondition(r, z);
             let rz = dot(r, z);
-            if !(rz > 0.0) {
+            if rz.is_nan() || rz <= 0.0 {
                 break;
             }
             let beta = if step == 0 { 0.0 } else { rz / before };

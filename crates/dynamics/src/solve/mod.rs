@@ -19,5 +19,5 @@ pub(crate) use lanczos::Lanczos;
 pub use pcg::{CoefficientSystem, ConjugateGradients, PcgReport, Preconditioner, System, Unpreconditioned};
 pub use sample_multigrid::SampleMultigrid;
 pub use schwarz::Schwarz;
-pub use step_solver::{Method, SolveError, SolveReport, SolverOptions, StepSolver};
+pub use step_solver::{ITERATED, Method, SolveError, SolveReport, SolverOptions, StepSolver};
 pub use v_cycle::{VCycle, VCycleOptions};

@@ -97,7 +97,7 @@ fn interpolation(m: usize) -> (usize, Vec<[(usize, f64); 2]>) {
     let parents = |i: usize| {
         if i + 1 == m {
             [(last, 1.0), (last, 0.0)]
-        } else if i % 2 == 0 {
+        } else if i.is_multiple_of(2) {
             [(i / 2, 1.0), (i / 2, 0.0)]
         } else {
             [(i / 2, 0.5), (i / 2 + 1, 0.5)]

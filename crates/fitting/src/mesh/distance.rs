@@ -2,6 +2,7 @@
 
 use std::f64::consts::PI;
 
+use bspline::Aabb;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -10,6 +11,7 @@ use super::nearest::Nearest;
 use super::surface::{Rim, Surface, surface};
 use super::topology::{Faces, area_vector};
 use crate::FitError;
+use crate::phantoms::SplitMix64;
 
 /// The solid that a triangle mesh bounds: exact distance to its surface, sign by the generalized winding number.
 ///
@@ -33,6 +35,8 @@ pub(crate) struct Distance {
     pub distance: f64,
     /// Gradient where it is defined: off the surface, and off holes.
     pub gradient: Option<DVec3>,
+    /// Whether the winding number is neither inside nor outside.
+    pub in_hole: bool,
     /// Nearest point of the surface.
     pub foot: DVec3,
     /// Triangle of the foot, for searches near by.
@@ -90,6 +94,40 @@ impl MeshDistance {
         self.at(self.to_unit(p), None).value * self.scale
     }
 
+    /// The box that a fit fills: a cube 1.15 times as wide as the longest side of the mesh.
+    pub fn fit_box(&self) -> Aabb {
+        Aabb::new(self.origin, self.origin + self.scale)
+    }
+
+    /// `count` points of the surface, world units: one at random in each of `count` shares of its area.
+    pub fn surface_samples(&self, count: usize) -> Vec<DVec3> {
+        let triangles = &self.surface.boundary.corners;
+        let areas: Vec<f64> = triangles.iter().map(|t| area_vector(t).length()).collect();
+        let share = areas.iter().sum::<f64>() / count as f64;
+        let mut random = SplitMix64::new(1);
+        let (mut at, mut passed) = (0, 0.0);
+        (0..count)
+            .map(|i| {
+                let [r, mut s, mut t] = random.uniform3().to_array();
+                let goal = (i as f64 + r) * share;
+                while at + 1 < areas.len() && passed + areas[at] < goal {
+                    passed += areas[at];
+                    at += 1;
+                }
+                if s + t > 1.0 {
+                    (s, t) = (1.0 - s, 1.0 - t);
+                }
+                let [a, b, c] = triangles[at];
+                self.origin + (a + (b - a) * s + (c - a) * t) * self.scale
+            })
+            .collect()
+    }
+
+    /// Whether `p` lies in a hole, where the winding number is neither inside nor outside and the surface is invented.
+    pub fn is_in_hole(&self, p: DVec3) -> bool {
+        self.surface.rim.is_some() && (4.0 * self.winding_number(p) - 2.0).abs() < 1.0
+    }
+
     /// Diagonal of the box round the mesh, world units.
     pub fn diagonal(&self) -> f64 {
         self.diagonal
@@ -138,6 +176,7 @@ impl MeshDistance {
         Distance {
             value: share * distance,
             distance,
+            in_hole: share.abs() < 1.0,
             gradient: is_whole.then(|| offset * (share / distance)),
             foot: found.point,
             hint: found.triangle,

@@ -54,10 +54,10 @@ struct Quality {
 impl Quality {
     fn add(&mut self, error: f64, probe: &Probe, octant: usize, plan: &Plan) {
         let distance = f64::from(probe.distance);
-        if error > AIM * plan.allowed(distance) {
+        if error > AIM * plan.allowed(distance, probe.in_hole) {
             self.over |= 1 << octant;
         }
-        if distance <= plan.band {
+        if distance <= plan.band && !probe.in_hole {
             self.count += 1;
             self.square += error * error;
             self.max = self.max.max(error);
@@ -427,7 +427,7 @@ impl Octree<'_> {
         let mut sums = vec![(0u32, 0.0f64, 0.0f64); self.leaves.len()];
         let mut in_band = Vec::new();
         for (probe, &error) in self.settled.iter().zip(&errors) {
-            if f64::from(probe.distance) > self.plan.band {
+            if f64::from(probe.distance) > self.plan.band || probe.in_hole {
                 continue;
             }
             in_band.push(error);

@@ -55,10 +55,11 @@ pub(crate) struct Plan {
 }
 
 impl Plan {
-    /// Error allowed at so far from the surface. Beyond the band it grows by a quarter of the way, so the sign is
-    /// right everywhere farther from the surface than the tolerance.
-    pub fn allowed(&self, distance: f64) -> f64 {
-        self.tolerance + 0.25 * (distance - self.band).max(0.0)
+    /// Error allowed at so far from the surface. Beyond the band, and in holes from the rim on, it grows by a quarter
+    /// of the way, so the sign is right everywhere farther from the surface than the tolerance.
+    pub fn allowed(&self, distance: f64, in_hole: bool) -> f64 {
+        let band = if in_hole { 0.0 } else { self.band };
+        self.tolerance + 0.25 * (distance - band).max(0.0)
     }
 }
 

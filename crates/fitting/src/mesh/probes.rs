@@ -17,6 +17,8 @@ pub(crate) struct Probe {
     pub distance: f32,
     /// Edge of the part of space it stands for, unit box.
     pub size: f32,
+    /// Whether it lies in a hole, where what is asked for is a guess.
+    pub in_hole: bool,
 }
 
 impl Probe {
@@ -27,6 +29,7 @@ impl Probe {
             normal: found.gradient.map_or([0.0; 3], |g| (-g).as_vec3().to_array()),
             distance: found.distance as f32,
             size: size as f32,
+            in_hole: found.in_hole,
         }
     }
 
@@ -38,6 +41,7 @@ impl Probe {
             normal: [0.0; 3],
             distance: 0.0,
             size: 0.0,
+            in_hole: false,
         }
     }
 
@@ -49,6 +53,7 @@ impl Probe {
             normal: [0.0; 3],
             distance: 0.0,
             size: size as f32,
+            in_hole: false,
         }
     }
 }

@@ -20,6 +20,8 @@ pub(crate) struct Surroundings {
     pub normal: DVec3,
     /// Mean square distance to the neighbours.
     pub spread: f64,
+    /// Distance of the point from the quadric of its neighbours.
+    pub residual: f64,
 }
 
 impl<'a> Neighbours<'a> {
@@ -75,16 +77,17 @@ fn surroundings(near: &[(DVec3, f64)]) -> Surroundings {
     let mut order = [0, 1, 2];
     order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
     let [normal, e1, e2] = order.map(|i| DVec3::from_slice(eigen.eigenvectors.column(i).as_slice()));
-    let tilt = quadric(around, reach2, [e1, e2, normal]).unwrap_or(DVec3::Z);
+    let (tilt, height) = quadric(around, reach2, [e1, e2, normal]).unwrap_or((DVec3::Z, 0.0));
     Surroundings {
         normal: (e1 * tilt.x + e2 * tilt.y + normal * tilt.z).normalize_or(normal),
         spread: around.iter().map(|p| p.1).sum::<f64>() / n,
+        residual: height.abs(),
     }
 }
 
-/// Normal (in the frame) at the origin of the height field `h(x, y)` of second degree that is nearest
+/// Normal (in the frame) and height at the origin of the height field `h(x, y)` of second degree that is nearest
 /// to the points, with Gaussian weights of a standard deviation of half the reach.
-fn quadric(around: &[(DVec3, f64)], reach2: f64, [e1, e2, e3]: [DVec3; 3]) -> Option<DVec3> {
+fn quadric(around: &[(DVec3, f64)], reach2: f64, [e1, e2, e3]: [DVec3; 3]) -> Option<(DVec3, f64)> {
     if around.len() < 8 {
         return None;
     }
@@ -107,5 +110,5 @@ fn quadric(around: &[(DVec3, f64)], reach2: f64, [e1, e2, e3]: [DVec3; 3]) -> Op
         matrix[(i, i)] += 1e-9 * trace;
     }
     let h = matrix.cholesky()?.solve(&right);
-    Some(DVec3::new(-h[1], -h[2], 1.0))
+    Some((DVec3::new(-h[1], -h[2], 1.0), h[0] * scale))
 }
