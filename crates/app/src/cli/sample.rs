@@ -3,7 +3,8 @@ use std::path::PathBuf;
 
 use bspline::{Field, Frame};
 use fitting::Cancel;
-use formats::volumes::{Preview, StoreAs, VolumeOptions};
+use formats::FormatError;
+use formats::volumes::{Grid, Preview, StoreAs, VolumeOptions, save_slices};
 
 use super::cost::Cost;
 use super::failure::Outcome;
@@ -36,8 +37,17 @@ pub struct Args {
     json: bool,
 }
 
-/// Voxels along x that are evaluated at a time.
+/// Slices that are evaluated at a time: enough to share among threads, few enough to keep out of memory.
 const SLAB: usize = 16;
+
+/// Why the volume is not written.
+struct Stopped(Failure);
+
+impl From<FormatError> for Stopped {
+    fn from(e: FormatError) -> Self {
+        Self(writing(e))
+    }
+}
 
 /// Writes the field at the voxel centres of another volume.
 pub fn run(args: &Args) -> Outcome {
@@ -49,42 +59,48 @@ pub fn run(args: &Args) -> Outcome {
     let Preview { header, notes, .. } =
         formats::volumes::peek(&args.like, &VolumeOptions::default()).map_err(reading)?;
     let open = OpenField::load(&args.field)?;
-    let dims = header.dims;
-    let needed = header.voxel_count() as u64 * 4;
+    let [nx, ny, nz] = header.dims;
+    let slice = nx * ny;
+    let needed = slice as u64 * (SLAB.min(nz) * size_of::<f64>() + size_of::<f32>()) as u64;
     if args.memory.is_some_and(|m| needed > remaining(m)) {
         return Err(Failure::limit(format!(
-            "{}: {} × {} × {} voxels need {}, more than --memory leaves; raise it",
+            "{}: {SLAB} slices of {nx} × {ny} voxels need {}, more than --memory leaves; raise it",
             args.like.display(),
-            dims[0],
-            dims[1],
-            dims[2],
             human_bytes(needed)
         )));
     }
     let frame = voxel_frame(&header);
     let bar = Bar::new();
-    let mut values = vec![0f32; header.voxel_count()];
-    let mut slab = vec![0f64; SLAB.min(dims[0]) * dims[1] * dims[2]];
-    for x0 in (0..dims[0]).step_by(SLAB) {
-        interrupt::check(&cancel)?;
-        bar.show("sampling", x0 as f64 / dims[0] as f64);
-        let thick = SLAB.min(dims[0] - x0);
-        let slab = &mut slab[..thick * dims[1] * dims[2]];
-        slab_values(open.field(), &frame, x0, [thick, dims[1], dims[2]], slab);
-        for (row, line) in values.chunks_exact_mut(dims[0]).enumerate() {
-            let (y, z) = (row % dims[1], row / dims[1]);
-            for x in 0..thick {
-                line[x0 + x] = slab[(x * dims[1] + y) * dims[2] + z] as f32;
+    let grid = Grid {
+        dims: header.dims,
+        world_from_voxel: header.world_from_voxel,
+        unit: header.unit,
+    };
+    let mut slab = vec![0f64; slice * SLAB.min(nz)];
+    let written = save_slices(&args.output, &grid, StoreAs::Float32, |z, out| {
+        let (z0, thick) = (z / SLAB * SLAB, SLAB.min(nz - z / SLAB * SLAB));
+        if z == z0 {
+            interrupt::check(&cancel).map_err(Stopped)?;
+            bar.show("sampling", z as f64 / nz as f64);
+            slab_values(
+                open.field(),
+                &frame,
+                z0,
+                [nx, ny, thick],
+                &mut slab[..slice * thick],
+            );
+        }
+        for (y, row) in out.chunks_exact_mut(nx).enumerate() {
+            for (x, value) in row.iter_mut().enumerate() {
+                *value = slab[(x * ny + y) * thick + z - z0] as f32;
             }
         }
-    }
-    bar.show("writing", 0.99);
-    let map = header.world_from_voxel;
-    formats::volumes::save(&args.output, dims, &values, &map, header.unit, StoreAs::Float32)
-        .map_err(writing)?;
+        Ok(())
+    });
+    written.map_err(|Stopped(failure)| failure)?;
     bar.clear();
     Summary {
-        input_count: Some(values.len()),
+        input_count: Some(header.voxel_count()),
         field_sha256: Some(open.sha256()),
         output: Some(args.output.display().to_string()),
         notes,
@@ -103,16 +119,21 @@ pub fn voxel_frame(header: &formats::volumes::VolumeHeader) -> Frame {
     }
 }
 
-/// [`Field::frame_values`] of one slab, its rows shared among the threads.
-fn slab_values(field: &dyn Field, frame: &Frame, x0: usize, count: [usize; 3], out: &mut [f64]) {
+/// [`Field::frame_values`] of slices from `z0` on, their rows shared among the threads.
+fn slab_values(field: &dyn Field, frame: &Frame, z0: usize, count: [usize; 3], out: &mut [f64]) {
     use rayon::prelude::*;
     // Whole sheets of x, so that parts lie together in memory.
     let sheets = count[0].div_ceil(rayon::current_num_threads()).max(1);
     out.par_chunks_mut(sheets * count[1] * count[2])
         .enumerate()
         .for_each(|(part, out)| {
-            let first = x0 + part * sheets;
+            let first = part * sheets;
             let thick = out.len() / (count[1] * count[2]);
-            field.frame_values(frame, [first as i64, 0, 0], [thick, count[1], count[2]], out);
+            field.frame_values(
+                frame,
+                [first as i64, 0, z0 as i64],
+                [thick, count[1], count[2]],
+                out,
+            );
         });
 }
