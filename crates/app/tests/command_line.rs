@@ -25,6 +25,8 @@ fn wrong_usage_ends_with_code_2_and_a_remedy() {
         ("fit cloud.ply -o out.iclay --method exact", "interpolate"),
         ("fit cloud.ply -o out.iclay --method interpolate", "volumes"),
         ("fit cloud.ply -o out.iclay --unit inch", "mm, cm or m"),
+        ("fit cloud.ply -o out.iclay --unoriented=guess", "tagging"),
+        (&format!("fit {head} -o out.iclay --unoriented"), "point clouds"),
         ("fit cloud.ply -o out.txt", ".iclay"),
         ("fit cloud.ply -o nowhere/out.iclay", "no directory"),
         (&format!("fit {head} -o out.iclay --tolerance 1mm"), "density"),
@@ -34,6 +36,7 @@ fn wrong_usage_ends_with_code_2_and_a_remedy() {
             "interpolating",
         ),
         (&format!("fit {bunny} -o ."), "directory"),
+        (&format!("fit {head} -o out.iclay --as mesh"), "--as"),
         ("mesh field.iclay -o out.stp", ".ply"),
         (
             "mesh field.iclay -o out.ply --resolution 8 --tolerance 1",
@@ -239,4 +242,29 @@ fn same_bits_with_1_and_2_threads() {
             assert!(mesh(1) == mesh(n), "{input}: meshes with {n} threads differ");
         }
     }
+}
+
+/// A mesh is fitted by its faces where the file holds nothing else or the user says so, and checked against them.
+#[test]
+fn a_mesh_is_fitted_as_the_solid_that_it_bounds() {
+    let bench = Bench::new();
+    let obj = "v 0 0 0\nv 2 0 0\nv 0 2 0\nv 0 0 2\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 3 2 4\n";
+    std::fs::write(bench.path("corner.obj"), obj).unwrap();
+    let fit = bench.json("fit corner.obj --as mesh --tolerance 1% -o corner.iclay");
+    // The last of the four faces the wrong way.
+    assert_eq!(fit["defects"]["flipped_faces"], 1);
+    assert!(number(&fit, "max") <= number(&fit, "tolerance"));
+    let check = bench.json("check corner.iclay corner.obj --as mesh");
+    assert_eq!(check["wrong_signs"], 0);
+    assert!(number(&check, "max") <= 2.0 * number(&fit, "tolerance"));
+    assert!(number(&check, "back_max") <= 2.0 * number(&fit, "tolerance"));
+    bench.json("mesh corner.iclay -o corner.stl --resolution 16");
+    let again = bench.json("fit corner.stl --tolerance 1% -o again.iclay");
+    assert_eq!(again["defects"]["boundary_edges"], 0);
+    assert_eq!(
+        bench
+            .run("fit corner.obj -o out.iclay --as mesh --smoothing 1")
+            .code,
+        2
+    );
 }

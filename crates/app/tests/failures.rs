@@ -62,7 +62,7 @@ fn no_normals() {
         .map(|(p, _)| format!("{} {} {}\n", p[0], p[1], p[2]))
         .collect();
     bench.write("bare.xyz", text);
-    refused(&bench, "bare.xyz", 3, &["no normals", "estimate", "faces"]);
+    refused(&bench, "bare.xyz", 3, &["no normals", "--unoriented", "faces"]);
 }
 
 #[test]

@@ -115,6 +115,13 @@ pub trait Field: Send + Sync {
     /// An interval that holds `f` everywhere in `b`: never too small, possibly too large.
     fn bounds(&self, b: &Aabb) -> Interval;
 
+    /// Intervals that hold the three components of `∇f` everywhere in `b`, where there is a gradient; at creases the
+    /// limits from all sides. Never too small; the whole line, as here, for a field that does not know.
+    fn gradient_bounds(&self, b: &Aabb) -> [Interval; 3] {
+        let _ = b;
+        [Interval::EVERYTHING; 3]
+    }
+
     /// [`Field::value_gradient`] of many points, in order.
     ///
     /// # Panics

@@ -71,8 +71,7 @@ const ORDER: usize = MAX_DEGREE + 1;
 impl KnotVector {
     /// How often `u` occurs.
     pub fn multiplicity(&self, u: f64) -> usize {
-        let knots = self.knots();
-        knots.partition_point(|k| *k <= u) - knots.partition_point(|k| *k < u)
+        occurrences(self.knots(), u)
     }
 
     /// The knots with `new` ones among them, given in any order, repeated to insert them more than once.
@@ -90,9 +89,9 @@ impl KnotVector {
         }
         let degree = self.degree();
         let mut knots: Vec<f64> = self.knots().iter().chain(new).copied().collect();
-        knots.sort_by(f64::total_cmp);
+        knots.sort_by(|a, b| a.partial_cmp(b).expect("checked to be numbers"));
         for &knot in new {
-            let wanted = self.multiplicity(knot) + new.iter().filter(|u| **u == knot).count();
+            let wanted = occurrences(&knots, knot);
             if wanted > degree {
                 return Err(InsertionError::Multiplicity { knot, wanted, degree });
             }
@@ -134,6 +133,11 @@ impl KnotVector {
     }
 }
 
+/// How often `u` is among sorted `knots`.
+fn occurrences(knots: &[f64], u: f64) -> usize {
+    knots.partition_point(|k| *k <= u) - knots.partition_point(|k| *k < u)
+}
+
 /// Inserts `u` once: the new knots, and the matrix from old to new coefficients.
 ///
 /// `Q_i = α_i P_i + (1 - α_i) P_{i-1}`, `α_i = (u - u_i)/(u_{i+p} - u_i)` between `k-p+1` and `k-s`, where
@@ -167,7 +171,7 @@ pub fn boehm<T: Real>(knots: &KnotVector, u: f64) -> Result<(KnotVector, BandedR
 /// [`InsertionError::Outside`], [`InsertionError::Multiplicity`], [`InsertionError::TooMany`].
 pub fn oslo<T: Real>(knots: &KnotVector, new: &[f64]) -> Result<(KnotVector, BandedRows<T>), InsertionError> {
     let finer = knots.with_inserted(new)?;
-    let rows = discrete_splines(knots, finer.knots());
+    let rows = discrete_splines(knots.degree(), knots.knots(), finer.knots());
     Ok((finer, rows))
 }
 
@@ -207,21 +211,49 @@ pub(crate) fn restriction_rows<T: Real>(knots: &KnotVector, a: f64, b: f64) -> (
     let inner = knots.knots();
     let inner = &inner[inner.partition_point(|u| *u <= a)..inner.partition_point(|u| *u < b)];
     let part: Vec<f64> = ends(a).chain(inner.iter().copied()).chain(ends(b)).collect();
-    let rows = discrete_splines(knots, &part);
+    let rows = discrete_splines(knots.degree(), knots.knots(), &part);
     (part, rows)
 }
 
-/// The discrete B-splines `α_{i,p+1}(j)` of the knots `t` on `tau`, one row for each `j`; `tau` contains the
-/// knots of `t` between its own ends.
+/// Rows to the coefficients of the *derivative* on the knots `a … a, those strictly between, b … b`, for `a <= b` in
+/// the domain, opened by one unit in the last place, so that at a knot the limits from both sides are among them.
+///
+/// The derivative has the coefficients `p(c_{i+1} - c_i)/(u_{i+p+1} - u_{i+1})` on the knots without the first and the
+/// last, and one degree less [The NURBS Book eq. 3.8].
+pub(crate) fn derivative_rows<T: Real>(knots: &KnotVector, a: f64, b: f64) -> BandedRows<T> {
+    let [start, end] = knots.domain();
+    let (a, b) = (a.next_down().max(start), b.next_up().min(end));
+    let (p, t) = (knots.degree(), knots.knots());
+    let lower = &t[1..t.len() - 1];
+    let ends = |u: f64| std::iter::repeat_n(u, p);
+    let inner = &lower[lower.partition_point(|u| *u <= a)..lower.partition_point(|u| *u < b)];
+    let part: Vec<f64> = ends(a).chain(inner.iter().copied()).chain(ends(b)).collect();
+    let of_derivative = discrete_splines::<f64>(p - 1, lower, &part);
+    let mut rows = BandedRows::with_capacity(knots.coefficient_count(), p + 1, of_derivative.row_count());
+    for r in 0..of_derivative.row_count() {
+        let (first, weights) = of_derivative.row(r);
+        let mut combined = [0.0; ORDER];
+        for (j, w) in weights.iter().enumerate().filter(|(_, w)| **w != 0.0) {
+            let i = first + j;
+            let share = w * (p as f64 / (t[i + p + 1] - t[i + 1]));
+            combined[j] -= share;
+            combined[j + 1] += share;
+        }
+        rows.push(first as isize, &combined[..=p]);
+    }
+    rows
+}
+
+/// The discrete B-splines `α_{i,p+1}(j)` of degree `p` of the knots `t` on `tau`, one row for each `j`; `tau` contains
+/// the knots of `t` between its own ends.
 ///
 /// `α_{i,1}(j) = 1` where `t_i <= τ_j < t_{i+1}`,
 /// `α_{i,k+1}(j) = (τ_{j+k} - t_i)/(t_{i+k} - t_i) α_{i,k}(j) + (t_{i+k+1} - τ_{j+k})/(t_{i+k+1} - t_{i+1}) α_{i+1,k}(j)`
 /// [Cohen, Lyche & Riesenfeld 1980, eq. 3.10; Oslo algorithm 1]. Where a factor would be negative or divide by zero,
 /// the `α` beside it is exactly zero.
-fn discrete_splines<T: Real>(knots: &KnotVector, tau: &[f64]) -> BandedRows<T> {
-    let (p, t) = (knots.degree(), knots.knots());
-    let count = tau.len() - knots.order();
-    let mut rows = BandedRows::with_capacity(knots.coefficient_count(), knots.order(), count);
+fn discrete_splines<T: Real>(p: usize, t: &[f64], tau: &[f64]) -> BandedRows<T> {
+    let count = tau.len() - p - 1;
+    let mut rows = BandedRows::with_capacity(t.len() - p - 1, p + 1, count);
     for j in 0..count {
         let span = t.partition_point(|u| *u <= tau[j]) - 1;
         // Slot r stands for function span - p + r, of which some may not exist: their α stays zero.

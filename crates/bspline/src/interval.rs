@@ -104,6 +104,28 @@ impl Interval {
         }
     }
 
+    /// `{ x/√(x² + q) }` for `q` in `rest >= 0`: a component of a unit vector.
+    ///
+    /// It rises with `x`, and its magnitude falls with `q`. Where both may be 0 it is any number between -1 and 1.
+    pub fn over_hypot(self, rest: Self) -> Self {
+        if self.contains(0.0) && rest.lo <= 0.0 {
+            return Self::new(-1.0, 1.0);
+        }
+        let at = |x: f64, q: f64| {
+            if x == 0.0 {
+                0.0
+            } else {
+                (1.0 / (1.0 + q.max(0.0) / x / x).sqrt()).copysign(x)
+            }
+        };
+        let end = |x: f64, toward_one: bool| at(x, if toward_one { rest.lo } else { rest.hi });
+        Self {
+            lo: end(self.lo, self.lo < 0.0),
+            hi: end(self.hi, self.hi > 0.0),
+        }
+        .widened(8.0 * f64::EPSILON)
+    }
+
     /// `{ |x| }`.
     pub fn abs(self) -> Self {
         let (a, b) = (self.lo.abs(), self.hi.abs());
@@ -111,6 +133,37 @@ impl Interval {
             lo: if self.contains(0.0) { 0.0 } else { a.min(b) },
             hi: a.max(b),
         }
+    }
+}
+
+/// `{ a·x }`, and the length of what lies in `a`, for a fixed vector and vectors known by their components' intervals.
+pub(crate) mod vectors {
+    use glam::{DMat3, DVec3};
+
+    use super::Interval;
+
+    /// `{ m v }`.
+    pub fn transformed(m: DMat3, v: [Interval; 3]) -> [Interval; 3] {
+        std::array::from_fn(|row| dot(m.row(row), v))
+    }
+
+    /// `{ a·v }`.
+    pub fn dot(a: DVec3, v: [Interval; 3]) -> Interval {
+        let terms: [Interval; 3] = std::array::from_fn(|i| Interval::point(a[i]) * v[i]);
+        terms[0] + terms[1] + terms[2]
+    }
+
+    /// `{ |v| }`.
+    pub fn length(v: [Interval; 3]) -> Interval {
+        (v[0].square() + v[1].square() + v[2].square()).sqrt()
+    }
+
+    /// All vectors no longer than `length`, which may be infinite.
+    pub fn ball(length: f64) -> [Interval; 3] {
+        [Interval {
+            lo: -length,
+            hi: length,
+        }; 3]
     }
 }
 

@@ -4,6 +4,15 @@
 //! normal `-∇f/|∇f|`. Every field answers value, gradient, Hessian, and a sound interval over a box
 //! ([`Field`]).
 //!
+//! | type | what |
+//! | --- | --- |
+//! | [`HierarchicalSpline`] | dyadic levels of cubic B-splines, refined where the data is: what a fit gives |
+//! | [`TensorSpline`] | one block of B-splines on three knot vectors, degrees 1 to 5; insertion of knots |
+//! | [`Primitive`] | spheres, boxes, cylinders and other formulas |
+//! | [`Csg`] | sharp and smooth Boolean operations, affine placement, sums, growth by a length |
+//!
+//! [`polygonize`] makes triangles of any of them, and follows changes of a field.
+//!
 //! Index order is `(x, y, z)` with `z` fastest in memory, everywhere in this crate.
 
 mod banded;
@@ -28,6 +37,7 @@ pub use csg::{Csg, CsgError};
 pub use field::{Aabb, Field, Frame, Jet};
 pub use hierarchical::HierarchicalSpline;
 pub use interval::Interval;
+pub(crate) use interval::vectors;
 pub use knots::{KnotError, KnotVector};
 pub use primitives::{Primitive, PrimitiveError};
 pub use real::Real;

@@ -1,6 +1,6 @@
 use glam::{DAffine3, DMat3, DVec3};
 
-use crate::{Aabb, Frame, Interval, Jet};
+use crate::{Aabb, Frame, Interval, Jet, vectors};
 
 /// The box on which a spline is defined, in its own coordinates, where it lies in the world, and how the field goes on
 /// outside it: `f(clamp x) - g·|x - clamp x|`, clamped in the box's own coordinates, distance in the world.
@@ -96,6 +96,25 @@ impl PlacedBox {
         };
         let slack = 1e-12 * hi;
         Interval::new((lo - slack).max(0.0), hi + slack) * Interval::point(self.slope)
+    }
+
+    /// Intervals of the gradient over the local box `b`, of which `inside` is the clamped part, from those inside.
+    pub fn extend_slopes(&self, inside_slopes: [Interval; 3], b: &Aabb, inside: &Aabb) -> [Interval; 3] {
+        if self.fall(b, inside) == Interval::point(0.0) && b == inside {
+            return inside_slopes;
+        }
+        // The clamped point moves by `F dx`, the way to it by `(1 - F) dx`, where `F` keeps some of the box's axes.
+        let m = self.world_from_local.matrix3;
+        let is_diagonal = m == DMat3::from_diagonal(m.diagonal());
+        let norm = |m: DMat3| m.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt();
+        let most = if is_diagonal {
+            1.0
+        } else {
+            norm(m) * norm(self.local_from_world.matrix3)
+        };
+        let steepest = vectors::length(inside_slopes).hi * most;
+        let fall = self.slope * if is_diagonal { 1.0 } else { 1.0 + most };
+        vectors::ball((steepest + fall) * (1.0 + 1e-12))
     }
 
     /// Local coordinates of node `i` of a frame are `start + step·i`, axis by axis, if the frame lies along the box.

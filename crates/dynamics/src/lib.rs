@@ -1,6 +1,43 @@
-//! Density dynamics of implicit solids.
+//! Density dynamics of implicit solids: a field becomes elastic.
+//!
+//! A [`Patch`](patch::Patch) is a box of a B-spline field, sampled on a regular [lattice](lattice::Lattice). The
+//! samples are mass-points that move along the density axis only, joined by [density springs](springs); their
+//! [matter](matter::Matter) is given per volume. The state is the change `p` of the free control coefficients and its
+//! rate; with the collocation matrix `A`, `d = d₀ + A p` are the densities, and
+//!
+//! `M̃ p̈ + D̃ ṗ = Aᵀ(f_ext + f_int(d))`, `M̃ = AᵀMA`, `D̃ = AᵀDA` [DIS eq. 8 with forces relative to rest]
+//!
+//! is integrated by [`step`](patch::Patch::step). Implicit steps solve for the *increment*, `AᵀSA x = Aᵀg` with a
+//! matrix `S` on the samples ([`solve`]), and judge convergence against the impulse `Aᵀg`.
+//!
+//! Arrays have the order `(x, y, z)` with `z` fastest. Coefficients and samples with a fixed rim are the free ones only.
+//! Sums have fixed orders, and multiplications and additions are never fused: the same input gives the same bits.
+//!
+//! ```
+//! use dynamics::{integrators::Integrator, lattice::{Lattice, Rim}, matter::Matter, patch::Patch};
+//! use dynamics::{solve::SolverOptions, springs::{Law, Neighbours}};
+//!
+//! // 15³ coefficients of which 9³ are free, 20³ samples 0.5 apart, cut from the half-space x < 4.75.
+//! let lattice = Lattice::<f32>::cube(15, 20, Rim::Fixed, 0.5)?;
+//! let d: Vec<f32> = (0..8000).map(|i| 4.75 - 0.5 * (i / 400) as f32).collect();
+//! let law = Law::Linear { scale: 1.0 };
+//! let mut patch = Patch::new(lattice, Matter::default(), law, Neighbours::Six, &d, SolverOptions::default())?;
+//! let mut force = vec![0.0; 8000];
+//! force[10 * 400 + 10 * 20 + 10] = 1.0;
+//! patch.set_force(&force)?;
+//! let report = patch.step(Integrator::TrBdf2, 0.1)?;
+//! assert!(report.work > 0.0 && report.solve.iteration.iterations <= 8);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Sources: J. Hua and H. Qin, *Haptics-Based Dynamic Implicit Solid Modeling*, 2004 (DIS).
+//!
+//! What it cannot do yet: constraints, sleeping parts, more than one thread.
 
+pub mod integrators;
 pub mod lattice;
+pub mod matter;
+pub mod patch;
 pub mod solve;
 pub mod springs;
 pub mod study;

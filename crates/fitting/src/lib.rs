@@ -20,4 +20,4 @@ pub mod volume;
 pub use budget::{Cancel, Control, Progress};
 pub use components::{UnsupportedComponent, unsupported_components};
 pub use error::FitError;
-pub use report::{FitReport, Leaf, StopReason};
+pub use report::{FitReport, Leaf, SignReport, StopReason};

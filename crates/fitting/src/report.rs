@@ -1,3 +1,5 @@
+use crate::orient::{Route, UNSURE};
+
 /// Why a leaf was not split further.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
@@ -36,6 +38,26 @@ pub struct Leaf {
     pub reason: StopReason,
 }
 
+/// How the normals of a cloud that had none were found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SignReport {
+    /// How inside was told from outside.
+    pub route: Route,
+    /// Points that no surface passes through; they were left out.
+    pub outlier_count: usize,
+    /// Points whose sign is unsure.
+    pub unsure_count: usize,
+    /// Mean confidence in the sign, 0 to 1, of each leaf of [`FitReport::leaves`].
+    pub leaf_confidence: Vec<f32>,
+}
+
+impl SignReport {
+    /// Leaves whose sign is unsure.
+    pub fn unsure_leaves(&self) -> usize {
+        self.leaf_confidence.iter().filter(|c| **c < UNSURE).count()
+    }
+}
+
 /// What a fit says of itself. Residuals are first measured by the fit; `isoclay check` measures them again.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FitReport {
@@ -63,6 +85,8 @@ pub struct FitReport {
     pub smoothing: f64,
     /// Leaves in a fixed order.
     pub leaves: Vec<Leaf>,
+    /// Of a cloud that came without normals.
+    pub signs: Option<SignReport>,
     /// Repairs and doubts, each a sentence with its figures.
     pub notes: Vec<String>,
 }

@@ -32,6 +32,10 @@ pub enum PointFormat {
     Obj,
     /// Point Cloud Library.
     Pcd,
+    /// LAS, compressed (LAZ) or not.
+    Las,
+    /// ASTM E57.
+    E57,
 }
 
 /// Formats that hold meshes and nothing else.
@@ -55,6 +59,8 @@ impl fmt::Display for Kind {
             Self::Cloud(PointFormat::Xyz) => "point cloud (XYZ)",
             Self::Cloud(PointFormat::Obj) => "point cloud (OBJ)",
             Self::Cloud(PointFormat::Pcd) => "point cloud (PCD)",
+            Self::Cloud(PointFormat::Las) => "point cloud (LAS)",
+            Self::Cloud(PointFormat::E57) => "point cloud (E57)",
             Self::Mesh(MeshFileFormat::Stl) => "mesh (STL)",
             Self::Mesh(MeshFileFormat::ThreeMf) => "mesh (3MF)",
             Self::Mesh(MeshFileFormat::Vrml) => "mesh (VRML)",
@@ -64,11 +70,12 @@ impl fmt::Display for Kind {
     }
 }
 
-pub(crate) const CLOUDS: &str = "point clouds .ply .obj .pcd .xyz .xyzn .txt .asc .csv .pts, each also .gz";
+pub(crate) const CLOUDS: &str =
+    "point clouds .ply .obj .pcd .las .laz .e57 .xyz .xyzn .txt .asc .csv .pts, each also .gz";
 pub(crate) const MESHES: &str = "meshes .ply .obj .stl .gltf .glb .3mf .wrl, each also .gz";
-const SUPPORTED: &str = "point clouds .ply .obj .pcd .xyz .xyzn .txt .asc .csv .pts, meshes .ply .obj .stl .gltf .glb .3mf .wrl \
-                         and volumes .nii .hdr .nrrd .nhdr .mha .mhd .tif, each also .gz, DICOM series, directories of \
-                         .tif, and fields .iclay; voxels without a header need their layout stated";
+const SUPPORTED: &str = "point clouds .ply .obj .pcd .las .laz .e57 .xyz .xyzn .txt .asc .csv .pts, meshes .ply .obj .stl .gltf .glb \
+                         .3mf .wrl, volumes .nii .hdr .nrrd .nhdr .mha .mhd .tif, each also .gz, directories of DICOM \
+                         or .tif slices, and fields .iclay; voxels without a header need their layout stated";
 
 /// Bytes that are enough to know every content that can be known.
 const LOOK: usize = 400;
@@ -103,7 +110,7 @@ fn kind_of_directory(path: &Path) -> Result<Kind, Fault> {
         return Ok(Kind::Volume(VolumeFormat::TiffFolder));
     }
     Err(Fault::UnknownKind {
-        found: "a directory without DICOM or TIFF files".into(),
+        found: "a directory without slices".into(),
         purpose: "input",
         supported: SUPPORTED,
     })
@@ -126,14 +133,11 @@ pub(crate) fn kind_of(head: &[u8], path: &Path) -> Result<Kind, Fault> {
     if let Some(format) = volumes::nifti_format(head) {
         return Ok(Kind::Volume(format));
     }
-    if volumes::looks_like_nrrd(head) {
-        return Ok(Kind::Volume(VolumeFormat::Nrrd));
+    if head.starts_with(b"LASF") {
+        return Ok(Kind::Cloud(PointFormat::Las));
     }
-    if volumes::looks_like_metaimage(head) {
-        return Ok(Kind::Volume(VolumeFormat::MetaImage));
-    }
-    if volumes::looks_like_tiff(head) {
-        return Ok(Kind::Volume(VolumeFormat::Tiff));
+    if head.starts_with(b"ASTM-E57") {
+        return Ok(Kind::Cloud(PointFormat::E57));
     }
     if meshes::looks_like_gltf(head) {
         return Ok(Kind::Mesh(MeshFileFormat::Gltf));
@@ -150,10 +154,21 @@ pub(crate) fn kind_of(head: &[u8], path: &Path) -> Result<Kind, Fault> {
     if volumes::looks_like_dicom(head) {
         return Ok(Kind::Volume(VolumeFormat::Dicom));
     }
+    if volumes::looks_like_nrrd(head) {
+        return Ok(Kind::Volume(VolumeFormat::Nrrd));
+    }
+    if volumes::looks_like_metaimage(head) {
+        return Ok(Kind::Volume(VolumeFormat::MetaImage));
+    }
+    if volumes::looks_like_tiff(head) {
+        return Ok(Kind::Volume(VolumeFormat::Tiff));
+    }
     let extension = extension(path);
     match extension.as_str() {
         "ply" => Ok(Kind::Cloud(PointFormat::Ply)),
         "xyz" | "xyzn" | "txt" | "asc" | "csv" | "pts" => Ok(Kind::Cloud(PointFormat::Xyz)),
+        "las" | "laz" => Ok(Kind::Cloud(PointFormat::Las)),
+        "e57" => Ok(Kind::Cloud(PointFormat::E57)),
         "pcd" => Ok(Kind::Cloud(PointFormat::Pcd)),
         "obj" => Ok(Kind::Cloud(PointFormat::Obj)),
         "nii" => Ok(Kind::Volume(VolumeFormat::Nifti)),
@@ -214,8 +229,8 @@ mod tests {
         );
         assert_eq!(kind(b"1 2 3", "a.b.csv").unwrap(), Kind::Cloud(PointFormat::Xyz));
         assert!(matches!(kind(b"", "a.ply"), Err(Fault::Empty)));
-        for name in ["scan.las", "scan", "scan.gz"] {
-            let e = kind(b"LASF", name).unwrap_err().to_string();
+        for name in ["scan.step", "scan", "scan.gz"] {
+            let e = kind(b"ISO-10303", name).unwrap_err().to_string();
             assert!(
                 e.contains(".ply") && e.contains(".nii") && e.contains(".iclay"),
                 "{e}"

@@ -3,9 +3,9 @@
 //! # What is read and written
 //! | what | read | written |
 //! | --- | --- | --- |
-//! | points | PLY (ascii, binary of both endians), XYZ, OBJ; each also gzipped | PLY with colours |
-//! | volumes | NIfTI-1 and -2, NRRD, MetaImage, TIFF stacks, raw voxels, each also gzipped; DICOM series | NIfTI-1, NRRD, MetaImage, VTK ImageData |
-//! | meshes | | PLY, STL, OBJ |
+//! | points | PLY (ascii, binary of both endians), PCD (ascii, binary, compressed), LAS, LAZ, E57, XYZ, OBJ; each also gzipped; the vertices of any mesh | PLY, PCD, LAS, LAZ, E57, XYZ |
+//! | volumes | NIfTI-1 and -2, NRRD, MetaImage, TIFF stacks, raw voxels, gzipped or not; DICOM series | NIfTI-1, NRRD, MetaImage, VTK ImageData |
+//! | meshes | PLY, OBJ, STL (ascii, binary), glTF 2.0 (.gltf, .glb), 3MF, VRML97; each also gzipped | PLY, OBJ, STL, glTF 2.0 (.gltf, .glb), 3MF, VRML97 |
 //! | fields | the native file, `docs/format.md` | the same |
 //!
 //! # Conventions
@@ -25,13 +25,14 @@
 //! ```
 //!
 //! # What it cannot do
-//! No RGB or complex voxels, no time series, no textures or materials of OBJ. Of a volume, [`volumes`] says more.
+//! No RGB or complex voxels, no time series, no textures or materials of meshes. Of a volume, [`volumes`]
+//! says more.
 
 pub mod atomic;
 mod detect;
 mod error;
 pub mod field;
-mod foreign;
+mod guard;
 mod input;
 mod limits;
 pub mod meshes;

@@ -1,6 +1,6 @@
 //! Random bytes and random changes of good files, seeded: no panic, and never more memory than allowed.
 
-use formats::{ReadLimits, field, points, volumes};
+use formats::{ReadLimits, field, meshes, points, volumes};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 
@@ -22,6 +22,13 @@ fn read_all(bytes: &[u8]) {
     bounded("ply", bytes, |b| points::parse_ply(b, &LIMITS).is_ok());
     bounded("xyz", bytes, |b| points::parse_xyz(b, &LIMITS).is_ok());
     bounded("obj", bytes, |b| points::parse_obj(b, &LIMITS).is_ok());
+    bounded("pcd", bytes, |b| points::parse_pcd(b, &LIMITS).is_ok());
+    bounded("las", bytes, |b| points::parse_las(b, &LIMITS).is_ok());
+    bounded("e57", bytes, |b| points::parse_e57(b, &LIMITS).is_ok());
+    bounded("stl", bytes, |b| meshes::parse_stl(b, &LIMITS).is_ok());
+    bounded("gltf", bytes, |b| meshes::parse_gltf(b, &LIMITS).is_ok());
+    bounded("3mf", bytes, |b| meshes::parse_threemf(b, &LIMITS).is_ok());
+    bounded("vrml", bytes, |b| meshes::parse_vrml(b, &LIMITS).is_ok());
     bounded("nifti", bytes, |b| volumes::parse_nifti(b, &LIMITS).is_ok());
     bounded("nrrd", bytes, |b| volumes::parse_nrrd(b, &LIMITS).is_ok());
     bounded("metaimage", bytes, |b| {
@@ -72,7 +79,7 @@ fn seeds() -> Vec<Vec<u8>> {
         .filter(|p| {
             !matches!(
                 p.extension().and_then(|e| e.to_str()),
-                Some("py" | "md" | "gz" | "json")
+                Some("py" | "md" | "gz" | "json" | "bin")
             )
         })
         .map(|p| std::fs::read(p).unwrap())
@@ -118,6 +125,14 @@ fn random_bytes_behind_any_magic_are_refused_or_read_within_the_ceiling() {
         b"II*\0\x08\0\0\0",
         b"MM\0+\0\x08\0\0\0\0\0\0\0\0\0\x10",
         &field::MAGIC,
+        b"# .PCD v0.7\nVERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 9\nHEIGHT 1\nPOINTS 9\nDATA binary_compressed\n",
+        b"solid\nfacet normal 0 0 1\nouter loop\nvertex ",
+        b"glTF\x02\0\0\0",
+        b"{\"asset\":{\"version\":\"2.0\"},\"nodes\":[",
+        b"#VRML V2.0 utf8\nShape { geometry IndexedFaceSet { coord Coordinate { point [ ",
+        b"PK\x03\x04",
+        b"LASF",
+        b"ASTM-E57\x01\0\0\0\0\0\0\0",
         b"\x89ICLAY\r\n\x01\0\0\0HEAD",
     ];
     let strategy = (0..heads.len(), prop::collection::vec(any::<u8>(), 0..700));

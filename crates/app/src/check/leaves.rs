@@ -42,6 +42,12 @@ impl<'a> LeafIndex<'a> {
         })
     }
 
+    /// World positions of the middles of the leaves with samples.
+    pub fn centers(&self) -> impl Iterator<Item = DVec3> {
+        let with_samples = (0..self.leaves.len()).filter(|&i| self.leaves[i].sample_count > 0);
+        with_samples.map(|i| self.corners(i).iter().sum::<DVec3>() / 8.0)
+    }
+
     /// World corners of leaf `i`, corner `4x + 2y + z`.
     pub fn corners(&self, i: usize) -> [DVec3; 8] {
         let leaf = &self.leaves[i];

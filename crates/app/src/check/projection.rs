@@ -27,6 +27,11 @@ pub fn project_points(field: &dyn Field, points: &[DVec3], spacing: f64) -> Vec<
         .collect()
 }
 
+/// The point of the surface that Newton's steps reach from `p`, if they do.
+pub fn surface_point(field: &dyn Field, p: DVec3, spacing: f64) -> Option<DVec3> {
+    newton(field, p, spacing).ok().map(|hit| hit.0)
+}
+
 fn project(field: &dyn Field, p: DVec3, spacing: f64) -> Projected {
     let (mut foot, mut normal) = match newton(field, p, spacing) {
         Ok(hit) => hit,

@@ -7,6 +7,7 @@ use fitting::Cancel;
 use formats::Kind;
 use serde_json::{Map, Value};
 
+use super::chart_orient;
 use super::failure::{Failure, OrFail, Outcome};
 use super::input::{reading, writing};
 use super::interrupt;
@@ -24,6 +25,8 @@ pub struct Args {
 enum Subject {
     /// Error of fits against their time and memory, over tolerance, depth, smoothing and precision
     Fit(FitArgs),
+    /// Wrong normals of clouds without any against the time of their estimation
+    Orient(chart_orient::Args),
 }
 
 #[derive(clap::Args)]
@@ -45,7 +48,13 @@ struct FitArgs {
 
 /// Runs the sweeps and draws the charts.
 pub fn run(args: &Args) -> Outcome {
-    let Subject::Fit(args) = &args.subject;
+    match &args.subject {
+        Subject::Fit(args) => fit(args),
+        Subject::Orient(args) => chart_orient::run(args),
+    }
+}
+
+fn fit(args: &FitArgs) -> Outcome {
     let cancel = Cancel::new();
     interrupt::cancel_on_interrupt(&cancel)?;
     std::fs::create_dir_all(&args.output)

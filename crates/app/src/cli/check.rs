@@ -1,7 +1,9 @@
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
+use fitting::mesh::MeshDistance;
 use fitting::{Cancel, StopReason, UnsupportedComponent, unsupported_components};
+use formats::meshes::TriangleMesh;
 use formats::points::PointCloud;
 use formats::volumes::Volume;
 use glam::DVec3;
@@ -10,14 +12,14 @@ use serde_json::json;
 use super::cost::Cost;
 use super::failure::{Failure, OrFail, Outcome};
 use super::field::OpenField;
-use super::input::{self, Input, writing};
+use super::input::{self, Input, Shape, writing};
 use super::sample::voxel_frame;
 use super::summary::Summary;
 use super::volume_choice::VolumeChoice;
 use super::{interrupt, set_threads};
 use crate::check::{
-    ErrorStatistics, LeafAudit, LeafIndex, audit_leaves, project_points, viridis, voxel_residuals,
-    write_boxes,
+    AgainstMesh, ErrorStatistics, LeafAudit, LeafIndex, against_mesh, audit_leaves, project_points, viridis,
+    voxel_residuals, write_boxes,
 };
 
 /// Arguments of `isoclay check`.
@@ -27,6 +29,9 @@ pub struct Args {
     field: PathBuf,
     /// What it was fitted to
     input: PathBuf,
+    /// What to take a file with faces for [default: cloud for PLY and OBJ, mesh for files that hold nothing else]
+    #[arg(long = "as", value_enum, value_name = "KIND")]
+    shape: Option<Shape>,
     /// Directory for error.ply, octree.ply and report.json; made if missing
     #[arg(short, long, value_name = "REPORT_DIR")]
     output: Option<PathBuf>,
@@ -52,6 +57,8 @@ struct Measured {
     unprojected: Option<usize>,
     /// Pieces of the solid or of its complement without a sample, larger than a cell.
     unsupported: Vec<UnsupportedComponent>,
+    /// Against a mesh: the way back and the sign.
+    against_mesh: Option<AgainstMesh>,
     unit: String,
 }
 
@@ -70,8 +77,9 @@ pub fn run(args: &Args) -> Outcome {
     let open = OpenField::load(&args.field)?;
     let leaves = &open.report().leaves;
     let index = LeafIndex::new(open.lattice(), leaves);
-    let measured = match input::read(&args.input, &args.volume.options(None)?, None)? {
+    let measured = match input::read(&args.input, args.shape, &args.volume.options(None)?, None)? {
         Input::Cloud(cloud) => measure_cloud(&open, &index, &cloud),
+        Input::Mesh(mesh) => measure_mesh(&open, &index, &mesh)?,
         Input::Volume(volume) => measure_volume(&open, &index, &volume),
     };
     interrupt::check(&cancel)?;
@@ -116,6 +124,9 @@ pub fn run(args: &Args) -> Outcome {
         p95: Some(s.p95),
         max: Some(s.max),
         unprojected: measured.unprojected,
+        back_p95: measured.against_mesh.as_ref().map(|m| m.back.p95),
+        back_max: measured.against_mesh.as_ref().map(|m| m.back.max),
+        wrong_signs: measured.against_mesh.as_ref().map(|m| m.wrong_signs),
         unsupported_components: Some(measured.unsupported.len()).filter(|_| measured.unprojected.is_some()),
         leaves: Some(audit.leaves),
         leaves_over_tolerance: has_tolerance.then_some(audit.over_tolerance),
@@ -147,10 +158,35 @@ fn measure_cloud(open: &OpenField, index: &LeafIndex, cloud: &PointCloud) -> Mea
         count: errors.len(),
         unprojected: Some(projected.iter().filter(|p| !p.converged).count()),
         unsupported: unsupported(open, &cloud.positions),
+        against_mesh: None,
         unit: open.unit().to_string(),
         positions: cloud.positions.clone(),
         errors,
     }
+}
+
+/// Points of the mesh that are measured.
+const MESH_SAMPLES: usize = 100_000;
+
+fn measure_mesh(open: &OpenField, index: &LeafIndex, mesh: &TriangleMesh) -> Outcome<Measured> {
+    let (solid, _) = MeshDistance::new(&mesh.vertices, &mesh.triangles)?;
+    let positions = solid.surface_samples(MESH_SAMPLES);
+    let cloud = PointCloud {
+        positions,
+        unit: mesh.unit,
+        ..Default::default()
+    };
+    let spacing = open.lattice().spacing(open.level_count() - 1).min_element();
+    Ok(Measured {
+        against_mesh: Some(against_mesh(
+            open.field(),
+            &solid,
+            index.centers(),
+            spacing,
+            open.report().tolerance,
+        )),
+        ..measure_cloud(open, index, &cloud)
+    })
 }
 
 /// Cells along the longest side of the grid on which components are told apart.
@@ -200,6 +236,7 @@ fn measure_volume(open: &OpenField, index: &LeafIndex, volume: &Volume) -> Measu
         count: errors.len(),
         unprojected: None,
         unsupported: Vec::new(),
+        against_mesh: None,
         unit: "density".into(),
         audit,
         errors: worst.iter().map(|&i| errors[i].abs()).collect(),
@@ -255,6 +292,7 @@ fn write_report(
         "tolerance": report.tolerance,
         "errors": measured.statistics,
         "unprojected": measured.unprojected,
+        "against_mesh": measured.against_mesh,
         "stated_by_the_fit": { "rms": report.rms, "p95": report.p95, "max": report.max, "bound": report.bound },
         "leaves": audit,
         "components_without_samples": measured.unsupported.iter().map(|c| json!({

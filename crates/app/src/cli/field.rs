@@ -2,7 +2,8 @@ use std::path::Path;
 
 use bspline::hierarchical::Lattice;
 use bspline::{Field, Frame, HierarchicalSpline, Real};
-use fitting::{FitReport, Leaf, StopReason};
+use fitting::orient::Route;
+use fitting::{FitReport, Leaf, SignReport, StopReason};
 use formats::Unit;
 use formats::field::{AnyField, FieldMeta, LeafRecord, LoadedField};
 use serde::{Deserialize, Serialize};
@@ -30,6 +31,16 @@ struct StoredReport {
     noise: Option<f64>,
     tolerance: f64,
     smoothing: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    signs: Option<StoredSigns>,
+}
+
+/// The figures of a [`SignReport`]; the confidences of the leaves have a place of their own.
+#[derive(Serialize, Deserialize)]
+struct StoredSigns {
+    route: String,
+    outlier_count: usize,
+    unsure_count: usize,
 }
 
 /// Asks the spline of either precision.
@@ -77,6 +88,7 @@ impl OpenField {
             noise: stored.noise,
             tolerance: stored.tolerance,
             smoothing: stored.smoothing,
+            signs: stored.signs.map(|s| signs(s, &loaded.meta.sign_confidence)),
             leaves,
             notes: loaded.meta.notes.clone(),
         };
@@ -170,6 +182,14 @@ impl OpenField {
         self.frame(self.lattice().cells_at(finest).map(|c| c.saturating_mul(n)))
     }
 
+    /// The grid with two cells in every knot interval of the level that holds the surface `{ f = iso }`: the finest one
+    /// on which, or on finer ones, at least a tenth of the surface's area lies; and how many finer levels there are.
+    pub fn frame_of_surface(&self, iso: f64) -> (Frame, usize) {
+        let level = either!(&self.loaded.field, f => f.level_of_surface(iso, 0.1));
+        let frame = self.frame(self.lattice().cells_at(level).map(|c| c.saturating_mul(2)));
+        (frame, self.level_count() - 1 - level)
+    }
+
     /// The grid with `n` cells along the longest side of the box and as many on the others as their lengths ask.
     pub fn frame_of_resolution(&self, n: u32) -> Frame {
         let sides = self.lattice().spacing(0) * self.lattice().extent();
@@ -212,10 +232,19 @@ pub fn save(path: &Path, field: &AnyField, report: &FitReport, meta: FieldMeta) 
         noise: report.noise,
         tolerance: report.tolerance,
         smoothing: report.smoothing,
+        signs: report.signs.as_ref().map(|s| StoredSigns {
+            route: s.route.name().into(),
+            outlier_count: s.outlier_count,
+            unsure_count: s.unsure_count,
+        }),
     };
     let meta = FieldMeta {
         report: serde_json::to_string(&stored).expect("a struct of plain fields is always JSON"),
         leaves: report.leaves.iter().map(record).collect(),
+        sign_confidence: report
+            .signs
+            .as_ref()
+            .map_or_else(Vec::new, |s| s.leaf_confidence.clone()),
         notes: report.notes.clone(),
         ..meta
     };
@@ -239,6 +268,18 @@ fn record(leaf: &Leaf) -> LeafRecord {
         rms: leaf.rms,
         max: leaf.max,
         reason: leaf.reason as u8,
+    }
+}
+
+fn signs(stored: StoredSigns, leaf_confidence: &[f32]) -> SignReport {
+    SignReport {
+        route: Route::ALL
+            .into_iter()
+            .find(|r| r.name() == stored.route)
+            .unwrap_or_default(),
+        outlier_count: stored.outlier_count,
+        unsure_count: stored.unsure_count,
+        leaf_confidence: leaf_confidence.to_vec(),
     }
 }
 

@@ -2,32 +2,39 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use clap::ValueEnum;
+use fitting::mesh::{MeshDefects, MeshOptions, fit_mesh};
 use fitting::points::{OrientedPoints, PointOptions, fit_points};
 use fitting::volume::{VolumeMethod, VolumeOptions, VolumeView, fit_volume, otsu_threshold};
 use fitting::{Cancel, Control, FitError, FitReport, StopReason};
 use formats::Unit;
 use formats::field::{AnyField, FieldMeta, SourceKind, Stored};
+use formats::meshes::TriangleMesh;
 use formats::points::PointCloud;
 use formats::volumes::Volume;
 
 use super::cost::{Cost, rss_bytes};
 use super::failure::{Failure, Outcome};
 use super::field::{self, either};
-use super::input::{self, Input, check_output, remaining};
+use super::input::{self, Input, Shape, bounding_box, check_output, remaining};
 use super::progress::Bar;
 use super::quantity::{Memory, Tolerance, human_bytes, positive};
 use super::summary::Summary;
+use super::unoriented::{Oriented, Unoriented};
 use super::volume_choice::VolumeChoice;
 use super::{interrupt, set_threads};
 
 /// Arguments of `isoclay fit`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Point cloud with normals or faces (.ply, .obj, .xyz) or volume (.nii), each also gzipped (.gz)
+    /// Point cloud with normals or faces (.ply, .obj, .xyz), mesh (.stl and others, see --as) or volume (.nii), each also gzipped (.gz)
     input: PathBuf,
     /// Field to write (.iclay)
     #[arg(short, long, value_name = "FIELD")]
     output: PathBuf,
+    /// What to fit of a file with faces. Meshes become the solid that their triangles bound [default: cloud for PLY
+    /// and OBJ, mesh for files that hold nothing else]
+    #[arg(long = "as", value_enum, value_name = "KIND")]
+    shape: Option<Shape>,
     #[command(flatten)]
     choice: Choice,
     /// Memory that the process may hold, such as 2GiB
@@ -51,6 +58,10 @@ pub struct Choice {
     /// percentile [default: what the noise justifies; for clean data 0.01% of the diagonal, 0.5% of the range]
     #[arg(long, value_name = "T[mm|%]")]
     pub tolerance: Option<Tolerance>,
+    /// Meshes: half the width of the band round the surface in which no error is above the tolerance, a length like
+    /// it [default: eight tolerances]
+    #[arg(long, value_name = "L[mm|%]")]
+    pub band: Option<Tolerance>,
     /// Coefficients to spend
     #[arg(long, value_name = "N")]
     pub coefficients: Option<NonZeroUsize>,
@@ -64,6 +75,10 @@ pub struct Choice {
     /// Weight of the bending energy [default: chosen from the data]
     #[arg(long, value_name = "μ", value_parser = positive)]
     pub smoothing: Option<f64>,
+    /// Estimate the normals of a cloud that has none (or not those of its file), and how to tell inside from outside
+    #[arg(long, value_enum, value_name = "ROUTE", num_args = 0..=1, require_equals = true,
+          default_missing_value = "winding")]
+    pub unoriented: Option<Unoriented>,
     /// Unit of the coordinates, where the file does not tell: mm, cm or m
     #[arg(long, value_parser = unit)]
     pub unit: Option<Unit>,
@@ -109,6 +124,8 @@ pub struct Fitted {
     pub source: SourceKind,
     /// Iso-value that meshing takes if the user names none; a constant volume has none.
     pub iso: Option<f64>,
+    /// What was wrong with a mesh.
+    pub defects: Option<MeshDefects>,
 }
 
 /// Fits a file and writes the field.
@@ -120,7 +137,12 @@ pub fn run(args: &Args) -> Outcome {
     interrupt::cancel_on_interrupt(&cancel)?;
     let bar = Bar::new();
     bar.show("reading", 0.0);
-    let input = input::read(&args.input, &args.volume.options(args.choice.unit)?, args.memory)?;
+    let input = input::read(
+        &args.input,
+        args.shape,
+        &args.volume.options(args.choice.unit)?,
+        args.memory,
+    )?;
     interrupt::check(&cancel)?;
     let shown = bar.clone();
     let mut control = Control {
@@ -171,6 +193,8 @@ pub fn fit(input: &Input, choice: &Choice, control: &mut Control) -> Outcome<Fit
     match (input, choice.precision) {
         (Input::Cloud(cloud), Precision::F32) => fit_cloud::<f32>(cloud, choice, control),
         (Input::Cloud(cloud), Precision::F64) => fit_cloud::<f64>(cloud, choice, control),
+        (Input::Mesh(mesh), Precision::F32) => fit_triangles::<f32>(mesh, choice, control),
+        (Input::Mesh(mesh), Precision::F64) => fit_triangles::<f64>(mesh, choice, control),
         (Input::Volume(volume), Precision::F32) => fit_voxels::<f32>(volume, choice, control),
         (Input::Volume(volume), Precision::F64) => fit_voxels::<f64>(volume, choice, control),
     }
@@ -182,19 +206,14 @@ fn fit_cloud<T: Stored>(cloud: &PointCloud, choice: &Choice, control: &mut Contr
             "--method interpolate is for volumes; leave it out for a point cloud",
         ));
     }
-    let Some(normals) = &cloud.normals else {
-        return Err(Failure::input(
-            "the points have no normals, which tell inside from outside; give a file with columns nx ny nz \
-             (estimate and orient them with a tool such as MeshLab, CloudCompare or Open3D), or a mesh with faces",
-        ));
-    };
     if cloud.positions.is_empty() {
         return Err(FitError::NotEnoughSamples { found: 0, needed: 10 }.into());
     }
+    let oriented = Oriented::new(cloud, choice.unoriented, control)?.map_err(|e| explain(e, control))?;
     let unit = stated_unit(cloud.unit, choice.unit)?;
     let points = OrientedPoints {
-        positions: &cloud.positions,
-        normals,
+        positions: oriented.positions(),
+        normals: oriented.normals(),
     };
     let diagonal = points.diagonal();
     let options = PointOptions {
@@ -206,8 +225,10 @@ fn fit_cloud<T: Stored>(cloud: &PointCloud, choice: &Choice, control: &mut Contr
         coefficients: choice.coefficients.map(NonZeroUsize::get),
         max_depth: choice.max_depth.map(usize::from),
         smoothing: choice.smoothing,
+        ..Default::default()
     };
     let (field, mut report) = fit_points::<T>(&points, &options, control).map_err(|e| explain(e, control))?;
+    oriented.complete(&mut report, field.lattice());
     report.notes.splice(0..0, cloud.notes.iter().cloned());
     Ok(Fitted {
         field: T::any(field),
@@ -215,10 +236,53 @@ fn fit_cloud<T: Stored>(cloud: &PointCloud, choice: &Choice, control: &mut Contr
         unit,
         source: SourceKind::Cloud,
         iso: Some(0.0),
+        defects: None,
+    })
+}
+
+fn fit_triangles<T: Stored>(mesh: &TriangleMesh, choice: &Choice, control: &mut Control) -> Outcome<Fitted> {
+    if choice.method == Method::Interpolate {
+        return Err(Failure::usage(
+            "--method interpolate is for volumes; leave it out for a mesh",
+        ));
+    }
+    if choice.smoothing.is_some() {
+        return Err(Failure::usage(
+            "--smoothing is for clouds and volumes: the distance to a mesh has no noise; leave it out",
+        ));
+    }
+    let unit = stated_unit(mesh.unit, choice.unit)?;
+    let diagonal = bounding_box(&mesh.vertices).size().length();
+    let length = |t: Option<Tolerance>| {
+        t.map(|t| t.length(diagonal, unit))
+            .transpose()
+            .map_err(Failure::usage)
+    };
+    let options = MeshOptions {
+        tolerance: length(choice.tolerance)?,
+        coefficients: choice.coefficients.map(NonZeroUsize::get),
+        max_depth: choice.max_depth.map(usize::from),
+        band: length(choice.band)?,
+    };
+    let (field, mut report, defects) =
+        fit_mesh::<T>(&mesh.vertices, &mesh.triangles, &options, control).map_err(|e| explain(e, control))?;
+    report.notes.splice(0..0, mesh.notes.iter().cloned());
+    Ok(Fitted {
+        field: T::any(field),
+        report,
+        unit,
+        source: SourceKind::Cloud,
+        iso: Some(0.0),
+        defects: Some(defects),
     })
 }
 
 fn fit_voxels<T: Stored>(volume: &Volume, choice: &Choice, control: &mut Control) -> Outcome<Fitted> {
+    if choice.unoriented.is_some() {
+        return Err(Failure::usage(
+            "--unoriented is for point clouds; leave it out for a volume",
+        ));
+    }
     let header = &volume.header;
     let unit = stated_unit(header.unit, choice.unit)?;
     let view = VolumeView {
@@ -254,6 +318,7 @@ fn fit_voxels<T: Stored>(volume: &Volume, choice: &Choice, control: &mut Control
         unit,
         source: SourceKind::Volume,
         iso,
+        defects: None,
     })
 }
 
@@ -298,7 +363,7 @@ impl Fitted {
             input_count: Some(r.input_count),
             used_count: Some(r.used_count),
             unit: Some(match input {
-                Input::Cloud(_) => self.unit.to_string(),
+                Input::Cloud(_) | Input::Mesh(_) => self.unit.to_string(),
                 Input::Volume(_) => "density".into(),
             }),
             coefficients: Some(either!(&self.field, f => f.coefficient_count())),
@@ -321,8 +386,32 @@ impl Fitted {
                     .filter(|l| l.reason == StopReason::NoData)
                     .count()
             }),
+            oriented_by: r.signs.as_ref().map(|s| s.route.name().into()),
+            outliers: r.signs.as_ref().map(|s| s.outlier_count),
+            unsure_signs: r.signs.as_ref().map(|s| s.unsure_count),
+            leaves_of_unsure_sign: r.signs.as_ref().map(|s| s.unsure_leaves()),
+            defects: self.defects.as_ref().map(defects),
             notes: r.notes.clone(),
             ..Default::default()
         }
     }
+}
+
+/// The counts as an object.
+fn defects(d: &MeshDefects) -> serde_json::Value {
+    serde_json::json!({
+        "components": d.components,
+        "merged_vertices": d.merged_vertices,
+        "boundary_edges": d.boundary_edges,
+        "non_manifold_edges": d.non_manifold_edges,
+        "non_orientable_edges": d.non_orientable_edges,
+        "flipped_faces": d.flipped_faces,
+        "inside_out": d.inside_out,
+        "degenerate_faces": d.degenerate_faces,
+        "duplicate_faces": d.duplicate_faces,
+        "unbounding_faces": d.unbounding_faces,
+        "interior_faces": d.interior_faces,
+        "self_intersections": d.self_intersections,
+        "intersections_sampled": d.intersections_sampled,
+    })
 }

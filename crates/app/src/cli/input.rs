@@ -1,6 +1,8 @@
 use std::path::Path;
 
 use bspline::Aabb;
+use clap::ValueEnum;
+use formats::meshes::TriangleMesh;
 use formats::points::PointCloud;
 use formats::volumes::{Volume, VolumeFormat, VolumeOptions};
 use formats::{Fault, FormatError, Kind, ReadLimits};
@@ -14,25 +16,56 @@ use super::quantity::{Memory, human_bytes};
 pub enum Input {
     /// Points.
     Cloud(PointCloud),
+    /// Triangles.
+    Mesh(TriangleMesh),
     /// Voxels.
     Volume(Volume),
 }
 
-/// Reads a cloud or a volume, of a volume what `part` asks for, holding no more than `memory` in the whole process.
-pub fn read(path: &Path, part: &VolumeOptions, memory: Option<Memory>) -> Outcome<Input> {
+/// What to take a file with vertices and faces for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Shape {
+    /// Its vertices, with normals that the file holds or that its faces define.
+    Cloud,
+    /// Its faces.
+    Mesh,
+}
+
+/// Reads something that can be fitted, of a volume what `part` asks for, holding no more than `memory` in the whole
+/// process. `shape` is the user's word for files with faces; by itself a file that can hold points alone is a cloud.
+pub fn read(
+    path: &Path,
+    shape: Option<Shape>,
+    part: &VolumeOptions,
+    memory: Option<Memory>,
+) -> Outcome<Input> {
     let limits = limits(memory);
-    match kind(path, part)? {
-        Kind::Cloud(_) | Kind::Mesh(_) => formats::points::read(path, &limits)
-            .map_err(reading)
-            .map(Input::Cloud),
-        Kind::Volume(_) => formats::volumes::read(path, part, &limits)
-            .map_err(reading)
-            .map(Input::Volume),
-        Kind::Field => Err(Failure::input(format!(
-            "{}: is a fitted field, where a point cloud or a volume is needed",
-            path.display()
-        ))),
+    let kind = kind(path, part)?;
+    let shape = match (kind, shape) {
+        (Kind::Volume(_), None) => {
+            let volume = formats::volumes::read(path, part, &limits).map_err(reading)?;
+            return Ok(Input::Volume(volume));
+        }
+        (Kind::Volume(_), Some(_)) => {
+            return Err(Failure::usage(format!(
+                "{}: is a {kind}, and --as is for files with faces; leave it out",
+                path.display()
+            )));
+        }
+        (Kind::Field, _) => {
+            return Err(Failure::input(format!(
+                "{}: is a fitted field, where a point cloud, a mesh or a volume is needed",
+                path.display()
+            )));
+        }
+        (Kind::Mesh(_), shape) => shape.unwrap_or(Shape::Mesh),
+        (Kind::Cloud(_), shape) => shape.unwrap_or(Shape::Cloud),
+    };
+    match shape {
+        Shape::Cloud => formats::points::read(path, &limits).map(Input::Cloud),
+        Shape::Mesh => formats::meshes::read(path, &limits).map(Input::Mesh),
     }
+    .map_err(reading)
 }
 
 /// What a file is: without a header that is the user's word.

@@ -25,7 +25,8 @@ pub struct Args {
     /// Mesh to write: .ply, .stl or .obj
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
-    /// Cells along the longest side of the box [default: two cells per finest knot interval]
+    /// Cells along the longest side of the box [default: two cells per knot interval of the finest level that a
+    /// tenth of the surface lies on]
     #[arg(long, value_name = "N", conflicts_with = "tolerance", value_parser = clap::value_parser!(u32).range(1..=65535))]
     resolution: Option<u32>,
     /// Distance from the surface that 99 % of the triangles keep at their centres: in the field's unit, in mm,
@@ -74,7 +75,16 @@ pub fn run(args: &Args) -> Outcome {
         Some(tolerance) => mesher.within_tolerance(&open, tolerance, &mut notes)?,
         None => mesher.on(match args.resolution {
             Some(n) => open.frame_of_resolution(n),
-            None => open.frame_of_subdivision(2),
+            None => {
+                let (frame, finer) = open.frame_of_surface(options.iso);
+                if finer > 0 {
+                    let all = frame.cells.into_iter().max().unwrap_or(1) << finer;
+                    notes.push(format!(
+                        "less than a tenth of the surface has finer knots than the mesh; --resolution {all} meshes them all"
+                    ));
+                }
+                frame
+            }
         })?,
     };
     if mesh.triangles.is_empty() {
@@ -92,7 +102,7 @@ pub fn run(args: &Args) -> Outcome {
     bar.clear();
     notes.extend(doubts(&report));
     if args.resolution.is_none() && args.tolerance.is_none() && mesh.triangles.len() > MANY {
-        notes.push("the finest level covers a small part of the solid; --resolution or --tolerance give a smaller mesh".into());
+        notes.push("--resolution or --tolerance give a smaller mesh".into());
     }
     Summary {
         vertices: Some(mesh.positions.len()),

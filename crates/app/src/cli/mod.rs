@@ -2,8 +2,10 @@
 //!
 //! Exit codes: 0 done, 2 wrong usage, 3 bad input, 4 a limit was reached or the work was cancelled.
 
+mod chart_orient;
 mod charts;
 mod check;
+mod convert;
 mod cost;
 mod eval;
 mod failure;
@@ -19,6 +21,7 @@ mod progress;
 mod quantity;
 mod sample;
 mod summary;
+mod unoriented;
 mod volume_choice;
 
 use std::num::NonZeroUsize;
@@ -54,6 +57,8 @@ enum Command {
     Info(info::Args),
     /// Measure the errors of a field against its input again, and draw them
     Check(check::Args),
+    /// Write a cloud, a mesh or a volume in another format
+    Convert(convert::Args),
     /// Write a test object with a known shape, as cloud or volume
     Phantom(phantom::Args),
     /// Draw the solid into a PNG picture
@@ -79,6 +84,7 @@ pub fn main() -> ExitCode {
         Command::Eval(a) => eval::run(a),
         Command::Info(a) => info::run(a),
         Command::Check(a) => check::run(a),
+        Command::Convert(a) => convert::run(a),
         Command::Phantom(a) => phantom::run(a),
         Command::Picture(a) => picture::run(a),
         Command::Charts(a) => charts::run(a),

@@ -28,7 +28,7 @@ pub struct Args {
     /// Density of the surface [default: as for mesh]
     #[arg(long, value_name = "V", value_parser = finite, allow_negative_numbers = true)]
     iso: Option<f64>,
-    /// Cells along the longest side of the box [default: two cells per finest knot interval]
+    /// Cells along the longest side of the box [default: two cells per knot interval of the finest level that a tenth of the surface lies on]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65535))]
     resolution: Option<u32>,
     /// Width and height in pixels
@@ -86,7 +86,7 @@ pub fn run(args: &Args) -> Outcome {
     };
     let frame = match args.resolution {
         Some(n) => open.frame_of_resolution(n),
-        None => open.frame_of_subdivision(2),
+        None => open.frame_of_surface(options.iso).0,
     };
     let (mesh, _, frame) = Mesher {
         field: open.field(),

@@ -62,12 +62,36 @@ pub struct Summary {
     /// Leaves above the tolerance that were not split for lack of data.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub leaves_without_data: Option<usize>,
+    /// How inside was told from outside, where the cloud had no normals.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub oriented_by: Option<String>,
+    /// Points that no surface passes through.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub outliers: Option<usize>,
+    /// Points whose estimated normal may point the wrong way.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unsure_signs: Option<usize>,
+    /// Leaves where that is so on the mean of their points.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub leaves_of_unsure_sign: Option<usize>,
     /// Points that Newton's method could not bring to the surface.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unprojected: Option<usize>,
     /// Components of the solid or of its complement that hold no sample, larger than a cell of 1/128 of the box.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unsupported_components: Option<usize>,
+    /// 95th percentile of the distances from points of the zero set to the mesh that was fitted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub back_p95: Option<f64>,
+    /// Largest of them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub back_max: Option<f64>,
+    /// Wrong signs at points of the box farther from the mesh than the tolerance.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wrong_signs: Option<usize>,
+    /// Defects of the mesh that was fitted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub defects: Option<serde_json::Value>,
     /// Vertices of the mesh.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub vertices: Option<usize>,
@@ -134,6 +158,10 @@ impl Summary {
                     .filter(|n| Some(*n) != self.input_count)
                     .map(count),
             ),
+            ("oriented by", self.oriented_by.clone()),
+            ("  outliers", self.outliers.map(count)),
+            ("  unsure signs", self.unsure_signs.map(count)),
+            ("  leaves of unsure sign", self.leaves_of_unsure_sign.map(count)),
             ("tolerance", self.tolerance.map(size)),
             ("noise found", self.noise.map(size)),
             ("smoothing", self.smoothing.map(human_number)),
@@ -149,6 +177,9 @@ impl Summary {
                 "parts without samples",
                 self.unsupported_components.filter(|n| *n > 0).map(count),
             ),
+            ("back to the mesh p95", self.back_p95.map(size)),
+            ("back to the mesh max", self.back_max.map(size)),
+            ("wrong signs", self.wrong_signs.map(count)),
             ("leaves", self.leaves.map(count)),
             ("  over tolerance", self.leaves_over_tolerance.map(count)),
             ("  refused for lack of data", self.leaves_without_data.map(count)),

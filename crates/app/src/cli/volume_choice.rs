@@ -1,7 +1,8 @@
 use std::str::FromStr;
 
+use clap::ValueEnum;
 use formats::Unit;
-use formats::volumes::{RawLayout, VolumeOptions, VoxelType};
+use formats::volumes::{DicomOptions, RawLayout, Tilt, Uneven, VolumeOptions, VoxelType};
 
 use super::failure::{Failure, Outcome};
 
@@ -30,6 +31,35 @@ pub struct VolumeChoice {
     /// The file has no header: bytes before the first voxel
     #[arg(long, value_name = "BYTES", requires = "shape", default_value_t = 0)]
     offset: u64,
+    /// DICOM: the series to read, by its number or its identifier, where there are several
+    #[arg(long, value_name = "NUMBER|UID")]
+    series: Option<String>,
+    /// DICOM: what to do about slices at uneven distances or missing ones
+    #[arg(long, value_enum, default_value_t)]
+    uneven: UnevenChoice,
+    /// DICOM: what to do about slices of a tilted gantry
+    #[arg(long, value_enum, default_value_t)]
+    tilt: TiltChoice,
+}
+
+/// Slices at uneven distances.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum UnevenChoice {
+    /// Say where and stop.
+    #[default]
+    Refuse,
+    /// Interpolate along the stack, at the smallest distance.
+    Resample,
+}
+
+/// Slices of a tilted gantry.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum TiltChoice {
+    /// Leave every voxel where it was measured.
+    #[default]
+    Keep,
+    /// Interpolate onto a grid with right angles.
+    Resample,
 }
 
 impl VolumeChoice {
@@ -72,7 +102,17 @@ impl VolumeChoice {
                 self.spacing.as_ref().map(|s| s.0)
             },
             raw,
-            ..Default::default()
+            dicom: DicomOptions {
+                series: self.series.clone(),
+                uneven: match self.uneven {
+                    UnevenChoice::Refuse => Uneven::Refuse,
+                    UnevenChoice::Resample => Uneven::Resample,
+                },
+                tilt: match self.tilt {
+                    TiltChoice::Keep => Tilt::Keep,
+                    TiltChoice::Resample => Tilt::Resample,
+                },
+            },
         })
     }
 }

@@ -3,7 +3,7 @@ use std::sync::Arc;
 use glam::{DAffine3, DVec3};
 
 use super::CsgError;
-use crate::{Aabb, Field, Frame, Interval, Jet};
+use crate::{Aabb, Field, Frame, Interval, Jet, vectors};
 
 /// `f(x) = g(T⁻¹x)` for an invertible affine `T`, the `s_i(T_i(x))` of DIS eqs. 3 and 4.
 ///
@@ -96,6 +96,11 @@ impl Field for Affine {
         self.field.bounds(&b.transformed(&self.local_from_world))
     }
 
+    fn gradient_bounds(&self, b: &Aabb) -> [Interval; 3] {
+        let local = self.field.gradient_bounds(&b.transformed(&self.local_from_world));
+        vectors::transformed(self.local_from_world.matrix3.transpose(), local)
+    }
+
     fn values_gradients(&self, points: &[DVec3], out: &mut [(f64, DVec3)]) {
         let local: Vec<DVec3> = points
             .iter()
@@ -113,5 +118,10 @@ impl Field for Affine {
 
     fn frame_bounds(&self, frame: &Frame, lo: [i64; 3], hi: [i64; 3]) -> Interval {
         self.field.frame_bounds(&self.local_frame(frame), lo, hi)
+    }
+
+    fn frame_bounds_about(&self, frame: &Frame, lo: [i64; 3], hi: [i64; 3], level: f64) -> Interval {
+        self.field
+            .frame_bounds_about(&self.local_frame(frame), lo, hi, level)
     }
 }

@@ -277,6 +277,23 @@ impl Field for Boolean {
         )
     }
 
+    /// All branches that can win somewhere in the box.
+    fn gradient_bounds(&self, b: &Aabb) -> [Interval; 3] {
+        let all: Vec<&Branch> = self.branches.iter().collect();
+        let live = self.live(&all, |field| field.bounds(b));
+        let ranges = live.iter().map(|branch| {
+            let range = branch.field.gradient_bounds(b);
+            if branch.twice_iso.is_some() {
+                range.map(|g| -g)
+            } else {
+                range
+            }
+        });
+        ranges
+            .reduce(|a, b| std::array::from_fn(|i| a[i].hull(b[i])))
+            .expect("a branch lives everywhere")
+    }
+
     fn values_gradients(&self, points: &[DVec3], out: &mut [(f64, DVec3)]) {
         assert_eq!(points.len(), out.len(), "one output slot per point");
         let mut term = [(0.0, DVec3::ZERO); CHUNK];

@@ -1,7 +1,8 @@
 //! Trees of fields: Boolean operations, affine placement, weighted sums.
 //!
 //! With `f > c` inside, union is the larger value and intersection the smaller (DIS eq. 4, `Ω`); the hierarchy
-//! of patches is a sum of affine nodes (DIS eq. 3). The results are sharp: along a crease the gradient jumps. Every
+//! of patches is a sum of affine nodes (DIS eq. 3). These results are sharp: along a crease the gradient jumps; the
+//! smooth operations round it ([`Rounding`]). Every
 //! node passes blocks of grid nodes and batches of points on to its branches, so that theirs are as fast as
 //! alone, and leaves out those branches that their bounds prove irrelevant. Leaving out never changes a bit.
 //!
@@ -20,11 +21,15 @@
 //! ```
 
 mod affine;
+mod blend;
 mod boolean;
+mod grown;
 mod sum;
 
 pub use affine::Affine;
+pub use blend::{Blend, Rounding};
 pub use boolean::{Boolean, Operation};
+pub use grown::Grown;
 pub use sum::Sum;
 
 use std::sync::Arc;
@@ -47,6 +52,16 @@ pub enum CsgError {
         /// Value given.
         value: f64,
     },
+    /// A number that makes no sense for what it stands for.
+    #[error("{name} is {value}; it has to be {allowed}")]
+    OutOfRange {
+        /// Name of the parameter.
+        name: &'static str,
+        /// Value given.
+        value: f64,
+        /// What is possible.
+        allowed: &'static str,
+    },
     /// A map that flattens space.
     #[error("the map flattens space (relative determinant {determinant:e}) and cannot be inverted")]
     NotInvertible {
@@ -58,12 +73,16 @@ pub enum CsgError {
 /// A node of a tree; its branches are fields of any kind, shared.
 #[derive(Clone)]
 pub enum Csg {
-    /// Union, intersection or difference.
+    /// Union, intersection or difference, sharp.
     Boolean(Boolean),
+    /// Union or intersection with its crease rounded.
+    Blend(Blend),
     /// A field moved, turned, stretched or mirrored.
     Affine(Affine),
     /// A weighted sum and a constant.
     Sum(Sum),
+    /// A field grown by a length.
+    Grown(Grown),
 }
 
 impl Csg {
@@ -91,6 +110,55 @@ impl Csg {
         Boolean::difference(solid, taken, iso).map(Self::Boolean)
     }
 
+    /// The union with its creases rounded, `iso` the iso-value of the surfaces; several solids two by two in their order.
+    ///
+    /// # Errors
+    /// [`CsgError::NoBranches`], [`CsgError::NotFinite`], [`CsgError::OutOfRange`].
+    pub fn smooth_union(
+        solids: Vec<Arc<dyn Field>>,
+        rounding: Rounding,
+        iso: f64,
+    ) -> Result<Arc<dyn Field>, CsgError> {
+        blended(Operation::Union, solids, rounding, iso)
+    }
+
+    /// The intersection with its creases rounded; see [`Self::smooth_union`].
+    ///
+    /// # Errors
+    /// [`CsgError::NoBranches`], [`CsgError::NotFinite`], [`CsgError::OutOfRange`].
+    pub fn smooth_intersection(
+        solids: Vec<Arc<dyn Field>>,
+        rounding: Rounding,
+        iso: f64,
+    ) -> Result<Arc<dyn Field>, CsgError> {
+        blended(Operation::Intersection, solids, rounding, iso)
+    }
+
+    /// `solid` without `taken`, with the creases rounded: the smooth intersection with their complements.
+    ///
+    /// # Errors
+    /// [`CsgError::NotFinite`], [`CsgError::OutOfRange`].
+    pub fn smooth_difference(
+        solid: Arc<dyn Field>,
+        taken: Vec<Arc<dyn Field>>,
+        rounding: Rounding,
+        iso: f64,
+    ) -> Result<Arc<dyn Field>, CsgError> {
+        let mut solids = vec![solid];
+        for field in taken {
+            solids.push(Arc::new(Self::complement(field, iso)?));
+        }
+        blended(Operation::Intersection, solids, rounding, iso)
+    }
+
+    /// `field` grown by the world length `by`, to first order: `f + by·|∇f|`; shrunk if `by` is negative.
+    ///
+    /// # Errors
+    /// [`CsgError::NotFinite`].
+    pub fn grown(field: Arc<dyn Field>, by: f64) -> Result<Self, CsgError> {
+        Grown::new(field, by).map(Self::Grown)
+    }
+
     /// `field` carried by `world_from_local`; values stay as they are.
     ///
     /// # Errors
@@ -107,7 +175,8 @@ impl Csg {
         Sum::new(terms, constant).map(Self::Sum)
     }
 
-    /// `field + by`: for a distance, the solid grown by `by` (a true offset outside convex parts).
+    /// `field + by`, in the unit of the field: for a distance, the solid grown by `by` (a true offset outside convex
+    /// parts). [`Self::grown`] takes a length for any field.
     ///
     /// # Errors
     /// [`CsgError::NotFinite`].
@@ -128,6 +197,8 @@ impl Csg {
             Self::Boolean(node) => node,
             Self::Affine(node) => node,
             Self::Sum(node) => node,
+            Self::Blend(node) => node,
+            Self::Grown(node) => node,
         }
     }
 }
@@ -145,6 +216,9 @@ impl Field for Csg {
     fn bounds(&self, b: &Aabb) -> Interval {
         self.node().bounds(b)
     }
+    fn gradient_bounds(&self, b: &Aabb) -> [Interval; 3] {
+        self.node().gradient_bounds(b)
+    }
     fn values_gradients(&self, points: &[DVec3], out: &mut [(f64, DVec3)]) {
         self.node().values_gradients(points, out);
     }
@@ -154,4 +228,22 @@ impl Field for Csg {
     fn frame_bounds(&self, frame: &Frame, lo: [i64; 3], hi: [i64; 3]) -> Interval {
         self.node().frame_bounds(frame, lo, hi)
     }
+    fn frame_bounds_about(&self, frame: &Frame, lo: [i64; 3], hi: [i64; 3], level: f64) -> Interval {
+        self.node().frame_bounds_about(frame, lo, hi, level)
+    }
+}
+
+/// Two fields at a time, from the first on.
+fn blended(
+    operation: Operation,
+    solids: Vec<Arc<dyn Field>>,
+    rounding: Rounding,
+    iso: f64,
+) -> Result<Arc<dyn Field>, CsgError> {
+    let mut solids = solids.into_iter();
+    let mut whole = solids.next().ok_or(CsgError::NoBranches)?;
+    for solid in solids {
+        whole = Arc::new(Blend::new(operation, rounding, [whole, solid], iso)?);
+    }
+    Ok(whole)
 }

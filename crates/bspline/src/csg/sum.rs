@@ -7,8 +7,8 @@ use crate::{Aabb, Field, Frame, Interval, Jet};
 
 /// `f = constant + Σ_i w_i f_i`, added in the order given.
 ///
-/// Bounds add the branches' own; they know nothing of how the branches vary together, so the sum of a field
-/// and its near opposite is bounded loosely.
+/// Bounds add the branches' own, and so do those of the gradient; for several terms the mean-value form
+/// `f(c) + ∇f(b)·(b - c)`, `c` the centre of the box, tells the first how the terms vary together.
 #[derive(Clone)]
 pub struct Sum {
     terms: Vec<(f64, Arc<dyn Field>)>,
@@ -39,6 +39,28 @@ impl Sum {
     /// What is added to the weighted fields.
     pub fn constant(&self) -> f64 {
         self.constant
+    }
+
+    /// For several terms, if their gradients are known: `f(c) + ∇f(b)·(b - c)`.
+    fn mean_value_form(&self, b: &Aabb) -> Option<Interval> {
+        if self.terms.len() < 2 {
+            return None;
+        }
+        let slopes = self.gradient_bounds(b);
+        if slopes.iter().any(|g| !g.width().is_finite()) {
+            return None;
+        }
+        // A box that is a point bounds the value there, rounding included.
+        let (center, half) = (b.center(), b.size() * 0.5);
+        let middle = Aabb {
+            min: center,
+            max: center,
+        };
+        let at_center = self.add_intervals(|field| field.bounds(&middle));
+        let off = 2.0 * f64::EPSILON * center.abs().max_element();
+        Some((0..3).fold(at_center, |sum, a| {
+            sum + slopes[a] * Interval::new(-half[a], half[a]).widened(off)
+        }))
     }
 
     fn add_intervals(&self, of: impl Fn(&dyn Field) -> Interval) -> Interval {
@@ -83,7 +105,18 @@ impl Field for Sum {
     }
 
     fn bounds(&self, b: &Aabb) -> Interval {
-        self.add_intervals(|field| field.bounds(b))
+        let plain = self.add_intervals(|field| field.bounds(b));
+        self.mean_value_form(b)
+            .map_or(plain, |mean| plain.intersection(mean))
+    }
+
+    fn gradient_bounds(&self, b: &Aabb) -> [Interval; 3] {
+        self.terms
+            .iter()
+            .fold([Interval::point(0.0); 3], |sum, (w, field)| {
+                let term = field.gradient_bounds(b);
+                std::array::from_fn(|a| sum[a] + Interval::point(*w) * term[a])
+            })
     }
 
     fn values_gradients(&self, points: &[DVec3], out: &mut [(f64, DVec3)]) {
@@ -115,6 +148,8 @@ impl Field for Sum {
     }
 
     fn frame_bounds(&self, frame: &Frame, lo: [i64; 3], hi: [i64; 3]) -> Interval {
-        self.add_intervals(|field| field.frame_bounds(frame, lo, hi))
+        let plain = self.add_intervals(|field| field.frame_bounds(frame, lo, hi));
+        let mean = self.mean_value_form(&frame.world_box(lo, hi));
+        mean.map_or(plain, |mean| plain.intersection(mean))
     }
 }

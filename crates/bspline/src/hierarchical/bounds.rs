@@ -163,7 +163,7 @@ fn visit<T: Real>(spline: &HierarchicalSpline<T>, level: usize, index: usize, b:
 
 /// The part of `b` between `low` and `high`. None where they share just a face, which the brick on its other side
 /// covers as well (the field is continuous), unless `b` is no thicker than that itself.
-fn shared(b: &Aabb, low: DVec3, high: DVec3) -> Option<Aabb> {
+pub(super) fn shared(b: &Aabb, low: DVec3, high: DVec3) -> Option<Aabb> {
     let part = Aabb {
         min: b.min.max(low),
         max: b.max.min(high),
@@ -174,7 +174,7 @@ fn shared(b: &Aabb, low: DVec3, high: DVec3) -> Option<Aabb> {
 }
 
 /// A box in the cells of a brick, `0 ..= 8` on each axis.
-fn local_box<T>(brick: &Brick<T>, level: usize, b: &Aabb) -> [[f64; 2]; 3] {
+pub(super) fn local_box<T>(brick: &Brick<T>, level: usize, b: &Aabb) -> [[f64; 2]; 3] {
     let scale = (1u64 << level) as f64;
     std::array::from_fn(|a| {
         let first = (BRICK as u32 * brick.key.0[a]) as f64;

@@ -67,7 +67,7 @@ impl<T: Real> HierarchicalSpline<T> {
     /// The very field, to the bit, that [`Self::from_corrections`] makes of the new corrections. `self` stays as it is,
     /// and all bricks that come out with the bits they had are shared by both: the old version costs the bricks changed,
     /// and keeping it is how an edit is undone (subtraction would not give the old bits back). Computes only the bricks
-    /// that the functions reach; besides that, the tables of all bricks are copied (about 10 ns for each).
+    /// that the functions reach; besides that, the tables of all bricks are copied (about 40 ns for each).
     ///
     /// # Errors
     /// Any [`EditError`]; then nothing is done.

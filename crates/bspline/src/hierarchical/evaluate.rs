@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 
 use super::spline::HierarchicalSpline;
-use super::{batch, bounds, grid, kernel};
+use super::{batch, bounds, grid, kernel, slopes};
 use crate::{Aabb, Field, Frame, Interval, Jet, Real};
 
 impl<T: Real> Field for HierarchicalSpline<T> {
@@ -42,6 +42,10 @@ impl<T: Real> Field for HierarchicalSpline<T> {
 
     fn bounds(&self, b: &Aabb) -> Interval {
         bounds::over_lattice_box(self, &b.transformed(self.lattice_from_world()), None)
+    }
+
+    fn gradient_bounds(&self, b: &Aabb) -> [Interval; 3] {
+        slopes::over_world_box(self, b)
     }
 
     fn values_gradients(&self, points: &[DVec3], out: &mut [(f64, DVec3)]) {

@@ -1,4 +1,12 @@
 //! Dyadic levels of uniform cubic B-splines whose active functions are chosen one by one.
+//!
+//! The degree is 3 and no parameter. Of degree `p` a brick would hold `(8 + p)³` totals, and stable Rust cannot make
+//! that an array by a constant parameter: sizes known at run time would cost the inner loops, now over arrays of four and
+//! of eleven, their speed. The kernels, the restriction of bounds, the two-scale rule, the Gram matrices of the fits and
+//! the file format all rest on 3. Other degrees, 1 to 5 and another on each axis, are
+//! [`TensorSpline`](crate::TensorSpline)'s.
+//!
+//! A field never changes: [`HierarchicalSpline::edited`] makes a new one that shares the bricks it leaves alone.
 
 mod batch;
 mod bounds;
@@ -10,7 +18,9 @@ mod grid;
 mod kernel;
 mod lattice;
 mod prolong;
+mod slopes;
 mod spline;
+mod surface;
 mod versions;
 
 pub use brick::{BRICK, BRICK_LEN, BrickKey, Corrections, HALO, HALO_LEN, LevelCorrections};

@@ -154,7 +154,7 @@ impl BlockMesh {
     }
 
     /// The whole mesh; its vertices and triangles are numbered in the order of the blocks. Asks the field nothing: time
-    /// in proportion to the mesh, 20 ns a triangle.
+    /// in proportion to the mesh, 40 ns a triangle.
     ///
     /// # Errors
     /// [`PolygonizeError::TooManyVertices`], [`PolygonizeError::InconsistentField`].

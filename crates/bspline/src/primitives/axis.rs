@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 
 use super::range::{convex, linear};
 use super::{PrimitiveError, finite};
-use crate::{Aabb, Jet};
+use crate::{Aabb, Interval, Jet};
 
 /// Unit vector along `v`.
 pub(super) fn direction(name: &'static str, v: DVec3) -> Result<DVec3, PrimitiveError> {
@@ -90,6 +90,25 @@ impl Axis {
             (at.radius, at.outward)
         });
         [low.max(0.0), high]
+    }
+
+    /// Ranges of the components of the unit vector away from the axis, each of them exact but for the box's turn.
+    pub fn outward_range(&self, b: &Aabb) -> [Interval; 3] {
+        let slack = 16.0 * f64::EPSILON * (b.min.abs().max(b.max.abs()).element_sum() + self.size());
+        let away: [Interval; 3] = std::array::from_fn(|a| {
+            let [low, high] = linear(
+                b,
+                self.origin,
+                DVec3::AXES[a] - self.direction * self.direction[a],
+            );
+            Interval {
+                lo: low.min(high),
+                hi: high.max(low),
+            }
+            .widened(slack)
+        });
+        let rest = |a: usize| away[(a + 1) % 3].square() + away[(a + 2) % 3].square();
+        std::array::from_fn(|a| away[a].over_hypot(rest(a)))
     }
 
     /// Range of the height over the box, exact.

@@ -1,7 +1,7 @@
 use glam::{DMat3, DVec3};
 
 use super::range::{absolute, outward};
-use super::{PrimitiveError, finite, positive};
+use super::{PrimitiveError, finite, positive, unit_gradient};
 use crate::{Aabb, Field, Interval, Jet};
 
 /// A box along the axes, with its exact distance inside and outside. Turned boxes are affine nodes of a tree.
@@ -87,5 +87,9 @@ impl Field for Cuboid {
         let distance = |end: usize| Self::distance(DVec3::from_array(axes.map(|r| r[end])) - self.half_size);
         let size = (self.center.abs() + self.half_size).element_sum();
         outward(b, size, -distance(1), -distance(0))
+    }
+
+    fn gradient_bounds(&self, _: &Aabb) -> [Interval; 3] {
+        unit_gradient()
     }
 }

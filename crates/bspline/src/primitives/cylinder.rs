@@ -2,7 +2,7 @@ use glam::DVec3;
 
 use super::axis::{Axis, Meridian, Profile, direction};
 use super::range::{absolute, convex, outward};
-use super::{PrimitiveError, finite, positive};
+use super::{PrimitiveError, finite, positive, unit_gradient};
 use crate::{Aabb, Field, Interval, Jet};
 
 /// A solid cylinder between two flat caps, with its exact distance inside and outside.
@@ -91,5 +91,9 @@ impl Field for Cylinder {
         });
         let (low, high) = (low.max(self.distance(r0, s0)), high.min(self.distance(r1, s1)));
         outward(b, self.axis.size() + self.half_length + self.radius, -high, -low)
+    }
+
+    fn gradient_bounds(&self, _: &Aabb) -> [Interval; 3] {
+        unit_gradient()
     }
 }

@@ -42,6 +42,25 @@ impl Gyroid {
     fn length(&self) -> f64 {
         self.period / TAU
     }
+
+    /// Intervals of the sines and of the cosines over the box, and what rounding can do to them, if they are known.
+    fn ranges(&self, b: &Aabb) -> Option<([[Interval; 3]; 2], f64)> {
+        let (low, high) = (
+            (b.min - self.origin) / self.period,
+            (b.max - self.origin) / self.period,
+        );
+        if !(low.is_finite() && high.is_finite()) {
+            return None;
+        }
+        // Rounding of the angle, here and in `value`, in turns; beyond 2⁴⁸ turns it hides the sine.
+        let turns = low.abs().max(high.abs()).max_element()
+            + (b.min.abs().max(b.max.abs()) + self.origin.abs()).max_element() / self.period;
+        let slack = 8.0 * f64::EPSILON * (1.0 + turns);
+        let axes: [[Interval; 2]; 3] =
+            std::array::from_fn(|a| ranges(Interval::new(low[a], high[a]).widened(slack)));
+        let rounding = 64.0 * f64::EPSILON * (1.0 + turns);
+        Some(([axes.map(|r| r[0]), axes.map(|r| r[1])], rounding))
+    }
 }
 
 impl Field for Gyroid {
@@ -81,21 +100,9 @@ impl Field for Gyroid {
 
     /// The formula in interval arithmetic, cut with the mean-value form `f(c) + ∇f(b)·(b - c)`.
     fn bounds(&self, b: &Aabb) -> Interval {
-        let (low, high) = (
-            (b.min - self.origin) / self.period,
-            (b.max - self.origin) / self.period,
-        );
-        if !(low.is_finite() && high.is_finite()) {
+        let Some(([s, c], rounding)) = self.ranges(b) else {
             return Interval::EVERYTHING;
-        }
-        // Rounding of the angle, here and in `value`, in turns; beyond 2⁴⁸ turns it hides the sine.
-        let turns = low.abs().max(high.abs()).max_element()
-            + (b.min.abs().max(b.max.abs()) + self.origin.abs()).max_element() / self.period;
-        let slack = 8.0 * f64::EPSILON * (1.0 + turns);
-        let axes: [[Interval; 2]; 3] =
-            std::array::from_fn(|a| ranges(Interval::new(low[a], high[a]).widened(slack)));
-        let (s, c) = (axes.map(|r| r[0]), axes.map(|r| r[1]));
-        let rounding = 64.0 * f64::EPSILON * (1.0 + turns);
+        };
         let plain = s[0] * c[1] + s[1] * c[2] + s[2] * c[0];
         let level = Interval::point(self.level);
         let length = Interval::point(self.length()).widened(4.0 * f64::EPSILON * self.length());
@@ -103,9 +110,7 @@ impl Field for Gyroid {
 
         let center = b.center();
         let half = (b.size() * 0.5).to_array();
-        let slope = |a: usize, b: usize, z: usize| c[a] * c[b] - s[z] * s[a];
-        let slopes = [slope(0, 1, 2), slope(1, 2, 0), slope(2, 0, 1)];
-        let mean = slopes
+        let mean = slopes(s, c)
             .iter()
             .zip(half)
             .fold(Interval::point(self.value(center)), |sum, (g, h)| {
@@ -113,4 +118,17 @@ impl Field for Gyroid {
             });
         plain.intersection(mean.widened(rounding * self.length()))
     }
+
+    fn gradient_bounds(&self, b: &Aabb) -> [Interval; 3] {
+        match self.ranges(b) {
+            Some(([s, c], rounding)) => slopes(s, c).map(|g| g.widened(rounding)),
+            None => [Interval::EVERYTHING; 3],
+        }
+    }
+}
+
+/// The gradient from sines and cosines.
+fn slopes(s: [Interval; 3], c: [Interval; 3]) -> [Interval; 3] {
+    let slope = |a: usize, b: usize, z: usize| c[a] * c[b] - s[z] * s[a];
+    [slope(0, 1, 2), slope(1, 2, 0), slope(2, 0, 1)]
 }

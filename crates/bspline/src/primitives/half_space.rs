@@ -46,4 +46,8 @@ impl Field for HalfSpace {
         let [low, high] = linear(b, self.point, -self.normal);
         outward(b, self.point.abs().element_sum(), low, high)
     }
+
+    fn gradient_bounds(&self, _: &Aabb) -> [Interval; 3] {
+        (-self.normal).to_array().map(Interval::point)
+    }
 }

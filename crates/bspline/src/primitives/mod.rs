@@ -77,6 +77,11 @@ pub enum PrimitiveError {
     },
 }
 
+/// What bounds the gradient of every distance: its length is at most 1.
+fn unit_gradient() -> [Interval; 3] {
+    crate::vectors::ball(1.0 + 8.0 * f64::EPSILON)
+}
+
 fn finite(name: &'static str, v: DVec3) -> Result<DVec3, PrimitiveError> {
     match v.to_array().into_iter().find(|x| !x.is_finite()) {
         Some(value) => Err(PrimitiveError::NotFinite { name, value }),
@@ -147,6 +152,9 @@ impl Field for Primitive {
     }
     fn bounds(&self, b: &Aabb) -> Interval {
         self.field().bounds(b)
+    }
+    fn gradient_bounds(&self, b: &Aabb) -> [Interval; 3] {
+        self.field().gradient_bounds(b)
     }
     fn values_gradients(&self, points: &[DVec3], out: &mut [(f64, DVec3)]) {
         self.field().values_gradients(points, out);

@@ -97,13 +97,37 @@ impl Field for PiercedTetrahedron {
         let plain = (Interval::point(self.level) - square - product).widened(rounding) * scale;
 
         let half = (b.size() * 0.5).to_array();
-        let others = [y[1] * y[2], y[2] * y[0], y[0] * y[1]];
-        let four = Interval::point(4.0);
+        let slopes = slopes(y);
         let mut mean = Interval::point(self.value(b.center())).widened(rounding * self.scale());
         for a in 0..3 {
-            let slope = (y[a] * w * four + others[a] * eight) * Interval::point(-1.0 / 16.0);
-            mean = mean + slope * Interval::new(-half[a], half[a]).widened(slack[a] * self.size);
+            mean = mean + slopes[a] * Interval::new(-half[a], half[a]).widened(slack[a] * self.size);
         }
         plain.intersection(mean)
     }
+
+    fn gradient_bounds(&self, b: &Aabb) -> [Interval; 3] {
+        let (low, high) = (
+            (b.min - self.center) / self.size,
+            (b.max - self.center) / self.size,
+        );
+        let slack = (b.min.abs().max(b.max.abs()) + self.center.abs()) * (4.0 * f64::EPSILON / self.size);
+        if !(low.is_finite() && high.is_finite() && slack.is_finite()) {
+            return [Interval::EVERYTHING; 3];
+        }
+        let y: [Interval; 3] = std::array::from_fn(|a| Interval::new(low[a], high[a]).widened(slack[a]));
+        let y2 = y.map(|y| y.square().hi).iter().sum::<f64>() + 5.0;
+        slopes(y).map(|g| g.widened(64.0 * f64::EPSILON * y2 * y2))
+    }
+}
+
+/// The gradient over a box of `y`.
+fn slopes(y: [Interval; 3]) -> [Interval; 3] {
+    let w = y[0].square() + y[1].square() + y[2].square() - Interval::point(5.0);
+    let others = [y[1] * y[2], y[2] * y[0], y[0] * y[1]];
+    let (four, eight, share) = (
+        Interval::point(4.0),
+        Interval::point(8.0),
+        Interval::point(-1.0 / 16.0),
+    );
+    std::array::from_fn(|a| (y[a] * w * four + others[a] * eight) * share)
 }

@@ -1,7 +1,7 @@
 use glam::{DMat3, DVec3};
 
 use super::range::{absolute, outward};
-use super::{PrimitiveError, finite, positive};
+use super::{PrimitiveError, finite, positive, unit_gradient};
 use crate::{Aabb, Field, Interval, Jet};
 
 /// `f = r - |x - c|`. At the centre gradient and Hessian are given as zero.
@@ -61,5 +61,17 @@ impl Field for Sphere {
         let length = |end: usize| DVec3::from_array(axes.map(|r| r[end])).length();
         let size = self.center.abs().element_sum() + self.radius;
         outward(b, size, self.radius - length(1), self.radius - length(0))
+    }
+
+    /// `-v/|v|` in interval arithmetic: each component exact.
+    fn gradient_bounds(&self, b: &Aabb) -> [Interval; 3] {
+        let slack = 4.0 * f64::EPSILON * (b.min.abs().max(b.max.abs()) + self.center.abs());
+        let (low, high) = (b.min - self.center, b.max - self.center);
+        if !(low.is_finite() && high.is_finite()) {
+            return unit_gradient();
+        }
+        let v: [Interval; 3] = std::array::from_fn(|a| Interval::new(low[a], high[a]).widened(slack[a]));
+        let rest = |a: usize| v[(a + 1) % 3].square() + v[(a + 2) % 3].square();
+        std::array::from_fn(|a| -v[a].over_hypot(rest(a)))
     }
 }

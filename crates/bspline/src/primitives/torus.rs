@@ -2,7 +2,7 @@ use glam::DVec3;
 
 use super::axis::{Axis, Meridian, Profile, direction};
 use super::range::{absolute, outward};
-use super::{PrimitiveError, finite, positive};
+use super::{PrimitiveError, finite, positive, unit_gradient};
 use crate::{Aabb, Field, Interval, Jet};
 
 /// `f = r - √((ρ - R)² + s²)`, radius and height from the axis: a tube round a ring.
@@ -88,5 +88,28 @@ impl Field for Torus {
         let low = self.value_at(u[1], s[1]).max(center - reach);
         let high = self.value_at(u[0], s[0]).min(center + reach);
         outward(b, self.axis.size() + self.major + self.minor, low, high)
+    }
+
+    /// `-(u e + s a)/√(u² + s²)` in interval arithmetic, `u` the distance off the ring's radius, `s` the height.
+    fn gradient_bounds(&self, b: &Aabb) -> [Interval; 3] {
+        if !(b.min.is_finite() && b.max.is_finite()) {
+            return unit_gradient();
+        }
+        let slack = 64.0
+            * f64::EPSILON
+            * (b.min.abs().max(b.max.abs()).element_sum() + self.axis.size() + self.major);
+        let range = |[lo, hi]: [f64; 2]| Interval::new(lo, hi).widened(slack);
+        let [r0, r1] = self.axis.radius_range(b);
+        let (u, s) = (
+            range([r0 - self.major, r1 - self.major]),
+            range(self.axis.height_range(b)),
+        );
+        let (across, along) = (u.over_hypot(s.square()), s.over_hypot(u.square()));
+        let outward = self.axis.outward_range(b);
+        let unit = unit_gradient();
+        std::array::from_fn(|a| {
+            let exact = -(outward[a] * across + Interval::point(self.axis.direction[a]) * along);
+            exact.intersection(unit[a])
+        })
     }
 }

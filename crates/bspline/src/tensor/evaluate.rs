@@ -65,6 +65,10 @@ impl<T: Real> Field for TensorSpline<T> {
         bounds::over_parameters(self, &b.transformed(&self.place.local_from_world))
     }
 
+    fn gradient_bounds(&self, b: &Aabb) -> [Interval; 3] {
+        bounds::of_gradient(self, b)
+    }
+
     fn frame_values(&self, frame: &Frame, lo: [i64; 3], count: [usize; 3], out: &mut [f64]) {
         grid::frame_values(self, frame, lo, count, out);
     }

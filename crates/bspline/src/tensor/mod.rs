@@ -26,4 +26,5 @@ mod kernel;
 mod refine;
 mod spline;
 
+pub(crate) use bounds::slopes;
 pub use spline::{TensorError, TensorSpline};

@@ -47,6 +47,7 @@ impl Default for Options {
 /// the widths of the bounds over those of the true ranges.
 pub fn field_conformance(name: &str, field: &dyn Field, region: &Aabb, options: &Options) -> [f64; 2] {
     bounds_are_sound(name, field, region, options);
+    gradient_bounds_are_sound(name, field, region, options);
     ways_to_ask_agree(name, field, region, options);
     derivatives_match_differences(name, field, region, options);
     batches_equal_single_points(name, field, region, options);
@@ -152,6 +153,29 @@ fn bounds_are_sound(name: &str, field: &dyn Field, region: &Aabb, options: &Opti
             bounds.lo <= lo && hi <= bounds.hi,
             "{name}: [{lo}, {hi}] leaves {bounds:?} over {b:?}"
         );
+    }
+}
+
+fn gradient_bounds_are_sound(name: &str, field: &dyn Field, region: &Aabb, options: &Options) {
+    let mut random = Random(options.seed ^ 0x97ad);
+    // Over the edge of the region too.
+    let reach = region.size() * 0.1;
+    let around = Aabb::new(region.min - reach, region.max + reach);
+    for i in 0..options.sound_boxes / 10 {
+        let mut b = random.small_box(&around);
+        match i % 10 {
+            0 => b.max[i / 10 % 3] = b.min[i / 10 % 3],
+            1 => b.max = b.min,
+            _ => {}
+        }
+        let bounds = field.gradient_bounds(&b);
+        for p in [b.min, b.max, random.point(&b), random.point(&b), random.point(&b)] {
+            let (_, gradient) = field.value_gradient(p);
+            assert!(
+                (0..3).all(|a| bounds[a].contains(gradient[a])),
+                "{name}: {gradient} leaves {bounds:?} over {b:?} at {p}"
+            );
+        }
     }
 }
 

@@ -129,8 +129,8 @@ impl Axis {
         let diagonal: Vec<f64> = (0..n).map(|i| gram[(i, i)]).collect();
         for j in 0..n {
             let pivot = gram[(j, j)] / diagonal[j];
-            // Negated so that NaN, from an empty column, is refused too.
-            if !(pivot > 1e-12) {
+            // NaN comes from an empty column.
+            if pivot.is_nan() || pivot <= 1e-12 {
                 return Err(LatticeError::Undetermined {
                     axis,
                     index: j,

@@ -12,7 +12,6 @@ const ROWS: usize = 4;
 /// A square matrix and its transpose, padded for products along any axis.
 #[derive(Clone, Debug)]
 pub(crate) struct DenseAxis<T> {
-    pub n: usize,
     /// Row-major, `n × n`.
     pub matrix: Vec<T>,
     /// Row-major, `n × n`.
@@ -36,7 +35,6 @@ impl<T: Real> DenseAxis<T> {
         let (straight, turned) = (|i: usize, j: usize| v[(i, j)], |i: usize, j: usize| v[(j, i)]);
         let width = n.next_multiple_of(PAD);
         Self {
-            n,
             matrix: rows(&straight, n),
             transposed: rows(&turned, n),
             matrix_padded: rows(&straight, width),

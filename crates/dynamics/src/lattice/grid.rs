@@ -66,6 +66,11 @@ impl<T: Real> Lattice<T> {
         self.sample_dims().iter().product()
     }
 
+    /// Whether there are as many free coefficients as samples on every axis.
+    pub fn is_square(&self) -> bool {
+        self.coefficient_dims() == self.sample_dims()
+    }
+
     /// Distance of the samples along each axis, in world units.
     pub fn spacing(&self) -> [f64; 3] {
         std::array::from_fn(|a| self.axes[a].spacing())
@@ -115,5 +120,22 @@ impl<T: Real> Lattice<T> {
             std::array::from_fn(|k| self.axes[k].prolongation(&half.axes[k]).map(T::from_f64));
         let t: [Banded<T>; 3] = std::array::from_fn(|k| p[k].transposed());
         [TensorProduct::new(p.each_ref()), TensorProduct::new(t.each_ref())]
+    }
+
+    /// Solves `A p = d`, in double precision, on a square lattice.
+    ///
+    /// # Panics
+    /// If the lattice is not square.
+    pub(crate) fn inverse(&self) -> TensorProduct<f64> {
+        assert!(self.is_square(), "as many coefficients as samples");
+        let inverse: [Banded<f64>; 3] = std::array::from_fn(|k| {
+            let a = self.axes[k].collocation().to_dense();
+            let a = a
+                .try_inverse()
+                .expect("axes are refused when their collocation is singular");
+            let row = |i: usize| (0..a.ncols()).map(|j| (j, a[(i, j)])).collect::<Vec<_>>();
+            Banded::from_rows(a.ncols(), (0..a.nrows()).map(row))
+        });
+        TensorProduct::new(inverse.each_ref())
     }
 }

@@ -3,6 +3,9 @@
 use bspline::Real;
 use pulp::Arch;
 
+use super::pcg::Preconditioner;
+use crate::springs::StepMatrix;
+
 /// Rows and columns that are eliminated together.
 const TILE: usize = 4;
 const LANES: usize = 16;
@@ -161,6 +164,13 @@ impl<T: Real> BandCholesky<T> {
                 }
             },
         );
+    }
+}
+
+impl<T: Real> Preconditioner<T> for BandCholesky<T> {
+    fn apply(&mut self, _: &StepMatrix<T>, r: &[T], z: &mut [T]) {
+        z.copy_from_slice(r);
+        self.solve(z);
     }
 }
 

@@ -5,7 +5,9 @@ use bspline::Real;
 use nalgebra::{Cholesky, DMatrix, SymmetricEigen};
 use pulp::Arch;
 
+use super::pcg::Preconditioner;
 use crate::lattice::{Banded, DenseAxis, Lattice, PAD, multiply, multiply_last};
+use crate::springs::StepMatrix;
 
 /// `z = s∘(V⊗V⊗V) [ (V⊗V⊗V)ᵀ(s∘r) / (a + b_x λ_i + b_y λ_j + b_z λ_k) ]` with, on each axis, `AᵀK₁A V = AᵀA V Λ`,
 /// `VᵀAᵀAV = I` and `K₁` the path Laplacian of the samples.
@@ -46,8 +48,17 @@ fn pencil(a: &Banded<f64>) -> (DMatrix<f64>, Vec<f64>) {
 impl<T: Real> FastDiagonalization<T> {
     /// The transforms of a lattice; [`set`](Self::set) gives the material.
     pub fn new(lattice: &Lattice<T>) -> Self {
-        let dims = lattice.coefficient_dims();
-        let pencils: [_; 3] = std::array::from_fn(|a| pencil(&lattice.axes()[a].collocation()));
+        let pencils = std::array::from_fn(|a| pencil(&lattice.axes()[a].collocation()));
+        Self::from_pencils(lattice.coefficient_dims(), pencils)
+    }
+
+    /// The same on samples without splines, `A` the identity.
+    pub fn on_samples(dims: [usize; 3]) -> Self {
+        let identity = |m: usize| Banded::from_rows(m, (0..m).map(|i| [(i, 1.0)]));
+        Self::from_pencils(dims, dims.map(|m| pencil(&identity(m))))
+    }
+
+    fn from_pencils(dims: [usize; 3], pencils: [(DMatrix<f64>, Vec<f64>); 3]) -> Self {
         let padded = dims[0] * dims[1] * dims[2].next_multiple_of(PAD);
         let mut out = Self {
             dims,
@@ -75,6 +86,18 @@ impl<T: Real> FastDiagonalization<T> {
                 }
             }
         }
+    }
+
+    /// The material of a matrix of constant weights.
+    pub fn set_constant(&mut self, s: &StepMatrix<T>) {
+        let mut along = [0.0; 3];
+        for spring in &s.springs {
+            for (a, step) in along.iter_mut().zip(spring.direction.step) {
+                *a += spring.weights.at(0).as_f64() * (step * step) as f64;
+            }
+        }
+        self.set(s.mass.at(0).as_f64(), along);
+        self.scale.fill(T::one());
     }
 
     /// The scaling `s`, one number per coefficient, to be written in place.
@@ -125,5 +148,11 @@ impl<T: Real> FastDiagonalization<T> {
                 }
             },
         );
+    }
+}
+
+impl<T: Real> Preconditioner<T> for FastDiagonalization<T> {
+    fn apply(&mut self, _: &StepMatrix<T>, r: &[T], z: &mut [T]) {
+        FastDiagonalization::apply(self, r, z);
     }
 }

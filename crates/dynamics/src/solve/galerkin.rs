@@ -153,8 +153,28 @@ impl Galerkin {
         ((rx * ny + ry) * nz + rz).min(n - 1)
     }
 
+    /// Coefficients along each axis.
+    pub fn dims(&self) -> [usize; 3] {
+        self.dims
+    }
+
+    /// Element of the matrix that was summed last; 0 outside the reach of the springs.
+    pub fn element(&self, a: [usize; 3], b: [usize; 3]) -> f64 {
+        let (a, b) = if a <= b { (a, b) } else { (b, a) };
+        let [_, py, pz] = self.pair_dims;
+        let [rx, ry, rz] = self.reach;
+        let [ox, oy, oz] = std::array::from_fn(|k| b[k] as isize - a[k] as isize);
+        if ox > rx as isize || oy.unsigned_abs() > ry || oz.unsigned_abs() > rz {
+            return 0.0;
+        }
+        let x = a[0] * (rx + 1) + ox as usize;
+        let y = a[1] * (2 * ry + 1) + (oy + ry as isize) as usize;
+        let z = a[2] * (2 * rz + 1) + (oz + rz as isize) as usize;
+        self.sums[(x * py + y) * pz + z]
+    }
+
     /// Sums of all pairs.
-    fn accumulate<T: Real>(&mut self, s: &StepMatrix<T>) {
+    pub fn accumulate<T: Real>(&mut self, s: &StepMatrix<T>) {
         let own: Vec<_> = s.springs.iter().map(|s| s.direction.step).collect();
         assert_eq!(own, self.steps, "springs as planned");
         fill(&mut self.weights, &s.mass);

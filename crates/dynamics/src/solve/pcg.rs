@@ -6,6 +6,14 @@ use super::dot::dot;
 use crate::lattice::{Lattice, TensorWorkspace};
 use crate::springs::StepMatrix;
 
+/// A symmetric positive definite system.
+pub trait System<T> {
+    /// `q = Hp`; returns `pᵀq`.
+    fn apply(&mut self, p: &[T], q: &mut [T]) -> f64;
+    /// `z ≈ H⁻¹ r`, symmetric and positive definite.
+    fn precondition(&mut self, r: &[T], z: &mut [T]);
+}
+
 /// An approximate inverse of `AᵀSA`, symmetric and positive definite.
 pub trait Preconditioner<T> {
     /// `z ≈ (AᵀSA)⁻¹ r`.
@@ -19,6 +27,34 @@ pub struct Unpreconditioned;
 impl<T: Real> Preconditioner<T> for Unpreconditioned {
     fn apply(&mut self, _: &StepMatrix<T>, r: &[T], z: &mut [T]) {
         z.copy_from_slice(r);
+    }
+}
+
+/// `AᵀSA` with any preconditioner.
+pub struct CoefficientSystem<'a, T, P> {
+    /// Gives `A`.
+    pub lattice: &'a Lattice<T>,
+    /// `S`.
+    pub matrix: &'a StepMatrix<T>,
+    /// The approximate inverse.
+    pub preconditioner: &'a mut P,
+    /// Two vectors on the samples.
+    pub samples: &'a mut [Vec<T>; 2],
+    /// Scratch.
+    pub workspace: &'a mut TensorWorkspace<T>,
+}
+
+impl<T: Real, P: Preconditioner<T>> System<T> for CoefficientSystem<'_, T, P> {
+    fn apply(&mut self, p: &[T], q: &mut [T]) -> f64 {
+        let [d, s] = &mut *self.samples;
+        self.lattice.sample(p, d, self.workspace);
+        self.matrix.apply(d, s);
+        self.lattice.gather(s, q, self.workspace);
+        dot(d, s)
+    }
+
+    fn precondition(&mut self, r: &[T], z: &mut [T]) {
+        self.preconditioner.apply(self.matrix, r, z);
     }
 }
 
@@ -47,51 +83,32 @@ pub struct ConjugateGradients<T> {
     z: Vec<T>,
     p: Vec<T>,
     q: Vec<T>,
-    d: Vec<T>,
-    s: Vec<T>,
-    workspace: TensorWorkspace<T>,
 }
 
 impl<T: Real> ConjugateGradients<T> {
-    /// For systems on a lattice.
-    pub fn new(lattice: &Lattice<T>) -> Self {
-        let (n, m) = (lattice.coefficient_count(), lattice.sample_count());
-        let zeros = |n: usize| vec![T::zero(); n];
+    /// For systems of `n` unknowns.
+    pub fn new(n: usize) -> Self {
+        let zeros = || vec![T::zero(); n];
         Self {
-            r: zeros(n),
-            z: zeros(n),
-            p: zeros(n),
-            q: zeros(n),
-            d: zeros(m),
-            s: zeros(m),
-            workspace: TensorWorkspace::new(),
+            r: zeros(),
+            z: zeros(),
+            p: zeros(),
+            q: zeros(),
         }
     }
 
-    /// Solves `AᵀSA x = b` from `x = 0`, at most `cap` iterations, until the residual falls below `tolerance` times
-    /// the impulse `b`. Also writes the increment of the densities, `dx = A x`.
+    /// Solves `Hx = b` from `x = 0`, at most `cap` iterations, until the residual falls below `tolerance` times the
+    /// impulse `b`.
     pub fn solve(
         &mut self,
-        lattice: &Lattice<T>,
-        matrix: &StepMatrix<T>,
-        preconditioner: &mut impl Preconditioner<T>,
+        system: &mut impl System<T>,
         b: &[T],
         x: &mut [T],
-        dx: &mut [T],
         cap: usize,
         tolerance: f64,
     ) -> PcgReport {
-        let Self {
-            r,
-            z,
-            p,
-            q,
-            d,
-            s,
-            workspace,
-        } = self;
+        let Self { r, z, p, q } = self;
         x.fill(T::zero());
-        dx.fill(T::zero());
         r.copy_from_slice(b);
         let impulse = dot(b, b).sqrt();
         let mut report = PcgReport::default();
@@ -101,7 +118,7 @@ impl<T: Real> ConjugateGradients<T> {
         report.residual = 1.0;
         let mut before = 1.0;
         while report.iterations < cap && report.residual > tolerance {
-            preconditioner.apply(matrix, r, z);
+            system.precondition(r, z);
             let rz = dot(r, z);
             if report.iterations == 0 {
                 p.copy_from_slice(z);
@@ -112,17 +129,13 @@ impl<T: Real> ConjugateGradients<T> {
                 }
             }
             before = rz;
-            lattice.sample(p, d, workspace);
-            matrix.apply(d, s);
-            let curvature = dot(d, s);
+            let curvature = system.apply(p, q);
             if !(curvature > 0.0 && rz > 0.0) {
                 report.negative_curvature = Some(curvature.min(rz));
                 break;
             }
-            lattice.gather(s, q, workspace);
             let alpha = T::from_f64(rz / curvature);
             add_scaled(x, alpha, p);
-            add_scaled(dx, alpha, d);
             add_scaled(r, -alpha, q);
             report.iterations += 1;
             report.residual = dot(r, r).sqrt() / impulse;

@@ -3,10 +3,11 @@
 use bspline::Real;
 
 use super::band_cholesky::{BandCholesky, NotPositive};
-use super::dot::dot;
 use super::fast_diagonalization::FastDiagonalization;
 use super::galerkin::Galerkin;
-use super::pcg::{Preconditioner, add_scaled};
+use super::lanczos::Lanczos;
+use super::pcg::{CoefficientSystem, Preconditioner, add_scaled};
+use super::schwarz::Schwarz;
 use crate::lattice::{Lattice, TensorProduct, TensorWorkspace};
 use crate::springs::{StepMatrix, Weights};
 
@@ -19,6 +20,14 @@ pub struct VCycleOptions {
     pub direct_limit: usize,
     /// Lanczos steps for the largest eigenvalue of the smoother.
     pub eigenvalue_steps: usize,
+    /// Size of the overlapping blocks that are solved exactly where material is painted, 0 for none.
+    pub blocks: usize,
+    /// Distance of the blocks.
+    pub stride: usize,
+    /// Ratio within a block, of the actual diagonal to that of constant material, from which on it is solved.
+    pub block_contrast: f64,
+    /// Coefficients of a level up to which it has blocks: their matrix takes 3 kB a coefficient.
+    pub block_limit: usize,
 }
 
 impl Default for VCycleOptions {
@@ -27,6 +36,10 @@ impl Default for VCycleOptions {
             degree: 2,
             direct_limit: 1400,
             eigenvalue_steps: 10,
+            blocks: 5,
+            stride: 3,
+            block_contrast: 3.0,
+            block_limit: 20_000,
         }
     }
 }
@@ -40,6 +53,12 @@ struct Level<T> {
     /// Diagonal of `H` for unit mass, and for unit springs along each axis.
     unit_diagonals: [Vec<f64>; 4],
     largest_eigenvalue: f64,
+    /// Actual diagonal over that of constant material.
+    variation: Vec<f64>,
+    all: Option<Galerkin>,
+    schwarz: Option<Schwarz<T>>,
+    schwarz_eigenvalue: f64,
+    lanczos: Lanczos<T>,
     prolong: TensorProduct<T>,
     restrict: TensorProduct<T>,
     r: Vec<T>,
@@ -106,6 +125,11 @@ impl<T: Real> VCycle<T> {
                 diagonal: Galerkin::diagonal(&here, steps),
                 unit_diagonals,
                 largest_eigenvalue: 1.0,
+                variation: vec![1.0; n],
+                all: (options.blocks > 0 && n <= options.block_limit).then(|| Galerkin::new(&here, steps)),
+                schwarz: None,
+                schwarz_eigenvalue: 1.0,
+                lanczos: Lanczos::new(n),
                 prolong,
                 restrict,
                 r: zeros(n),
@@ -146,6 +170,14 @@ impl<T: Real> VCycle<T> {
         self.coarsest.coefficient_count()
     }
 
+    /// The smoother of the finest level.
+    ///
+    /// # Panics
+    /// If the finest level is factorized.
+    pub fn smoother(&self) -> &FastDiagonalization<T> {
+        &self.levels[0].smoother
+    }
+
     /// Largest eigenvalue of the smoother times `H`, as estimated, of each level.
     pub fn eigenvalues(&self) -> impl Iterator<Item = f64> + '_ {
         self.levels.iter().map(|l| l.largest_eigenvalue)
@@ -174,65 +206,38 @@ impl<T: Real> VCycle<T> {
                 let unit = &level.unit_diagonals;
                 let constant =
                     mass * unit[0][i] + along[0] * unit[1][i] + along[1] * unit[2][i] + along[2] * unit[3][i];
+                level.variation[i] = actual[i] / constant;
                 *scale = T::from_f64((constant / actual[i]).sqrt());
             }
-            self.levels[l].largest_eigenvalue = self.largest_eigenvalue(s, l);
+            self.levels[l].largest_eigenvalue = self.largest_eigenvalue(s, l, false);
+            let level = &mut self.levels[l];
+            if let Some(all) = &mut level.all {
+                all.accumulate(s);
+                let (size, stride) = (self.options.blocks, self.options.stride);
+                let blocks = Schwarz::new(all, size, stride, &level.variation, self.options.block_contrast);
+                level.schwarz = (blocks.block_count() > 0).then_some(blocks);
+                if level.schwarz.is_some() {
+                    self.levels[l].schwarz_eigenvalue = self.largest_eigenvalue(s, l, true);
+                }
+            }
         }
         Ok(())
     }
 
-    /// By preconditioned Lanczos steps (the coefficients of conjugate gradients), from a fixed start; 10 % on top.
-    fn largest_eigenvalue(&mut self, s: &StepMatrix<T>, l: usize) -> f64 {
-        let Self {
-            levels,
-            samples,
-            workspace,
-            options,
-            ..
-        } = self;
-        let Level {
-            lattice,
-            smoother,
-            r,
-            d: p,
-            z,
-            q,
-            ..
-        } = &mut levels[l];
-        // A rough start: any smooth one hides the largest eigenvalues.
-        let mut seed = 0x9E37_79B9_7F4A_7C15_u64;
-        for v in r.iter_mut() {
-            seed = seed
-                .wrapping_mul(0xD129_42F0_5A3B_4B79)
-                .wrapping_add(0x1405_7B7E_F767_814F);
-            *v = T::from_f64((seed >> 11) as f64 / (1u64 << 53) as f64 - 0.5);
-        }
-        let (mut diagonal, mut off) = (Vec::new(), Vec::new());
-        let (mut before, mut last_alpha, mut beta) = (0.0, 1.0, 0.0);
-        for step in 0..options.eigenvalue_steps {
-            smoother.apply(r, z);
-            let rz = dot(r, z);
-            if !(rz > 0.0) {
-                break;
-            }
-            if step == 0 {
-                p.copy_from_slice(z);
-            } else {
-                beta = rz / before;
-                for (p, z) in p.iter_mut().zip(z.iter()) {
-                    *p = *z + T::from_f64(beta) * *p;
-                }
-            }
-            operator(lattice, s, p, q, samples, workspace);
-            let alpha = rz / dot(p, q);
-            diagonal.push(1.0 / alpha + if step > 0 { beta / last_alpha } else { 0.0 });
-            if step > 0 {
-                off.push(beta.sqrt() / last_alpha);
-            }
-            add_scaled(r, T::from_f64(-alpha), q);
-            (before, last_alpha) = (rz, alpha);
-        }
-        1.1 * largest_of_tridiagonal(&diagonal, &off)
+    /// Of the smoother, or of the blocks, times `H`; 10 % above the estimate.
+    fn largest_eigenvalue(&mut self, s: &StepMatrix<T>, l: usize, blocks: bool) -> f64 {
+        let level = &mut self.levels[l];
+        let mut system = CoefficientSystem {
+            lattice: &level.lattice,
+            matrix: s,
+            preconditioner: &mut Smoothing {
+                diagonalization: &mut level.smoother,
+                blocks: level.schwarz.as_mut().filter(|_| blocks),
+            },
+            samples: &mut self.samples,
+            workspace: &mut self.workspace,
+        };
+        1.1 * level.lanczos.largest(&mut system, self.options.eigenvalue_steps)
     }
 
     /// Solves level `l` for its right-hand side by one cycle.
@@ -244,6 +249,7 @@ impl<T: Real> VCycle<T> {
         }
         // x = S(b)
         self.smooth(s, l, true);
+        self.solve_blocks(s, l);
         // x += P E⁻¹ Pᵀ (b - Hx)
         self.residual(s, l);
         self.levels[l]
@@ -255,8 +261,23 @@ impl<T: Real> VCycle<T> {
             .prolong
             .apply(&self.solution[l + 1], &mut level.z, &mut self.workspace);
         add_scaled(&mut self.solution[l], T::one(), &level.z);
+        self.solve_blocks(s, l);
         // x += S(b - Hx)
         self.smooth(s, l, false);
+    }
+
+    /// One step over the blocks, where there are any; 1.7 of 2 is what keeps it convergent.
+    fn solve_blocks(&mut self, s: &StepMatrix<T>, l: usize) {
+        if self.levels[l].schwarz.is_none() {
+            return;
+        }
+        self.residual(s, l);
+        let level = &mut self.levels[l];
+        let omega = T::from_f64(1.7 / level.schwarz_eigenvalue);
+        if let Some(schwarz) = &mut level.schwarz {
+            schwarz.apply(&level.r, &mut level.z);
+        }
+        add_scaled(&mut self.solution[l], omega, &level.z);
     }
 
     /// `r = b - Hx`.
@@ -330,6 +351,21 @@ impl<T: Real> VCycle<T> {
     }
 }
 
+/// One of the two smoothers.
+struct Smoothing<'a, T> {
+    diagonalization: &'a mut FastDiagonalization<T>,
+    blocks: Option<&'a mut Schwarz<T>>,
+}
+
+impl<T: Real> Preconditioner<T> for Smoothing<'_, T> {
+    fn apply(&mut self, _: &StepMatrix<T>, r: &[T], z: &mut [T]) {
+        match &mut self.blocks {
+            Some(blocks) => blocks.apply(r, z),
+            None => self.diagonalization.apply(r, z),
+        }
+    }
+}
+
 /// `out = AᵀSA x`.
 fn operator<T: Real>(
     lattice: &Lattice<T>,
@@ -343,40 +379,6 @@ fn operator<T: Real>(
     lattice.sample(x, a, w);
     s.apply(a, b);
     lattice.gather(b, out, w);
-}
-
-/// Largest eigenvalue of a symmetric tridiagonal matrix, by bisection on Sturm sequences.
-pub(crate) fn largest_of_tridiagonal(diagonal: &[f64], off: &[f64]) -> f64 {
-    let around = |i: usize| {
-        let left = if i > 0 { off[i - 1].abs() } else { 0.0 };
-        left + off.get(i).map_or(0.0, |o| o.abs())
-    };
-    let mut low = diagonal.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let mut high = (0..diagonal.len())
-        .map(|i| diagonal[i] + around(i))
-        .fold(low, f64::max);
-    // Eigenvalues above t are as many as positive pivots of T - t.
-    let has_above = |t: f64| {
-        let mut pivot = 1.0;
-        (0..diagonal.len()).any(|i| {
-            let coupling = if i > 0 {
-                off[i - 1] * off[i - 1] / pivot
-            } else {
-                0.0
-            };
-            pivot = diagonal[i] - t - coupling;
-            pivot > 0.0
-        })
-    };
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if has_above(middle) {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    high
 }
 
 impl<T: Real> Preconditioner<T> for VCycle<T> {

@@ -102,6 +102,12 @@ impl<T: Real> StepMatrix<T> {
         }
     }
 
+    /// Whether all weights are constant.
+    pub fn is_uniform(&self) -> bool {
+        let constant = |w: &Weights<T>| matches!(w, Weights::Constant(_));
+        constant(&self.mass) && self.springs.iter().all(|s| constant(&s.weights))
+    }
+
     /// Samples along each axis.
     pub fn dims(&self) -> [usize; 3] {
         self.dims

@@ -1,5 +1,7 @@
 //! Painted materials and loads on which the solvers are judged, and the judgement: the error of the increment.
 
+mod increment;
 mod patterns;
 
-pub use patterns::{Pattern, loads, spring_weights};
+pub use increment::{Configuration, Outcome, Reference, Solver, StudyError};
+pub use patterns::{Pattern, loads, random_masses, spring_weights};

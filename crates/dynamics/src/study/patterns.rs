@@ -156,3 +156,11 @@ pub fn loads(m: usize) -> [Vec<f64>; 3] {
         field(&|[x, y, z]| (1.3 * x + 0.4).sin() * (2.1 * y - 0.3).cos() * (1.0 + z * z)),
     ]
 }
+
+/// Masses of a cube from 1 to `contrast`, each at random, its logarithm equally distributed.
+pub fn random_masses(m: usize, contrast: f64) -> Vec<f64> {
+    let count = (m * m * m) as u64;
+    (0..count)
+        .map(|i| contrast.powf(unit_random(i ^ 0x00C0_FFEE)))
+        .collect()
+}

@@ -29,6 +29,8 @@ const ITERATIONS: usize = 12;
 const REACH: u32 = 3;
 /// Weight of a condition that stands for a larger part of space than those of the level at hand, at most.
 const MOST_WEIGHT: f32 = 8.0;
+/// Weight of a corner of the surface: there may be many in a cell.
+const LEAST_WEIGHT: f32 = 0.25;
 /// Share of the tolerance that is aimed at: cells beside refined ones move a little after they were judged.
 const AIM: f64 = 0.8;
 
@@ -52,10 +54,10 @@ struct Quality {
 impl Quality {
     fn add(&mut self, error: f64, probe: &Probe, octant: usize, plan: &Plan) {
         let distance = f64::from(probe.distance);
-        if error > AIM * plan.allowed(distance) {
+        if error > AIM * plan.allowed(distance, probe.in_hole) {
             self.over |= 1 << octant;
         }
-        if distance <= plan.band {
+        if distance <= plan.band && !probe.in_hole {
             self.count += 1;
             self.square += error * error;
             self.max = self.max.max(error);
@@ -78,6 +80,8 @@ struct Octree<'a> {
     cells: Vec<Cell>,
     /// Conditions of leaves.
     settled: Vec<Probe>,
+    /// Corners of the surface, where a smooth field errs most.
+    corners: Vec<Probe>,
     leaves: Vec<LeafCell>,
 }
 
@@ -95,6 +99,7 @@ pub(crate) fn fit<T: Real>(
         plan,
         cells: Vec::new(),
         settled: Vec::new(),
+        corners: mesh.corners().map(Probe::corner).collect(),
         leaves: Vec::new(),
     };
     tree.judge_base(&base);
@@ -154,28 +159,39 @@ impl Octree<'_> {
                 })
             })
             .collect();
-        let octants: Vec<Octants> = cells.par_iter().map(|c| c.ask(self.mesh, BASE_DEPTH)).collect();
+        let octants: Vec<Octants> = cells
+            .par_iter()
+            .map(|c| c.ask(self.mesh, BASE_DEPTH, self.plan.tolerance))
+            .collect();
         let m = base.grid.width();
-        let quality: Vec<Quality> = cells
+        let cell_of = |p: DVec3| p.to_array().map(|x| ((x * f64::from(n)) as u32).min(n - 1));
+        let error = |probe: &Probe| {
+            let (at, place) = (cell_of(probe.at).map(|c| c as usize), probe.at * f64::from(n));
+            let spot = Spot {
+                start: (at[0] * m + at[1]) * m + at[2],
+                t: std::array::from_fn(|a| place[a] - at[a] as f64),
+            };
+            (gather(&base.grid.values, spot, [m * m, m]).0 - probe.value).abs()
+        };
+        let mut quality: Vec<Quality> = cells
             .par_iter()
             .zip(&octants)
             .map(|(cell, octants)| {
-                let mut probes = Vec::new();
-                octants.probes(cell.at, BASE_DEPTH, &mut probes);
+                let mut probes = Vec::with_capacity(16);
+                octants.probes(cell, BASE_DEPTH, &mut probes);
                 let mut q = Quality::default();
-                for (i, probe) in probes.iter().enumerate() {
-                    let place = probe.at * f64::from(n);
-                    let own = place.to_array().map(|x| (x as usize).min(n as usize - 1));
-                    let spot = Spot {
-                        start: (own[0] * m + own[1]) * m + own[2],
-                        t: std::array::from_fn(|a| place[a] - own[a] as f64),
-                    };
-                    let (value, _) = gather(&base.grid.values, spot, [m * m, m]);
-                    q.add((value - probe.value).abs(), probe, i % 8, self.plan);
+                for probe in &probes {
+                    q.add(error(probe), probe, octant_of(probe.at, BASE_DEPTH), self.plan);
                 }
                 q
             })
             .collect();
+        let index: FxHashMap<[u32; 3], usize> = cells.iter().map(|c| c.at).zip(0..).collect();
+        for corner in &self.corners {
+            if let Some(&i) = index.get(&cell_of(corner.at)) {
+                quality[i].add(error(corner), corner, octant_of(corner.at, BASE_DEPTH), self.plan);
+            }
+        }
         self.judge(BASE_DEPTH, &cells, &octants, &quality);
     }
 
@@ -186,7 +202,7 @@ impl Octree<'_> {
         for ((cell, octants), q) in cells.iter().zip(octants).zip(quality) {
             let is_last = depth == self.plan.max_depth;
             if q.over == 0 || is_last {
-                octants.probes(cell.at, depth, &mut self.settled);
+                octants.probes(cell, depth, &mut self.settled);
                 self.leaves.push(LeafCell {
                     depth,
                     at: cell.at,
@@ -199,7 +215,7 @@ impl Octree<'_> {
                 continue;
             }
             let mut kept = Vec::new();
-            octants.probes(cell.at, depth, &mut kept);
+            octants.probes(cell, depth, &mut kept);
             for (o, found) in octants.found.iter().enumerate() {
                 // Parts that the band passes through belong to it whole.
                 if q.over >> o & 1 == 1 || found.distance <= self.plan.band + 0.87 * half {
@@ -259,7 +275,10 @@ impl Octree<'_> {
     /// Fits the corrections of one level, and judges its cells.
     fn refine<T: Real>(&mut self, depth: usize, coarser: &Coarser<'_, T>) -> (Band<T>, Level<T>) {
         let cells = std::mem::take(&mut self.cells);
-        let octants: Vec<Octants> = cells.par_iter().map(|c| c.ask(self.mesh, depth)).collect();
+        let octants: Vec<Octants> = cells
+            .par_iter()
+            .map(|c| c.ask(self.mesh, depth, self.plan.tolerance))
+            .collect();
         let at: Vec<[u32; 3]> = cells.iter().map(|c| c.at).collect();
         let mut band = Band::around_reaching(depth, &at, REACH, coarser);
         let conditions = self.conditions(depth, &band, &cells, &octants);
@@ -313,11 +332,12 @@ impl Octree<'_> {
             .zip(octants)
             .flat_map_iter(|(cell, octants)| {
                 let mut probes = Vec::with_capacity(16);
-                octants.probes(cell.at, depth, &mut probes);
+                octants.probes(cell, depth, &mut probes);
                 probes.iter().filter_map(place).collect::<Vec<_>>()
             })
             .collect();
         placed.par_extend(self.settled.par_iter().filter_map(place));
+        placed.par_extend(self.corners.par_iter().filter_map(place));
         placed.par_sort_by_key(|p| p.0);
         let mut out = Conditions {
             samples: Vec::with_capacity(placed.len()),
@@ -338,7 +358,7 @@ impl Octree<'_> {
             let local = [slot / 64, slot / 8 % 8, slot % 8];
             let corner = band.keys[brick as usize].0;
             let q = probe.at * n;
-            let weight = (probe.size / own_size).powi(3).min(MOST_WEIGHT);
+            let weight = (probe.size / own_size).powi(3).clamp(LEAST_WEIGHT, MOST_WEIGHT);
             let has_gradient = probe.normal != [0.0; 3];
             out.samples.push(BandSample {
                 spot: Spot {
@@ -383,12 +403,10 @@ impl Octree<'_> {
                     .collect::<Vec<_>>()
             })
             .collect();
-        let finer = (2u64 << depth) as f64;
         let mut out = vec![Quality::default(); cell_count];
         for ((probe, owner), error) in conditions.probes.iter().zip(errors) {
             if *owner != NONE {
-                let part = (probe.at * finer).to_array().map(|x| x as usize & 1);
-                out[*owner as usize].add(error, probe, 4 * part[0] + 2 * part[1] + part[2], self.plan);
+                out[*owner as usize].add(error, probe, octant_of(probe.at, depth), self.plan);
             }
         }
         out
@@ -409,7 +427,7 @@ impl Octree<'_> {
         let mut sums = vec![(0u32, 0.0f64, 0.0f64); self.leaves.len()];
         let mut in_band = Vec::new();
         for (probe, &error) in self.settled.iter().zip(&errors) {
-            if f64::from(probe.distance) > self.plan.band {
+            if f64::from(probe.distance) > self.plan.band || probe.in_hole {
                 continue;
             }
             in_band.push(error);
@@ -462,9 +480,16 @@ impl Octree<'_> {
             tolerance,
             smoothing: BENDING,
             leaves: leaves.collect(),
+            signs: None,
             notes: Vec::new(),
         }
     }
+}
+
+/// Which part of its cell on the grid of `depth` a point lies in: `4x + 2y + z`.
+fn octant_of(at: DVec3, depth: usize) -> usize {
+    let part = (at * (2u64 << depth) as f64).to_array().map(|x| x as usize & 1);
+    4 * part[0] + 2 * part[1] + part[2]
 }
 
 /// Conditions of one level, brick by brick.

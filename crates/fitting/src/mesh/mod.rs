@@ -5,6 +5,7 @@ mod crossings;
 mod defects;
 mod distance;
 mod levels;
+mod moments;
 mod nearest;
 mod pieces;
 mod probes;
@@ -31,7 +32,7 @@ pub struct MeshOptions {
     pub coefficients: Option<usize>,
     /// Deepest level: `2^max_depth` cells along the box; 10 if not given.
     pub max_depth: Option<usize>,
-    /// Half the width of the band round the surface in which the tolerance holds, world units; 16 tolerances if not
+    /// Half the width of the band round the surface in which the tolerance holds, world units; 8 tolerances if not
     /// given. Beyond it the error may grow by a quarter of the way out.
     pub band: Option<f64>,
 }
@@ -42,7 +43,7 @@ const DEFAULT_DEPTH: usize = 10;
 const DEFAULT_TOLERANCE: f64 = 1e-4;
 /// Half the width of the band when the caller gives none, in tolerances. Cells at sharp edges end about eight
 /// tolerances wide, so these are two of the finest cells.
-const DEFAULT_BAND: f64 = 16.0;
+const DEFAULT_BAND: f64 = 8.0;
 
 /// Lengths of a fit in the unit box.
 #[derive(Clone, Copy, Debug)]
@@ -54,10 +55,11 @@ pub(crate) struct Plan {
 }
 
 impl Plan {
-    /// Error allowed at so far from the surface. Beyond the band it grows by a quarter of the way, so the sign is
-    /// right everywhere farther from the surface than the tolerance.
-    pub fn allowed(&self, distance: f64) -> f64 {
-        self.tolerance + 0.25 * (distance - self.band).max(0.0)
+    /// Error allowed at so far from the surface. Beyond the band, and in holes from the rim on, it grows by a quarter
+    /// of the way, so the sign is right everywhere farther from the surface than the tolerance.
+    pub fn allowed(&self, distance: f64, in_hole: bool) -> f64 {
+        let band = if in_hole { 0.0 } else { self.band };
+        self.tolerance + 0.25 * (distance - band).max(0.0)
     }
 }
 

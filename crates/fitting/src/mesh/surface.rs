@@ -32,8 +32,16 @@ pub(crate) struct Surface {
     pub certain: Vec<bool>,
     /// All triangles that count for the winding number.
     pub winding: WindingTree,
-    /// Whether the winding number is a whole number off the surface.
-    pub is_closed: bool,
+    /// The rim of its holes; none if the winding number is a whole number off the surface.
+    pub rim: Option<Rim>,
+}
+
+/// Edges at which the surface ends.
+pub(crate) struct Rim {
+    /// Edges, as triangles whose last two corners coincide.
+    pub edges: TriangleTree,
+    /// Length of all, each as often as it is passed more one way than the other.
+    pub length: f64,
 }
 
 /// Sides of a triangle at one of its points.
@@ -105,7 +113,7 @@ pub(crate) fn surface(faces: &mut Faces, defects: &mut MeshDefects) -> Result<Su
         }
         winding = winding_of(faces, &face_of);
     }
-    let is_closed = idle.iter().all(|i| !i) && faces.is_closed();
+    let rim = rim(faces, &idle);
     let tree_faces: Vec<u32> = winding.tree.ids.iter().map(|&i| face_of[i as usize]).collect();
     let found = crossings(faces, &winding.tree, &tree_faces);
     defects.self_intersections = found.pairs;
@@ -126,7 +134,25 @@ pub(crate) fn surface(faces: &mut Faces, defects: &mut MeshDefects) -> Result<Su
         boundary: tree,
         certain,
         winding,
-        is_closed,
+        rim,
+    })
+}
+
+/// Edges passed more often one way than the other, over the sheets in use.
+fn rim(faces: &Faces, idle: &[bool]) -> Option<Rim> {
+    let (mut edges, mut length) = (Vec::new(), 0.0);
+    for edge in faces.sides().chunk_by(|a, b| a.0 == b.0) {
+        let used = edge.iter().filter(|s| !idle[faces.sheets[s.1 as usize] as usize]);
+        let excess: i32 = used.map(|s| if s.2 { 1 } else { -1 }).sum();
+        if excess != 0 {
+            let ends = [edge[0].0 >> 32, edge[0].0 & 0xffff_ffff].map(|v| faces.vertices[v as usize]);
+            edges.push([ends[0], ends[1], ends[1]]);
+            length += f64::from(excess.abs()) * ends[0].distance(ends[1]);
+        }
+    }
+    (!edges.is_empty()).then(|| Rim {
+        edges: TriangleTree::new(&edges),
+        length,
     })
 }
 

@@ -119,14 +119,6 @@ impl Faces {
         sides
     }
 
-    /// Whether every edge is passed as often one way as the other: the winding number is then whole.
-    pub fn is_closed(&self) -> bool {
-        self.sides().chunk_by(|a, b| a.0 == b.0).all(|edge| {
-            let forward = edge.iter().filter(|s| s.2).count();
-            2 * forward == edge.len()
-        })
-    }
-
     fn component_count(&self) -> usize {
         let mut root: Vec<u32> = (0..self.vertices.len() as u32).collect();
         for &[a, b, c] in &self.corners {

@@ -1,55 +1,44 @@
 //! Generalized winding number of oriented triangles: `w(q) = Σ Ω_t(q) / 4π`, the solid angles of all triangles
 //! (Jacobson, Kavan & Sorkine-Hornung, *Robust inside-outside segmentation using generalized winding numbers*, ACM
-//! TOG 2013). Near triangles count exactly; far boxes by the first two terms of a Taylor expansion (Barill, Dickson,
-//! Schmidt, Levin & Jacobson, *Fast winding numbers for soups and clouds*, ACM TOG 2018, eq. 12).
+//! TOG 2013). Near triangles count exactly; far boxes by the first three terms of a Taylor expansion (Barill, Dickson,
+//! Schmidt, Levin & Jacobson, *Fast winding numbers for soups and clouds*, ACM TOG 2018).
 
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
+use super::moments::Moments;
 use super::nearest::STACK;
+use super::topology::area_vector;
 use super::tree::TriangleTree;
 
-/// A box is far when it is so many of its radii away. Errors at random points round a scan of 70 000 triangles are
-/// at most 2e-3 with 2, 5e-4 with 3.
-const FAR: f64 = 2.5;
-
-/// What a box looks like from afar.
-#[derive(Clone, Copy, Debug)]
-struct Moments {
-    center: DVec3,
-    /// `(FAR · radius)²`: squared distance beyond which the expansion serves.
-    reach_squared: f64,
-    /// `Σ a n`, area vectors.
-    dipole: DVec3,
-    /// `Σ a n ⊗ (c - center)`, made symmetric; exact, since `∫(x - c) dA = 0` over a triangle.
-    quadrupole: DMat3,
-}
+/// A box is far when it is so many of its radii away. Largest error and cost at points round a scan of 70 000
+/// triangles, against the sum over all: 1.5 1.6e-2, 5.6 µs; 2 4.0e-3, 7.9 µs; 2.5 1.6e-3, 12.8 µs.
+const FAR: f64 = 2.0;
 
 /// Triangles with the moments of their boxes.
 #[derive(Clone, Debug)]
 pub(crate) struct WindingTree {
     pub tree: Arc<TriangleTree>,
+    /// `(FAR · radius)²` of each box: squared distance from its centre beyond which the expansion serves.
+    reach_squared: Vec<f64>,
     moments: Vec<Moments>,
 }
 
-/// Area, centroid-weighted sums of a box, kept while moments are gathered.
+/// Sums of a box that its parent needs.
 struct Sums {
     area: f64,
+    /// Centroids times areas.
     weighted: DVec3,
+    radius: f64,
 }
 
 impl WindingTree {
     pub fn new(tree: Arc<TriangleTree>) -> Self {
-        let blank = Moments {
-            center: DVec3::ZERO,
-            reach_squared: 0.0,
-            dipole: DVec3::ZERO,
-            quadrupole: DMat3::ZERO,
-        };
         let mut out = Self {
-            moments: vec![blank; tree.nodes.len()],
+            reach_squared: vec![0.0; tree.nodes.len()],
+            moments: vec![Moments::default(); tree.nodes.len()],
             tree,
         };
         out.gather(0);
@@ -58,29 +47,31 @@ impl WindingTree {
 
     fn gather(&mut self, at: usize) -> Sums {
         let node = self.tree.nodes[at];
-        let (mut sums, mut parts) = (
-            Sums {
-                area: 0.0,
-                weighted: DVec3::ZERO,
-            },
-            Vec::with_capacity(4),
-        );
+        let mut sums = Sums {
+            area: 0.0,
+            weighted: DVec3::ZERO,
+            radius: 0.0,
+        };
+        let mut parts = Vec::with_capacity(4);
         if node.count > 0 {
             for t in node.first..node.first + node.count {
-                let [a, b, c] = self.tree.corners[t as usize];
-                let vector = (b - a).cross(c - a) * 0.5;
-                let area = vector.length();
-                sums.area += area;
-                sums.weighted += (a + b + c) * (area / 3.0);
-                parts.push(((a + b + c) / 3.0, vector, DMat3::ZERO));
+                let corners = &self.tree.corners[t as usize];
+                let vector = area_vector(corners);
+                let part = Moments::of_triangle(corners, vector);
+                sums.area += vector.length();
+                sums.weighted += part.center * vector.length();
+                let radius = corners
+                    .iter()
+                    .map(|p| p.distance(part.center))
+                    .fold(0.0, f64::max);
+                parts.push((part, radius));
             }
         } else {
             for child in [at + 1, node.first as usize] {
                 let below = self.gather(child);
                 sums.area += below.area;
                 sums.weighted += below.weighted;
-                let m = &self.moments[child];
-                parts.push((m.center, m.dipole, m.quadrupole));
+                parts.push((self.moments[child], below.radius));
             }
         }
         let center = if sums.area > 0.0 {
@@ -88,19 +79,15 @@ impl WindingTree {
         } else {
             (node.min + node.max) * 0.5
         };
-        let mut m = Moments {
-            center,
-            reach_squared: FAR * FAR * (center - node.min).max(node.max - center).length_squared(),
-            dipole: DVec3::ZERO,
-            quadrupole: DMat3::ZERO,
-        };
-        for (place, dipole, quadrupole) in parts {
-            let d = place - center;
-            let outer = DMat3::from_cols(dipole * d.x, dipole * d.y, dipole * d.z);
-            m.dipole += dipole;
-            m.quadrupole += quadrupole + (outer + outer.transpose()) * 0.5;
+        let mut whole = Moments::about(center);
+        for (part, radius) in &parts {
+            sums.radius = sums.radius.max(radius + part.center.distance(center));
+            whole.add(part);
         }
-        self.moments[at] = m;
+        let to_corner = (center - node.min).max(node.max - center).length();
+        sums.radius = sums.radius.min(to_corner);
+        self.reach_squared[at] = (FAR * sums.radius).powi(2);
+        self.moments[at] = whole;
         sums
     }
 
@@ -108,19 +95,14 @@ impl WindingTree {
     pub fn at(&self, q: DVec3) -> f64 {
         let mut stack = [0u32; STACK];
         let mut height = 1;
-        let mut total = 0.0;
+        let (mut afar, mut near) = (0.0, Turn::default());
         while height > 0 {
             height -= 1;
             let at = stack[height] as usize;
             let m = &self.moments[at];
             let r = m.center - q;
-            let distance_squared = r.length_squared();
-            if distance_squared > m.reach_squared {
-                // Σ a n · r/|r|³ + Q : ∇(r/|r|³), over 4π like the solid angles.
-                let inverse = 1.0 / distance_squared;
-                let trace = m.quadrupole.x_axis.x + m.quadrupole.y_axis.y + m.quadrupole.z_axis.z;
-                let second = trace - 3.0 * inverse * r.dot(m.quadrupole * r);
-                total += (m.dipole.dot(r) + second) * (inverse * inverse.sqrt());
+            if r.length_squared() > self.reach_squared[at] {
+                afar += m.solid_angle(r);
                 continue;
             }
             let node = &self.tree.nodes[at];
@@ -131,20 +113,61 @@ impl WindingTree {
                 continue;
             }
             for t in node.first..node.first + node.count {
-                total += solid_angle(q, &self.tree.corners[t as usize]);
+                let (re, im) = half_solid_angle(q, &self.tree.corners[t as usize]);
+                near.add(re, im);
             }
         }
-        total / (4.0 * PI)
+        afar / (4.0 * PI) + near.turns()
     }
 }
 
-/// Signed solid angle of a triangle seen from `q`, positive from behind (van Oosterom & Strackee, *The solid angle
-/// of a plane triangle*, 1983, eq. 8).
+/// A complex number whose argument is half the signed solid angle of a triangle seen from `q`, positive from behind
+/// (van Oosterom & Strackee, *The solid angle of a plane triangle*, 1983, eq. 8).
 #[inline]
-pub(crate) fn solid_angle(q: DVec3, corners: &[DVec3; 3]) -> f64 {
+fn half_solid_angle(q: DVec3, corners: &[DVec3; 3]) -> (f64, f64) {
     let [a, b, c] = corners.map(|p| p - q);
     let [la, lb, lc] = [a, b, c].map(DVec3::length);
     let volume = a.dot(b.cross(c));
     let other = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
-    2.0 * volume.atan2(other)
+    (other, volume)
+}
+
+/// A sum of angles, as a product of complex numbers and whole turns: one arctangent for all triangles.
+struct Turn {
+    re: f64,
+    im: f64,
+    whole: f64,
+}
+
+impl Default for Turn {
+    fn default() -> Self {
+        Self {
+            re: 1.0,
+            im: 0.0,
+            whole: 0.0,
+        }
+    }
+}
+
+impl Turn {
+    #[inline]
+    fn add(&mut self, re: f64, im: f64) {
+        let (x, y) = (self.re * re - self.im * im, self.re * im + self.im * re);
+        let size = x.abs() + y.abs();
+        if size == 0.0 {
+            // Seen from a corner a triangle has no solid angle.
+            return;
+        }
+        // Two angles of one sign that end up with the other have passed π.
+        let (before, added, after) = (self.im >= 0.0, im >= 0.0, y >= 0.0);
+        if before == added && after != before {
+            self.whole += if before { 1.0 } else { -1.0 };
+        }
+        (self.re, self.im) = (x / size, y / size);
+    }
+
+    /// The sum over 2π. The arctangent is one that gives the same bits on every machine.
+    fn turns(&self) -> f64 {
+        self.whole + libm::atan2(self.im, self.re) / (2.0 * PI)
+    }
 }

@@ -62,11 +62,6 @@ impl Band {
         c.at.iter().any(|&x| x == 0 || x + 1 == 1 << c.level)
     }
 
-    /// Edge of the smallest cells, unit of the points.
-    pub fn spacing(&self) -> f64 {
-        (1.0 + 2.0 * MARGIN) / f64::from(1u32 << self.depth)
-    }
-
     /// The smallest leaves within `reach` cells of a point of the unit box along each axis, with the vectors from
     /// the point to their centres in cells.
     pub fn around(&self, p: DVec3, reach: i32) -> impl Iterator<Item = (usize, DVec3)> {

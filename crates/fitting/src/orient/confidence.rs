@@ -1,5 +1,6 @@
 //! How certain the signs are, and where they are not.
 
+use bspline::hierarchical::Lattice;
 use glam::DVec3;
 use rustc_hash::FxHashMap;
 
@@ -102,16 +103,14 @@ pub(super) fn places(cloud: &Cloud, kept: &[usize], confidence: &[f32]) -> Vec<S
         .collect()
 }
 
-/// Mean confidence of the points in each leaf of a fit, 1 where there are none; `leaves` in any order, cells along
-/// the box of level 0 as in the field's lattice.
-///
-/// `lattice_from_world` takes a point to units of cells of level 0.
+/// Mean confidence of the points in each leaf of a fit on `lattice`; 1 where there are none.
 pub fn leaf_confidence(
     leaves: &[Leaf],
-    lattice_from_world: impl Fn(DVec3) -> DVec3,
+    lattice: &Lattice,
     positions: &[DVec3],
     confidence: &[f32],
 ) -> Vec<f32> {
+    let lattice_from_world = lattice.world_from_lattice.inverse();
     let mut index: FxHashMap<(u8, [u32; 3]), usize> = FxHashMap::default();
     let mut levels: Vec<u8> = Vec::new();
     for (i, leaf) in leaves.iter().enumerate() {
@@ -123,7 +122,7 @@ pub fn leaf_confidence(
     levels.sort_unstable();
     let mut sums = vec![(0.0f64, 0u32); leaves.len()];
     for (p, c) in positions.iter().zip(confidence) {
-        let at = lattice_from_world(*p);
+        let at = lattice_from_world.transform_point3(*p);
         if !at.is_finite() || at.min_element() < 0.0 {
             continue;
         }

@@ -20,8 +20,6 @@ pub(crate) struct Surroundings {
     pub normal: DVec3,
     /// Mean square distance to the neighbours.
     pub spread: f64,
-    /// Share of the smallest principal variance, 0 for a plane, 1/3 for a ball (Pauly, Gross & Kobbelt 2002).
-    pub variation: f64,
     /// Distance of the point from the quadric of its neighbours.
     pub residual: f64,
 }
@@ -79,13 +77,11 @@ fn surroundings(near: &[(DVec3, f64)]) -> Surroundings {
     let mut order = [0, 1, 2];
     order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
     let [normal, e1, e2] = order.map(|i| DVec3::from_slice(eigen.eigenvectors.column(i).as_slice()));
-    let total: f64 = eigen.eigenvalues.iter().sum();
-    let (tilt, residual) = quadric(around, reach2, [e1, e2, normal]).unwrap_or((DVec3::Z, 0.0));
+    let (tilt, height) = quadric(around, reach2, [e1, e2, normal]).unwrap_or((DVec3::Z, 0.0));
     Surroundings {
         normal: (e1 * tilt.x + e2 * tilt.y + normal * tilt.z).normalize_or(normal),
         spread: around.iter().map(|p| p.1).sum::<f64>() / n,
-        variation: (eigen.eigenvalues[order[0]] / total).max(0.0),
-        residual,
+        residual: height.abs(),
     }
 }
 

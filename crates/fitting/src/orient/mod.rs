@@ -37,6 +37,9 @@ pub enum Route {
 }
 
 impl Route {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::WindingNumber, Self::Tagging];
+
     /// Its name in reports.
     pub fn name(self) -> &'static str {
         match self {
@@ -105,10 +108,10 @@ pub fn orient_points(
     control.reserve(BYTES_PER_POINT * positions.len() as u64)?;
     let cloud = Cloud::prepare(positions)?;
     let is_lone = outliers::lone(&cloud.positions);
-    let kept: Vec<usize> = (0..is_lone.len()).filter(|&i| !is_lone[i]).collect();
-    let points: Vec<DVec3> = kept.iter().map(|&i| cloud.positions[i]).collect();
+    let mut kept: Vec<usize> = (0..is_lone.len()).filter(|&i| !is_lone[i]).collect();
+    let mut points: Vec<DVec3> = kept.iter().map(|&i| cloud.positions[i]).collect();
     control.step("looking at neighbours", 0.1)?;
-    let surface = Surface::estimate(&points);
+    let surface = Surface::estimate(&mut points, &mut kept);
     let signed = match options.route {
         Route::WindingNumber => by_winding(&points, &surface, control)?,
         Route::Tagging => by_tagging(&points, &surface, control)?,
@@ -135,26 +138,28 @@ struct Surface {
 }
 
 impl Surface {
-    fn estimate(points: &[DVec3]) -> Self {
+    /// Of `points`, from which those beside the surface are taken out, as from `kept`.
+    fn estimate(points: &mut Vec<DVec3>, kept: &mut Vec<usize>) -> Self {
         let near = Neighbours::new(points);
         let first = near.surroundings(NEIGHBOURS);
+        let is_beside = outliers::beside(points, &near, &first);
+        let on_surface = |i: &usize| !is_beside[*i];
+        let places: Vec<usize> = (0..points.len()).filter(on_surface).collect();
+        let is_whole = places.len() == points.len();
+        let first: Vec<Surroundings> = places.iter().map(|&i| first[i]).collect();
+        *points = places.iter().map(|&i| points[i]).collect();
+        *kept = places.iter().map(|&i| kept[i]).collect();
+        let near = Neighbours::new(points);
         let spacing = (total(&areas(&first, NEIGHBOURS)) / points.len() as f64).sqrt();
-        let diagonal = {
-            let (low, high) = points
-                .iter()
-                .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), &p| {
-                    (l.min(p), h.max(p))
-                });
-            (high - low).length()
-        };
-        // Without signs the other wall of a thin part cannot be told from this one, but for its slant.
-        let same_wall = |i: usize, j: usize| first[i].normal.dot(first[j].normal).abs() > 0.3;
-        let noise = noise::of_positions(points, same_wall, NEGLIGIBLE_NOISE * diagonal);
+        let none = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let (low, high) = points.iter().fold(none, |(l, h), &p| (l.min(p), h.max(p)));
+        let unknown: Option<fn(usize, usize) -> bool> = None;
+        let noise = noise::of_positions(points, unknown, NEGLIGIBLE_NOISE * (high - low).length());
         let count = noise.map_or(NEIGHBOURS, |sigma| {
             let disc = std::f64::consts::PI * (4.0 * sigma / spacing).powi(2);
             disc.clamp(NOISY_NEIGHBOURS[0], NOISY_NEIGHBOURS[1]) as usize
         });
-        let around = if count == NEIGHBOURS {
+        let around = if count == NEIGHBOURS && is_whole {
             first
         } else {
             near.surroundings(count)
@@ -244,7 +249,9 @@ fn by_winding(points: &[DVec3], surface: &Surface, control: &mut Control) -> Res
 
 /// Normals by the tags of the cells round each point.
 fn by_tagging(points: &[DVec3], surface: &Surface, control: &mut Control) -> Result<Vec<DVec3>, FitError> {
-    let spacing = (total(&surface.areas) / points.len() as f64).sqrt();
+    let mut sorted = surface.areas.clone();
+    let rank = sorted.len() * 9 / 10;
+    let spacing = f64::from(*sorted.select_nth_unstable_by(rank, f32::total_cmp).1).sqrt();
     let cell =
         (tagging::CELL_BY_SPACING * spacing).max(tagging::CELL_BY_NOISE * surface.noise.unwrap_or(0.0));
     let band = band::Band::new(points, cell);

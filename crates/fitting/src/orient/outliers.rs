@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 use nalgebra::{Matrix3, SymmetricEigen};
 use rayon::prelude::*;
 
-use super::local::Neighbours;
+use super::local::{Neighbours, Surroundings};
 
 /// Neighbours looked at.
 const COUNT: usize = 12;
@@ -15,6 +15,11 @@ const ALONE: f64 = 2.5;
 const VOLUME: f64 = 0.08;
 /// Rounds: outliers hide each other. Ten per cent over the box of a scan take eight.
 const ROUNDS: usize = 12;
+/// Distance from the quadric of the neighbours, as a multiple of that usual among them, from which on a point lies
+/// beside the surface: six standard deviations of Gaussian noise.
+const BESIDE: f64 = 9.0;
+/// The same as a share of the distance to the neighbours; clean creases reach it, but among others like them.
+const BESIDE_BY_DISTANCE: f64 = 0.2;
 /// No neighbours are known, or not any more.
 const STALE: u32 = u32::MAX;
 
@@ -111,6 +116,25 @@ fn view(p: DVec3, here: &[DVec3], kept: &[u32], tree: &Neighbours<'_>) -> View {
 fn stands_alone(view: &View, views: &[View], typical: f64) -> bool {
     let theirs = median(view.near.iter().map(|&j| views[j as usize].distance).collect());
     view.distance > ALONE * theirs || (view.distance > ALONE * typical && view.variation > VOLUME)
+}
+
+/// Which points lie beside the surface of their neighbours; the one farthest from it where several seem to, since
+/// it bends the quadrics of the others.
+pub(crate) fn beside(positions: &[DVec3], near: &Neighbours<'_>, around: &[Surroundings]) -> Vec<bool> {
+    positions
+        .par_iter()
+        .zip(around)
+        .with_min_len(256)
+        .map(|(&p, own)| {
+            let is_suspect = own.residual > BESIDE_BY_DISTANCE * own.spread.sqrt();
+            is_suspect && {
+                let theirs = near.nearest(p, COUNT + 1).skip(1);
+                let theirs: Vec<f64> = theirs.map(|(j, _)| around[j].residual).collect();
+                let is_farthest = theirs.iter().all(|r| *r <= own.residual);
+                is_farthest && own.residual > BESIDE * median(theirs)
+            }
+        })
+        .collect()
 }
 
 fn median(mut all: Vec<f64>) -> f64 {

@@ -7,7 +7,8 @@ use glam::DVec3;
 
 use super::band::Band;
 
-/// Edge of the smallest cells in mean spacings of the points, and in standard deviations of the noise.
+/// Edge of the smallest cells, at least, in the spacing that nine tenths of the points keep, and in standard deviations
+/// of the noise. Cells of 1.6 spacings turn 3.3 % of the bunny's normals over, of 1 spacing 0.3 %.
 pub(crate) const CELL_BY_SPACING: f64 = 1.0;
 pub(crate) const CELL_BY_NOISE: f64 = 3.0;
 /// Cells on each side of a point that vote for its sign.

@@ -54,7 +54,11 @@ pub(crate) fn run<T: Real>(
     let mut coefficients = base.values.len();
     for depth in BASE_DEPTH + 1..=plan.max_depth {
         let cells = children(samples, &split, depth);
-        let refined: Vec<[u32; 3]> = cells.iter().filter(|c| c.refined).map(|c| c.at).collect();
+        let refined: Vec<[u32; 3]> = cells
+            .iter()
+            .filter(|c| c.refined && c.is_live)
+            .map(|c| c.at)
+            .collect();
         if refined.is_empty() {
             break;
         }
@@ -168,11 +172,15 @@ fn band_samples<T: Real>(
             1
         };
         let taken = count.div_ceil(stride);
-        let weight = T::from_f64(count as f64 / taken as f64);
+        let stands_for = count as f64 / taken as f64;
         for i in (cell.start..cell.end).step_by(stride as usize) {
             let q = samples.positions[i as usize] * n;
             let t = std::array::from_fn(|a| T::from_f64(q[a] - cell.at[a] as f64));
             let i = i as usize;
+            if samples.weights[i] == 0.0 {
+                continue;
+            }
+            let weight = T::from_f64(stands_for * f64::from(samples.weights[i]));
             let (target, normal) = match &plan.probe {
                 None => (samples.targets[i], samples.normals[i]),
                 Some(probe) => (probe[i], [0.0; 3]),

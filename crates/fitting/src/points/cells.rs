@@ -27,6 +27,8 @@ pub(crate) struct Cell {
     pub refined: bool,
     /// Samples of the cell above.
     pub above: u32,
+    /// Whether a sample has weight.
+    pub is_live: bool,
 }
 
 impl Cell {
@@ -60,6 +62,7 @@ pub(crate) fn root_cells(samples: &Samples) -> Vec<(Cell, bool)> {
         end: samples.positions.len() as u32,
         refined: true,
         above: u32::MAX,
+        is_live: true,
     };
     let mut level = vec![(whole, true)];
     for depth in 1..=BASE_DEPTH {
@@ -79,14 +82,19 @@ pub(crate) fn children(samples: &Samples, above: &[(Cell, bool)], depth: usize) 
         let first = cells.len();
         for i in parent.start..parent.end {
             let at = samples.cell(i as usize, depth);
+            let is_live = samples.weights[i as usize] > 0.0;
             match cells[first..].last_mut() {
-                Some(cell) if cell.at == at => cell.end = i + 1,
+                Some(cell) if cell.at == at => {
+                    cell.end = i + 1;
+                    cell.is_live |= is_live;
+                }
                 _ => cells.push(Cell {
                     at,
                     start: i,
                     end: i + 1,
                     refined: *split,
                     above: count,
+                    is_live,
                 }),
             }
         }
@@ -96,6 +104,9 @@ pub(crate) fn children(samples: &Samples, above: &[(Cell, bool)], depth: usize) 
 
 /// Whether a cell is split, or why not.
 pub(crate) fn judge(cell: &Cell, q: &Quality, plan: &Plan, depth: usize) -> Result<(), StopReason> {
+    if !cell.is_live {
+        return Err(StopReason::NoData);
+    }
     let fits = q.distance() <= plan.tolerance && q.turn() <= GRADIENT_LIMIT;
     if fits && !plan.uniform {
         Err(StopReason::Tolerance)

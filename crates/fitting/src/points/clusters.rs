@@ -19,9 +19,15 @@ pub(crate) struct Cluster {
 
 /// Clusters for the grid with `2^depth` cells: half-cells are cells of `depth + 1`.
 pub(crate) fn clusters(samples: &Samples, depth: usize) -> Vec<Cluster> {
-    let entries = samples.positions.iter().zip(&samples.normals);
+    let entries = samples
+        .positions
+        .iter()
+        .zip(&samples.normals)
+        .zip(&samples.weights);
     merge(
-        entries.map(|(p, n)| (*p, DVec3::from(n.map(f64::from)), 1.0)),
+        entries
+            .filter(|(_, w)| **w > 0.0)
+            .map(|((p, n), w)| (*p, DVec3::from(n.map(f64::from)), f64::from(*w))),
         depth,
     )
 }
@@ -29,6 +35,26 @@ pub(crate) fn clusters(samples: &Samples, depth: usize) -> Vec<Cluster> {
 /// The clusters of the next coarser grid, from those of this one (which are in Morton order).
 pub(crate) fn coarser(finer: &[Cluster], depth: usize) -> Vec<Cluster> {
     merge(finer.iter().map(|c| (c.position, c.normal, c.count)), depth)
+}
+
+/// Weighs clusters by the samples of their half-cell where these are fewer than in the median cluster's.
+pub(crate) fn doubt_the_sparse(clusters: &mut [Cluster]) {
+    let mut counts: Vec<f64> = clusters.iter().map(Cluster::in_half_cell).collect();
+    if counts.is_empty() {
+        return;
+    }
+    let middle = counts.len() / 2;
+    let usual = *counts.select_nth_unstable_by(middle, f64::total_cmp).1;
+    for c in clusters {
+        c.weight *= (c.in_half_cell() / usual).min(1.0);
+    }
+}
+
+impl Cluster {
+    /// Samples of the half-cell.
+    fn in_half_cell(&self) -> f64 {
+        0.25 * self.count / self.weight
+    }
 }
 
 fn merge(entries: impl Iterator<Item = (DVec3, DVec3, f64)>, depth: usize) -> Vec<Cluster> {

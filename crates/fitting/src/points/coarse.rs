@@ -7,7 +7,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use super::clusters::{Cluster, clusters, coarser};
+use super::clusters::{Cluster, clusters, coarser, doubt_the_sparse};
 use super::full_grid::{FullGrid, add_bending, bending_diagonal};
 use super::samples::{BASE_DEPTH, Samples};
 use super::stencil::{Spot, gather, scatter, scatter_squares};
@@ -21,14 +21,18 @@ const TOLERANCE: f64 = 1e-3;
 /// continuation of 16³ in holes (2 to 10 are alike, 25 lose a third of the accuracy in holes).
 const BASE_ITERATIONS: usize = 5;
 
-/// Coefficients of the 32³ level, distances in units of the box, positive inside.
-pub(crate) fn solve(samples: &Samples, beta_s: f64) -> FullGrid<f64> {
+/// Coefficients of the 32³ level, distances in units of the box, positive inside. Under `suspicion` a half-cell that
+/// holds fewer samples than most weighs less: what is left of the outliers lies in such.
+pub(crate) fn solve(samples: &Samples, beta_s: f64, suspicion: bool) -> FullGrid<f64> {
     let mut by_depth = vec![clusters(samples, BASE_DEPTH)];
     for depth in (2..BASE_DEPTH).rev() {
         let finer = by_depth.last().expect("starts with one");
         by_depth.push(coarser(finer, depth));
     }
     by_depth.reverse();
+    if suspicion {
+        by_depth.iter_mut().for_each(|data| doubt_the_sparse(data));
+    }
     let beta = |n: usize| (1.0 / n as f64).max(beta_s);
     let mut x = FullGrid::zeros(4);
     for (level, data) in by_depth.iter().enumerate().take(BASE_DEPTH - 2) {

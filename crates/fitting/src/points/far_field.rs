@@ -31,7 +31,7 @@ pub(crate) fn conditions<T: Real>(field: &HierarchicalSpline<T>, samples: &Sampl
         cells: [n; 3],
     };
     let most = (LARGEST_SHARE * f64::from(n).powi(3)) as usize;
-    let points = samples.points().map(|i| samples.world(i));
+    let points = samples.live_points().map(|i| samples.world(i));
     unsupported_components(field, 0.0, &frame, points)
         .iter()
         .filter(|c| c.cells.len() >= CELLS_TO_ACT && c.cells.len() <= most)

@@ -9,6 +9,7 @@ mod clusters;
 mod coarse;
 mod cross_validation;
 mod far_field;
+mod feet;
 pub(crate) mod full_grid;
 #[cfg(test)]
 mod iteration_growth;
@@ -16,8 +17,10 @@ pub(crate) mod noise;
 mod plan;
 mod residual;
 pub use residual::newton_distance;
+mod robust;
 pub(crate) mod samples;
 pub(crate) mod stencil;
+mod support;
 
 use bspline::{HierarchicalSpline, Real};
 
@@ -38,6 +41,8 @@ pub struct PointOptions {
     pub max_depth: Option<usize>,
     /// Weight `μ` of the bending energy on the finest level.
     pub smoothing: Option<f64>,
+    /// Whether points that the others contradict lose their weight.
+    pub robust: bool,
 }
 
 /// Rounds of conditions against pieces that no sample speaks for.
@@ -58,15 +63,44 @@ pub fn fit_points<T: Real>(
     // Below the default tolerance noise does not matter; above, it does even to a caller who asks for less.
     let default_tolerance = 1e-4 * samples.diagonal / samples.scale;
     let tolerance = options.tolerance.map_or(default_tolerance, |t| t / samples.scale);
-    let noise = match options.smoothing {
-        None => noise::estimate(&samples, default_tolerance.min(tolerance)),
-        Some(_) => None,
+    let tree = support::tree(&samples.positions);
+    if let Some(tree) = tree.as_ref().filter(|_| options.robust) {
+        control.step("weighing points", 0.03)?;
+        robust::weigh_by_support(&mut samples, tree);
+    } else if let Some(tree) = &tree {
+        samples.notes.extend(support::doubt(&samples, tree));
+    }
+    let noise = match (&tree, options.smoothing) {
+        (Some(tree), None) => noise::estimate(&samples, tree, default_tolerance.min(tolerance)),
+        _ => None,
     };
+    drop(tree);
     let mut plan = Plan::new(&samples, options, tolerance, noise);
     control.step("fitting coarse levels", 0.05)?;
-    let base = coarse::solve(&samples, plan.beta);
+    let base = if options.robust {
+        robust::reweigh::<T>(&mut samples, &plan, control)?
+    } else {
+        coarse::solve(&samples, plan.beta, false)
+    };
+    if options.robust {
+        samples.notes.push(robust::account(&samples));
+    }
+    if let (Some(sigma), Some(beta)) = (noise, plan.second_beta) {
+        let first = cascade::run::<T>(&samples, &base, &plan, 0.09..0.1, control)?;
+        let field = assemble::assemble(&samples, &base, &first.levels);
+        samples = feet::on_feet(&samples, &field, sigma);
+        let without = samples.weights.iter().filter(|w| **w == 0.0).count();
+        if without > 0 && !options.robust {
+            samples.notes.push(format!(
+                "{without} of {} noisy points lie on no sheet that the first fit found; they are measured, but not fitted",
+                samples.positions.len()
+            ));
+        }
+        plan.beta = beta;
+    }
     if let Some(sigma) = noise {
-        let mu = cross_validation::choose::<T>(&samples, &base, &plan, sigma, control)?;
+        let start = plan.smoothing.at(plan.max_depth, plan.max_depth);
+        let mu = cross_validation::choose::<T>(&samples, &base, &plan, start, sigma, control)?;
         plan.smoothing = Smoothing::Halving(mu);
     }
     let mut rounds = 0;

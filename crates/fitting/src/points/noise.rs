@@ -3,10 +3,11 @@
 use std::num::NonZero;
 
 use glam::{DMat3, DVec3};
-use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use kiddo::SquaredEuclidean;
 use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen};
 
 use super::samples::Samples;
+use super::support::{self, Tree};
 
 /// Points at which a quadric is fitted.
 const QUERIES: usize = 256;
@@ -18,6 +19,8 @@ const NEIGHBOURS: [usize; 5] = [30, 60, 120, 240, 480];
 const LEVEL: f64 = 1.17;
 /// Cosine between normals above which two samples lie on the same wall.
 const SAME_WALL: f32 = 0.3;
+/// Kurtosis of heights that part into two walls: 1 for equal ones, 1.8 for an evenly filled slab, 3 for noise.
+const TWO_WALLS: f64 = 1.8;
 /// Growth that shows at once that shape, not noise, is seen.
 const SHAPE: f64 = 1.35;
 
@@ -26,20 +29,31 @@ const SHAPE: f64 = 1.35;
 ///
 /// The neighbourhood has to reach three standard deviations: in a smaller one the noise bends the principal
 /// plane and hides part of itself.
-pub(crate) fn estimate(samples: &Samples, negligible: f64) -> Option<f64> {
-    // The other wall of a thin part is no noise of this one.
-    let same_wall = |i: usize, j: usize| dot(samples.normals[i], samples.normals[j]) > SAME_WALL;
-    of_positions(&samples.positions, same_wall, negligible)
+pub(crate) fn estimate(samples: &Samples, tree: &Tree, negligible: f64) -> Option<f64> {
+    // The other wall of a thin part is no noise of this one, nor are points without weight.
+    let same_wall = |i: usize, j: usize| {
+        let live = samples.weights[i] > 0.0 && samples.weights[j] > 0.0;
+        live && dot(samples.normals[i], samples.normals[j]) > SAME_WALL
+    };
+    quadrics(&samples.positions, tree, Some(same_wall), negligible)
 }
 
-/// The same, where `same_wall(i, j)` tells whether point `j` near point `i` may belong to its surface.
+/// The same of bare positions, where `same_wall(i, j)` tells whether point `j` near point `i` may belong to its
+/// surface. Without it, places where the heights fall into two walls are passed over.
 pub(crate) fn of_positions(
     positions: &[DVec3],
-    same_wall: impl Fn(usize, usize) -> bool,
+    same_wall: Option<impl Fn(usize, usize) -> bool>,
     negligible: f64,
 ) -> Option<f64> {
-    let points: Vec<[f64; 3]> = positions.iter().map(|p| p.to_array()).collect();
-    let tree = ImmutableKdTree::<f64, 3>::new_from_slice(&points).ok()?;
+    quadrics(positions, &support::tree(positions)?, same_wall, negligible)
+}
+
+fn quadrics(
+    points: &[DVec3],
+    tree: &Tree,
+    same_wall: Option<impl Fn(usize, usize) -> bool>,
+    negligible: f64,
+) -> Option<f64> {
     let stride = points.len().div_ceil(QUERIES);
     let mut previous: Option<f64> = None;
     for k in NEIGHBOURS {
@@ -49,19 +63,21 @@ pub(crate) fn of_positions(
         let count = NonZero::new(k).expect("not zero");
         let mut found: Vec<(f64, f64)> = (0..points.len())
             .step_by(stride)
+            .filter(|&i| same_wall.as_ref().is_none_or(|same| same(i, i)))
             .filter_map(|i| {
                 let near = tree
-                    .query(&points[i])
+                    .query(&points[i].to_array())
                     .nearest_n::<SquaredEuclidean<f64>>(count)
                     .execute();
                 let reach = f64::sqrt(near.last()?.distance);
                 let around: Vec<DVec3> = near
                     .iter()
                     .map(|n| n.item as usize)
-                    .filter(|&j| same_wall(i, j))
-                    .map(|j| positions[j])
+                    .filter(|&j| same_wall.as_ref().is_none_or(|same| same(i, j)))
+                    .map(|j| points[j])
                     .collect();
-                Some((quadric_residual(&around)?, reach))
+                let (residual, kurtosis) = quadric_residual(&around)?;
+                (same_wall.is_some() || kurtosis > TWO_WALLS).then_some((residual, reach))
             })
             .collect();
         if found.is_empty() {
@@ -89,8 +105,8 @@ pub(crate) fn of_positions(
 }
 
 /// Root mean square distance of points to their best quadric height field over their principal plane,
-/// corrected for its six degrees of freedom.
-fn quadric_residual(points: &[DVec3]) -> Option<f64> {
+/// corrected for its six degrees of freedom; and the kurtosis of these distances.
+fn quadric_residual(points: &[DVec3]) -> Option<(f64, f64)> {
     let n = points.len();
     if n < 12 {
         return None;
@@ -116,7 +132,13 @@ fn quadric_residual(points: &[DVec3]) -> Option<f64> {
     });
     let heights = DVector::from_fn(n, |i, _| (points[i] - mean).dot(normal));
     let fit = rows.tr_mul(&rows).cholesky()?.solve(&rows.tr_mul(&heights));
-    Some(((heights - rows * fit).norm_squared() / (n as f64 - 6.0)).sqrt())
+    let rest = heights - rows * fit;
+    let square = rest.norm_squared();
+    let fourth: f64 = rest.iter().map(|r| r.powi(4)).sum();
+    Some((
+        (square / (n as f64 - 6.0)).sqrt(),
+        n as f64 * fourth / (square * square),
+    ))
 }
 
 fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {

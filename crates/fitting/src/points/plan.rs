@@ -18,6 +18,8 @@ pub(crate) struct Plan {
     pub coefficients: Option<usize>,
     /// `β` of the finest level, unit box.
     pub beta: f64,
+    /// `β` of a second fit to the feet of the points, where noise needs one.
+    pub second_beta: Option<f64>,
     /// `μ` of a level.
     pub smoothing: Smoothing,
     /// CG stops at this relative residual ...
@@ -28,6 +30,8 @@ pub(crate) struct Plan {
     pub thin: bool,
     /// Why cells of the deepest level are not split.
     pub limited_by: StopReason,
+    /// Whether points without weight are outliers, which no figure counts.
+    pub robust: bool,
     /// Value targets in the place of 0, and no normals: for the trace of the smoother.
     pub probe: Option<Vec<f32>>,
 }
@@ -51,6 +55,15 @@ const FINEST_SPACING: f64 = 0.3;
 /// Tolerance of a noisy cloud in standard deviations, when the caller gives none.
 const NOISE_FACTOR: f64 = 1.25;
 
+/// Least knot spacing of a noisy cloud in units of `√(σ̂s)`: what the samples of a cell leave of the noise when they
+/// are averaged, `σ̂s/h`, is then at most `0.44 h`. On clouds of 0.25, 0.5 and 1 % noise one level deeper or shallower
+/// is no better.
+const NOISE_CELL: f64 = 1.5;
+/// Width of the band that noise fills, in standard deviations.
+const NOISE_BAND: f64 = 3.0;
+/// Standard deviation, in knot spacings, above which the points are moved to their feet.
+const THICK: f64 = 0.25;
+
 /// The last level whose knot spacing is at least `h` (unit box).
 fn depth_of(h: f64) -> usize {
     ((1.0 / h).log2().floor() as usize).clamp(BASE_DEPTH + 1, MAX_DEPTH)
@@ -58,12 +71,13 @@ fn depth_of(h: f64) -> usize {
 
 impl Plan {
     /// Clean clouds: `β = 0.6 s` (`s` the mean spacing), refined by residual. Noisy ones: every occupied cell
-    /// down to the last spacing of at least `2σ̂`, `β = 0.3 s`, `μ` left to cross-validation, and a tolerance of
-    /// `1.25 σ̂` unless one is given.
+    /// down to the last spacing of at least `1.5 √(σ̂s)`, a first fit with `β = σ̂/2` and a second on the
+    /// [feet](super::feet) with `β = 0.3 s`, or the second alone where the noise is below a quarter of a cell; `μ`
+    /// left to cross-validation, begun at `0.05 (h/s)²`, and a tolerance of `1.25 σ̂` unless one is given.
     ///
     /// `tolerance` and `noise` in the unit box.
     pub fn new(samples: &Samples, options: &PointOptions, tolerance: f64, noise: Option<f64>) -> Self {
-        let spacing = samples.mean_spacing();
+        let spacing = samples.mean_spacing(0.0);
         let asked = options.max_depth.map(|d| d.clamp(BASE_DEPTH + 1, MAX_DEPTH));
         let clean = Self {
             tolerance,
@@ -71,6 +85,7 @@ impl Plan {
             uniform: false,
             coefficients: options.coefficients,
             beta: 0.6 * spacing,
+            second_beta: None,
             smoothing: Smoothing::Steps {
                 coarse: 1e-3,
                 finest: options.smoothing.unwrap_or(1e-4),
@@ -79,19 +94,26 @@ impl Plan {
             iterations: 8,
             thin: true,
             limited_by: StopReason::Depth,
+            robust: options.robust,
             probe: None,
         };
         let Some(sigma) = noise else { return clean };
-        let justified = depth_of(2.0 * sigma);
+        let spacing = samples.mean_spacing(NOISE_BAND * sigma);
+        let justified = depth_of(NOISE_CELL * (sigma * spacing).sqrt());
+        let max_depth = asked.unwrap_or(justified);
+        let h = 0.5f64.powi(max_depth as i32);
+        let is_thick = sigma > THICK * h;
         Self {
             tolerance: if options.tolerance.is_some() {
                 tolerance
             } else {
                 NOISE_FACTOR * sigma
             },
-            max_depth: asked.unwrap_or(justified),
+            max_depth,
             uniform: true,
-            beta: 0.3 * spacing,
+            beta: if is_thick { 0.5 * sigma } else { 0.3 * spacing },
+            smoothing: Smoothing::Halving(0.05 * (h / spacing).powi(2)),
+            second_beta: is_thick.then_some(0.3 * spacing),
             residual: 0.01,
             iterations: 20,
             thin: false,
@@ -121,7 +143,8 @@ impl Plan {
 }
 
 impl Smoothing {
-    fn at(self, depth: usize, max_depth: usize) -> f64 {
+    /// `μ` on the level of `depth`.
+    pub fn at(self, depth: usize, max_depth: usize) -> f64 {
         match self {
             Self::Steps { coarse, finest } => {
                 if depth == max_depth {

@@ -17,6 +17,18 @@ const NEWTON_STEPS: usize = 5;
 /// Steps stop when they are under a hundredth of the way gone. Where the gradient vanishes the way gone so far
 /// is returned.
 pub fn newton_distance(field: &dyn Field, p: DVec3) -> (f64, f64) {
+    let (x, _, first) = newton(field, p);
+    ((x - p).length(), first.abs())
+}
+
+/// Where the steps of [`newton_distance`] end, and the gradient met last.
+pub(crate) fn newton_foot(field: &dyn Field, p: DVec3) -> (DVec3, DVec3) {
+    let (x, gradient, _) = newton(field, p);
+    (x, gradient)
+}
+
+/// End of the steps, gradient before the last of them, and `f(p)`.
+fn newton(field: &dyn Field, p: DVec3) -> (DVec3, DVec3, f64) {
     let (first, mut gradient) = field.value_gradient(p);
     let (mut x, mut value) = (p, first);
     for step in 0..NEWTON_STEPS {
@@ -31,7 +43,7 @@ pub fn newton_distance(field: &dyn Field, p: DVec3) -> (f64, f64) {
         }
         (value, gradient) = field.value_gradient(x);
     }
-    ((x - p).length(), first.abs())
+    (x, gradient, first)
 }
 
 pub(crate) fn report<T: Real>(
@@ -42,10 +54,12 @@ pub(crate) fn report<T: Real>(
     plan: &Plan,
     noise: Option<f64>,
 ) -> FitReport {
+    // Outliers are no part of the surface whose error this is.
+    let is_counted = |i: usize| !samples.is_sign_condition(i) && (!plan.robust || samples.weights[i] > 0.0);
     let measured: Vec<Option<(f64, f64)>> = (0..samples.positions.len())
         .into_par_iter()
         .with_min_len(4096)
-        .map(|i| (!samples.is_sign_condition(i)).then(|| newton_distance(field, samples.world(i))))
+        .map(|i| is_counted(i).then(|| newton_distance(field, samples.world(i))))
         .collect();
     let leaves = cascade.leaves.iter().map(|leaf| {
         let part = measured[leaf.start as usize..leaf.end as usize].iter().flatten();
@@ -90,6 +104,7 @@ pub(crate) fn report<T: Real>(
             Smoothing::Halving(mu) => mu,
         },
         leaves: leaves.collect(),
+        signs: None,
         notes: samples.notes.clone(),
     }
 }

@@ -40,6 +40,21 @@ pub(crate) const BASE_DEPTH: usize = 5;
 /// Share of the points that may lie outside the robust extent before they count as part of the scan.
 const OUTLIER_SHARE: f64 = 1e-3;
 
+/// One sample.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Entry {
+    /// Where the conditions hold, unit box.
+    pub position: DVec3,
+    /// Where the point was measured, unit box.
+    pub measured: DVec3,
+    /// Outward unit normal; zero for a sign condition.
+    pub normal: [f32; 3],
+    /// Value asked for, unit box.
+    pub target: f32,
+    /// Share in the fit.
+    pub weight: f32,
+}
+
 /// The usable samples in Morton order of their position.
 #[derive(Debug)]
 pub(crate) struct Samples {
@@ -47,8 +62,12 @@ pub(crate) struct Samples {
     pub positions: Vec<DVec3>,
     /// Outward unit normals; zero for a sign condition.
     pub normals: Vec<[f32; 3]>,
-    /// Values asked for, unit box: 0, but for sign conditions.
+    /// Values asked for, unit box: 0, but for sign conditions and points moved to their feet.
     pub targets: Vec<f32>,
+    /// Share of each sample in the fit, `0..=1`; 0 for points that are measured but not fitted.
+    pub weights: Vec<f32>,
+    /// Where the points were measured, unit box, if they were moved from there.
+    measured: Option<Vec<DVec3>>,
     /// Edge of the (cubic) box in world units.
     pub scale: f64,
     /// Corner of the box in world units.
@@ -134,6 +153,8 @@ impl Samples {
             positions,
             normals,
             targets,
+            weights: vec![1.0; keyed.len()],
+            measured: None,
             scale,
             origin,
             diagonal: size.length(),
@@ -143,63 +164,87 @@ impl Samples {
 
     /// Whether sample `index` is a condition on the sign of the field away from the surface, not a point of it.
     pub fn is_sign_condition(&self, index: usize) -> bool {
-        self.targets[index] != 0.0
+        self.normals[index] == [0.0; 3]
     }
 
-    /// Indices of the points of the cloud.
-    pub fn points(&self) -> impl Iterator<Item = usize> {
-        (0..self.positions.len()).filter(|&i| !self.is_sign_condition(i))
+    /// Indices of the points of the cloud that have weight.
+    pub fn live_points(&self) -> impl Iterator<Item = usize> {
+        (0..self.positions.len()).filter(|&i| !self.is_sign_condition(i) && self.weights[i] > 0.0)
     }
 
-    /// World position of a sample.
+    /// World position at which a sample was measured.
     pub fn world(&self, index: usize) -> DVec3 {
+        self.origin + self.entry(index).measured * self.scale
+    }
+
+    /// World position at which the conditions of a sample hold.
+    pub fn world_of_conditions(&self, index: usize) -> DVec3 {
         self.origin + self.positions[index] * self.scale
     }
 
-    /// The same samples with conditions `f(x) = d` (unit box) added, in Morton order.
-    pub fn with_sign_conditions(&self, conditions: &[(DVec3, f32)]) -> Self {
-        let mut keyed: Vec<(u64, usize)> = self
-            .positions
-            .iter()
-            .chain(conditions.iter().map(|c| &c.0))
-            .map(|p| morton(*p))
-            .zip(0..)
-            .collect();
+    /// Whether a sample was moved to its foot.
+    pub fn is_moved(&self, index: usize) -> bool {
+        self.measured
+            .as_ref()
+            .is_some_and(|m| m[index] != self.positions[index])
+    }
+
+    /// Sample `index`.
+    pub fn entry(&self, index: usize) -> Entry {
+        let position = self.positions[index];
+        Entry {
+            position,
+            measured: self.measured.as_ref().map_or(position, |m| m[index]),
+            normal: self.normals[index],
+            target: self.targets[index],
+            weight: self.weights[index],
+        }
+    }
+
+    /// Other samples in the same box, put in Morton order.
+    pub fn with_entries(&self, entries: Vec<Entry>) -> Self {
+        let mut keyed: Vec<(u64, u32)> = entries.iter().map(|e| morton(e.position)).zip(0..).collect();
         keyed.sort_unstable();
-        let n = self.positions.len();
-        let pick = |i: usize| match i.checked_sub(n) {
-            None => (self.positions[i], self.normals[i], self.targets[i]),
-            Some(c) => (conditions[c].0, [0.0; 3], conditions[c].1),
-        };
-        let mut out = Self {
-            positions: Vec::with_capacity(keyed.len()),
-            normals: Vec::with_capacity(keyed.len()),
-            targets: Vec::with_capacity(keyed.len()),
+        let sorted = || keyed.iter().map(|k| &entries[k.1 as usize]);
+        let is_moved = entries.iter().any(|e| e.measured != e.position);
+        Self {
+            positions: sorted().map(|e| e.position).collect(),
+            normals: sorted().map(|e| e.normal).collect(),
+            targets: sorted().map(|e| e.target).collect(),
+            weights: sorted().map(|e| e.weight).collect(),
+            measured: is_moved.then(|| sorted().map(|e| e.measured).collect()),
             notes: self.notes.clone(),
             ..*self
-        };
-        for (_, i) in keyed {
-            let (position, normal, target) = pick(i);
-            out.positions.push(position);
-            out.normals.push(normal);
-            out.targets.push(target);
         }
-        out
+    }
+
+    /// The same samples with conditions `f(x) = d` (unit box) added.
+    pub fn with_sign_conditions(&self, conditions: &[(DVec3, f32)]) -> Self {
+        let mut entries: Vec<Entry> = (0..self.positions.len()).map(|i| self.entry(i)).collect();
+        entries.extend(conditions.iter().map(|&(position, target)| Entry {
+            position,
+            measured: position,
+            normal: [0.0; 3],
+            target,
+            weight: 1.0,
+        }));
+        self.with_entries(entries)
     }
 
     /// Mean spacing `√(area/N)` of the samples, unit box.
     ///
-    /// The area is that of the occupied cells, `cells·h²/1.5`, on the grid where a cell holds about six points.
-    pub fn mean_spacing(&self) -> f64 {
-        let n = self.positions.len();
+    /// The area is that of the occupied cells, `cells·h²/1.5`, on the grid where a cell holds about six points, or
+    /// where it is `band` wide: noise fills a band round the surface that smaller cells would count.
+    pub fn mean_spacing(&self, band: f64) -> f64 {
+        let n = self.live_points().count().max(1);
         let occupied = |depth: usize| {
             let mut last = [u32::MAX; 3];
-            (0..n)
+            self.live_points()
                 .filter(|&i| std::mem::replace(&mut last, self.cell(i, depth)) != last)
                 .count()
         };
         let mut depth = 2;
-        while depth < MAX_DEPTH && n > 6 * occupied(depth) {
+        while depth < MAX_DEPTH && n > 6 * occupied(depth) && 0.5f64.powi(depth as i32 + 1) >= band {
             depth += 1;
         }
         let area = occupied(depth) as f64 * 0.25f64.powi(depth as i32) / 1.5;

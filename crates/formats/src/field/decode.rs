@@ -6,7 +6,7 @@ use glam::DAffine3;
 
 use super::chunk::Chunk;
 use super::cursor::Cursor;
-use super::encode::{END, HEADER, LEAVES, LEVEL, NOTES, PROVENANCE, REPORT};
+use super::encode::{END, HEADER, LEAVES, LEVEL, NOTES, PROVENANCE, REPORT, SIGNS};
 use super::levels::{self, Level};
 use super::{AnyField, FieldMeta, LeafRecord, LoadedField, MAGIC, MAX_LEVELS, SourceKind, Stored, VERSION};
 use crate::error::excerpt;
@@ -194,6 +194,7 @@ fn assemble<T: Stored>(header: Header, chunks: &[Chunk], budget: &mut Budget) ->
                 )?);
             }
             LEAVES => meta.leaves = leaves(&chunk.unpack(budget)?, budget)?,
+            SIGNS => meta.sign_confidence = confidences(&chunk.unpack(budget)?, budget)?,
             REPORT => meta.report = text(chunk.unpack(budget)?)?,
             PROVENANCE => meta.provenance = text(chunk.unpack(budget)?)?,
             NOTES => {
@@ -217,6 +218,15 @@ fn assemble<T: Stored>(header: Header, chunks: &[Chunk], budget: &mut Budget) ->
     if levels.len() != level_count as usize {
         return Err(Fault::Damaged {
             what: format!("{} levels are stored, {level_count} are stated", levels.len()),
+        });
+    }
+    if !meta.sign_confidence.is_empty() && meta.sign_confidence.len() != meta.leaves.len() {
+        return Err(Fault::Damaged {
+            what: format!(
+                "{} confidences are stored for {} leaves",
+                meta.sign_confidence.len(),
+                meta.leaves.len()
+            ),
         });
     }
     reserve_totals(&levels, budget)?;
@@ -274,6 +284,18 @@ fn text(raw: Vec<u8>) -> Result<String, Fault> {
     String::from_utf8(raw).map_err(|_| Fault::Damaged {
         what: "a text chunk is no UTF-8".into(),
     })
+}
+
+fn confidences(raw: &[u8], budget: &mut Budget) -> Result<Vec<f32>, Fault> {
+    let (all, rest) = raw.as_chunks::<4>();
+    budget.reserve("the confidences", all.len() as u64, size_of::<f32>())?;
+    let all: Vec<f32> = all.iter().map(|b| f32::from_le_bytes(*b)).collect();
+    if !rest.is_empty() || all.iter().any(|c| !(0.0..=1.0).contains(c)) {
+        return Err(Fault::Damaged {
+            what: "the table of confidences holds something else".into(),
+        });
+    }
+    Ok(all)
 }
 
 fn leaves(raw: &[u8], budget: &mut Budget) -> Result<Vec<LeafRecord>, Fault> {

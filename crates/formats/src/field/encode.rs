@@ -12,6 +12,7 @@ use crate::Fault;
 pub(super) const HEADER: Kind = *b"HEAD";
 pub(super) const LEVEL: Kind = *b"CORR";
 pub(super) const LEAVES: Kind = *b"LEAF";
+pub(super) const SIGNS: Kind = *b"SIGN";
 pub(super) const REPORT: Kind = *b"REPT";
 pub(super) const NOTES: Kind = *b"NOTE";
 pub(super) const PROVENANCE: Kind = *b"PROV";
@@ -66,6 +67,15 @@ pub(super) fn check<T: Stored>(field: &HierarchicalSpline<T>, meta: &FieldMeta) 
     {
         return refuse("a residual", format!("{leaf:?}"));
     }
+    if !meta.sign_confidence.is_empty() && meta.sign_confidence.len() != meta.leaves.len() {
+        return refuse(
+            "a table of confidences",
+            format!("{} for {} leaves", meta.sign_confidence.len(), meta.leaves.len()),
+        );
+    }
+    if let Some(c) = meta.sign_confidence.iter().find(|c| !(0.0..=1.0).contains(*c)) {
+        return refuse("a confidence", c.to_string());
+    }
     if let Some(iso) = meta.iso.filter(|v| !v.is_finite()) {
         return refuse("an iso-value", iso.to_string());
     }
@@ -91,6 +101,14 @@ pub(super) fn write<T: Stored>(
     }
     if !meta.leaves.is_empty() {
         put(LEAVES, &leaves(meta))?;
+    }
+    if !meta.sign_confidence.is_empty() {
+        let raw: Vec<u8> = meta
+            .sign_confidence
+            .iter()
+            .flat_map(|c| c.to_le_bytes())
+            .collect();
+        put(SIGNS, &raw)?;
     }
     if !meta.report.is_empty() {
         put(REPORT, meta.report.as_bytes())?;

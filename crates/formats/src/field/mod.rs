@@ -73,6 +73,8 @@ pub struct FieldMeta {
     pub report: String,
     /// Error of each leaf, in the fit's order.
     pub leaves: Vec<LeafRecord>,
+    /// Confidence in the sign of each leaf, 0 to 1, in the order of `leaves`; empty where no sign was estimated.
+    pub sign_confidence: Vec<f32>,
     /// Repairs and doubts met on the way.
     pub notes: Vec<String>,
     /// Where the field comes from (input, options, program version), a JSON object or empty.

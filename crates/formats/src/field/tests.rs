@@ -73,6 +73,7 @@ fn meta() -> FieldMeta {
                 reason: 2,
             })
             .collect(),
+        sign_confidence: vec![0.0, 0.25, 0.5, 0.75, 1.0],
         notes: vec!["3 points left out".into(), "µ".into()],
         provenance: "{\"program\":\"isoclay\"}".into(),
     }

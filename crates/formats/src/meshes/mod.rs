@@ -4,6 +4,7 @@ mod gltf;
 mod gltf_write;
 mod obj_write;
 mod ply_write;
+mod read;
 mod stl;
 mod stl_write;
 mod threemf;
@@ -21,95 +22,13 @@ use glam::DVec3;
 pub(crate) use gltf::looks_like_gltf;
 pub use ply_write::save_points;
 pub(crate) use ply_write::write_points as write_ply_points;
+pub(crate) use read::parse;
+pub use read::{parse_gltf, parse_stl, parse_threemf, parse_vrml, read};
 pub(crate) use threemf::looks_like_3mf;
 pub use triangle_mesh::TriangleMesh;
 pub(crate) use vrml::looks_like_vrml;
 
-use crate::detect::{self, Kind, MeshFileFormat, PointFormat};
-use crate::limits::Budget;
-use crate::raw::{RawShape, Wanted};
-use crate::{Fault, FormatError, ReadLimits, Unit, atomic, input, points};
-
-/// Reads a mesh; the format is told by content first, then by name, and `.gz` by its content.
-///
-/// Polygons are cut into triangles. Corners of STL at the same place become one vertex.
-///
-/// # Errors
-/// Every [`Fault`] of reading; [`Fault::Value`] for a file without any face.
-pub fn read(path: &Path, limits: &ReadLimits) -> Result<TriangleMesh, FormatError> {
-    read_faulty(path, limits).map_err(|fault| fault.at(path))
-}
-
-fn read_faulty(path: &Path, limits: &ReadLimits) -> Result<TriangleMesh, Fault> {
-    let mut budget = Budget::new(limits);
-    let bytes = input::open(path)?.read_all(&mut budget)?;
-    let budget = &mut budget;
-    let raw = match detect::kind_of(&bytes, path)? {
-        Kind::Cloud(PointFormat::Ply) => points::ply::parse(&bytes, Wanted::Mesh, budget),
-        Kind::Cloud(PointFormat::Obj) => points::obj::parse(&bytes, Wanted::Mesh, budget),
-        Kind::Mesh(format) => parse(&bytes, format, path, budget),
-        other => Err(Fault::UnknownKind {
-            found: format!("a {other}"),
-            purpose: "mesh",
-            supported: detect::MESHES,
-        }),
-    }?;
-    triangle_mesh::finish(raw, budget)
-}
-
-/// Parses a file that can only be a mesh.
-pub(crate) fn parse(
-    bytes: &[u8],
-    format: MeshFileFormat,
-    path: &Path,
-    budget: &mut Budget,
-) -> Result<RawShape, Fault> {
-    match format {
-        MeshFileFormat::Gltf => gltf::parse(bytes, Some(path), budget),
-        MeshFileFormat::ThreeMf => threemf::parse(bytes, budget),
-        MeshFileFormat::Vrml => vrml::parse(bytes, budget),
-        MeshFileFormat::Stl => stl::parse(bytes, budget),
-    }
-}
-
-/// Reads the bytes of a glTF file, binary or text, whose buffers are in it.
-///
-/// # Errors
-/// A [`Fault`] naming the node or accessor that contradicts the rest, a part that ends too early, or something
-/// that is not read (sparse accessors, compressed buffers).
-pub fn parse_gltf(bytes: &[u8], limits: &ReadLimits) -> Result<TriangleMesh, Fault> {
-    let mut budget = Budget::new(limits);
-    triangle_mesh::finish(gltf::parse(bytes, None, &mut budget)?, &mut budget)
-}
-
-/// Reads the bytes of a 3MF package.
-///
-/// # Errors
-/// A [`Fault`] with the byte of the XML, the object or the part of the package that does not hold, components of
-/// themselves or without end, a required extension that is not read.
-pub fn parse_threemf(bytes: &[u8], limits: &ReadLimits) -> Result<TriangleMesh, Fault> {
-    let mut budget = Budget::new(limits);
-    triangle_mesh::finish(threemf::parse(bytes, &mut budget)?, &mut budget)
-}
-
-/// Reads the text of a VRML97 file.
-///
-/// # Errors
-/// A [`Fault`] with the line for text that breaks the format, an index beyond the points, nodes too deep or too
-/// many, a file of VRML 1.0.
-pub fn parse_vrml(bytes: &[u8], limits: &ReadLimits) -> Result<TriangleMesh, Fault> {
-    let mut budget = Budget::new(limits);
-    triangle_mesh::finish(vrml::parse(bytes, &mut budget)?, &mut budget)
-}
-
-/// Reads the bytes of an STL file, ascii or binary.
-///
-/// # Errors
-/// A [`Fault`] with the line for text that is no STL, a length that is not the count's, no usable triangle.
-pub fn parse_stl(bytes: &[u8], limits: &ReadLimits) -> Result<TriangleMesh, Fault> {
-    let mut budget = Budget::new(limits);
-    triangle_mesh::finish(stl::parse(bytes, &mut budget)?, &mut budget)
-}
+use crate::{Fault, FormatError, Unit, atomic, detect};
 
 /// A triangle mesh to be written; triangles are counterclockwise seen from outside.
 #[derive(Clone, Copy, Debug)]

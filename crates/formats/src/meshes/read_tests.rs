@@ -1,4 +1,7 @@
 use super::*;
+use crate::limits::Budget;
+use crate::raw::Wanted;
+use crate::{ReadLimits, points};
 
 const LIMITS: ReadLimits = ReadLimits { max_bytes: 1 << 20 };
 

@@ -1,5 +1,7 @@
 //! Point clouds in, with the normals that a fit needs, and out.
 
+mod e57;
+mod las;
 mod normals;
 pub(crate) mod obj;
 mod pcd;
@@ -11,6 +13,8 @@ use std::path::Path;
 
 use glam::DVec3;
 
+pub use e57::parse_e57;
+pub use las::parse_las;
 pub use obj::parse_obj;
 pub use pcd::parse_pcd;
 pub use ply::parse_ply;
@@ -94,6 +98,8 @@ fn read_faulty(path: &Path, limits: &ReadLimits) -> Result<PointCloud, Fault> {
         Kind::Cloud(PointFormat::Ply) => ply::parse(&bytes, Wanted::Cloud, budget),
         Kind::Cloud(PointFormat::Xyz) => xyz::parse(&bytes, budget),
         Kind::Cloud(PointFormat::Pcd) => pcd::parse(&bytes, budget),
+        Kind::Cloud(PointFormat::Las) => las::parse(&bytes, budget),
+        Kind::Cloud(PointFormat::E57) => e57::parse(&bytes, budget),
         Kind::Cloud(PointFormat::Obj) => obj::parse(&bytes, Wanted::Cloud, budget),
         Kind::Mesh(format) => meshes::parse(&bytes, format, path, budget),
         other => Err(Fault::UnknownKind {

@@ -3,9 +3,9 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use super::{PointCloud, pcd};
+use super::{PointCloud, e57, las, pcd};
 use crate::meshes::{needs_double, write_ply_points};
-use crate::{Fault, FormatError, atomic, detect};
+use crate::{Fault, FormatError, Unit, atomic, detect};
 
 /// Formats of point clouds to be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,14 +13,19 @@ enum Format {
     Ply,
     Xyz,
     Pcd,
+    Las,
+    Laz,
+    E57,
 }
 
-const SUPPORTED: &str = ".ply, .pcd, .xyz, .xyzn and .txt";
+const SUPPORTED: &str = ".ply, .pcd, .las, .laz, .e57, .xyz, .xyzn and .txt";
 
 /// Writes a cloud in the format of its name, atomically; normals go with the points where there are any.
 ///
 /// Coordinates are single precision in PLY and PCD, unless that would move points by more than a millionth of the
-/// cloud's diagonal (a small thing far from the origin): then they are double. The others keep all digits.
+/// cloud's diagonal (a small thing far from the origin): then they are double. LAS and LAZ hold multiples of a decimal step, a
+/// thousand-millionth of the cloud's extent or finer. The others keep all digits. E57 is in metres, and so are LAS and
+/// LAZ where the unit is known.
 /// The returned notes say what the format cannot hold.
 ///
 /// # Errors
@@ -36,11 +41,26 @@ pub fn save(path: &Path, cloud: &PointCloud) -> Result<Vec<String>, FormatError>
     );
     let format = format_of(path).map_err(|fault| fault.at(path))?;
     let double = needs_double(points);
-    let notes = Vec::new();
+    if format != Format::Xyz && points.len() > u32::MAX as usize {
+        return Err(Fault::Output {
+            what: "a cloud",
+            value: format!("{} points", points.len()),
+            remedy: "split it, or write text",
+        }
+        .at(path));
+    }
     match format {
         Format::Ply => atomic::replace(path, |out| write_ply_points(out, points, normals, None))?,
         Format::Pcd => atomic::replace(path, |out| pcd::write(out, cloud, double))?,
+        Format::Las | Format::Laz => {
+            atomic::replace(path, |out| las::write(out, cloud, format == Format::Laz))?
+        }
+        Format::E57 => atomic::replace(path, |out| e57::write(out, cloud))?,
         Format::Xyz => atomic::replace(path, |out| write_xyz(out, cloud))?,
+    }
+    let mut notes = Vec::new();
+    if format == Format::E57 && cloud.unit == Unit::Unknown {
+        notes.push("the unit of the cloud is not known; the file's numbers mean metres".into());
     }
     Ok(notes)
 }
@@ -51,6 +71,9 @@ fn format_of(path: &Path) -> Result<Format, Fault> {
         _ if detect::is_gz_name(path) => {}
         "ply" => return Ok(Format::Ply),
         "pcd" => return Ok(Format::Pcd),
+        "las" => return Ok(Format::Las),
+        "laz" => return Ok(Format::Laz),
+        "e57" => return Ok(Format::E57),
         "xyz" | "xyzn" | "txt" => return Ok(Format::Xyz),
         _ => {}
     }
@@ -105,17 +128,23 @@ mod tests {
     #[test]
     fn points_come_back_near_and_far_from_the_origin_with_and_without_normals() {
         let directory = tempfile::tempdir().unwrap();
-        for name in ["a.ply", "a.pcd", "a.xyz"] {
+        for name in ["a.ply", "a.pcd", "a.xyz", "a.las", "a.laz", "a.e57"] {
             let path = directory.path().join(name);
-            for (offset, slack) in [(DVec3::ZERO, 1e-6), (DVec3::new(1e6, 5_400_000.0, 12.0), 0.0)] {
+            // Metres become millimetres where the format has no other unit.
+            let scale = if name.ends_with("e57") { 1000.0 } else { 1.0 };
+            for (offset, slack) in [(DVec3::ZERO, 1e-6), (DVec3::new(1e6, 5_400_000.0, 12.0), 2e-9)] {
                 for with_normals in [true, false] {
                     let mut written = cloud(offset);
                     written.normals = written.normals.filter(|_| with_normals);
-                    save(&path, &written).unwrap();
+                    let notes = save(&path, &written).unwrap();
+                    assert_eq!(notes.len(), usize::from(scale > 1.0), "{notes:?}");
                     let back = read(&path, &ReadLimits::default()).unwrap();
                     assert_eq!(back.positions.len(), 40);
                     for (a, b) in back.positions.iter().zip(&written.positions) {
-                        assert!((*a - *b).abs().max_element() <= slack, "{name}: {a} for {b}");
+                        assert!(
+                            (*a / scale - *b).abs().max_element() <= slack,
+                            "{name}: {a} for {b}"
+                        );
                     }
                     assert_eq!(back.normals.is_some(), with_normals, "{name}");
                     for n in back.normals.iter().flatten() {

@@ -68,6 +68,8 @@ pub enum VolumeFormat {
     Nifti,
     /// A NIfTI header with its image beside it.
     NiftiPair,
+    /// A DICOM series: a directory, one of its files, or one file of several frames.
+    Dicom,
     /// NRRD, its voxels in the same file or in others.
     Nrrd,
     /// MetaImage, its voxels in the same file or in others.
@@ -76,8 +78,6 @@ pub enum VolumeFormat {
     Tiff,
     /// The TIFF files of a directory, a slice each.
     TiffFolder,
-    /// A DICOM series: a directory, one of its files, or one file of several frames.
-    Dicom,
     /// Voxels without a header, told by [`VolumeOptions::raw`] alone.
     Raw,
 }
@@ -87,11 +87,11 @@ impl fmt::Display for VolumeFormat {
         f.write_str(match self {
             Self::Nifti => "NIfTI",
             Self::NiftiPair => "NIfTI header and image",
+            Self::Dicom => "DICOM",
             Self::Nrrd => "NRRD",
             Self::MetaImage => "MetaImage",
             Self::Tiff => "TIFF stack",
             Self::TiffFolder => "directory of TIFF slices",
-            Self::Dicom => "DICOM",
             Self::Raw => "raw",
         })
     }
@@ -145,6 +145,17 @@ impl VolumeHeader {
     pub fn spacing(&self) -> DVec3 {
         let m = self.world_from_voxel.matrix3;
         DVec3::new(m.x_axis.length(), m.y_axis.length(), m.z_axis.length())
+    }
+
+    /// States the unit of the file and converts the map to millimetres.
+    ///
+    /// # Errors
+    /// [`crate::Fault::Value`] if `stated` is [`Unit::Unknown`] or the volume already is in a known unit.
+    pub fn to_mm(&mut self, stated: Unit) -> Result<(), crate::Fault> {
+        let scale = stated.scale_for("volume", self.unit)?;
+        self.world_from_voxel = DAffine3::from_scale(DVec3::splat(scale)) * self.world_from_voxel;
+        self.unit = Unit::Millimetre;
+        Ok(())
     }
 
     /// Number of voxels.

@@ -10,8 +10,8 @@ use crate::limits::Budget;
 use crate::{Fault, FormatError};
 
 /// Everything that [`super::read`] reads.
-const VOLUMES: &str =
-    "volumes .nii .hdr .nrrd .nhdr .mha .mhd .tif, each also .gz, DICOM series, directories of .tif";
+pub(crate) const VOLUMES: &str =
+    "volumes .nii .hdr .nrrd .nhdr .mha .mhd .tif, also .gz, DICOM series, directories of .tif";
 
 /// An open volume: its slices as asked, and what it is as a whole.
 pub(super) struct Opened {

@@ -55,6 +55,32 @@ impl VoxelType {
         }
     }
 
+    /// Whether values are whole numbers.
+    pub fn is_integer(self) -> bool {
+        !matches!(self, Self::F32 | Self::F64)
+    }
+
+    /// Smallest and largest finite value.
+    pub fn range(self) -> (f64, f64) {
+        macro_rules! of {
+            ($t:ty) => {
+                (<$t>::MIN as f64, <$t>::MAX as f64)
+            };
+        }
+        match self {
+            Self::U8 => of!(u8),
+            Self::I8 => of!(i8),
+            Self::U16 => of!(u16),
+            Self::I16 => of!(i16),
+            Self::U32 => of!(u32),
+            Self::I32 => of!(i32),
+            Self::U64 => of!(u64),
+            Self::I64 => of!(i64),
+            Self::F32 => of!(f32),
+            Self::F64 => of!(f64),
+        }
+    }
+
     /// Whether `f32` may have to round a value of this type.
     pub fn exceeds_f32(self) -> bool {
         matches!(self, Self::U32 | Self::I32 | Self::U64 | Self::I64 | Self::F64)

@@ -169,7 +169,7 @@ fn a_missing_slice_is_refused_with_its_neighbours_and_filled_on_request() {
     refused(
         read(directory.path()),
         &[
-            "1 slices missing",
+            "with 1 missing",
             "between IM0003.dcm and IM0001.dcm",
             "2.750000 mm",
         ],

@@ -8,7 +8,9 @@ mod accessor;
 mod container;
 mod json;
 
+use std::collections::BTreeMap;
 use std::path::Path;
+use std::rc::Rc;
 
 use glam::{DAffine3, DMat4, DQuat, DVec3};
 
@@ -44,7 +46,8 @@ pub(super) fn parse(bytes: &[u8], path: Option<&Path>, budget: &mut Budget) -> R
         welder: Welder::new(),
         colors: Counted::new("colours"),
         faces: Faces::new(),
-        vertices: 0,
+        numbers: BTreeMap::new(),
+        vertex_count: 0,
         uncolored: 0,
         skipped: 0,
         at_rest: 0,
@@ -56,7 +59,7 @@ pub(super) fn parse(bytes: &[u8], path: Option<&Path>, budget: &mut Budget) -> R
         positions: builder.welder.positions.items,
         ..Default::default()
     };
-    let joined = builder.vertices - raw.positions.len();
+    let joined = builder.vertex_count - raw.positions.len();
     for (count, what) in [
         (joined, "vertices stand at the place of another one; joined"),
         (builder.skipped, "primitives are points or lines; left out"),
@@ -79,8 +82,10 @@ struct Builder<'a> {
     welder: Welder,
     colors: Counted<[u8; 3]>,
     faces: Faces,
+    /// Vertices of the accessors of this node: primitives often share one and differ by their indices.
+    numbers: BTreeMap<u32, Rc<[u32]>>,
     /// Vertices before joining.
-    vertices: usize,
+    vertex_count: usize,
     /// Primitives without colours.
     uncolored: usize,
     skipped: usize,
@@ -137,6 +142,7 @@ impl Builder<'_> {
                     .ok_or_else(|| bad(format!("mesh {mesh} of {}", root.meshes.len())))?;
                 self.at_rest +=
                     usize::from(node.skin.is_some() || mesh.primitives.iter().any(|p| !p.targets.is_empty()));
+                self.numbers.clear();
                 for primitive in &mesh.primitives {
                     self.primitive(primitive, &world_from_node, budget)?;
                 }
@@ -180,19 +186,16 @@ impl Builder<'_> {
             )));
         }
         self.uncolored += usize::from(colors.is_none());
-        budget.reserve("numbers of vertices", positions.count as u64, size_of::<u32>())?;
-        let mut number = Vec::with_capacity(positions.count);
-        for i in 0..positions.count {
-            let at = DVec3::new(positions.at(i, 0), positions.at(i, 1), positions.at(i, 2));
-            let world = world_from_node.transform_point3(at) * MM_PER_METRE;
-            let vertex = self.welder.vertex(world, budget)?;
-            if vertex as usize == self.colors.items.len() {
-                let byte = |c| colors.as_ref().map_or(0.0, |v| v.at(i, c) * 255.0).round() as u8;
-                self.colors.push([byte(0), byte(1), byte(2)], budget)?;
+        let number = match self.numbers.get(&position) {
+            Some(number) => Rc::clone(number),
+            None => {
+                let number: Rc<[u32]> = self
+                    .vertices(&positions, colors.as_ref(), world_from_node, budget)?
+                    .into();
+                self.numbers.insert(position, Rc::clone(&number));
+                number
             }
-            number.push(vertex);
-        }
-        self.vertices += positions.count;
+        };
         let indices = match p.indices {
             Some(index) => {
                 let view = View::new(self.root, self.buffers, index)?;
@@ -236,6 +239,36 @@ impl Builder<'_> {
             self.faces.push(face.into_iter(), budget)?;
         }
         Ok(())
+    }
+}
+
+impl Builder<'_> {
+    /// Places the vertices of a primitive; the number of each.
+    fn vertices(
+        &mut self,
+        positions: &View,
+        colors: Option<&View>,
+        world_from_node: &DAffine3,
+        budget: &mut Budget,
+    ) -> Result<Vec<u32>, Fault> {
+        budget.reserve(
+            "numbers of vertices",
+            positions.count as u64,
+            2 * size_of::<u32>(),
+        )?;
+        self.vertex_count += positions.count;
+        let mut number = Vec::with_capacity(positions.count);
+        for i in 0..positions.count {
+            let at = DVec3::new(positions.at(i, 0), positions.at(i, 1), positions.at(i, 2));
+            let world = world_from_node.transform_point3(at) * MM_PER_METRE;
+            let vertex = self.welder.vertex(world, budget)?;
+            if vertex as usize == self.colors.items.len() {
+                let byte = |c| colors.map_or(0.0, |v| v.at(i, c) * 255.0).round() as u8;
+                self.colors.push([byte(0), byte(1), byte(2)], budget)?;
+            }
+            number.push(vertex);
+        }
+        Ok(number)
     }
 }
 

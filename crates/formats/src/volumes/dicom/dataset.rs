@@ -21,7 +21,8 @@ pub(super) struct DataSet {
     /// `None` if the element is absent, as in files of one frame.
     pub frame_count: Option<u32>,
     pub format: PixelFormat,
-    pub padding: Option<Value>,
+    /// Read as unsigned.
+    pub padding: Option<i64>,
     pub has_modality_table: bool,
     /// Of all frames, unless a frame says otherwise.
     pub common: Attributes,
@@ -122,8 +123,8 @@ const DETECTOR: Tag = 0x0054_0022;
 /// Plane position, plane orientation, pixel measures, pixel value transformation.
 const MACROS: [Tag; 4] = [0x0020_9113, 0x0020_9116, 0x0028_9110, 0x0028_9145];
 
-/// Longest value that is read; the positions of 10⁵ frames fit.
-const LONGEST: u32 = 1 << 20;
+/// Longest value that is read; the offsets of thousands of frames fit.
+const LONGEST: u32 = 1 << 16;
 
 /// Whether a file starts like DICOM.
 pub(crate) fn looks_like_dicom(head: &[u8]) -> bool {
@@ -189,7 +190,7 @@ fn meta_group(stream: &mut Stream) -> Result<Option<String>, Fault> {
         let element = element::parse(&head, stream, Encoding::EXPLICIT)?;
         match element.length {
             Some(length) if element.tag == TRANSFER_SYNTAX && length <= LONGEST => {
-                uid = Some(Value::read(stream, &element, length, Encoding::EXPLICIT)?.text());
+                uid = Some(Value::read(stream, &element, length, Encoding::EXPLICIT)?.label());
             }
             _ => element::skip(stream, &element, Encoding::EXPLICIT)?,
         }
@@ -274,7 +275,6 @@ impl Reader<'_> {
     fn items(&mut self, sequence: &Element, inner: Scope, encoding: Encoding) -> Result<(), Fault> {
         let encoding = element::inside(sequence, encoding);
         let end = sequence.length.map(|n| self.stream.position() + u64::from(n));
-        let mut index = 0;
         loop {
             if let Some(at) = end
                 && self.stream.position() >= at
@@ -296,7 +296,7 @@ impl Reader<'_> {
             let scope = match inner {
                 Scope::Frame(_) if sequence.tag == PER_FRAME_GROUPS => {
                     self.frames.push(Attributes::default(), self.budget)?;
-                    Scope::Frame(index)
+                    Scope::Frame(self.frames.items.len() - 1)
                 }
                 other => other,
             };
@@ -304,7 +304,6 @@ impl Reader<'_> {
                 .length
                 .map_or(End::Delimiter, |n| End::At(self.stream.position() + u64::from(n)));
             self.elements(until, scope, encoding)?;
-            index += 1;
         }
     }
 
@@ -322,7 +321,7 @@ impl Reader<'_> {
             // The scale of a dose grid is a slope by another name.
             0x0028_1053 | 0x3004_000E => attributes.slope = value.real(tag)?,
             0x0028_1052 => attributes.intercept = value.real(tag)?,
-            0x0028_1054 => attributes.rescale_type = Some(value.text()),
+            0x0028_1054 => attributes.rescale_type = Some(value.label()),
             _ if scope == Scope::Root => self.take_root(tag, value)?,
             _ => {}
         }
@@ -333,14 +332,14 @@ impl Reader<'_> {
         let d = &mut self.data;
         let count = |value: &Value| value.integer(tag).map(|n| n.and_then(|n| u32::try_from(n).ok()));
         match tag {
-            0x0008_0008 => d.flavour = value.text().split('\\').nth(2).unwrap_or("").trim().into(),
-            0x0008_0016 => d.sop_class = value.text(),
-            0x0008_0060 => d.series.modality = value.text(),
-            0x0008_103E => d.series.description = value.text(),
-            0x0020_000E => d.series.uid = value.text(),
+            0x0008_0008 => d.flavour = value.part(2),
+            0x0008_0016 => d.sop_class = value.label(),
+            0x0008_0060 => d.series.modality = value.label(),
+            0x0008_103E => d.series.description = value.label(),
+            0x0020_000E => d.series.uid = value.label(),
             0x0020_0011 => d.series.number = value.integer(tag)?,
             0x0028_0002 => d.format.samples = count(&value)?.unwrap_or(1),
-            0x0028_0004 => d.format.photometric = value.text(),
+            0x0028_0004 => d.format.photometric = value.label(),
             0x0028_0008 => d.frame_count = count(&value)?,
             0x0028_0010 => d.rows = count(&value)?.unwrap_or(0),
             0x0028_0011 => d.columns = count(&value)?.unwrap_or(0),
@@ -348,7 +347,7 @@ impl Reader<'_> {
             0x0028_0101 => d.format.bits_stored = count(&value)?.unwrap_or(0),
             0x0028_0102 => d.format.high_bit = count(&value)?.unwrap_or(0),
             0x0028_0103 => d.format.signed = value.integer(tag)? == Some(1),
-            0x0028_0120 => d.padding = Some(value),
+            0x0028_0120 => d.padding = value.integer(tag)?,
             0x3004_000C => d.grid_offsets = value.all_reals(tag)?,
             _ => {}
         }

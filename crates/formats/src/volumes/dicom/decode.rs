@@ -14,7 +14,7 @@ use super::scan::File;
 use super::stream::Stream;
 use super::syntax::Codec;
 use crate::Fault;
-use crate::foreign::guarded;
+use crate::guard;
 use crate::limits::Budget;
 
 /// Reads pictures, compressed ones several at a time.
@@ -188,7 +188,9 @@ impl Worker {
                 fragments.read(&mut stream, plane.frame, &mut self.compressed)?;
                 let (compressed, raw) = (&self.compressed, &mut self.raw);
                 let decode = || codec::decode(source.codec, compressed, &source.shape, raw);
-                source.layout.decoded(guarded("compressed pixels", decode)?)
+                source
+                    .layout
+                    .decoded(guard::decode("decoder of compressed pixels", decode)?)
             }
         };
         self.open = Some((plane.file, stream));
@@ -213,10 +215,6 @@ impl Source {
                 budget,
             )?),
         };
-        let padding = match &data.padding {
-            Some(value) => value.integer(0x0028_0120)?.map(|n| data.format.signed_number(n)),
-            None => None,
-        };
         let shape = Shape {
             rows: data.rows as usize,
             columns: data.columns as usize,
@@ -236,7 +234,7 @@ impl Source {
             at: if fragments.is_some() { 0 } else { pixels.at },
             deflated: data.syntax.deflated,
             fragments,
-            padding,
+            padding: data.padding.map(|n| data.format.signed_number(n)),
         })
     }
 

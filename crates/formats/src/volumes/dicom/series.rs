@@ -50,11 +50,11 @@ impl Series {
             is_scalar(&file.data).map_err(inside)?;
             goes_with(&files[0], file)?;
             let count = frame_count(&file.data).map_err(inside)?;
-            // Ordered, parted from copies, and once more while the vector grows.
+            // Twice while the vector grows, parted from copies, and the slices that are made of them.
             budget.reserve(
                 "the positions of the pictures",
                 count.into(),
-                3 * size_of::<Plane>(),
+                5 * size_of::<Plane>(),
             )?;
             planes.extend(plane::of_file(&file.data, i as u32, count).map_err(inside)?);
         }
@@ -108,7 +108,7 @@ impl Series {
                 all: stack.planes,
                 copies: stack.copies,
                 decoder,
-                copy: vec![0.0; copy_pixels],
+                copy: Vec::new(),
             },
             notes,
         })
@@ -146,6 +146,7 @@ impl Planes {
         self.decoder.read_in_order(&self.files, &self.all, index, out)?;
         let from = self.copies.partition_point(|(i, _)| *i < index);
         for (_, copy) in self.copies[from..].iter().take_while(|(i, _)| *i == index) {
+            self.copy.resize(out.len(), 0.0);
             self.decoder.read(&self.files, copy, &mut self.copy)?;
             let is_same = |(a, b): (&f32, &f32)| a.to_bits() == b.to_bits();
             if !out.iter().zip(&self.copy).all(is_same) {

@@ -293,7 +293,7 @@ fn uneven(
     }
     let mut sorted = distances.clone();
     sorted.sort_by(f64::total_cmp);
-    let usual = sorted[sorted.len() / 2];
+    let usual = sorted[(sorted.len() - 1) / 2];
     let between = |i: usize| format!("between {} and {}", name(&planes[i]), name(&planes[i + 1]));
     let multiple = |d: &f64| (d / usual).round();
     let are_multiples = distances
@@ -303,7 +303,7 @@ fn uneven(
         let gaps = || (0..distances.len()).filter(|i| multiple(&distances[*i]) > 1.0);
         let missing: f64 = distances.iter().map(|d| multiple(d) - 1.0).sum();
         return Some(format!(
-            "{usual:.6} mm with {missing} slices missing, {}",
+            "{usual:.6} mm, with {missing} missing {}",
             some(gaps().map(between))
         ));
     }

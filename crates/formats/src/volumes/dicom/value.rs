@@ -36,6 +36,18 @@ impl Value {
         text.trim_matches(|c: char| c == '\0' || c.is_whitespace()).into()
     }
 
+    /// As the name of something: at most 64 letters, which is what the standard allows.
+    pub fn label(&self) -> String {
+        self.text().chars().take(64).collect()
+    }
+
+    /// One of several names, counted from 0; empty if there are fewer.
+    pub fn part(&self, index: usize) -> String {
+        let text = self.text();
+        let part = text.split('\\').nth(index).unwrap_or("");
+        part.trim().chars().take(64).collect()
+    }
+
     /// The first number; `None` if the value is empty.
     pub fn real(&self, tag: Tag) -> Result<Option<f64>, Fault> {
         Ok(self.all_reals(tag)?.first().copied())

@@ -1,0 +1,87 @@
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use fitting::orient::{OrientOptions, Route, orient_points};
+use fitting::{Cancel, Control};
+use formats::ReadLimits;
+use glam::DVec3;
+
+use super::cost::cpu_seconds;
+use super::failure::{Failure, OrFail, Outcome};
+use super::input::{reading, writing};
+use super::interrupt;
+use crate::charts::{Chart, Oriented};
+
+/// Arguments of `isoclay charts orient`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Clouds with their true normals, of which only the positions are used; a zero normal is that of an outlier
+    #[arg(required = true)]
+    inputs: Vec<PathBuf>,
+    /// Other methods on clouds of the same names, as benches/peers/orientation.py measures them
+    #[arg(long, value_name = "CSV")]
+    peers: Option<PathBuf>,
+    /// Directory for the chart orient.svg; made if missing
+    #[arg(short, long, value_name = "DIR", default_value = "docs/charts")]
+    output: PathBuf,
+}
+
+/// Orients every cloud on both routes, prints a line of CSV each, and draws the chart.
+pub fn run(args: &Args) -> Outcome {
+    let cancel = Cancel::new();
+    interrupt::cancel_on_interrupt(&cancel)?;
+    std::fs::create_dir_all(&args.output)
+        .map_err(|e| anyhow::anyhow!("-o {}: cannot be made ({e})", args.output.display()))
+        .or_limit()?;
+    let mut peers = match &args.peers {
+        Some(path) => {
+            let text = std::fs::read_to_string(path)
+                .map_err(|e| Failure::input(format!("{}: {e}", path.display())))?;
+            Oriented::read_csv(&text).map_err(|e| Failure::input(format!("{}: {e}", path.display())))?
+        }
+        None => Vec::new(),
+    };
+    let mut runs = Vec::new();
+    for route in Route::ALL {
+        for path in &args.inputs {
+            interrupt::check(&cancel)?;
+            let run = measure(path, route, &cancel)?;
+            writeln!(io::stdout().lock(), "{}", run.csv()).or_limit()?;
+            runs.push(run);
+        }
+    }
+    peers.retain(|p| runs.iter().any(|r| r.cloud == p.cloud));
+    runs.append(&mut peers);
+    let svg = Chart::of_orientation(&runs).svg().map_err(Failure::limit)?;
+    let target = args.output.join("orient.svg");
+    formats::atomic::replace(&target, |out| out.write_all(svg.as_bytes())).map_err(writing)
+}
+
+fn measure(path: &Path, route: Route, cancel: &Cancel) -> Outcome<Oriented> {
+    let cloud = formats::points::read(path, &ReadLimits::default()).map_err(reading)?;
+    let Some(truth) = &cloud.normals else {
+        return Err(Failure::input(format!(
+            "{}: has no normals to compare with; give a cloud with true ones",
+            path.display()
+        )));
+    };
+    let mut control = Control {
+        cancel: cancel.clone(),
+        ..Control::default()
+    };
+    let before = cpu_seconds();
+    let found = orient_points(&cloud.positions, &OrientOptions { route }, &mut control)?;
+    let cpu_seconds = cpu_seconds() - before;
+    let known = || truth.iter().zip(&found.normals).filter(|p| *p.0 != DVec3::ZERO);
+    Ok(Oriented {
+        cloud: path
+            .file_stem()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned(),
+        method: route.name().into(),
+        points: known().count(),
+        wrong: known().filter(|(t, n)| t.dot(**n) <= 0.0).count(),
+        cpu_seconds,
+    })
+}

@@ -1,0 +1,99 @@
+use bspline::hierarchical::Lattice;
+use clap::ValueEnum;
+use fitting::orient::{OrientOptions, Orientation, Route, leaf_confidence, orient_points};
+use fitting::{Control, FitError, FitReport, SignReport};
+use formats::points::PointCloud;
+use glam::DVec3;
+
+use super::failure::{Failure, Outcome};
+
+/// How to tell inside from outside where a cloud has no normals.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Unoriented {
+    /// Consistency of the winding number with the normals.
+    Winding,
+    /// Exterior tagged from outside; needs closed surfaces.
+    Tagging,
+}
+
+/// The points that a fit may use, with normals.
+pub struct Oriented<'a> {
+    cloud: &'a PointCloud,
+    kept: Option<(Vec<DVec3>, Vec<DVec3>, Orientation)>,
+}
+
+impl<'a> Oriented<'a> {
+    /// The normals of the file, or estimated ones if the user asks for them.
+    pub fn new(
+        cloud: &'a PointCloud,
+        asked: Option<Unoriented>,
+        control: &mut Control,
+    ) -> Outcome<Result<Self, FitError>> {
+        let Some(asked) = asked else {
+            if cloud.normals.is_none() {
+                return Err(Failure::input(
+                    "the points have no normals, which tell inside from outside; estimate them with --unoriented, \
+                     or give a file with columns nx ny nz, or a mesh with faces",
+                ));
+            }
+            return Ok(Ok(Self { cloud, kept: None }));
+        };
+        let options = OrientOptions {
+            route: match asked {
+                Unoriented::Winding => Route::WindingNumber,
+                Unoriented::Tagging => Route::Tagging,
+            },
+        };
+        let mut orientation = match orient_points(&cloud.positions, &options, control) {
+            Ok(orientation) => orientation,
+            Err(e) => return Ok(Err(e)),
+        };
+        if cloud.normals.is_some() {
+            orientation
+                .notes
+                .insert(0, "--unoriented: the normals of the file were not used".into());
+        }
+        let kept = |all: &[DVec3]| {
+            let on_surface = all.iter().zip(&orientation.outlier).filter(|p| !p.1);
+            on_surface.map(|p| *p.0).collect::<Vec<_>>()
+        };
+        let (positions, normals) = (kept(&cloud.positions), kept(&orientation.normals));
+        Ok(Ok(Self {
+            cloud,
+            kept: Some((positions, normals, orientation)),
+        }))
+    }
+
+    /// Positions of the points to fit.
+    pub fn positions(&self) -> &[DVec3] {
+        self.kept.as_ref().map_or(&self.cloud.positions, |k| &k.0)
+    }
+
+    /// Their normals.
+    pub fn normals(&self) -> &[DVec3] {
+        let given = || self.cloud.normals.as_deref().unwrap_or_default();
+        self.kept.as_ref().map_or_else(given, |k| &k.1)
+    }
+
+    /// Tells in the report of the fit how the normals were found.
+    pub fn complete(self, report: &mut FitReport, lattice: &Lattice) {
+        let Some((positions, _, orientation)) = self.kept else {
+            return;
+        };
+        report.input_count = self.cloud.positions.len();
+        let confidence: Vec<f32> = orientation
+            .confidence
+            .iter()
+            .zip(&orientation.outlier)
+            .filter(|c| !c.1)
+            .map(|c| *c.0)
+            .collect();
+        report.signs = Some(SignReport {
+            route: orientation.route,
+            outlier_count: orientation.outlier.iter().filter(|o| **o).count(),
+            unsure_count: orientation.unsure_count,
+            leaf_confidence: leaf_confidence(&report.leaves, lattice, &positions, &confidence),
+        });
+        report.notes.splice(0..0, orientation.notes);
+    }
+}

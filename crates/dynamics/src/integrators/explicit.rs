@@ -1,0 +1,167 @@
+use bspline::Real;
+
+use super::implicit::Moved;
+use crate::lattice::TensorWorkspace;
+use crate::patch::{Patch, PatchError};
+use crate::solve::{Lanczos, StepSolver, System, dot};
+use crate::springs::{SpringWeights, StepMatrix, Weights};
+
+/// Share of the bound that a step may use: the bound is an estimate from below of the largest eigenvalue.
+const SAFETY: f64 = 0.95;
+const LANCZOS_STEPS: usize = 30;
+
+/// `K̃`, preconditioned by the inverse of `M̃`; on a square lattice, where `A` changes nothing, `K` and `M` themselves.
+struct Stiffness<'a, T> {
+    stiffness: &'a StepMatrix<T>,
+    mass: &'a StepMatrix<T>,
+    solver: &'a mut StepSolver<T>,
+    samples: [Vec<T>; 2],
+    workspace: TensorWorkspace<T>,
+}
+
+impl<T: Real> System<T> for Stiffness<'_, T> {
+    fn apply(&mut self, p: &[T], q: &mut [T]) -> f64 {
+        if self.solver.lattice().is_square() {
+            self.stiffness.apply(p, q);
+            return dot(p, q);
+        }
+        let [d, s] = &mut self.samples;
+        self.solver.lattice().sample(p, d, &mut self.workspace);
+        self.stiffness.apply(d, s);
+        self.solver.lattice().gather(s, q, &mut self.workspace);
+        dot(d, s)
+    }
+
+    fn precondition(&mut self, r: &[T], z: &mut [T]) {
+        if self.solver.lattice().is_square() {
+            for (i, (z, r)) in z.iter_mut().zip(r).enumerate() {
+                *z = *r / self.mass.mass.at(i);
+            }
+        } else {
+            self.solver.solve_coefficients(self.mass, r, z);
+        }
+    }
+}
+
+/// `√λ_max(M̃⁻¹K̃)` by Lanczos steps; `solver` is prepared for the mass.
+pub(crate) fn largest_frequency<T: Real>(
+    stiffness: &StepMatrix<T>,
+    mass: &StepMatrix<T>,
+    solver: &mut StepSolver<T>,
+) -> f64 {
+    let samples = solver.lattice().sample_count();
+    let mut lanczos = Lanczos::new(solver.lattice().coefficient_count());
+    let mut system = Stiffness {
+        stiffness,
+        mass,
+        solver,
+        samples: [vec![T::zero(); samples], vec![T::zero(); samples]],
+        workspace: TensorWorkspace::new(),
+    };
+    lanczos.largest(&mut system, LANCZOS_STEPS).sqrt()
+}
+
+impl<T: Real> Patch<T> {
+    /// The matrix `M + aD`.
+    fn mass_matrix(&self, damping: f64) -> StepMatrix<T> {
+        let springs = self.lumped.springs.iter().take(3).map(|s| SpringWeights {
+            direction: s.direction,
+            weights: Weights::Constant(T::zero()),
+        });
+        let a = T::from_f64(damping);
+        let lumped = &self.lumped;
+        let mass = match (&lumped.mass, &lumped.damping) {
+            (Weights::Constant(m), Weights::Constant(c)) => Weights::Constant(*m + a * *c),
+            (m, c) => Weights::Each((0..self.base.len()).map(|i| m.at(i) + a * c.at(i)).collect()),
+        };
+        StepMatrix::new(self.matrix.dims(), mass, springs.collect())
+    }
+
+    fn mass_solver(&mut self) -> Box<StepSolver<T>> {
+        self.mass_solver.take().unwrap_or_else(|| {
+            let steps = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
+            Box::new(StepSolver::new(
+                self.solver.lattice().clone(),
+                &steps,
+                self.solver.options(),
+            ))
+        })
+    }
+
+    /// The largest stable explicit step, `2/√λ_max(M̃⁻¹K̃)`, by Lanczos steps; of the 4-D law with all tangent factors 1,
+    /// which they never exceed. Infinite without stiffness.
+    ///
+    /// # Errors
+    /// [`PatchError::Solve`].
+    pub fn explicit_limit(&mut self) -> Result<f64, PatchError> {
+        if let Some((version, limit)) = self.limit
+            && version == self.version
+        {
+            return Ok(limit);
+        }
+        let mass = self.mass_matrix(0.0);
+        let scale = self.network.law().scale().powi(2);
+        let springs = self.lumped.springs.iter().map(|s| SpringWeights {
+            direction: s.direction,
+            weights: s.weights.scaled(scale),
+        });
+        let stiffness = StepMatrix::new(
+            self.matrix.dims(),
+            self.lumped.ground.scaled(scale),
+            springs.collect(),
+        );
+        let mut solver = self.mass_solver();
+        self.mass_matrix = None;
+        solver.prepare(&mass)?;
+        let largest = largest_frequency(&stiffness, &mass, &mut solver);
+        self.mass_solver = Some(solver);
+        let limit = if largest > 0.0 {
+            2.0 / largest
+        } else {
+            f64::INFINITY
+        };
+        self.limit = Some((self.version, limit));
+        Ok(limit)
+    }
+
+    /// `v += Δt (M̃ + ΔtD̃)⁻¹ Aᵀ(f - Dw)`, `p += Δt v`.
+    pub(super) fn symplectic_step(&mut self, dt: f64) -> Result<Moved, PatchError> {
+        let limit = SAFETY * self.explicit_limit()?;
+        if dt > limit {
+            return Err(PatchError::Unstable { dt, limit });
+        }
+        let clamped = self.forces(None);
+        let t = T::from_f64;
+        for (i, g) in self.work.g.iter_mut().enumerate() {
+            *g = t(dt) * (self.work.force[i] - self.lumped.damping.at(i) * self.state.w[i]);
+        }
+        let mut solver = self.mass_solver();
+        let kept = self
+            .mass_matrix
+            .take()
+            .filter(|m| (m.0, m.1) == (self.version, dt));
+        let (matrix, prepared) = match kept {
+            Some((.., matrix)) => (matrix, Ok(())),
+            None => {
+                let matrix = self.mass_matrix(dt);
+                let prepared = solver.prepare(&matrix);
+                (matrix, prepared)
+            }
+        };
+        let work = &mut self.work;
+        let report = prepared.map(|()| solver.solve(&matrix, &work.g, &mut work.x, &mut work.dx));
+        self.mass_solver = Some(solver);
+        let report = report?;
+        self.mass_matrix = Some((self.version, dt, matrix));
+        let state = &mut self.state;
+        for ((p, v), x) in state.p.iter_mut().zip(&mut state.v).zip(&work.x) {
+            *v += *x;
+            *p += t(dt) * *v;
+        }
+        for ((d, w), dx) in state.d.iter_mut().zip(&mut state.w).zip(&work.dx) {
+            *w += *dx;
+            *d += t(dt) * *w;
+        }
+        Ok((report, clamped, None))
+    }
+}

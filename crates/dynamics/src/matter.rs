@@ -1,0 +1,201 @@
+//! Fields of matter: mass, damping and stiffness per volume, and the scale of rest lengths.
+//!
+//! Everything is given per volume, `m = μV`, `c = γV`, `k = κV/h²` for a spring along an axis of spacing `h`, where `V`
+//! is the volume of a sample, so that the same matter sampled more finely moves alike.
+
+use bspline::Real;
+
+use crate::lattice::Lattice;
+use crate::springs::{Neighbours, SpringWeights, Weights};
+
+/// One quantity over the samples of a patch.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Quantity {
+    /// The same everywhere.
+    Constant(f64),
+    /// One value per sample, z fastest.
+    PerSample(Vec<f64>),
+}
+
+impl Quantity {
+    /// Value at sample `i`.
+    pub fn at(&self, i: usize) -> f64 {
+        match self {
+            Self::Constant(v) => *v,
+            Self::PerSample(v) => v[i],
+        }
+    }
+
+    /// The values, one per sample, to be painted in place; a constant becomes `samples` equal values.
+    pub fn paint(&mut self, samples: usize) -> &mut [f64] {
+        if let Self::Constant(v) = self {
+            *self = Self::PerSample(vec![*v; samples]);
+        }
+        match self {
+            Self::PerSample(v) => v,
+            Self::Constant(_) => unreachable!("made a list above"),
+        }
+    }
+
+    fn weights<T: Real>(&self, factor: f64) -> Weights<T> {
+        match self {
+            Self::Constant(v) => Weights::Constant(T::from_f64(v * factor)),
+            Self::PerSample(v) => Weights::Each(v.iter().map(|v| T::from_f64(v * factor)).collect()),
+        }
+    }
+
+    fn check(&self, what: &'static str, samples: usize, may_vanish: bool) -> Result<(), MatterError> {
+        let wrong = |v: f64| !(v.is_finite() && (v > 0.0 || (may_vanish && v == 0.0)));
+        match self {
+            Self::Constant(v) if wrong(*v) => Err(MatterError::Value {
+                what,
+                index: 0,
+                value: *v,
+            }),
+            Self::PerSample(v) if v.len() != samples => Err(MatterError::Length {
+                what,
+                found: v.len(),
+                needed: samples,
+            }),
+            Self::PerSample(v) => match v.iter().position(|v| wrong(*v)) {
+                Some(index) => Err(MatterError::Value {
+                    what,
+                    index,
+                    value: v[index],
+                }),
+                None => Ok(()),
+            },
+            Self::Constant(_) => Ok(()),
+        }
+    }
+}
+
+/// Why matter is refused.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MatterError {
+    /// A value that no matter has.
+    #[error(
+        "{what} is {value} at sample {index}; it has to be finite and positive \
+         (stiffness, damping and ground may be 0)"
+    )]
+    Value {
+        /// Which quantity.
+        what: &'static str,
+        /// At which sample; 0 of a constant.
+        index: usize,
+        /// The value.
+        value: f64,
+    },
+    /// A list of the wrong length.
+    #[error("{what} has {found} values, the patch has {needed} samples")]
+    Length {
+        /// Which quantity.
+        what: &'static str,
+        /// Values given.
+        found: usize,
+        /// Values needed.
+        needed: usize,
+    },
+}
+
+/// What a patch is made of.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Matter {
+    /// Stiffness κ per volume (the source paper's ρ).
+    pub stiffness: Quantity,
+    /// Mass μ per volume.
+    pub mass: Quantity,
+    /// Damping γ per volume.
+    pub damping: Quantity,
+    /// Stiffness per volume of springs that tie each density to its rest value; what holds a patch without a rim.
+    pub ground: Quantity,
+    /// Stiffness of single springs relative to `stiffness`, per direction and starting sample, if they differ.
+    pub spring_factors: Option<Vec<Vec<f64>>>,
+}
+
+impl Default for Matter {
+    fn default() -> Self {
+        Self {
+            stiffness: Quantity::Constant(1.0),
+            mass: Quantity::Constant(1.0),
+            damping: Quantity::Constant(0.0),
+            ground: Quantity::Constant(0.0),
+            spring_factors: None,
+        }
+    }
+}
+
+/// Matter on a lattice: numbers per sample and spring.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lumped<T> {
+    /// `m = μV`.
+    pub mass: Weights<T>,
+    /// `c = γV`.
+    pub damping: Weights<T>,
+    /// Ground stiffness times `V`.
+    pub ground: Weights<T>,
+    /// `k` of each spring.
+    pub springs: Vec<SpringWeights<T>>,
+}
+
+impl Matter {
+    /// The numbers on a lattice. A spring lies half in the volume of each of its samples: it has the harmonic mean of
+    /// their stiffness.
+    ///
+    /// # Errors
+    /// [`MatterError`].
+    pub fn lumped<T: Real>(
+        &self,
+        lattice: &Lattice<T>,
+        neighbours: Neighbours,
+    ) -> Result<Lumped<T>, MatterError> {
+        let samples = lattice.sample_count();
+        self.stiffness.check("stiffness", samples, true)?;
+        self.mass.check("mass", samples, false)?;
+        self.damping.check("damping", samples, true)?;
+        self.ground.check("ground stiffness", samples, true)?;
+        let directions = neighbours.directions();
+        if let Some(factors) = &self.spring_factors {
+            if factors.len() != directions.len() {
+                return Err(MatterError::Length {
+                    what: "list of spring directions",
+                    found: factors.len(),
+                    needed: directions.len(),
+                });
+            }
+            for f in factors {
+                Quantity::PerSample(f.clone()).check("spring stiffness", samples, true)?;
+            }
+        }
+        let volume = lattice.sample_volume();
+        let spacing = lattice.spacing();
+        let dims = lattice.sample_dims();
+        let springs = directions.into_iter().enumerate().map(|(n, direction)| {
+            // Along an axis of spacing h: κV/h². Diagonals are for cubic lattices, where all spacings agree.
+            let axis = direction.step.iter().position(|&s| s != 0).unwrap_or(0);
+            let factor = direction.share * volume / (spacing[axis] * spacing[axis]);
+            let own = self.spring_factors.as_ref().map(|f| &f[n]);
+            if let (Quantity::Constant(v), None) = (&self.stiffness, own) {
+                let weights = Weights::Constant(T::from_f64(v * factor));
+                return SpringWeights { direction, weights };
+            }
+            let [dx, dy, dz] = direction.step;
+            let offset = (dx * dims[1] as isize + dy) * dims[2] as isize + dz;
+            let weight = |i: usize| {
+                // Where the lattice ends the number is not read.
+                let j = i.wrapping_add_signed(offset).min(samples - 1);
+                let (a, b) = (self.stiffness.at(i), self.stiffness.at(j));
+                let mean = if a + b > 0.0 { 2.0 * a * b / (a + b) } else { 0.0 };
+                T::from_f64(mean * factor * own.map_or(1.0, |f| f[i]))
+            };
+            let weights = Weights::Each((0..samples).map(weight).collect());
+            SpringWeights { direction, weights }
+        });
+        Ok(Lumped {
+            mass: self.mass.weights(volume),
+            damping: self.damping.weights(volume),
+            ground: self.ground.weights(volume),
+            springs: springs.collect(),
+        })
+    }
+}

@@ -1,0 +1,361 @@
+//! A dynamic patch: a lattice, its matter and springs, and how they move.
+
+use bspline::Real;
+
+use crate::lattice::{Lattice, TensorWorkspace};
+use crate::matter::{Lumped, Matter, MatterError};
+use crate::solve::{SolveError, SolverOptions, StepSolver};
+use crate::springs::{Law, Neighbours, SpringNetwork, SpringWeights, StepMatrix, Weights};
+
+/// Why a patch cannot be made or moved.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PatchError {
+    /// The matter is refused.
+    #[error(transparent)]
+    Matter(#[from] MatterError),
+    /// The step cannot be solved.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
+    /// A list that does not fit the lattice.
+    #[error("{found} {what}; the patch has {needed}")]
+    Length {
+        /// Of what.
+        what: &'static str,
+        /// How many were given.
+        found: usize,
+        /// How many are needed.
+        needed: usize,
+    },
+    /// A number that is not finite.
+    #[error("{what} {index} is {value}; it has to be finite")]
+    NotFinite {
+        /// Which list.
+        what: &'static str,
+        /// Place in it.
+        index: usize,
+        /// The value.
+        value: f64,
+    },
+    /// A scale of densities that is no scale.
+    #[error(
+        "the scale of densities is {scale}; it has to be positive and finite (1/median |∇f| is a good one)"
+    )]
+    Scale {
+        /// Length per density.
+        scale: f64,
+    },
+    /// Springs across diagonals on a lattice that is not cubic.
+    #[error(
+        "the samples lie {spacing:?} apart; springs across diagonals need the same distance on all axes: \
+         choose other sample counts, or six neighbours"
+    )]
+    NotCubic {
+        /// Spacing along x, y and z.
+        spacing: [f64; 3],
+    },
+    /// A time step that is no step.
+    #[error("the time step is {dt}; it has to be positive and finite")]
+    TimeStep {
+        /// The step in seconds.
+        dt: f64,
+    },
+    /// An explicit step beyond its bound.
+    #[error(
+        "an explicit step of {dt:.3e} is unstable beyond {limit:.3e}; use sub-steps or an implicit scheme"
+    )]
+    Unstable {
+        /// The step asked for.
+        dt: f64,
+        /// The largest stable one.
+        limit: f64,
+    },
+}
+
+/// Energies of a state.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Energy {
+    /// `½ẇᵀMẇ` of the densities' velocities.
+    pub kinetic: f64,
+    /// Of the density springs.
+    pub springs: f64,
+    /// Of the ground springs.
+    pub ground: f64,
+}
+
+impl Energy {
+    /// Their sum.
+    pub fn total(self) -> f64 {
+        self.kinetic + self.springs + self.ground
+    }
+}
+
+/// The numbers that a state consists of: changes of the coefficients since the patch was made and their velocities,
+/// with the densities and velocities of the samples.
+#[derive(Clone, Debug, PartialEq)]
+pub struct State<T> {
+    /// Change of the free coefficients.
+    pub p: Vec<T>,
+    /// Its rate.
+    pub v: Vec<T>,
+    /// Densities at the samples.
+    pub d: Vec<T>,
+    /// Their rates, `w = A v`.
+    pub w: Vec<T>,
+}
+
+impl<T: Copy> State<T> {
+    /// Overwrites this state by one of the same patch.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.p.copy_from_slice(&other.p);
+        self.v.copy_from_slice(&other.v);
+        self.d.copy_from_slice(&other.d);
+        self.w.copy_from_slice(&other.w);
+    }
+}
+
+/// A region of a field that moves.
+#[derive(Clone, Debug)]
+pub struct Patch<T> {
+    pub(crate) neighbours: Neighbours,
+    pub(crate) matter: Matter,
+    pub(crate) lumped: Lumped<T>,
+    pub(crate) network: SpringNetwork<T>,
+    pub(crate) state: State<T>,
+    /// Densities of the field the patch was cut from, and where the ground springs rest.
+    pub(crate) base: Vec<T>,
+    pub(crate) external: Vec<T>,
+    pub(crate) solver: StepSolver<T>,
+    /// For the mass alone, made by the first explicit step.
+    pub(crate) mass_solver: Option<Box<StepSolver<T>>>,
+    /// `M + ΔtD` with the version and the step it was made for.
+    pub(crate) mass_matrix: Option<(u64, f64, StepMatrix<T>)>,
+    pub(crate) matrix: StepMatrix<T>,
+    /// What the matrix and the solver were made for.
+    pub(crate) prepared: Option<Prepared>,
+    /// Counts changes of the matter.
+    pub(crate) version: u64,
+    pub(crate) limit: Option<(u64, f64)>,
+    pub(crate) work: Scratch<T>,
+    pub(crate) workspace: TensorWorkspace<T>,
+}
+
+/// Key of the matrix in use.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Prepared {
+    pub version: u64,
+    pub damping: f64,
+    pub stiffness: f64,
+    /// Residual of the first solve with it.
+    pub residual: f64,
+}
+
+/// Vectors of a step.
+#[derive(Clone, Debug)]
+pub(crate) struct Scratch<T> {
+    /// Impulse on the samples.
+    pub g: Vec<T>,
+    pub force: Vec<T>,
+    pub x: Vec<T>,
+    pub dx: Vec<T>,
+    pub first_x: Vec<T>,
+    pub first_dx: Vec<T>,
+    pub before: State<T>,
+}
+
+impl<T: Real> Patch<T> {
+    /// A patch at rest with the densities `d` at its samples.
+    ///
+    /// # Errors
+    /// [`PatchError`] for densities, matter, scale or spacing that are refused.
+    pub fn new(
+        lattice: Lattice<T>,
+        matter: Matter,
+        law: Law,
+        neighbours: Neighbours,
+        d: &[T],
+        options: SolverOptions,
+    ) -> Result<Self, PatchError> {
+        let (n, m) = (lattice.coefficient_count(), lattice.sample_count());
+        finite("density", d, m)?;
+        let scale = law.scale();
+        if !(scale.is_finite() && scale > 0.0) {
+            return Err(PatchError::Scale { scale });
+        }
+        let spacing = lattice.spacing();
+        let cubic = spacing.iter().all(|h| (h / spacing[0] - 1.0).abs() < 1e-9);
+        if neighbours != Neighbours::Six && !cubic {
+            return Err(PatchError::NotCubic { spacing });
+        }
+        let lumped = matter.lumped(&lattice, neighbours)?;
+        let dims = lattice.sample_dims();
+        let network = SpringNetwork::new(dims, spacing, law, lumped.springs.clone(), d);
+        let steps: Vec<_> = neighbours.directions().iter().map(|d| d.step).collect();
+        let springs = lumped.springs.iter().map(|s| SpringWeights {
+            direction: s.direction,
+            weights: match law {
+                Law::Linear { .. } => s.weights.clone(),
+                Law::FourD { .. } => Weights::Each(vec![T::zero(); m]),
+            },
+        });
+        let matrix = StepMatrix::new(dims, lumped.mass.clone(), springs.collect());
+        let zeros = |n: usize| vec![T::zero(); n];
+        let state = State {
+            p: zeros(n),
+            v: zeros(n),
+            d: d.to_vec(),
+            w: zeros(m),
+        };
+        Ok(Self {
+            neighbours,
+            matter,
+            lumped,
+            network,
+            base: d.to_vec(),
+            external: zeros(m),
+            solver: StepSolver::new(lattice, &steps, options),
+            mass_solver: None,
+            mass_matrix: None,
+            matrix,
+            prepared: None,
+            version: 0,
+            limit: None,
+            work: Scratch {
+                g: zeros(m),
+                force: zeros(m),
+                x: zeros(n),
+                dx: zeros(m),
+                first_x: zeros(n),
+                first_dx: zeros(m),
+                before: state.clone(),
+            },
+            state,
+            workspace: TensorWorkspace::new(),
+        })
+    }
+
+    /// The lattice.
+    pub fn lattice(&self) -> &Lattice<T> {
+        self.solver.lattice()
+    }
+
+    /// Where everything is and how fast it moves.
+    pub fn state(&self) -> &State<T> {
+        &self.state
+    }
+
+    /// Puts the patch into a state given by changes of the coefficients and their rates.
+    ///
+    /// # Errors
+    /// [`PatchError::Length`], [`PatchError::NotFinite`].
+    pub fn set_state(&mut self, p: &[T], v: &[T]) -> Result<(), PatchError> {
+        let n = self.lattice().coefficient_count();
+        finite("coefficient", p, n)?;
+        finite("velocity", v, n)?;
+        self.state.p.copy_from_slice(p);
+        self.state.v.copy_from_slice(v);
+        self.sample_state();
+        Ok(())
+    }
+
+    /// Densities and rates of the samples from the coefficients.
+    pub(crate) fn sample_state(&mut self) {
+        let (lattice, state) = (self.solver.lattice(), &mut self.state);
+        lattice.sample(&state.p, &mut state.d, &mut self.workspace);
+        for (d, b) in state.d.iter_mut().zip(&self.base) {
+            *d += *b;
+        }
+        lattice.sample(&state.v, &mut state.w, &mut self.workspace);
+    }
+
+    /// The matter.
+    pub fn matter(&self) -> &Matter {
+        &self.matter
+    }
+
+    /// Changes the matter, also while the patch moves. Costs a new factor or V-cycle at the next implicit step.
+    ///
+    /// # Errors
+    /// [`PatchError::Matter`]; the old matter then stays.
+    pub fn set_matter(&mut self, matter: Matter) -> Result<(), PatchError> {
+        self.lumped = matter.lumped(self.solver.lattice(), self.neighbours)?;
+        self.matter = matter;
+        self.network.set_springs(self.lumped.springs.clone());
+        self.version += 1;
+        Ok(())
+    }
+
+    /// Sets the external forces on the densities of the samples, which hold until they are set again.
+    ///
+    /// # Errors
+    /// [`PatchError::Length`], [`PatchError::NotFinite`]; the old forces then stay.
+    pub fn set_force(&mut self, force: &[T]) -> Result<(), PatchError> {
+        finite("force", force, self.external.len())?;
+        self.external.copy_from_slice(force);
+        Ok(())
+    }
+
+    /// The springs and their rest state.
+    pub fn springs(&self) -> &SpringNetwork<T> {
+        &self.network
+    }
+
+    /// The springs, to change their rest state.
+    pub fn springs_mut(&mut self) -> &mut SpringNetwork<T> {
+        &mut self.network
+    }
+
+    /// Energies of the present state.
+    pub fn energy(&mut self) -> Energy {
+        self.work.force.fill(T::zero());
+        let springs = self.network.add_forces(&self.state.d, &mut self.work.force);
+        Energy {
+            kinetic: self.kinetic(),
+            springs: springs.energy,
+            ground: self.ground_energy(),
+        }
+    }
+
+    pub(crate) fn kinetic(&self) -> f64 {
+        let w = &self.state.w;
+        let terms = w.iter().enumerate();
+        0.5 * terms
+            .map(|(i, w)| self.lumped.mass.at(i).as_f64() * w.as_f64() * w.as_f64())
+            .sum::<f64>()
+    }
+
+    pub(crate) fn ground_energy(&self) -> f64 {
+        if let Weights::Constant(g) = self.lumped.ground
+            && g == T::zero()
+        {
+            return 0.0;
+        }
+        let sigma2 = self.network.law().scale().powi(2);
+        let away = self.state.d.iter().zip(&self.base).enumerate();
+        let terms = away.map(|(i, (d, b))| self.lumped.ground.at(i).as_f64() * (*d - *b).as_f64().powi(2));
+        0.5 * sigma2 * terms.sum::<f64>()
+    }
+}
+
+/// Refuses lists of the wrong length or with NaN or infinity.
+fn finite<T: Real>(what: &'static str, list: &[T], needed: usize) -> Result<(), PatchError> {
+    if list.len() != needed {
+        return Err(PatchError::Length {
+            what: match what {
+                "density" => "densities",
+                "force" => "forces",
+                "velocity" => "velocities",
+                _ => "coefficients",
+            },
+            found: list.len(),
+            needed,
+        });
+    }
+    match list.iter().position(|v| !v.is_finite()) {
+        Some(index) => Err(PatchError::NotFinite {
+            what,
+            index,
+            value: list[index].as_f64(),
+        }),
+        None => Ok(()),
+    }
+}

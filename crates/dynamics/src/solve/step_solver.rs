@@ -1,0 +1,348 @@
+//! Which method solves a step, and the methods behind one interface.
+
+use bspline::Real;
+
+use super::band_cholesky::{BandCholesky, NotPositive};
+use super::dot::dot;
+use super::fast_diagonalization::FastDiagonalization;
+use super::galerkin::Galerkin;
+use super::pcg::{CoefficientSystem, ConjugateGradients, PcgReport, Preconditioner, System};
+use super::sample_multigrid::SampleMultigrid;
+use super::v_cycle::{VCycle, VCycleOptions};
+use crate::lattice::{Lattice, TensorProduct, TensorWorkspace};
+use crate::springs::StepMatrix;
+
+/// Limits of a solve.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SolverOptions {
+    /// Most iterations of conjugate gradients.
+    pub iterations: usize,
+    /// Residual, relative to the impulse, that ends them earlier. `None`: what the precision can reach where a solve is
+    /// exact but for rounding, [`ITERATED`] where it is iterated.
+    pub tolerance: Option<f64>,
+    /// Free coefficients up to which the matrix is factorized.
+    pub direct_limit: usize,
+    /// Of the V-cycle for more.
+    pub v_cycle: VCycleOptions,
+}
+
+impl Default for SolverOptions {
+    fn default() -> Self {
+        Self {
+            iterations: 8,
+            tolerance: None,
+            direct_limit: 1000,
+            v_cycle: VCycleOptions::default(),
+        }
+    }
+}
+
+/// Residual, relative to the impulse, at which the V-cycle and the multigrid stop by default. The increment is then
+/// wrong by about as much, far less than the 0.3 % asked of a step; halving it costs one iteration.
+pub const ITERATED: f64 = 3e-4;
+
+/// How a step was solved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Method {
+    /// Fast diagonalization: constant material.
+    FastDiagonalization,
+    /// Banded Cholesky factor: few coefficients.
+    Direct,
+    /// V-cycle on every other knot: many coefficients.
+    VCycle,
+    /// Banded Cholesky factor on the samples: few, and as many coefficients as samples.
+    SampleDirect,
+    /// Multigrid on the samples: as many coefficients as samples.
+    SampleMultigrid,
+}
+
+impl Method {
+    /// Name in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::FastDiagonalization => "fast-diagonalization",
+            Self::Direct => "direct",
+            Self::VCycle => "v-cycle",
+            Self::SampleDirect => "sample-direct",
+            Self::SampleMultigrid => "sample-multigrid",
+        }
+    }
+}
+
+/// What a solve did.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SolveReport {
+    /// The method.
+    pub method: Method,
+    /// Iterations, residual and curvature.
+    pub iteration: PcgReport,
+}
+
+/// Why a matrix cannot be solved.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum SolveError {
+    /// Not positive definite.
+    #[error(transparent)]
+    NotPositive(#[from] NotPositive),
+}
+
+/// Solves `AᵀSA x = Aᵀg` on one lattice, by the method that its size, its sampling and the material ask for:
+///
+/// | lattice | constant material | painted |
+/// | --- | --- | --- |
+/// | as many coefficients as samples | fast diagonalization on the samples | factor (few) or multigrid on the samples, then `x = A⁻¹d` |
+/// | up to `direct_limit` coefficients | fast diagonalization | banded Cholesky factor |
+/// | more | fast diagonalization | V-cycle |
+#[derive(Clone, Debug)]
+pub struct StepSolver<T> {
+    lattice: Lattice<T>,
+    options: SolverOptions,
+    steps: Vec<[isize; 3]>,
+    method: Method,
+    diagonalization: FastDiagonalization<T>,
+    painted: Painted<T>,
+    inverse: Option<SampleInverse>,
+    iteration: ConjugateGradients<T>,
+    b: Vec<T>,
+    samples: [Vec<T>; 2],
+    workspace: TensorWorkspace<T>,
+}
+
+/// Made when the first painted matrix comes.
+#[derive(Clone, Debug)]
+enum Painted<T> {
+    None,
+    Direct(Box<(Galerkin, BandCholesky<T>)>),
+    VCycle(Box<VCycle<T>>),
+    SampleDirect(BandCholesky<T>),
+    SampleMultigrid(Box<SampleMultigrid<T>>),
+}
+
+/// `A⁻¹` in double precision.
+#[derive(Clone, Debug)]
+struct SampleInverse {
+    product: TensorProduct<f64>,
+    d: Vec<f64>,
+    p: Vec<f64>,
+    workspace: TensorWorkspace<f64>,
+}
+
+/// `S` on the samples.
+struct SampleSystem<'a, T, P> {
+    matrix: &'a StepMatrix<T>,
+    preconditioner: &'a mut P,
+}
+
+impl<T: Real, P: Preconditioner<T>> System<T> for SampleSystem<'_, T, P> {
+    fn apply(&mut self, p: &[T], q: &mut [T]) -> f64 {
+        self.matrix.apply(p, q);
+        dot(p, q)
+    }
+    fn precondition(&mut self, r: &[T], z: &mut [T]) {
+        self.preconditioner.apply(self.matrix, r, z);
+    }
+}
+
+impl<T: Real> StepSolver<T> {
+    /// For a lattice with springs of the given steps.
+    pub fn new(lattice: Lattice<T>, steps: &[[isize; 3]], options: SolverOptions) -> Self {
+        let m = lattice.sample_count();
+        let square = lattice.is_square();
+        let zeros = |n: usize| vec![T::zero(); n];
+        Self {
+            method: Method::FastDiagonalization,
+            diagonalization: if square {
+                FastDiagonalization::on_samples(lattice.sample_dims())
+            } else {
+                FastDiagonalization::new(&lattice)
+            },
+            painted: Painted::None,
+            inverse: square.then(|| SampleInverse {
+                product: lattice.inverse(),
+                d: vec![0.0; m],
+                p: vec![0.0; m],
+                workspace: TensorWorkspace::new(),
+            }),
+            iteration: ConjugateGradients::new(lattice.coefficient_count()),
+            b: zeros(lattice.coefficient_count()),
+            samples: [zeros(m), zeros(m)],
+            workspace: TensorWorkspace::new(),
+            steps: steps.to_vec(),
+            options,
+            lattice,
+        }
+    }
+
+    /// The lattice.
+    pub fn lattice(&self) -> &Lattice<T> {
+        &self.lattice
+    }
+
+    /// The limits.
+    pub fn options(&self) -> SolverOptions {
+        self.options
+    }
+
+    /// The method of the matrix that was prepared last.
+    pub fn method(&self) -> Method {
+        self.method
+    }
+
+    /// Makes ready for a matrix.
+    ///
+    /// # Errors
+    /// [`SolveError`] if it is not positive definite.
+    pub fn prepare(&mut self, s: &StepMatrix<T>) -> Result<(), SolveError> {
+        // Springs across diagonals are no tensor product where the lattice ends.
+        if s.is_uniform() && s.springs.len() == 3 {
+            self.diagonalization.set_constant(s);
+            self.method = Method::FastDiagonalization;
+            return Ok(());
+        }
+        if matches!(self.painted, Painted::None) {
+            self.painted = self.make_painted();
+        }
+        self.method = match &mut self.painted {
+            Painted::None => unreachable!("made above"),
+            Painted::Direct(direct) => {
+                let (galerkin, factor) = &mut **direct;
+                galerkin.assemble(s, factor);
+                factor.factorize()?;
+                Method::Direct
+            }
+            Painted::VCycle(cycle) => {
+                cycle.prepare(s)?;
+                Method::VCycle
+            }
+            Painted::SampleDirect(factor) => {
+                fill_band(s, factor);
+                factor.factorize()?;
+                Method::SampleDirect
+            }
+            Painted::SampleMultigrid(multigrid) => {
+                multigrid.prepare(s)?;
+                Method::SampleMultigrid
+            }
+        };
+        Ok(())
+    }
+
+    fn make_painted(&self) -> Painted<T> {
+        let [_, my, mz] = self.lattice.sample_dims();
+        let (n, m) = (self.lattice.coefficient_count(), self.lattice.sample_count());
+        let few = n <= self.options.direct_limit;
+        match (self.inverse.is_some(), few) {
+            (true, true) => Painted::SampleDirect(BandCholesky::new(m, ((my + 1) * mz + 1).min(m - 1))),
+            (true, false) => {
+                Painted::SampleMultigrid(Box::new(SampleMultigrid::new(self.lattice.sample_dims())))
+            }
+            (false, true) => {
+                let galerkin = Galerkin::new(&self.lattice, &self.steps);
+                let factor = BandCholesky::new(n, galerkin.band());
+                Painted::Direct(Box::new((galerkin, factor)))
+            }
+            (false, false) => Painted::VCycle(Box::new(VCycle::new(
+                &self.lattice,
+                &self.steps,
+                self.options.v_cycle,
+            ))),
+        }
+    }
+
+    /// The increment `x` of the coefficients and `dx = A x` of the densities under the impulses `g` on the samples, for
+    /// the matrix prepared last or one near it.
+    ///
+    /// # Panics
+    /// If a length is wrong.
+    pub fn solve(&mut self, s: &StepMatrix<T>, g: &[T], x: &mut [T], dx: &mut [T]) -> SolveReport {
+        let tolerance = self.options.tolerance.unwrap_or(match self.method {
+            Method::VCycle | Method::SampleMultigrid => ITERATED,
+            _ => 16.0 * T::UNIT_ROUND_OFF,
+        });
+        let cap = self.options.iterations;
+        let iteration = if let Some(inverse) = &mut self.inverse {
+            let mut run = |preconditioner: &mut dyn Preconditioner<T>| {
+                let mut system = SampleSystem {
+                    matrix: s,
+                    preconditioner: &mut Dynamic(preconditioner),
+                };
+                self.iteration.solve(&mut system, g, dx, cap, tolerance)
+            };
+            let report = match (self.method, &mut self.painted) {
+                (Method::SampleDirect, Painted::SampleDirect(factor)) => run(factor),
+                (Method::SampleMultigrid, Painted::SampleMultigrid(multigrid)) => run(&mut **multigrid),
+                _ => run(&mut self.diagonalization),
+            };
+            for (d, dx) in inverse.d.iter_mut().zip(dx.iter()) {
+                *d = dx.as_f64();
+            }
+            inverse
+                .product
+                .apply(&inverse.d, &mut inverse.p, &mut inverse.workspace);
+            for (x, p) in x.iter_mut().zip(&inverse.p) {
+                *x = T::from_f64(*p);
+            }
+            report
+        } else {
+            self.lattice.gather(g, &mut self.b, &mut self.workspace);
+            let report = self.iterate(s, x, cap, tolerance);
+            self.lattice.sample(x, dx, &mut self.workspace);
+            report
+        };
+        SolveReport {
+            method: self.method,
+            iteration,
+        }
+    }
+
+    /// The same for forces `b` on the coefficients, of lattices with fewer coefficients than samples.
+    pub(crate) fn solve_coefficients(&mut self, s: &StepMatrix<T>, b: &[T], x: &mut [T]) {
+        debug_assert!(self.inverse.is_none());
+        self.b.copy_from_slice(b);
+        self.iterate(s, x, self.options.iterations, 16.0 * T::UNIT_ROUND_OFF);
+    }
+
+    /// Solves for the right-hand side in `self.b`.
+    fn iterate(&mut self, s: &StepMatrix<T>, x: &mut [T], cap: usize, tolerance: f64) -> PcgReport {
+        let mut run = |preconditioner: &mut dyn Preconditioner<T>| {
+            let mut system = CoefficientSystem {
+                lattice: &self.lattice,
+                matrix: s,
+                preconditioner: &mut Dynamic(preconditioner),
+                samples: &mut self.samples,
+                workspace: &mut self.workspace,
+            };
+            self.iteration.solve(&mut system, &self.b, x, cap, tolerance)
+        };
+        match (self.method, &mut self.painted) {
+            (Method::Direct, Painted::Direct(direct)) => run(&mut direct.1),
+            (Method::VCycle, Painted::VCycle(cycle)) => run(&mut **cycle),
+            _ => run(&mut self.diagonalization),
+        }
+    }
+}
+
+/// A preconditioner behind a pointer.
+struct Dynamic<'a, T>(&'a mut dyn Preconditioner<T>);
+
+impl<T> Preconditioner<T> for Dynamic<'_, T> {
+    fn apply(&mut self, s: &StepMatrix<T>, r: &[T], z: &mut [T]) {
+        self.0.apply(s, r, z);
+    }
+}
+
+/// Writes `S` itself into a band.
+fn fill_band<T: Real>(s: &StepMatrix<T>, into: &mut BandCholesky<T>) {
+    into.clear();
+    let [mx, my, mz] = s.dims();
+    let mut diagonal: Vec<f64> = (0..mx * my * mz).map(|i| s.mass.at(i).as_f64()).collect();
+    s.for_each_spring(|i, j, w, _| {
+        let (i, j) = (i.min(j), i.max(j));
+        diagonal[i] += w.as_f64();
+        diagonal[j] += w.as_f64();
+        into.set(j, i, -w.as_f64());
+    });
+    for (i, d) in diagonal.into_iter().enumerate() {
+        into.set(i, i, d);
+    }
+}

@@ -1,0 +1,173 @@
+//! Solvers of a step against dense double precision.
+
+use dynamics::lattice::{Lattice, Rim, TensorWorkspace};
+use dynamics::solve::{BandCholesky, Galerkin, Method, SolverOptions, StepSolver};
+use dynamics::springs::{Neighbours, SpringWeights, StepMatrix, Weights};
+use dynamics::study::{Pattern, spring_weights};
+use nalgebra::{DMatrix, DVector};
+
+fn dense(lattice: &Lattice<f64>, s: &StepMatrix<f64>) -> DMatrix<f64> {
+    let n = lattice.coefficient_count();
+    let mut w = TensorWorkspace::new();
+    let (mut d, mut q) = (
+        vec![0.0; lattice.sample_count()],
+        vec![0.0; lattice.sample_count()],
+    );
+    let mut h = DMatrix::zeros(n, n);
+    let mut column = vec![0.0; n];
+    for j in 0..n {
+        let mut e = vec![0.0; n];
+        e[j] = 1.0;
+        lattice.sample(&e, &mut d, &mut w);
+        s.apply(&d, &mut q);
+        lattice.gather(&q, &mut column, &mut w);
+        h.set_column(j, &DVector::from_column_slice(&column));
+    }
+    h
+}
+
+fn matrix(
+    pattern: Pattern,
+    contrast: f64,
+    m: usize,
+    neighbours: Neighbours,
+    stiffness: f64,
+) -> StepMatrix<f64> {
+    let springs = spring_weights(pattern, contrast, m, neighbours, stiffness);
+    let mass = if pattern == Pattern::Uniform {
+        Weights::Constant(1.0)
+    } else {
+        Weights::Each((0..m * m * m).map(|i| 1.0 + (i % 4) as f64).collect())
+    };
+    StepMatrix::new([m; 3], mass, springs)
+}
+
+#[test]
+fn sums_over_pairs_are_the_dense_product_for_all_neighbours_and_rims() {
+    for (n, m, rim) in [(6, 8, Rim::Free), (11, 12, Rim::Fixed), (5, 5, Rim::Free)] {
+        for neighbours in [Neighbours::Six, Neighbours::Eighteen, Neighbours::TwentySix] {
+            let lattice = Lattice::<f64>::cube(n, m, rim, 1.0).unwrap();
+            let s = matrix(Pattern::Random, 100.0, m, neighbours, 3.0);
+            let steps: Vec<_> = neighbours.directions().iter().map(|d| d.step).collect();
+            let h = dense(&lattice, &s);
+            let scale = h.amax();
+            let mut galerkin = Galerkin::new(&lattice, &steps);
+            let count = lattice.coefficient_count();
+            let mut band = BandCholesky::<f64>::new(count, galerkin.band());
+            galerkin.assemble(&s, &mut band);
+            let [_, ny, nz] = lattice.coefficient_dims();
+            let place = |i: usize| [i / (ny * nz), i / nz % ny, i % nz];
+            for i in 0..count {
+                for j in 0..count {
+                    let found = galerkin.element(place(i), place(j));
+                    assert!(
+                        (found - h[(i, j)]).abs() < 1e-13 * scale,
+                        "{n} {neighbours:?} {i} {j}"
+                    );
+                }
+            }
+            let mut diagonal = Galerkin::diagonal(&lattice, &steps);
+            for (i, d) in diagonal.diagonal_of(&s).iter().enumerate() {
+                assert!((d - h[(i, i)]).abs() < 1e-13 * scale);
+            }
+            // The factor solves it.
+            band.factorize().unwrap();
+            let x = DVector::from_fn(count, |i, _| (i as f64).sin());
+            let b = &h * &x;
+            let mut found = b.as_slice().to_vec();
+            band.solve(&mut found);
+            let error = (DVector::from_vec(found) - &x).norm() / x.norm();
+            assert!(error < 1e-9, "{n} {neighbours:?}: {error}");
+        }
+    }
+}
+
+#[test]
+fn a_matrix_that_is_not_positive_definite_is_refused_with_its_pivot() {
+    let mut band = BandCholesky::<f64>::new(9, 2);
+    for i in 0..9 {
+        band.set(i, i, if i == 6 { -1.0 } else { 1.0 });
+    }
+    let refused = band.factorize().unwrap_err();
+    assert_eq!((refused.row, refused.pivot), (6, -1.0));
+}
+
+#[test]
+fn every_method_solves_its_own_kind_of_step() {
+    let cases = [
+        (7, 10, Rim::Free, Pattern::Uniform, Method::FastDiagonalization),
+        (9, 9, Rim::Free, Pattern::Uniform, Method::FastDiagonalization),
+        (7, 10, Rim::Free, Pattern::Bone, Method::Direct),
+        (7, 7, Rim::Free, Pattern::Random, Method::SampleDirect),
+        (9, 9, Rim::Free, Pattern::StiffBall, Method::SampleMultigrid),
+        (9, 12, Rim::Free, Pattern::StiffBall, Method::VCycle),
+    ];
+    for (n, m, rim, pattern, method) in cases {
+        let lattice = Lattice::<f64>::cube(n, m, rim, 1.0).unwrap();
+        let s = matrix(pattern, 1e3, m, Neighbours::Six, 0.5);
+        let steps: Vec<_> = s.springs.iter().map(|s| s.direction.step).collect();
+        let g: Vec<f64> = (0..m * m * m)
+            .map(|i| (0.31 * i as f64).sin() * (1.0 + (i % 11) as f64))
+            .collect();
+        let options = SolverOptions {
+            direct_limit: 500,
+            iterations: 30,
+            tolerance: Some(1e-12),
+            ..SolverOptions::default()
+        };
+        let mut solver = StepSolver::new(lattice.clone(), &steps, options);
+        solver.prepare(&s).unwrap();
+        let (mut x, mut dx) = (vec![0.0; lattice.coefficient_count()], vec![0.0; g.len()]);
+        let report = solver.solve(&s, &g, &mut x, &mut dx);
+        assert_eq!(report.method, method);
+        let mut b = vec![0.0; x.len()];
+        let mut w = TensorWorkspace::new();
+        lattice.gather(&g, &mut b, &mut w);
+        let exact = dense(&lattice, &s)
+            .cholesky()
+            .unwrap()
+            .solve(&DVector::from_vec(b));
+        let mut expected = vec![0.0; g.len()];
+        lattice.sample(exact.as_slice(), &mut expected, &mut w);
+        let norm = |v: &mut dyn Iterator<Item = f64>| v.map(|v| v * v).sum::<f64>().sqrt();
+        let error =
+            norm(&mut dx.iter().zip(&expected).map(|(a, b)| a - b)) / norm(&mut expected.iter().copied());
+        assert!(
+            error < 1e-8,
+            "{n}/{m} {method:?}: {error:.1e} after {:?}",
+            report.iteration
+        );
+        let limit = match method {
+            Method::FastDiagonalization | Method::Direct | Method::SampleDirect => 2,
+            _ => 30,
+        };
+        assert!(
+            report.iteration.iterations <= limit,
+            "{method:?}: {:?}",
+            report.iteration
+        );
+    }
+}
+
+#[test]
+fn negative_curvature_is_reported_and_not_divided_by() {
+    let lattice = Lattice::<f64>::cube(6, 9, Rim::Free, 1.0).unwrap();
+    let s = matrix(Pattern::Uniform, 1.0, 9, Neighbours::Six, 1.0);
+    let steps: Vec<_> = s.springs.iter().map(|s| s.direction.step).collect();
+    let mut solver = StepSolver::new(lattice.clone(), &steps, SolverOptions::default());
+    solver.prepare(&s).unwrap();
+    // Prepared for a good matrix, asked about one with repelling springs.
+    let repelling = s.springs.iter().map(|s| SpringWeights {
+        direction: s.direction,
+        weights: Weights::Constant(-5.0),
+    });
+    let bad = StepMatrix::new([9; 3], Weights::Constant(1.0), repelling.collect());
+    let g: Vec<f64> = (0..729).map(|i| if i % 2 == 0 { 1.0 } else { -1.0 }).collect();
+    let (mut x, mut dx) = (vec![0.0; 216], vec![0.0; 729]);
+    let report = solver.solve(&bad, &g, &mut x, &mut dx);
+    assert!(
+        report.iteration.negative_curvature.is_some_and(|c| c <= 0.0),
+        "{report:?}"
+    );
+    assert!(x.iter().all(|x| x.is_finite()));
+}
