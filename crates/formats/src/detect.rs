@@ -110,7 +110,7 @@ fn kind_of_directory(path: &Path) -> Result<Kind, Fault> {
         return Ok(Kind::Volume(VolumeFormat::TiffFolder));
     }
     Err(Fault::UnknownKind {
-        found: "a directory without slices".into(),
+        found: "a directory without DICOM or TIFF files".into(),
         purpose: "input",
         supported: SUPPORTED,
     })

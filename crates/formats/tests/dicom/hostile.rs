@@ -6,6 +6,7 @@ use formats::ReadLimits;
 use formats::volumes::{self, DicomOptions, Tilt, Uneven};
 
 use super::data;
+use super::writer::Picture;
 
 /// Above what any fixture needs, below what a forged number asks for.
 const LIMITS: ReadLimits = ReadLimits { max_bytes: 4 << 20 };
@@ -89,5 +90,33 @@ fn any_bits_turned_are_refused_or_read_within_the_ceiling() {
             }
             bounded(&bytes, &|| format!("{} case {case}", path.display()));
         }
+    }
+}
+
+/// Reading by recursion would overflow the stack, which nothing can catch.
+#[test]
+fn sequences_nested_without_end_are_refused_or_passed_over() {
+    // Undefined lengths; shared functional groups, in them plane positions in plane positions.
+    for tag in [[0x20, 0, 0x13, 0x91], [9, 0, 1, 0x10]] {
+        let mut bytes = Picture::axial(0.0).bytes();
+        let pixels = bytes
+            .windows(4)
+            .rposition(|w| w == [0xE0, 0x7F, 0x10, 0])
+            .unwrap();
+        bytes.truncate(pixels);
+        let open = |tag: [u8; 4]| {
+            [
+                &tag[..],
+                b"SQ\0\0\xFF\xFF\xFF\xFF",
+                b"\xFE\xFF\0\xE0\xFF\xFF\xFF\xFF",
+            ]
+            .concat()
+        };
+        bytes.extend(open([0, 0x52, 0x29, 0x92]));
+        for _ in 0..50_000 {
+            bytes.extend(open(tag));
+        }
+        let e = volumes::parse_dicom(&bytes, &DicomOptions::default(), &LIMITS).unwrap_err();
+        assert!(e.to_string().contains("nested more than 64 deep"), "{e}");
     }
 }

@@ -107,13 +107,20 @@ pub(super) enum PixelKind {
     Float64,
 }
 
-/// Where an element stands.
+/// Where an element stands. What is wanted lies at most three sequences deep.
 #[derive(Clone, Copy, PartialEq)]
 enum Scope {
     Root,
-    /// In the functional groups of all frames, or the detector of a multi-frame file.
-    Common,
-    /// In the functional groups of a frame.
+    /// Among the functional groups.
+    Groups(Owner),
+    /// In one of the groups, or in the detector of a multi-frame file.
+    Group(Owner),
+}
+
+/// Whose attributes they are.
+#[derive(Clone, Copy, PartialEq)]
+enum Owner {
+    All,
     Frame(usize),
 }
 
@@ -294,9 +301,9 @@ impl Reader<'_> {
                 _ => return Err(element::misplaced(&item, &self.stream)),
             }
             let scope = match inner {
-                Scope::Frame(_) if sequence.tag == PER_FRAME_GROUPS => {
+                Scope::Groups(_) if sequence.tag == PER_FRAME_GROUPS => {
                     self.frames.push(Attributes::default(), self.budget)?;
-                    Scope::Frame(self.frames.items.len() - 1)
+                    Scope::Groups(Owner::Frame(self.frames.items.len() - 1))
                 }
                 other => other,
             };
@@ -309,8 +316,8 @@ impl Reader<'_> {
 
     fn take(&mut self, tag: Tag, value: Value, scope: Scope) -> Result<(), Fault> {
         let attributes = match scope {
-            Scope::Root | Scope::Common => &mut self.data.common,
-            Scope::Frame(i) => &mut self.frames.items[i],
+            Scope::Root | Scope::Groups(Owner::All) | Scope::Group(Owner::All) => &mut self.data.common,
+            Scope::Groups(Owner::Frame(i)) | Scope::Group(Owner::Frame(i)) => &mut self.frames.items[i],
         };
         match tag {
             0x0020_0032 => attributes.position = value.reals(tag)?,
@@ -367,9 +374,10 @@ fn check_end(stream: &Stream, at: u64) -> Result<(), Fault> {
 /// Where the items of an element stand, if they are wanted.
 fn scope_of(tag: Tag, scope: Scope) -> Option<Scope> {
     match (scope, tag) {
-        (Scope::Root, SHARED_GROUPS | DETECTOR) => Some(Scope::Common),
-        (Scope::Root, PER_FRAME_GROUPS) => Some(Scope::Frame(0)),
-        (Scope::Common | Scope::Frame(_), tag) if MACROS.contains(&tag) => Some(scope),
+        (Scope::Root, SHARED_GROUPS) => Some(Scope::Groups(Owner::All)),
+        (Scope::Root, PER_FRAME_GROUPS) => Some(Scope::Groups(Owner::Frame(0))),
+        (Scope::Root, DETECTOR) => Some(Scope::Group(Owner::All)),
+        (Scope::Groups(owner), tag) if MACROS.contains(&tag) => Some(Scope::Group(owner)),
         _ => None,
     }
 }
