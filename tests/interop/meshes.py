@@ -27,7 +27,7 @@ def with_meshlab(path):
     ms = pymeshlab.MeshSet()
     ms.load_new_mesh(str(path))
     mesh = ms.current_mesh()
-    return mesh.vertex_matrix(), mesh.face_matrix(), None
+    return mesh.transformed_vertex_matrix(), mesh.face_matrix(), None
 
 
 def with_lib3mf(path):
@@ -58,7 +58,7 @@ readers = [
     ('ply', with_plyfile, 1, True), ('ply', with_trimesh, 1, True), ('ply', with_meshlab, 1, True),
     ('stl', with_trimesh, 1, False), ('stl', with_meshlab, 1, False),
     ('obj', with_trimesh, 1, True), ('obj', with_meshlab, 1, True),
-    ('glb', with_trimesh, 1000, True), ('gltf', with_trimesh, 1000, True), ('glb', with_meshlab, 1000, False),
+    ('glb', with_trimesh, 1000, True), ('gltf', with_trimesh, 1000, True), ('glb', with_meshlab, 1000, True),
     ('3mf', with_lib3mf, 1, False), ('3mf', with_trimesh, 1, True), ('3mf', with_meshlab, 1, False),
     ('wrl', with_meshlab, 1, False),
 ]

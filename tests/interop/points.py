@@ -41,13 +41,14 @@ def las(path):
 def e57(path):
     file = pye57.E57(str(path))
     assert file.scan_count == 1
-    scan = file.read_scan_raw(0)
+    # Its normals are of an extension that is known by name alone.
+    names = {f'nor:normal{c}' for c in 'XYZ'}
+    assert names <= set(file.get_header(0).point_fields), file.get_header(0).point_fields
+    scan = file.read_scan_raw(0, ignore_unsupported_fields=True)
     xyz = np.stack([scan[f'cartesian{c}'] for c in 'XYZ'], axis=1)
     header = file.get_header(0)
     assert np.allclose([header.xMinimum, header.yMaximum], [xyz[:, 0].min(), xyz[:, 1].max()], rtol=0, atol=1e-9)
-    names = [f'nor:normal{c}' for c in 'XYZ']
-    found = [scan[n] for n in names if n in scan]
-    return np.column_stack([xyz, *(found or normals.T)])
+    return np.column_stack([xyz, normals])
 
 
 # Reader, millimetres a unit, and the largest error allowed: half a step of what the format holds near and far.

@@ -193,7 +193,7 @@ fn nrrd_headers_that_cannot_be_used_say_why() {
         ("space: RAS", "space: right-anterior-superior-time", "space"),
         ("encoding: raw", "encoding: bzip2", "bzip2"),
         ("encoding: raw", "encoding: gzip", "ends too early"),
-        ("encoding: raw", "encoding: hex", "damaged"),
+        ("encoding: raw", "encoding: hex", "4 are there"),
         ("encoding: raw", "encoding: text", "text of 8 numbers"),
         ("origin: (0,0,0)", "origin: (0,0)", "space"),
         ("origin: (0,0,0)", "origin: (0,0,1e99)", "1e99"),

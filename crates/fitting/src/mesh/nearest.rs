@@ -108,3 +108,47 @@ pub(crate) fn closest_point(p: DVec3, &[a, b, c]: &[DVec3; 3]) -> (DVec3, bool) 
     let share = 1.0 / (va + vb + vc);
     (a + ab * (vb * share) + ac * (vc * share), true)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::phantoms::SplitMix64;
+
+    #[test]
+    fn the_tree_finds_what_looking_at_all_triangles_finds() {
+        let mut random = SplitMix64::new(1);
+        let triangles: Vec<[DVec3; 3]> = (0..500)
+            .map(|_| {
+                let p = random.uniform3();
+                [p, p + random.uniform3() * 0.1, p + random.uniform3() * 0.1]
+            })
+            .collect();
+        let tree = TriangleTree::new(&triangles);
+        for i in 0..500 {
+            let p = random.uniform3() * 2.0 - 0.5;
+            let all = triangles
+                .iter()
+                .map(|t| p.distance_squared(closest_point(p, t).0));
+            let least = all.fold(f64::INFINITY, f64::min);
+            assert_eq!(tree.nearest(p, 0).distance_squared, least);
+            assert_eq!(tree.nearest(p, i).distance_squared, least, "with a hint");
+        }
+    }
+
+    #[test]
+    fn the_nearest_point_of_a_triangle_is_no_farther_than_any_other() {
+        let mut random = SplitMix64::new(2);
+        for _ in 0..200 {
+            let t = [random.uniform3(), random.uniform3(), random.uniform3()];
+            let p = random.uniform3() * 3.0 - 1.0;
+            let (nearest, _) = closest_point(p, &t);
+            for i in 0..=20 {
+                for j in 0..=20 - i {
+                    let (s, r) = (f64::from(i) / 20.0, f64::from(j) / 20.0);
+                    let q = t[0] + (t[1] - t[0]) * s + (t[2] - t[0]) * r;
+                    assert!(p.distance(nearest) <= p.distance(q) + 1e-12);
+                }
+            }
+        }
+    }
+}

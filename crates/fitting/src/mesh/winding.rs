@@ -171,3 +171,50 @@ impl Turn {
         self.whole + libm::atan2(self.im, self.re) / (2.0 * PI)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::phantoms::SplitMix64;
+
+    /// Triangles that close nothing: every error shows.
+    fn soup(count: usize) -> Vec<[DVec3; 3]> {
+        let mut random = SplitMix64::new(3);
+        (0..count)
+            .map(|_| {
+                let p = random.uniform3();
+                [p, p + random.uniform3() * 0.1, p + random.uniform3() * 0.1]
+            })
+            .collect()
+    }
+
+    #[test]
+    fn the_tree_gives_the_sum_of_the_solid_angles() {
+        let triangles = soup(3000);
+        let tree = WindingTree::new(Arc::new(TriangleTree::new(&triangles)));
+        let mut random = SplitMix64::new(4);
+        for _ in 0..200 {
+            let q = random.uniform3() * 2.0 - 0.5;
+            let angle = |t| {
+                let (re, im) = half_solid_angle(q, t);
+                im.atan2(re) / (2.0 * PI)
+            };
+            let sum: f64 = triangles.iter().map(angle).sum();
+            assert!((tree.at(q) - sum).abs() < 5e-3 * sum.abs().max(1.0), "{q}");
+        }
+    }
+
+    #[test]
+    fn angles_add_up_over_whole_turns() {
+        let mut turn = Turn::default();
+        let mut sum = 0.0;
+        let mut random = SplitMix64::new(5);
+        for i in 0..1000 {
+            // Up for a while, then down.
+            let angle = (random.uniform() - 0.2) * if i < 500 { 3.0 } else { -3.0 };
+            turn.add(5.0 * angle.cos(), 5.0 * angle.sin());
+            sum += angle;
+            assert!((turn.turns() - sum / (2.0 * PI)).abs() < 1e-11);
+        }
+    }
+}

@@ -63,7 +63,7 @@ fn quadrics(
         let count = NonZero::new(k).expect("not zero");
         let mut found: Vec<(f64, f64)> = (0..points.len())
             .step_by(stride)
-            .filter(|&i| same_wall(i, i))
+            .filter(|&i| same_wall.as_ref().is_none_or(|same| same(i, i)))
             .filter_map(|i| {
                 let near = tree
                     .query(&points[i].to_array())

@@ -49,7 +49,7 @@ fn neighbours(samples: &Samples, tree: &Tree, i: usize) -> ([u32; NEIGHBOURS], f
         .nearest_n::<SquaredEuclidean<f64>>(NonZero::new(NEIGHBOURS + 1).expect("not zero"))
         .execute();
     let reach = found.last().map_or(0.0, |n| n.distance);
-    let mut others = found.iter().map(|n| n.item as u32).filter(|&j| j as usize != i);
+    let mut others = found.iter().map(|n| n.item).filter(|&j| j as usize != i);
     (std::array::from_fn(|_| others.next().unwrap_or(i as u32)), reach)
 }
 

@@ -124,7 +124,7 @@ pub(super) fn buffer_bytes(mesh: &Mesh) -> u64 {
 pub(super) fn write_binary(out: &mut dyn Write, mesh: &Mesh) -> io::Result<()> {
     let layout = Layout::of(mesh);
     let mut document = layout.document(mesh, "}]}");
-    while document.len() % 4 != 0 {
+    while !document.len().is_multiple_of(4) {
         document.push(' ');
     }
     let buffer = layout.bytes();

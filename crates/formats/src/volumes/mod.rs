@@ -1,4 +1,21 @@
 //! Volumes in and out.
+//!
+//! | format | read | not read, and refused by name |
+//! | --- | --- | --- |
+//! | NIfTI-1, -2 | `.nii`, header and image pairs, both byte orders | time series, colour, complex |
+//! | DICOM | series, multi-frame files, see [`DicomOptions`] | colour, video |
+//! | NRRD | attached or detached, lists of files; raw, gzip, text, hex; RAS, LAS, LPS | bzip2, `block`, vectors, time |
+//! | MetaImage | `.mha`, `.mhd`, lists and patterns of files; raw, zlib, text; LPS as ITK has it | channels, other than 3 axes |
+//! | TIFF | pages of a file (BigTIFF, ImageJ's form beyond 4 GB), files of a directory in the order of their numbers; plain, deflate, LZW, PackBits | colour, palettes, white as zero, JPEG |
+//! | raw | any layout that is stated, [`RawLayout`] | |
+//!
+//! Whole files may be gzipped. Voxels are integers of 8 to 64 bits or floats of 32 and 64, held as `f32`.
+//! A length unit is what the file names, else unknown: NRRD and MetaImage rarely name one, TIFF gives lengths only
+//! where ImageJ's description has all three and a unit; [`VolumeOptions::spacing_mm`] states what is missing.
+//! A header names only data files of its own directory or below it, by a relative name without `..`.
+//!
+//! [`peek`] tells dimensions, spacing and memory need, [`range`] the densities in one pass that holds a slice,
+//! [`read`] gives the voxels; all three of a region and stride if asked. [`save_slices`] writes, slice by slice.
 
 mod detached;
 mod dicom;

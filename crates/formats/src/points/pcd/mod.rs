@@ -81,16 +81,14 @@ fn reserve(header: &Header, available: u64, budget: &mut Budget) -> Result<usize
 }
 
 fn columns(bytes: &[u8], header: &Header, place: impl Fn(&Column, usize) -> usize, raw: &mut RawShape) {
-    let gather = |columns: &[Column]| -> Vec<DVec3> {
-        (0..header.points as usize)
-            .map(|row| {
-                let at = |c: &Column| c.kind.decode(&bytes[place(c, row)..]);
-                DVec3::new(at(&columns[0]), at(&columns[1]), at(&columns[2]))
-            })
-            .collect()
+    let rows = header.points as usize;
+    let gather = |columns: &[Column], row: usize| {
+        let at = |c: &Column| c.kind.decode(&bytes[place(c, row)..]);
+        DVec3::new(at(&columns[0]), at(&columns[1]), at(&columns[2]))
     };
-    raw.positions = gather(&header.columns[..3]);
-    raw.normals = header.columns.get(3..6).map(gather);
+    raw.positions = (0..rows).map(|row| gather(&header.columns[..3], row)).collect();
+    let normal = header.columns.get(3..6);
+    raw.normals = normal.map(|c| (0..rows).map(|row| gather(c, row)).collect());
 }
 
 fn unpack(body: &[u8], header: &Header, budget: &mut Budget) -> Result<Vec<u8>, Fault> {

@@ -106,7 +106,7 @@ pub(super) fn in_files(
 ) -> Result<Box<dyn SliceSource>, Fault> {
     let parts = paths.len() as u64;
     let values = header.voxel_count() as u64;
-    if parts == 0 || values % parts != 0 {
+    if parts == 0 || !values.is_multiple_of(parts) {
         return Err(Fault::Value {
             what: "the number of data files",
             value: format!("{parts} for {values} voxels"),

@@ -63,10 +63,15 @@ impl Predictor {
 }
 
 /// Fills `out` from `packed`; what is too short or does not hold is told in words.
-pub(super) fn inflate(how: Compression, packed: &[u8], out: &mut [u8]) -> Result<(), String> {
+pub(super) fn inflate(
+    how: Compression,
+    zlib: &mut Decompress,
+    packed: &[u8],
+    out: &mut [u8],
+) -> Result<(), String> {
     let filled = match how {
         Compression::None => unreachable!("plain chunks are read in place"),
-        Compression::Deflate => deflate(packed, out)?,
+        Compression::Deflate => deflate(zlib, packed, out)?,
         Compression::Lzw => lzw(packed, out)?,
         Compression::PackBits => pack_bits(packed, out),
     };
@@ -76,8 +81,8 @@ pub(super) fn inflate(how: Compression, packed: &[u8], out: &mut [u8]) -> Result
     Ok(())
 }
 
-fn deflate(packed: &[u8], out: &mut [u8]) -> Result<usize, String> {
-    let mut state = Decompress::new(true);
+fn deflate(state: &mut Decompress, packed: &[u8], out: &mut [u8]) -> Result<usize, String> {
+    state.reset(true);
     loop {
         let (read, written) = (state.total_in() as usize, state.total_out() as usize);
         let status = state
@@ -196,12 +201,13 @@ mod tests {
             0xfe, 0xaa, 0x02, 0x80, 0x00, 0x2a, 0xfd, 0xaa, 0x03, 0x80, 0x00, 0x2a, 0x22, 0xf7, 0xaa,
         ];
         let mut out = [0; 24];
-        inflate(Compression::PackBits, &packed, &mut out).unwrap();
+        let mut zlib = Decompress::new(true);
+        inflate(Compression::PackBits, &mut zlib, &packed, &mut out).unwrap();
         assert_eq!(out[..7], [0xaa, 0xaa, 0xaa, 0x80, 0x00, 0x2a, 0xaa]);
         assert_eq!(out[14..], [0xaa; 10]);
         for cut in 0..packed.len() {
             assert!(
-                inflate(Compression::PackBits, &packed[..cut], &mut out).is_err(),
+                inflate(Compression::PackBits, &mut zlib, &packed[..cut], &mut out).is_err(),
                 "{cut}"
             );
         }

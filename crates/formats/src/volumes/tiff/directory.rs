@@ -14,6 +14,8 @@ const MOST_ENTRIES: u64 = 4096;
 pub(super) struct Bytes<'a> {
     reader: Box<dyn Random + 'a>,
     length: u64,
+    /// Where the reader stands, if it is known.
+    position: Option<u64>,
     pub is_big_endian: bool,
     is_big_tiff: bool,
 }
@@ -47,6 +49,7 @@ impl<'a> Bytes<'a> {
         let mut bytes = Self {
             reader,
             length,
+            position: None,
             is_big_endian: false,
             is_big_tiff: false,
         };
@@ -87,10 +90,15 @@ impl<'a> Bytes<'a> {
                 found: self.length.saturating_sub(at),
             });
         }
-        self.reader
-            .seek(SeekFrom::Start(at))
+        // A relative step keeps what the reader has buffered.
+        let step = match self.position.take() {
+            Some(position) => self.reader.seek_relative(at.wrapping_sub(position) as i64),
+            None => self.reader.seek(SeekFrom::Start(at)).map(drop),
+        };
+        step.and_then(|()| self.reader.read_exact(buffer))
             .map_err(io_fault("reading"))?;
-        self.reader.read_exact(buffer).map_err(io_fault("reading"))
+        self.position = Some(end);
+        Ok(())
     }
 
     /// Reads the directory at byte `at`.

@@ -55,13 +55,18 @@ pub(super) fn open(path: &Path, budget: &mut Budget) -> Result<Box<dyn SliceSour
 /// A file that can be sought in: what is gzipped is inflated whole, which is booked.
 fn random(path: &Path, budget: &mut Budget) -> Result<(Box<dyn Random>, u64), Fault> {
     let input = input::open(path)?;
-    if let (input::Source::Plain(_), Some(length)) = (&input.source, input.length_bound) {
-        let file = File::open(path).map_err(io_fault("opening"))?;
-        return Ok((Box::new(BufReader::with_capacity(1 << 16, file)), length));
+    if let (input::Source::Plain(_), Some(_)) = (&input.source, input.length_bound) {
+        return plain(path);
     }
     let bytes = input.read_all(budget)?;
     let length = bytes.len() as u64;
     Ok((Box::new(Cursor::new(bytes)), length))
+}
+
+fn plain(path: &Path) -> Result<(Box<dyn Random>, u64), Fault> {
+    let file = File::open(path).map_err(io_fault("opening"))?;
+    let length = file.metadata().map_err(io_fault("opening"))?.len();
+    Ok((Box::new(BufReader::with_capacity(READER as usize, file)), length))
 }
 
 /// The pages of one file as slices; `again` gives the content once more, from its start.
@@ -210,9 +215,9 @@ fn name_of(path: &Path) -> String {
         .into_owned()
 }
 
-/// A file that has one page.
+/// A file that has one page; in a directory none is gzipped, so that no file has to be held whole.
 fn one_page(path: &Path, budget: &mut Budget) -> Result<Stack<'static>, Fault> {
-    let (reader, length) = random(path, budget)?;
+    let (reader, length) = plain(path)?;
     let stack = Stack::open(reader, length, budget)?;
     if stack.count() != 1 {
         return Err(Fault::Value {

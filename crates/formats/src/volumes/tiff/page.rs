@@ -101,6 +101,7 @@ pub(super) struct Stack<'a> {
     pub first: Page,
     packed: Vec<u8>,
     chunk: Vec<u8>,
+    zlib: flate2::Decompress,
 }
 
 impl<'a> Stack<'a> {
@@ -138,6 +139,7 @@ impl<'a> Stack<'a> {
             first,
             packed: Vec::new(),
             chunk: Vec::new(),
+            zlib: flate2::Decompress::new(true),
         })
     }
 
@@ -191,7 +193,7 @@ impl<'a> Stack<'a> {
             } else {
                 self.packed.resize(length as usize, 0);
                 self.bytes.read_at(at, &mut self.packed)?;
-                inflate(layout.compression, &self.packed, &mut self.chunk)
+                inflate(layout.compression, &mut self.zlib, &self.packed, &mut self.chunk)
                     .map_err(|what| damaged(format!("chunk {k}: {what}")))?;
             }
             for row in self.chunk.chunks_exact_mut(row_bytes) {
