@@ -317,9 +317,15 @@ fn directories_below_are_looked_into_where_the_first_holds_no_picture() {
 #[test]
 fn a_directory_without_pictures_is_refused() {
     let directory = tempfile::tempdir().unwrap();
-    refused(read(directory.path()), &["a directory without DICOM or TIFF files"]);
+    refused(
+        read(directory.path()),
+        &["a directory without DICOM or TIFF files"],
+    );
     std::fs::write(directory.path().join("a.txt"), "hello").unwrap();
-    refused(read(directory.path()), &["a directory without DICOM or TIFF files"]);
+    refused(
+        read(directory.path()),
+        &["a directory without DICOM or TIFF files"],
+    );
     // DICOM, but a report.
     let mut report = Picture::axial(0.0).bytes();
     let pixels = report
