@@ -220,3 +220,46 @@ fn near_occupied(c: &Cell, occupied: &FxHashSet<[u32; 3]>) -> bool {
     let range = |a: usize| c.at[a].saturating_sub(1)..=(c.at[a] + 1).min(last);
     range(0).any(|x| range(1).any(|y| range(2).any(|z| occupied.contains(&[x, y, z]))))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::phantoms::SplitMix64;
+
+    #[test]
+    fn swept_distances_are_those_to_the_nearest_point() {
+        let mut random = SplitMix64::new(1);
+        let points: Vec<DVec3> = (0..2000)
+            .map(|_| random.normal3().normalize() * 0.5 + 0.5)
+            .collect();
+        let band = Band::new(&points, 0.03);
+        let finest = 1.0 / f64::from(1u32 << band.depth);
+        for (i, c) in band.cells.iter().enumerate() {
+            let at = centre(c);
+            let exact = points
+                .iter()
+                .map(|&p| place(p).distance(at))
+                .fold(f64::INFINITY, f64::min);
+            // A leaf learns from its neighbours only, so the nearest point may be missed for one almost as near.
+            assert!(
+                band.distance[i] >= exact - 1e-12 && band.distance[i] < exact + 0.1 * finest,
+                "leaf {i}"
+            );
+        }
+    }
+
+    #[test]
+    fn leaves_fill_the_box_and_neighbours_differ_by_one_level() {
+        let points = [DVec3::ZERO, DVec3::ONE, DVec3::new(0.3, 0.9, 0.2)];
+        let band = Band::new(&points, 0.02);
+        let volume: f64 = band.cells.iter().map(|c| 0.125f64.powi(i32::from(c.level))).sum();
+        assert_eq!(volume, 1.0);
+        for i in 0..band.cells.len() {
+            assert!(!band.neighbours(i).is_empty());
+            for &j in band.neighbours(i) {
+                assert!(band.cells[i].level.abs_diff(band.cells[j as usize].level) <= 1);
+                assert!(band.neighbours(j as usize).contains(&(i as u32)));
+            }
+        }
+    }
+}

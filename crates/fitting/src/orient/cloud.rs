@@ -25,7 +25,7 @@ pub(crate) struct Cloud {
 }
 
 /// Fewest points that can stand for a surface; as for fits.
-const FEWEST: usize = 10;
+pub(crate) const FEWEST: usize = 10;
 
 impl Cloud {
     /// Checks, scales, sorts, and merges points that coincide.

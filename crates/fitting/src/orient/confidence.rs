@@ -6,10 +6,11 @@ use rustc_hash::FxHashMap;
 
 use crate::Leaf;
 
+use super::UNSURE;
 use super::cloud::Cloud;
 use super::kernel::{Target, Winding};
+use super::surface::Surface;
 use super::tree::Tree;
-use super::{Surface, UNSURE};
 
 /// Distance of the two places where the winding number is asked, in local spacings and in standard deviations of
 /// the noise; the larger counts.

@@ -57,7 +57,8 @@ pub(crate) fn lone(positions: &[DVec3]) -> Vec<bool> {
             .copied()
             .filter(|&i| stands_alone(&views[i as usize], &views, typical))
             .collect();
-        if found.is_empty() {
+        // Where most stand alone there is no surface to stand apart from.
+        if found.is_empty() || 2 * found.len() > kept.len() {
             break;
         }
         for &i in &found {

@@ -210,3 +210,135 @@ impl Tree {
 fn squared_distance(a: &[f32; 3], b: &[f32; 3]) -> f32 {
     (0..3).map(|k| (a[k] - b[k]) * (a[k] - b[k])).sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::kernel::{Adjoint, Gradient, Winding};
+    use super::*;
+    use crate::phantoms::SplitMix64;
+
+    /// A ball of radius 0.4 in the unit box, in no order at all, its outward normals and areas.
+    fn ball(count: usize) -> (Vec<[f32; 3]>, Vec<[f32; 3]>, Vec<f32>) {
+        let mut random = SplitMix64::new(9);
+        let normals: Vec<glam::DVec3> = (0..count).map(|_| random.normal3().normalize()).collect();
+        let area = 4.0 * std::f32::consts::PI * 0.16 / count as f32;
+        let single = |v: glam::DVec3| v.as_vec3().to_array();
+        (
+            normals.iter().map(|n| single(*n * 0.4 + 0.5)).collect(),
+            normals.iter().map(|n| single(*n * f64::from(area))).collect(),
+            vec![area; count],
+        )
+    }
+
+    fn sorted(mut p: Vec<[f32; 3]>, mut m: Vec<[f32; 3]>) -> (Vec<[f32; 3]>, Vec<[f32; 3]>) {
+        let key = |p: &[f32; 3]| crate::points::samples::morton(glam::DVec3::from_array(p.map(f64::from)));
+        let mut order: Vec<usize> = (0..p.len()).collect();
+        order.sort_by_key(|&i| key(&p[i]));
+        p = order.iter().map(|&i| p[i]).collect();
+        m = order.iter().map(|&i| m[i]).collect();
+        (p, m)
+    }
+
+    fn targets(positions: &[[f32; 3]], width: f32) -> Vec<Target> {
+        positions
+            .iter()
+            .map(|&position| Target { position, width })
+            .collect()
+    }
+
+    /// Without the tree, by the same kernel.
+    fn direct<K: Kernel>(kernel: &K, p: &[[f32; 3]], s: &[K::Strength], at: &[Target]) -> Vec<K::Output> {
+        let sources: Vec<_> = p
+            .iter()
+            .zip(s)
+            .map(|(&position, &strength)| Source { position, strength })
+            .collect();
+        let mut out = vec![K::Output::default(); at.len()];
+        for (at, out) in at.chunks(LANES).zip(out.chunks_mut(LANES)) {
+            kernel.sum(&sources, at, out);
+        }
+        out
+    }
+
+    #[test]
+    fn sums_over_the_tree_are_those_over_all_points() {
+        let (p, m, areas) = ball(4000);
+        let (p, m) = sorted(p, m);
+        let tree = Tree::new(p.clone(), &areas);
+        assert_eq!(tree.leaves().iter().map(|r| r.len()).sum::<usize>(), 4000);
+        let at = targets(&p, 0.02);
+        let (near, exact) = (
+            tree.sum(&Winding, &m, &at, tree.leaves()),
+            direct(&Winding, &p, &m, &at),
+        );
+        let rms = |e: f64| (e / 4000.0).sqrt();
+        let error = rms(near
+            .iter()
+            .zip(&exact)
+            .map(|(a, b)| f64::from(a - b).powi(2))
+            .sum());
+        assert!(error < 0.01, "{error}");
+        let (near, exact) = (
+            tree.sum(&Gradient, &m, &at, tree.leaves()),
+            direct(&Gradient, &p, &m, &at),
+        );
+        let square = |a: &[f32; 3]| a.iter().map(|x| f64::from(*x).powi(2)).sum::<f64>();
+        let error: f64 = near
+            .iter()
+            .zip(&exact)
+            .map(|(a, b)| square(&[0, 1, 2].map(|k| a[k] - b[k])))
+            .sum();
+        assert!(error < 1e-4 * exact.iter().map(square).sum::<f64>());
+    }
+
+    #[test]
+    fn the_winding_number_is_one_inside_and_none_outside() {
+        let (p, m, areas) = ball(20_000);
+        let (p, m) = sorted(p, m);
+        let tree = Tree::new(p, &areas);
+        let at = targets(
+            &[[0.5; 3], [0.6, 0.4, 0.5], [0.98, 0.5, 0.5], [0.1, 0.1, 0.1]],
+            0.0,
+        );
+        let w = tree.sum(&Winding, &m, &at, &[0..2, 2..4]);
+        for (w, expected) in w.iter().zip([1.0, 1.0, 0.0, 0.0]) {
+            assert!((w - expected).abs() < 0.02, "{w} for {expected}");
+        }
+    }
+
+    #[test]
+    fn the_gradient_is_the_difference_of_winding_numbers() {
+        let (p, m, _) = ball(500);
+        let x = [0.52f32, 0.3, 0.41];
+        let step = 1e-3f32;
+        let [g] = direct(&Gradient, &p, &m, &targets(&[x], 0.1))[..] else {
+            panic!("one target");
+        };
+        for k in 0..3 {
+            let side = |sign: f32| {
+                let mut y = x;
+                y[k] += sign * step;
+                direct(&Winding, &p, &m, &targets(&[y], 0.1))[0]
+            };
+            let slope = (side(1.0) - side(-1.0)) / (2.0 * step);
+            assert!((slope + g[k]).abs() < 2e-3, "{slope} {}", g[k]);
+        }
+    }
+
+    #[test]
+    fn the_adjoint_is_one() {
+        let (p, m, _) = ball(300);
+        let at = targets(&p, 0.05);
+        let mut random = SplitMix64::new(4);
+        let s: Vec<[f32; 1]> = p.iter().map(|_| [random.normal() as f32]).collect();
+        let w = direct(&Winding, &p, &m, &at);
+        let g = direct(&Adjoint, &p, &s, &at);
+        let one: f64 = w.iter().zip(&s).map(|(w, [s])| f64::from(w * s)).sum();
+        let other: f64 = g
+            .iter()
+            .zip(&m)
+            .map(|(g, m)| (0..3).map(|k| f64::from(g[k] * m[k])).sum::<f64>())
+            .sum();
+        assert!((one - other).abs() < 1e-4 * one.abs().max(1.0), "{one} {other}");
+    }
+}
