@@ -21,11 +21,7 @@ fn main() {
             contrast: number(2, 1e3),
             mass_contrast: number(4, 1.0),
             dt_over_limit: number(3, 30.0),
-            neighbours: if four_d {
-                Neighbours::Eighteen
-            } else {
-                Neighbours::Six
-            },
+            neighbours: if four_d { Neighbours::Eighteen } else { Neighbours::Six },
             four_d,
         };
         let reference = Reference::new(configuration).expect("a possible configuration");
@@ -44,22 +40,11 @@ fn main() {
             .collect();
         times.sort_by(f64::total_cmp);
         for cap in [2, 4, 8] {
-            let o = reference
-                .judge::<f32>(Solver::Default, cap)
-                .expect("prepared before");
+            let o = reference.judge::<f32>(Solver::Default, cap).expect("prepared before");
             println!(
                 "{{\"coefficients\":{n},\"samples\":{m},\"rim\":\"{}\",\"pattern\":\"{}\",\"contrast\":{},\"mass_contrast\":{},\"dt_over_limit\":{},\"preconditioner\":\"{}\",\"iterations\":{},\"increment_error\":{:.2e},\"residual\":{:.1e},\"reference_residual\":{:.0e},\"prepare_seconds\":{prepare:.2e},\"least_solve_seconds\":{:.2e}}}",
-                args[1],
-                pattern.name(),
-                configuration.contrast,
-                configuration.mass_contrast,
-                configuration.dt_over_limit,
-                o.method,
-                o.iterations,
-                o.increment_error,
-                o.residual,
-                reference.residual,
-                times[0]
+                args[1], pattern.name(), configuration.contrast, configuration.mass_contrast, configuration.dt_over_limit,
+                o.method, o.iterations, o.increment_error, o.residual, reference.residual, times[0]
             );
         }
     }

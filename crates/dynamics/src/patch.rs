@@ -37,9 +37,7 @@ pub enum PatchError {
         value: f64,
     },
     /// A scale of densities that is no scale.
-    #[error(
-        "the scale of densities is {scale}; it has to be positive and finite (1/median |∇f| is a good one)"
-    )]
+    #[error("the scale of densities is {scale}; it has to be positive and finite (1/median |∇f| is a good one)")]
     Scale {
         /// Length per density.
         scale: f64,
@@ -60,9 +58,7 @@ pub enum PatchError {
         dt: f64,
     },
     /// An explicit step beyond its bound.
-    #[error(
-        "an explicit step of {dt:.3e} is unstable beyond {limit:.3e}; use sub-steps or an implicit scheme"
-    )]
+    #[error("an explicit step of {dt:.3e} is unstable beyond {limit:.3e}; use sub-steps or an implicit scheme")]
     Unstable {
         /// The step asked for.
         dt: f64,

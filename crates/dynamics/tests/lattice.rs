@@ -13,18 +13,12 @@ fn axis(index: usize, inner: &[f64], samples: usize, rim: Rim) -> Result<Axis, L
 }
 
 fn assembled(lattice: &Lattice<f64>) -> DMatrix<f64> {
-    let a: Vec<DMatrix<f64>> = lattice
-        .axes()
-        .iter()
-        .map(|a| a.collocation().to_dense())
-        .collect();
+    let a: Vec<DMatrix<f64>> = lattice.axes().iter().map(|a| a.collocation().to_dense()).collect();
     a[0].kronecker(&a[1]).kronecker(&a[2])
 }
 
 fn wave(n: usize) -> Vec<f64> {
-    (0..n)
-        .map(|i| (0.7 * i as f64).sin() + 0.1 * (i % 5) as f64)
-        .collect()
+    (0..n).map(|i| (0.7 * i as f64).sin() + 0.1 * (i % 5) as f64).collect()
 }
 
 proptest! {
@@ -66,11 +60,7 @@ proptest! {
 fn free_lattices_reproduce_constants() {
     let lattice = Lattice::<f32>::cube(9, 14, Rim::Free, 0.5).unwrap();
     let mut d = vec![0.0; lattice.sample_count()];
-    lattice.sample(
-        &vec![1.0; lattice.coefficient_count()],
-        &mut d,
-        &mut TensorWorkspace::new(),
-    );
+    lattice.sample(&vec![1.0; lattice.coefficient_count()], &mut d, &mut TensorWorkspace::new());
     assert!(d.iter().all(|d| (d - 1.0).abs() < 1e-6));
 }
 
@@ -82,14 +72,7 @@ fn a_fixed_rim_does_not_move_the_ends() {
     lattice.sample(&p, &mut d, &mut TensorWorkspace::new());
     for i in 0..15 {
         for j in 0..15 {
-            for at in [
-                [0, i, j],
-                [14, i, j],
-                [i, 0, j],
-                [i, 14, j],
-                [i, j, 0],
-                [i, j, 14],
-            ] {
+            for at in [[0, i, j], [14, i, j], [i, 0, j], [i, 14, j], [i, j, 0], [i, j, 14]] {
                 assert_eq!(d[(at[0] * 15 + at[1]) * 15 + at[2]], 0.0, "{at:?}");
             }
         }
@@ -102,29 +85,14 @@ fn bad_lattices_are_refused_with_the_reason() {
     let refuse = |knots, rim, samples, length| Axis::new(1, knots, rim, samples, length).unwrap_err();
     assert!(matches!(
         refuse(knots(3), Rim::Fixed, 20, 1.0),
-        LatticeError::NothingFree {
-            axis: 1,
-            coefficients: 6,
-            needed: 7
-        }
+        LatticeError::NothingFree { axis: 1, coefficients: 6, needed: 7 }
     ));
     assert!(matches!(
         refuse(knots(8), Rim::Free, 10, 1.0),
-        LatticeError::TooFewSamples {
-            axis: 1,
-            found: 10,
-            coefficients: 11,
-            needed: 11
-        }
+        LatticeError::TooFewSamples { axis: 1, found: 10, coefficients: 11, needed: 11 }
     ));
-    assert!(matches!(
-        refuse(knots(8), Rim::Free, 20, f64::NAN),
-        LatticeError::Spacing { axis: 1, .. }
-    ));
+    assert!(matches!(refuse(knots(8), Rim::Free, 20, f64::NAN), LatticeError::Spacing { axis: 1, .. }));
     // Five functions within the first of nine cells between samples.
     let crowded = axis(2, &[0.01, 0.02, 0.03, 0.04, 0.05], 10, Rim::Free).unwrap_err();
-    assert!(
-        matches!(crowded, LatticeError::Undetermined { axis: 2, .. }),
-        "{crowded}"
-    );
+    assert!(matches!(crowded, LatticeError::Undetermined { axis: 2, .. }), "{crowded}");
 }

@@ -39,13 +39,7 @@ fn mode_error(integrator: Integrator, damping: f64, count: usize, alternate: boo
     let dt = 3.0 / count as f64;
     for step in 0..count {
         // The same mean length, alternately longer and shorter.
-        let factor = if !alternate {
-            1.0
-        } else if step % 2 == 0 {
-            4.0 / 3.0
-        } else {
-            2.0 / 3.0
-        };
+        let factor = if !alternate { 1.0 } else if step % 2 == 0 { 4.0 / 3.0 } else { 2.0 / 3.0 };
         p.step(integrator, factor * dt).unwrap();
     }
     let omega = (1.0 - 0.25 * damping * damping).sqrt();
@@ -56,11 +50,7 @@ fn mode_error(integrator: Integrator, damping: f64, count: usize, alternate: boo
 
 #[test]
 fn a_free_mode_converges_with_the_order_of_its_integrator() {
-    for (integrator, order) in [
-        (Integrator::Paper, 1.0),
-        (Integrator::Symplectic, 1.0),
-        (Integrator::TrBdf2, 2.0),
-    ] {
+    for (integrator, order) in [(Integrator::Paper, 1.0), (Integrator::Symplectic, 1.0), (Integrator::TrBdf2, 2.0)] {
         for damping in [0.0, 0.4] {
             for alternate in [false, true] {
                 let errors = [128, 256].map(|n| mode_error(integrator, damping, n, alternate));
@@ -83,10 +73,7 @@ fn halving_the_step_keeps_the_velocity() {
         p.set_state(&vec![0.0; n], &vec![0.5; n]).unwrap();
         for dt in [0.1, 0.05, 0.025, 0.2, 0.1] {
             p.step(integrator, dt).unwrap();
-            assert!(
-                p.state().v.iter().all(|v| (v - 0.5).abs() < 1e-9),
-                "{integrator:?}"
-            );
+            assert!(p.state().v.iter().all(|v| (v - 0.5).abs() < 1e-9), "{integrator:?}");
         }
         assert!((p.state().p[0] - 0.5 * 0.475).abs() < 1e-9);
     }
@@ -119,12 +106,7 @@ fn implicit_steps_of_any_length_do_not_create_energy() {
         *k = if i % (M * M) < M * M / 2 { 1000.0 } else { 1.0 };
     }
     for integrator in [Integrator::Paper, Integrator::TrBdf2] {
-        let mut p = patch(
-            matter.clone(),
-            Rim::Fixed,
-            Law::Linear { scale: 1.0 },
-            Neighbours::Six,
-        );
+        let mut p = patch(matter.clone(), Rim::Fixed, Law::Linear { scale: 1.0 }, Neighbours::Six);
         let n = p.lattice().coefficient_count();
         let start: Vec<f64> = (0..n).map(|i| (2.1 * i as f64).sin()).collect();
         p.set_state(&start, &vec![0.0; n]).unwrap();
@@ -134,10 +116,7 @@ fn implicit_steps_of_any_length_do_not_create_energy() {
             let dt = [0.001, 0.03, 1.0, 0.3, 0.01][step % 5];
             let report = p.step(integrator, dt).unwrap();
             let now = report.energy.total();
-            assert!(
-                now <= last + 1e-6 * first,
-                "{integrator:?} step {step}: {last} → {now}"
-            );
+            assert!(now <= last + 1e-6 * first, "{integrator:?} step {step}: {last} → {now}");
             last = now;
         }
     }
@@ -172,15 +151,9 @@ fn nonsense_is_refused_and_changes_nothing() {
     force[17] = f64::NAN;
     let refused = p.set_force(&force).unwrap_err();
     assert!(refused.to_string().contains("force 17 is NaN"), "{refused}");
-    assert!(matches!(
-        p.set_force(&[0.0]),
-        Err(PatchError::Length { found: 1, .. })
-    ));
+    assert!(matches!(p.set_force(&[0.0]), Err(PatchError::Length { found: 1, .. })));
     for dt in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        assert!(matches!(
-            p.step(Integrator::TrBdf2, dt),
-            Err(PatchError::TimeStep { .. })
-        ));
+        assert!(matches!(p.step(Integrator::TrBdf2, dt), Err(PatchError::TimeStep { .. })));
     }
     p.step(Integrator::Paper, 0.1).unwrap();
     assert_eq!(*p.state(), before, "at rest nothing moves, to the bit");
@@ -204,20 +177,12 @@ fn a_pulled_patch_settles_at_the_static_solution() {
     let moved: f64 = p.state().d[(6 * M + 6) * M + 5] - 0.8;
     assert!(energy.kinetic < 1e-12 * energy.springs);
     // At equilibrium the springs hold half the work of the force.
-    assert!(
-        (energy.springs - 0.5 * moved).abs() < 1e-8 * moved,
-        "{energy:?} {moved}"
-    );
+    assert!((energy.springs - 0.5 * moved).abs() < 1e-8 * moved, "{energy:?} {moved}");
 }
 
 #[test]
 fn painting_while_it_moves_stays_finite_and_keeps_the_energy_rule() {
-    let mut p = patch(
-        Matter::default(),
-        Rim::Fixed,
-        Law::Linear { scale: 1.0 },
-        Neighbours::Six,
-    );
+    let mut p = patch(Matter::default(), Rim::Fixed, Law::Linear { scale: 1.0 }, Neighbours::Six);
     let n = p.lattice().coefficient_count();
     let v: Vec<f64> = (0..n).map(|i| (1.1 * i as f64).cos()).collect();
     p.set_state(&vec![0.0; n], &v).unwrap();

@@ -9,10 +9,7 @@ use nalgebra::{DMatrix, DVector};
 fn dense(lattice: &Lattice<f64>, s: &StepMatrix<f64>) -> DMatrix<f64> {
     let n = lattice.coefficient_count();
     let mut w = TensorWorkspace::new();
-    let (mut d, mut q) = (
-        vec![0.0; lattice.sample_count()],
-        vec![0.0; lattice.sample_count()],
-    );
+    let (mut d, mut q) = (vec![0.0; lattice.sample_count()], vec![0.0; lattice.sample_count()]);
     let mut h = DMatrix::zeros(n, n);
     let mut column = vec![0.0; n];
     for j in 0..n {
@@ -26,13 +23,7 @@ fn dense(lattice: &Lattice<f64>, s: &StepMatrix<f64>) -> DMatrix<f64> {
     h
 }
 
-fn matrix(
-    pattern: Pattern,
-    contrast: f64,
-    m: usize,
-    neighbours: Neighbours,
-    stiffness: f64,
-) -> StepMatrix<f64> {
+fn matrix(pattern: Pattern, contrast: f64, m: usize, neighbours: Neighbours, stiffness: f64) -> StepMatrix<f64> {
     let springs = spring_weights(pattern, contrast, m, neighbours, stiffness);
     let mass = if pattern == Pattern::Uniform {
         Weights::Constant(1.0)
@@ -60,10 +51,7 @@ fn sums_over_pairs_are_the_dense_product_for_all_neighbours_and_rims() {
             for i in 0..count {
                 for j in 0..count {
                     let found = galerkin.element(place(i), place(j));
-                    assert!(
-                        (found - h[(i, j)]).abs() < 1e-13 * scale,
-                        "{n} {neighbours:?} {i} {j}"
-                    );
+                    assert!((found - h[(i, j)]).abs() < 1e-13 * scale, "{n} {neighbours:?} {i} {j}");
                 }
             }
             let mut diagonal = Galerkin::diagonal(&lattice, &steps);
@@ -106,9 +94,7 @@ fn every_method_solves_its_own_kind_of_step() {
         let lattice = Lattice::<f64>::cube(n, m, rim, 1.0).unwrap();
         let s = matrix(pattern, 1e3, m, Neighbours::Six, 0.5);
         let steps: Vec<_> = s.springs.iter().map(|s| s.direction.step).collect();
-        let g: Vec<f64> = (0..m * m * m)
-            .map(|i| (0.31 * i as f64).sin() * (1.0 + (i % 11) as f64))
-            .collect();
+        let g: Vec<f64> = (0..m * m * m).map(|i| (0.31 * i as f64).sin() * (1.0 + (i % 11) as f64)).collect();
         let options = SolverOptions {
             direct_limit: 500,
             iterations: 30,
@@ -123,29 +109,17 @@ fn every_method_solves_its_own_kind_of_step() {
         let mut b = vec![0.0; x.len()];
         let mut w = TensorWorkspace::new();
         lattice.gather(&g, &mut b, &mut w);
-        let exact = dense(&lattice, &s)
-            .cholesky()
-            .unwrap()
-            .solve(&DVector::from_vec(b));
+        let exact = dense(&lattice, &s).cholesky().unwrap().solve(&DVector::from_vec(b));
         let mut expected = vec![0.0; g.len()];
         lattice.sample(exact.as_slice(), &mut expected, &mut w);
         let norm = |v: &mut dyn Iterator<Item = f64>| v.map(|v| v * v).sum::<f64>().sqrt();
-        let error =
-            norm(&mut dx.iter().zip(&expected).map(|(a, b)| a - b)) / norm(&mut expected.iter().copied());
-        assert!(
-            error < 1e-8,
-            "{n}/{m} {method:?}: {error:.1e} after {:?}",
-            report.iteration
-        );
+        let error = norm(&mut dx.iter().zip(&expected).map(|(a, b)| a - b)) / norm(&mut expected.iter().copied());
+        assert!(error < 1e-8, "{n}/{m} {method:?}: {error:.1e} after {:?}", report.iteration);
         let limit = match method {
             Method::FastDiagonalization | Method::Direct | Method::SampleDirect => 2,
             _ => 30,
         };
-        assert!(
-            report.iteration.iterations <= limit,
-            "{method:?}: {:?}",
-            report.iteration
-        );
+        assert!(report.iteration.iterations <= limit, "{method:?}: {:?}", report.iteration);
     }
 }
 
@@ -165,9 +139,6 @@ fn negative_curvature_is_reported_and_not_divided_by() {
     let g: Vec<f64> = (0..729).map(|i| if i % 2 == 0 { 1.0 } else { -1.0 }).collect();
     let (mut x, mut dx) = (vec![0.0; 216], vec![0.0; 729]);
     let report = solver.solve(&bad, &g, &mut x, &mut dx);
-    assert!(
-        report.iteration.negative_curvature.is_some_and(|c| c <= 0.0),
-        "{report:?}"
-    );
+    assert!(report.iteration.negative_curvature.is_some_and(|c| c <= 0.0), "{report:?}");
     assert!(x.iter().all(|x| x.is_finite()));
 }

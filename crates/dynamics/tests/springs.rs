@@ -50,11 +50,7 @@ fn force_is_minus_the_gradient_of_energy() {
                 };
                 let step = 1e-5;
                 let slope = (force(&mut n, &at(step)).0 - force(&mut n, &at(-step)).0) / (2.0 * step);
-                assert!(
-                    (slope + f[i]).abs() < 1e-7,
-                    "{law:?} {neighbours:?} {i}: {slope} {}",
-                    -f[i]
-                );
+                assert!((slope + f[i]).abs() < 1e-7, "{law:?} {neighbours:?} {i}: {slope} {}", -f[i]);
             }
         }
     }
@@ -80,21 +76,12 @@ fn tangent_is_the_difference_of_forces_where_it_is_not_clamped() {
             let mut expected = vec![0.0; d.len()];
             matrix.apply(&direction, &mut expected);
             let step = 1e-6;
-            let at = |e: f64| {
-                d.iter()
-                    .zip(&direction)
-                    .map(|(d, v)| d + e * v)
-                    .collect::<Vec<_>>()
-            };
+            let at = |e: f64| d.iter().zip(&direction).map(|(d, v)| d + e * v).collect::<Vec<_>>();
             let (plus, minus) = (force(&mut n, &at(step)).1, force(&mut n, &at(-step)).1);
             let largest = expected.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
             for i in 0..d.len() {
                 let found = (minus[i] - plus[i]) / (2.0 * step);
-                assert!(
-                    (found - expected[i]).abs() < 1e-7 * largest,
-                    "{law:?} {i}: {found} {}",
-                    expected[i]
-                );
+                assert!((found - expected[i]).abs() < 1e-7 * largest, "{law:?} {i}: {found} {}", expected[i]);
             }
         }
     }
@@ -128,15 +115,10 @@ fn flattened_four_d_springs_are_clamped_and_counted() {
     let report = n.add_forces_and_tangent(&flat, &mut f, 1.0, &mut tangent);
     // Springs along x rest at one to one and are flat: τ = 1 - √2. The others rest flat: τ = 0.
     assert_eq!(report.clamped, (M - 1) * M * M);
-    let Weights::Each(w) = &tangent[0].weights else {
-        unreachable!()
-    };
+    let Weights::Each(w) = &tangent[0].weights else { unreachable!() };
     assert!(w.iter().all(|w| *w == 0.0));
     // The law gives no force at the flat state; the orientation of the rest state does.
-    assert!(
-        f[0] < 0.0 && f[M * M * M - 1] > 0.0,
-        "pushed back the way they rest"
-    );
+    assert!(f[0] < 0.0 && f[M * M * M - 1] > 0.0, "pushed back the way they rest");
 }
 
 #[test]
@@ -170,11 +152,5 @@ fn stiffness_of_a_spring_is_the_harmonic_mean_of_its_ends() {
     assert!((lumped.springs[2].weights.at(0) - 1.5 * 0.5).abs() < 1e-15);
     assert!((lumped.springs[2].weights.at(3) - 0.5).abs() < 1e-15);
     matter.mass = Quantity::Constant(f64::NAN);
-    assert!(
-        matter
-            .lumped(&lattice, Neighbours::Six)
-            .unwrap_err()
-            .to_string()
-            .contains("mass is NaN")
-    );
+    assert!(matter.lumped(&lattice, Neighbours::Six).unwrap_err().to_string().contains("mass is NaN"));
 }

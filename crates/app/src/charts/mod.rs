@@ -1,7 +1,13 @@
 //! Speed against accuracy: sweeps over the options, and their charts.
 
 mod fit;
+mod hard;
+mod noise;
+mod outliers;
 mod plot;
 
 pub use fit::{Configuration, Input, Measurement, sweeps};
+pub use hard::Scene;
+pub use noise::noise;
+pub use outliers::outliers;
 pub use plot::{Chart, Series};

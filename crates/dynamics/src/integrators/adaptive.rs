@@ -35,11 +35,7 @@ impl<T: Real> Patch<T> {
     ///
     /// # Errors
     /// As [`step`](Patch::step).
-    pub fn adaptive_step(
-        &mut self,
-        dt: f64,
-        options: &AdaptiveOptions,
-    ) -> Result<AdaptiveReport, PatchError> {
+    pub fn adaptive_step(&mut self, dt: f64, options: &AdaptiveOptions) -> Result<AdaptiveReport, PatchError> {
         let before = self.energy().total();
         let mut dt = dt.clamp(options.shortest, options.longest);
         let mut rejected = 0;
@@ -63,11 +59,7 @@ impl<T: Real> Patch<T> {
             }
             self.restore();
             rejected += 1;
-            let factor = if unbalanced || fast || !error.is_finite() {
-                0.5
-            } else {
-                factor.clamp(0.1, 0.9)
-            };
+            let factor = if unbalanced || fast || !error.is_finite() { 0.5 } else { factor.clamp(0.1, 0.9) };
             dt = (dt * factor).max(options.shortest);
         }
     }
@@ -75,8 +67,6 @@ impl<T: Real> Patch<T> {
     /// Largest mean acceleration of a density over the last step.
     fn acceleration(&self, dt: f64) -> f64 {
         let rates = self.state.w.iter().zip(&self.work.before.w);
-        rates
-            .map(|(now, then)| (*now - *then).as_f64().abs() / dt)
-            .fold(0.0, f64::max)
+        rates.map(|(now, then)| (*now - *then).as_f64().abs() / dt).fold(0.0, f64::max)
     }
 }

@@ -80,11 +80,7 @@ impl<T: Real> Patch<T> {
     fn mass_solver(&mut self) -> Box<StepSolver<T>> {
         self.mass_solver.take().unwrap_or_else(|| {
             let steps = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
-            Box::new(StepSolver::new(
-                self.solver.lattice().clone(),
-                &steps,
-                self.solver.options(),
-            ))
+            Box::new(StepSolver::new(self.solver.lattice().clone(), &steps, self.solver.options()))
         })
     }
 
@@ -105,20 +101,12 @@ impl<T: Real> Patch<T> {
             direction: s.direction,
             weights: s.weights.scaled(scale),
         });
-        let stiffness = StepMatrix::new(
-            self.matrix.dims(),
-            self.lumped.ground.scaled(scale),
-            springs.collect(),
-        );
+        let stiffness = StepMatrix::new(self.matrix.dims(), self.lumped.ground.scaled(scale), springs.collect());
         let mut solver = self.mass_solver();
         solver.prepare(&mass)?;
         let largest = largest_frequency(&stiffness, &mass, &mut solver);
         self.mass_solver = Some(solver);
-        let limit = if largest > 0.0 {
-            2.0 / largest
-        } else {
-            f64::INFINITY
-        };
+        let limit = if largest > 0.0 { 2.0 / largest } else { f64::INFINITY };
         self.limit = Some((self.version, limit));
         Ok(limit)
     }

@@ -94,9 +94,7 @@ impl<T: Real> Patch<T> {
         if let Law::Linear { .. } = self.network.law() {
             for (to, from) in self.matrix.springs.iter_mut().zip(&lumped.springs) {
                 let constant = matches!(from.weights, Weights::Constant(_));
-                write(&mut to.weights, constant, self.base.len(), |i| {
-                    b * from.weights.at(i)
-                });
+                write(&mut to.weights, constant, self.base.len(), |i| b * from.weights.at(i));
             }
         }
         self.matrix.refresh();
@@ -146,8 +144,7 @@ impl<T: Real> Patch<T> {
         let t = T::from_f64;
         let mut clamped = self.forces(Some(c * c));
         for (i, g) in self.work.g.iter_mut().enumerate() {
-            *g =
-                t(2.0 * c) * (self.lumped.mass.at(i) * self.state.w[i]) + t(2.0 * c * c) * self.work.force[i];
+            *g = t(2.0 * c) * (self.lumped.mass.at(i) * self.state.w[i]) + t(2.0 * c * c) * self.work.force[i];
         }
         self.solve_step(c, c * c)?;
         let (work, state) = (&mut self.work, &mut self.state);

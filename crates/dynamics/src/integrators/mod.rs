@@ -5,8 +5,8 @@ mod adaptive;
 mod explicit;
 mod implicit;
 
-pub use adaptive::{AdaptiveOptions, AdaptiveReport};
 pub(crate) use explicit::largest_frequency;
+pub use adaptive::{AdaptiveOptions, AdaptiveReport};
 
 use bspline::Real;
 
@@ -77,9 +77,7 @@ impl<T: Real> Patch<T> {
         let energy = self.energy();
         let before = &self.work.before;
         let path = self.state.d.iter().zip(&before.d).zip(&self.external);
-        let work = path
-            .map(|((now, then), f)| (*now - *then).as_f64() * f.as_f64())
-            .sum();
+        let work = path.map(|((now, then), f)| (*now - *then).as_f64() * f.as_f64()).sum();
         Ok(StepReport {
             dt,
             solve,

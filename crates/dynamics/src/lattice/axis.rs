@@ -223,10 +223,7 @@ impl Axis {
         keep[..=p].fill(start);
         keep.extend(std::iter::repeat_n(end, p + 1));
         let knots = KnotVector::new(p, keep).ok()?;
-        let out = Self {
-            knots,
-            ..self.clone()
-        };
+        let out = Self { knots, ..self.clone() };
         (out.knots.coefficient_count() > 2 * out.first_free()).then_some(out)
     }
 
@@ -254,8 +251,7 @@ impl Axis {
             a
         };
         let (fine, target) = (matrix(&self.knots), matrix(&coarse.knots));
-        let gram =
-            Cholesky::new(fine.transpose() * &fine).expect("functions on their own spans are independent");
+        let gram = Cholesky::new(fine.transpose() * &fine).expect("functions on their own spans are independent");
         let all = gram.solve(&(fine.transpose() * target));
         let (rows, columns) = (self.first_free(), coarse.first_free());
         let row = |i: usize| {

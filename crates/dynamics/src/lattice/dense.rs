@@ -76,48 +76,16 @@ fn strips<T: Real>(
         let rows = m / ROWS * ROWS;
         for i in (0..rows).step_by(ROWS) {
             if size_of::<T>() == 4 {
-                tile::<T, ROWS, 16>(
-                    &a[i * a_stride..],
-                    a_stride,
-                    &b[j..],
-                    b_stride,
-                    &mut c[i * n + j..],
-                    n,
-                    k,
-                );
+                tile::<T, ROWS, 16>(&a[i * a_stride..], a_stride, &b[j..], b_stride, &mut c[i * n + j..], n, k);
             } else {
-                tile::<T, ROWS, PAD>(
-                    &a[i * a_stride..],
-                    a_stride,
-                    &b[j..],
-                    b_stride,
-                    &mut c[i * n + j..],
-                    n,
-                    k,
-                );
+                tile::<T, ROWS, PAD>(&a[i * a_stride..], a_stride, &b[j..], b_stride, &mut c[i * n + j..], n, k);
             }
         }
         for i in rows..m {
             if size_of::<T>() == 4 {
-                tile::<T, 1, 16>(
-                    &a[i * a_stride..],
-                    a_stride,
-                    &b[j..],
-                    b_stride,
-                    &mut c[i * n + j..],
-                    n,
-                    k,
-                );
+                tile::<T, 1, 16>(&a[i * a_stride..], a_stride, &b[j..], b_stride, &mut c[i * n + j..], n, k);
             } else {
-                tile::<T, 1, PAD>(
-                    &a[i * a_stride..],
-                    a_stride,
-                    &b[j..],
-                    b_stride,
-                    &mut c[i * n + j..],
-                    n,
-                    k,
-                );
+                tile::<T, 1, PAD>(&a[i * a_stride..], a_stride, &b[j..], b_stride, &mut c[i * n + j..], n, k);
             }
         }
         j += wide;
@@ -125,26 +93,10 @@ fn strips<T: Real>(
     if j < n {
         let rows = m / ROWS * ROWS;
         for i in (0..rows).step_by(ROWS) {
-            tile::<T, ROWS, PAD>(
-                &a[i * a_stride..],
-                a_stride,
-                &b[j..],
-                b_stride,
-                &mut c[i * n + j..],
-                n,
-                k,
-            );
+            tile::<T, ROWS, PAD>(&a[i * a_stride..], a_stride, &b[j..], b_stride, &mut c[i * n + j..], n, k);
         }
         for i in rows..m {
-            tile::<T, 1, PAD>(
-                &a[i * a_stride..],
-                a_stride,
-                &b[j..],
-                b_stride,
-                &mut c[i * n + j..],
-                n,
-                k,
-            );
+            tile::<T, 1, PAD>(&a[i * a_stride..], a_stride, &b[j..], b_stride, &mut c[i * n + j..], n, k);
         }
     }
 }

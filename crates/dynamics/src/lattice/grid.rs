@@ -130,9 +130,7 @@ impl<T: Real> Lattice<T> {
         assert!(self.is_square(), "as many coefficients as samples");
         let inverse: [Banded<f64>; 3] = std::array::from_fn(|k| {
             let a = self.axes[k].collocation().to_dense();
-            let a = a
-                .try_inverse()
-                .expect("axes are refused when their collocation is singular");
+            let a = a.try_inverse().expect("axes are refused when their collocation is singular");
             let row = |i: usize| (0..a.ncols()).map(|j| (j, a[(i, j)])).collect::<Vec<_>>();
             Banded::from_rows(a.ncols(), (0..a.nrows()).map(row))
         });

@@ -6,8 +6,8 @@ use nalgebra::{Cholesky, DMatrix, SymmetricEigen};
 use pulp::Arch;
 
 use super::pcg::Preconditioner;
-use crate::lattice::{Banded, DenseAxis, Lattice, PAD, multiply, multiply_last};
 use crate::springs::StepMatrix;
+use crate::lattice::{Banded, DenseAxis, Lattice, PAD, multiply, multiply_last};
 
 /// `z = s∘(V⊗V⊗V) [ (V⊗V⊗V)ᵀ(s∘r) / (a + b_x λ_i + b_y λ_j + b_z λ_k) ]` with, on each axis, `AᵀK₁A V = AᵀA V Λ`,
 /// `VᵀAᵀAV = I` and `K₁` the path Laplacian of the samples.
@@ -127,7 +127,10 @@ impl<T: Real> FastDiagonalization<T> {
                     p[nz..].fill(T::zero());
                 }
                 multiply(&x.transposed, ping, pong, nx, nx, ny * pad);
-                for (a, b) in pong.chunks_exact(ny * pad).zip(ping.chunks_exact_mut(ny * pad)) {
+                for (a, b) in pong
+                    .chunks_exact(ny * pad)
+                    .zip(ping.chunks_exact_mut(ny * pad))
+                {
                     multiply(&y.transposed, a, b, ny, ny, pad);
                 }
                 // Along z a line is multiplied from the right, so the untransposed matrix gives Vᵀ.
@@ -136,7 +139,10 @@ impl<T: Real> FastDiagonalization<T> {
                     *v *= *i;
                 }
                 multiply_last(pong, pad, &zed.transposed_padded, ping, nz, pad);
-                for (a, b) in ping.chunks_exact(ny * pad).zip(pong.chunks_exact_mut(ny * pad)) {
+                for (a, b) in ping
+                    .chunks_exact(ny * pad)
+                    .zip(pong.chunks_exact_mut(ny * pad))
+                {
                     multiply(&y.matrix, a, b, ny, ny, pad);
                 }
                 multiply(&x.matrix, pong, ping, nx, nx, ny * pad);

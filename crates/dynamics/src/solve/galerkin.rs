@@ -59,11 +59,7 @@ fn reach(a: &Banded<f64>) -> usize {
         let j = (i + 1).min(a.rows() - 1);
         let (low, high) = (a.row(i).0.min(a.row(j).0), end(i).max(end(j)));
         let filled = !a.row(i).1.is_empty() && !a.row(j).1.is_empty();
-        if filled {
-            high - low - 1
-        } else {
-            a.row(i).1.len().max(a.row(j).1.len()).saturating_sub(1)
-        }
+        if filled { high - low - 1 } else { a.row(i).1.len().max(a.row(j).1.len()).saturating_sub(1) }
     });
     rows.max().unwrap_or(0)
 }
@@ -187,15 +183,10 @@ impl Galerkin {
                 weights[j] += w.as_f64();
             }
         });
-        self.mass
-            .apply(&self.weights, &mut self.sums, &mut self.workspace);
+        self.mass.apply(&self.weights, &mut self.sums, &mut self.workspace);
         for (products, springs) in self.springs.iter().zip(&s.springs) {
             fill(&mut self.weights, &springs.weights);
-            let sign = if springs.direction.axis().is_some() {
-                1.0
-            } else {
-                -1.0
-            };
+            let sign = if springs.direction.axis().is_some() { 1.0 } else { -1.0 };
             for product in products {
                 product.apply(&self.weights, &mut self.term, &mut self.workspace);
                 for (sum, t) in self.sums.iter_mut().zip(&self.term) {
@@ -222,11 +213,7 @@ impl Galerkin {
                     for j2 in from..(j + ry + 1).min(ny) {
                         let row = plane + (j * (2 * ry + 1) + j2 + ry - j) * pz;
                         for k in 0..nz {
-                            let from = if ox == 0 && j2 == j {
-                                k
-                            } else {
-                                k.saturating_sub(rz)
-                            };
+                            let from = if ox == 0 && j2 == j { k } else { k.saturating_sub(rz) };
                             for k2 in from..(k + rz + 1).min(nz) {
                                 let v = self.sums[row + k * (2 * rz + 1) + k2 + rz - k];
                                 into.set(number(i + ox, j2, k2), number(i, j, k), v);

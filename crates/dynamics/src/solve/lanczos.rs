@@ -80,11 +80,7 @@ fn largest_of_tridiagonal(diagonal: &[f64], off: &[f64]) -> f64 {
     let has_above = |t: f64| {
         let mut pivot = 1.0;
         (0..diagonal.len()).any(|i| {
-            let coupling = if i > 0 {
-                off[i - 1] * off[i - 1] / pivot
-            } else {
-                0.0
-            };
+            let coupling = if i > 0 { off[i - 1] * off[i - 1] / pivot } else { 0.0 };
             pivot = diagonal[i] - t - coupling;
             if pivot == 0.0 {
                 // An eigenvalue of the leading part: either side may be taken, but not its inverse.

@@ -12,9 +12,9 @@ mod step_solver;
 mod v_cycle;
 
 pub use band_cholesky::{BandCholesky, NotPositive};
-pub(crate) use dot::dot;
 pub use fast_diagonalization::FastDiagonalization;
 pub use galerkin::Galerkin;
+pub(crate) use dot::dot;
 pub(crate) use lanczos::Lanczos;
 pub use pcg::{CoefficientSystem, ConjugateGradients, PcgReport, Preconditioner, System, Unpreconditioned};
 pub use sample_multigrid::SampleMultigrid;

@@ -68,7 +68,8 @@ impl<T: Real> Schwarz<T> {
                         let [x, y, z] = block.place(e);
                         variation[(x * dims[1] + y) * dims[2] + z]
                     });
-                    let (low, high) = values.fold((f64::INFINITY, 0.0_f64), |(l, h), v| (l.min(v), h.max(v)));
+                    let (low, high) =
+                        values.fold((f64::INFINITY, 0.0_f64), |(l, h), v| (l.min(v), h.max(v)));
                     if high <= contrast * low {
                         continue;
                     }

@@ -228,19 +228,15 @@ impl<T: Real> StepSolver<T> {
         let few = n <= self.options.direct_limit;
         match (self.inverse.is_some(), few) {
             (true, true) => Painted::SampleDirect(BandCholesky::new(m, ((my + 1) * mz + 1).min(m - 1))),
-            (true, false) => {
-                Painted::SampleMultigrid(Box::new(SampleMultigrid::new(self.lattice.sample_dims())))
-            }
+            (true, false) => Painted::SampleMultigrid(Box::new(SampleMultigrid::new(self.lattice.sample_dims()))),
             (false, true) => {
                 let galerkin = Galerkin::new(&self.lattice, &self.steps);
                 let factor = BandCholesky::new(n, galerkin.band());
                 Painted::Direct(Box::new((galerkin, factor)))
             }
-            (false, false) => Painted::VCycle(Box::new(VCycle::new(
-                &self.lattice,
-                &self.steps,
-                self.options.v_cycle,
-            ))),
+            (false, false) => {
+                Painted::VCycle(Box::new(VCycle::new(&self.lattice, &self.steps, self.options.v_cycle)))
+            }
         }
     }
 
@@ -250,7 +246,10 @@ impl<T: Real> StepSolver<T> {
     /// # Panics
     /// If a length is wrong.
     pub fn solve(&mut self, s: &StepMatrix<T>, g: &[T], x: &mut [T], dx: &mut [T]) -> SolveReport {
-        let tolerance = self.options.tolerance.unwrap_or(16.0 * T::UNIT_ROUND_OFF);
+        let tolerance = self
+            .options
+            .tolerance
+            .unwrap_or(16.0 * T::UNIT_ROUND_OFF);
         let cap = self.options.iterations;
         let iteration = if let Some(inverse) = &mut self.inverse {
             let mut run = |preconditioner: &mut dyn Preconditioner<T>| {

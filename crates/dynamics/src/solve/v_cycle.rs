@@ -108,14 +108,13 @@ impl<T: Real> VCycle<T> {
             let unit = |which: usize, diagonal: &mut Galerkin| {
                 let weight = |k: usize| Weights::Constant(if k == which { T::one() } else { T::zero() });
                 let springs = crate::springs::Neighbours::Six.directions();
-                let springs =
-                    springs
-                        .iter()
-                        .enumerate()
-                        .map(|(k, &direction)| crate::springs::SpringWeights {
-                            direction,
-                            weights: weight(k + 1),
-                        });
+                let springs = springs
+                    .iter()
+                    .enumerate()
+                    .map(|(k, &direction)| crate::springs::SpringWeights {
+                        direction,
+                        weights: weight(k + 1),
+                    });
                 let s = StepMatrix::new(here.sample_dims(), weight(0), springs.collect());
                 diagonal.diagonal_of(&s).to_vec()
             };

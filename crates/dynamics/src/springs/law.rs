@@ -112,11 +112,7 @@ impl<T: Real> SpringNetwork<T> {
         springs: Vec<SpringWeights<T>>,
         d: &[T],
     ) -> Self {
-        let length = |s: &SpringWeights<T>| {
-            (0..3)
-                .map(|a| (s.direction.step[a] as f64 * spacing[a]).powi(2))
-                .sum()
-        };
+        let length = |s: &SpringWeights<T>| (0..3).map(|a| (s.direction.step[a] as f64 * spacing[a]).powi(2)).sum();
         let count: usize = dims.iter().product();
         let mut out = Self {
             dims,
@@ -149,11 +145,7 @@ impl<T: Real> SpringNetwork<T> {
     /// If the directions are others.
     pub fn set_springs(&mut self, springs: Vec<SpringWeights<T>>) {
         let directions = |s: &[SpringWeights<T>]| s.iter().map(|s| s.direction.step).collect::<Vec<_>>();
-        assert_eq!(
-            directions(&self.springs),
-            directions(&springs),
-            "the same directions"
-        );
+        assert_eq!(directions(&self.springs), directions(&springs), "the same directions");
         self.springs = springs;
     }
 
@@ -187,11 +179,7 @@ impl<T: Real> SpringNetwork<T> {
                 for ((r, a), b) in rest[from..from + count].iter_mut().zip(a).zip(b) {
                     let now = sigma * (*a - *b);
                     // Exactly the current difference when nothing is kept.
-                    *r = if keep == T::zero() {
-                        now
-                    } else {
-                        keep * *r + share * now
-                    };
+                    *r = if keep == T::zero() { now } else { keep * *r + share * now };
                 }
             });
         }

@@ -55,14 +55,7 @@ impl Neighbours {
         };
         add(&[[1, 0, 0], [0, 1, 0], [0, 0, 1]], axial);
         add(
-            &[
-                [1, 1, 0],
-                [1, -1, 0],
-                [1, 0, 1],
-                [1, 0, -1],
-                [0, 1, 1],
-                [0, 1, -1],
-            ],
+            &[[1, 1, 0], [1, -1, 0], [1, 0, 1], [1, 0, -1], [0, 1, 1], [0, 1, -1]],
             face,
         );
         add(&[[1, 1, 1], [1, 1, -1], [1, -1, 1], [1, -1, -1]], cube);
@@ -77,12 +70,7 @@ mod tests {
     #[test]
     fn a_gradient_costs_the_same_in_every_direction() {
         for neighbours in [Neighbours::Six, Neighbours::Eighteen, Neighbours::TwentySix] {
-            for g in [
-                [1.0, 0.0, 0.0],
-                [0.6, 0.8, 0.0],
-                [0.48, 0.6, 0.64],
-                [0.0, -0.6, 0.8],
-            ] {
+            for g in [[1.0, 0.0, 0.0], [0.6, 0.8, 0.0], [0.48, 0.6, 0.64], [0.0, -0.6, 0.8]] {
                 let rise = |d: &Direction| (0..3).map(|a| d.step[a] as f64 * g[a]).sum::<f64>();
                 let cost: f64 = neighbours
                     .directions()

@@ -92,9 +92,7 @@ impl<T: Real> StepMatrix<T> {
 
     /// To be called after a constant weight was changed in place.
     pub fn refresh(&mut self) {
-        let weights = [&self.mass]
-            .into_iter()
-            .chain(self.springs.iter().map(|s| &s.weights));
+        let weights = [&self.mass].into_iter().chain(self.springs.iter().map(|s| &s.weights));
         for (row, w) in self.constant_rows.chunks_exact_mut(self.dims[2]).zip(weights) {
             if let Weights::Constant(w) = w {
                 row.fill(*w);

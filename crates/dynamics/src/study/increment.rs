@@ -6,8 +6,8 @@ use super::patterns::{Pattern, loads, random_masses, spring_weights};
 use crate::integrators::largest_frequency;
 use crate::lattice::{Lattice, LatticeError, Rim, TensorWorkspace};
 use crate::solve::{
-    BandCholesky, CoefficientSystem, ConjugateGradients, FastDiagonalization, Galerkin, PcgReport,
-    Preconditioner, SolveError, SolverOptions, StepSolver, Unpreconditioned, VCycle, VCycleOptions,
+    BandCholesky, CoefficientSystem, ConjugateGradients, FastDiagonalization, Galerkin, PcgReport, Preconditioner,
+    SolveError, SolverOptions, StepSolver, Unpreconditioned, VCycle, VCycleOptions,
 };
 use crate::springs::{Neighbours, SpringWeights, StepMatrix, Weights};
 
@@ -242,12 +242,7 @@ impl Reference {
                     out.take(&dx, exact, report.iteration);
                 }
             }
-            Solver::Plain => self.judge_with(
-                &mut Unpreconditioned,
-                cap,
-                &mut out,
-                std::marker::PhantomData::<T>,
-            ),
+            Solver::Plain => self.judge_with(&mut Unpreconditioned, cap, &mut out, std::marker::PhantomData::<T>),
             Solver::ScaledDiagonalization => {
                 // The smoother of a V-cycle is just that.
                 let mut cycle = VCycle::new(

@@ -75,9 +75,7 @@ impl Pattern {
                 let r = (x - 0.5).hypot(y - 0.45);
                 let wall = (0.2..0.32).contains(&r);
                 let a = std::f64::consts::TAU * 3.0;
-                let gyroid = (a * x).sin() * (a * y).cos()
-                    + (a * y).sin() * (a * z).cos()
-                    + (a * z).sin() * (a * x).cos();
+                let gyroid = (a * x).sin() * (a * y).cos() + (a * y).sin() * (a * z).cos() + (a * z).sin() * (a * x).cos();
                 let strut = r < 0.2 && gyroid.abs() < 0.35 && !(0.3..0.7).contains(&z);
                 f64::from(wall || strut)
             }
@@ -88,9 +86,7 @@ impl Pattern {
 
 /// A number in `[0, 1)` from a seed [Steele, Lea and Flood, *Fast splittable pseudorandom number generators*, 2014].
 pub(crate) fn unit_random(seed: u64) -> f64 {
-    let mut z = seed
-        .wrapping_mul(0x9E37_79B9_7F4A_7C15)
-        .wrapping_add(0x9E37_79B9_7F4A_7C15);
+    let mut z = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(0x9E37_79B9_7F4A_7C15);
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
     ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
@@ -114,25 +110,21 @@ pub fn spring_weights(
     scale: f64,
 ) -> Vec<SpringWeights<f64>> {
     let h = 1.0 / (m - 1) as f64;
-    let springs = neighbours
-        .directions()
-        .into_iter()
-        .enumerate()
-        .map(|(n, direction)| {
-            if pattern == Pattern::Uniform {
-                let weights = Weights::Constant(scale * direction.share);
-                return SpringWeights { direction, weights };
-            }
-            let weight = |s: usize| {
-                let at = [s / (m * m), s / m % m, s % m];
-                let middle: [f64; 3] =
-                    std::array::from_fn(|a| (at[a] as f64 + 0.5 * direction.step[a] as f64) * h);
-                let seed = (s * 31 + n) as u64;
-                scale * direction.share * contrast.powf(pattern.exponent(middle, h, seed))
-            };
-            let weights = Weights::Each((0..m * m * m).map(weight).collect());
-            SpringWeights { direction, weights }
-        });
+    let springs = neighbours.directions().into_iter().enumerate().map(|(n, direction)| {
+        if pattern == Pattern::Uniform {
+            let weights = Weights::Constant(scale * direction.share);
+            return SpringWeights { direction, weights };
+        }
+        let weight = |s: usize| {
+            let at = [s / (m * m), s / m % m, s % m];
+            let middle: [f64; 3] =
+                std::array::from_fn(|a| (at[a] as f64 + 0.5 * direction.step[a] as f64) * h);
+            let seed = (s * 31 + n) as u64;
+            scale * direction.share * contrast.powf(pattern.exponent(middle, h, seed))
+        };
+        let weights = Weights::Each((0..m * m * m).map(weight).collect());
+        SpringWeights { direction, weights }
+    });
     springs.collect()
 }
 

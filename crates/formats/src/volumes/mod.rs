@@ -1,7 +1,7 @@
 //! Volumes in and out.
 
-mod detached;
 mod dicom;
+mod detached;
 mod encode;
 mod geometry;
 mod metaimage;

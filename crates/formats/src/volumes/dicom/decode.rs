@@ -188,9 +188,7 @@ impl Worker {
                 fragments.read(&mut stream, plane.frame, &mut self.compressed)?;
                 let (compressed, raw) = (&self.compressed, &mut self.raw);
                 let decode = || codec::decode(source.codec, compressed, &source.shape, raw);
-                source
-                    .layout
-                    .decoded(guard::decode("decoder of compressed pixels", decode)?)
+                source.layout.decoded(guard::decode("decoder of compressed pixels", decode)?)
             }
         };
         self.open = Some((plane.file, stream));
