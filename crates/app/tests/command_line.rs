@@ -31,6 +31,11 @@ fn wrong_usage_ends_with_code_2_and_a_remedy() {
         ("fit cloud.ply -o nowhere/out.iclay", "no directory"),
         (&format!("fit {head} -o out.iclay --tolerance 1mm"), "density"),
         (&format!("fit {head} -o out.iclay --unit cm"), "mm"),
+        (&format!("fit {head} -o out.iclay --robust"), "point clouds"),
+        (
+            &format!("fit {head} -o out.iclay --method offset-pairs"),
+            "adaptive",
+        ),
         (
             &format!("fit {head} -o out.iclay --method interpolate --tolerance 1"),
             "interpolating",
@@ -267,4 +272,20 @@ fn a_mesh_is_fitted_as_the_solid_that_it_bounds() {
             .code,
         2
     );
+}
+
+#[test]
+fn trim_leaves_holes_open_and_says_how_much_was_invented() {
+    let bench = Bench::new();
+    bench.json("phantom torus -o cloud.ply --count 8000 --holes 3");
+    bench.json("fit cloud.ply -o field.iclay --max-depth 6");
+    let note = |summary: &serde_json::Value| summary["notes"].to_string();
+    let whole = bench.json("mesh field.iclay -o whole.ply");
+    assert!(note(&whole).contains("is invented"), "{whole}");
+    let open = bench.json("mesh field.iclay -o open.ply --trim");
+    assert!(note(&open).contains("left out"), "{open}");
+    let share = number(&open, "triangles") / number(&whole, "triangles");
+    assert!((0.75..0.97).contains(&share), "three holes of 6 %: {share}");
+    let far = bench.json("mesh field.iclay -o far.ply --trim 100%");
+    assert_eq!(far["triangles"], whole["triangles"]);
 }

@@ -6,7 +6,6 @@ use glam::DAffine3;
 
 const DIMS: [usize; 3] = [160, 120, 90];
 const SLICE: u64 = 160 * 120 * 4;
-const VOLUME: u64 = SLICE * 90;
 
 /// Windows and tables of the decompressors, names, messages.
 const UNCOUNTED: u64 = 200_000;

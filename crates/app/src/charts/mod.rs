@@ -1,9 +1,15 @@
 //! Speed against accuracy: sweeps over the options, and their charts.
 
 mod fit;
+mod hard;
+mod noise;
 mod orient;
+mod outliers;
 mod plot;
 
 pub use fit::{Configuration, Input, Measurement, sweeps};
+pub use hard::Scene;
+pub use noise::noise;
 pub use orient::Oriented;
+pub use outliers::outliers;
 pub use plot::{Chart, Series};

@@ -27,9 +27,7 @@ pub struct Args {
 }
 
 /// Orients every cloud on both routes, prints a line of CSV each, and draws the chart.
-pub fn run(args: &Args) -> Outcome {
-    let cancel = Cancel::new();
-    interrupt::cancel_on_interrupt(&cancel)?;
+pub fn run(args: &Args, cancel: &Cancel) -> Outcome {
     std::fs::create_dir_all(&args.output)
         .map_err(|e| anyhow::anyhow!("-o {}: cannot be made ({e})", args.output.display()))
         .or_limit()?;
@@ -44,8 +42,8 @@ pub fn run(args: &Args) -> Outcome {
     let mut runs = Vec::new();
     for route in Route::ALL {
         for path in &args.inputs {
-            interrupt::check(&cancel)?;
-            let run = measure(path, route, &cancel)?;
+            interrupt::check(cancel)?;
+            let run = measure(path, route, cancel)?;
             writeln!(io::stdout().lock(), "{}", run.csv()).or_limit()?;
             runs.push(run);
         }

@@ -11,8 +11,9 @@ use super::chart_orient;
 use super::failure::{Failure, OrFail, Outcome};
 use super::input::{reading, writing};
 use super::interrupt;
+use super::phantom::Name;
 use super::progress::Bar;
-use crate::charts::{Chart, Configuration, Input, Measurement, sweeps};
+use crate::charts::{Chart, Configuration, Input, Measurement, Scene, noise, outliers, sweeps};
 
 /// Arguments of `isoclay charts`.
 #[derive(clap::Args)]
@@ -27,6 +28,18 @@ enum Subject {
     Fit(FitArgs),
     /// Wrong normals of clouds without any against the time of their estimation
     Orient(chart_orient::Args),
+    /// Noise against the resolution chosen and the error, and outliers against the error with and without --robust
+    Hard(HardArgs),
+}
+
+#[derive(clap::Args)]
+struct HardArgs {
+    /// Phantom to spoil
+    #[arg(value_enum, default_value = "gyroid")]
+    solid: Name,
+    /// Directory for the charts noise-NAME.svg and outliers-NAME.svg; made if missing
+    #[arg(short, long, value_name = "DIR", default_value = "docs/charts")]
+    output: PathBuf,
 }
 
 #[derive(clap::Args)]
@@ -48,18 +61,46 @@ struct FitArgs {
 
 /// Runs the sweeps and draws the charts.
 pub fn run(args: &Args) -> Outcome {
+    let cancel = Cancel::new();
+    interrupt::cancel_on_interrupt(&cancel)?;
     match &args.subject {
-        Subject::Fit(args) => fit(args),
-        Subject::Orient(args) => chart_orient::run(args),
+        Subject::Fit(args) => fits(args, &cancel),
+        Subject::Orient(args) => chart_orient::run(args, &cancel),
+        Subject::Hard(args) => hard(args, &cancel),
     }
 }
 
-fn fit(args: &FitArgs) -> Outcome {
-    let cancel = Cancel::new();
-    interrupt::cancel_on_interrupt(&cancel)?;
-    std::fs::create_dir_all(&args.output)
-        .map_err(|e| anyhow::anyhow!("-o {}: cannot be made ({e})", args.output.display()))
-        .or_limit()?;
+fn make(directory: &Path) -> Outcome {
+    std::fs::create_dir_all(directory)
+        .map_err(|e| anyhow::anyhow!("-o {}: cannot be made ({e})", directory.display()))
+        .or_limit()
+}
+
+/// Draws what noise and outliers do to a phantom.
+fn hard(args: &HardArgs, cancel: &Cancel) -> Outcome {
+    make(&args.output)?;
+    let Name::Solid(solid) = args.solid else {
+        return Err(Failure::usage("charts hard: the head is a volume; name a solid"));
+    };
+    let scene = Scene::new(solid).ok_or_else(|| Failure::input("the phantom has no surface"))?;
+    let bar = Bar::new();
+    let show = |fraction| bar.show("fitting", fraction);
+    for (kind, chart) in [
+        ("noise", noise(&scene, solid.name(), show)),
+        ("outliers", outliers(&scene, solid.name(), show)),
+    ] {
+        interrupt::check(cancel)?;
+        let svg = chart?.svg().map_err(Failure::limit)?;
+        let target = args.output.join(format!("{kind}-{}.svg", solid.name()));
+        formats::atomic::replace(&target, |out| out.write_all(svg.as_bytes())).map_err(writing)?;
+        bar.clear();
+        writeln!(io::stdout().lock(), "written  {}", target.display()).or_limit()?;
+    }
+    Ok(())
+}
+
+fn fits(args: &FitArgs, cancel: &Cancel) -> Outcome {
+    make(&args.output)?;
     let scratch = tempfile::tempdir().or_limit()?;
     for input in &args.inputs {
         let subject = match input.strip_prefix("phantom:") {
@@ -70,7 +111,7 @@ fn fit(args: &FitArgs) -> Outcome {
         let bar = Bar::new();
         let mut measured = Vec::new();
         for (i, configuration) in configurations.iter().enumerate() {
-            interrupt::check(&cancel)?;
+            interrupt::check(cancel)?;
             bar.show("fitting", i as f64 / configurations.len() as f64);
             let m = subject.measure(configuration, args.runs, scratch.path())?;
             if args.json {

@@ -5,7 +5,7 @@ use bspline::{Field, Frame, HierarchicalSpline, Real};
 use fitting::orient::Route;
 use fitting::{FitReport, Leaf, SignReport, StopReason};
 use formats::Unit;
-use formats::field::{AnyField, FieldMeta, LeafRecord, LoadedField};
+use formats::field::{AnyField, FieldMeta, LeafRecord, LoadedField, SourceKind};
 use serde::{Deserialize, Serialize};
 
 use super::failure::{Failure, Outcome};
@@ -148,6 +148,11 @@ impl OpenField {
             AnyField::F32(_) => <f32 as Real>::NAME,
             AnyField::F64(_) => <f64 as Real>::NAME,
         }
+    }
+
+    /// What it was fitted to.
+    pub fn source(&self) -> SourceKind {
+        self.loaded.meta.source
     }
 
     /// Unit of lengths.

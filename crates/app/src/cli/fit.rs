@@ -3,7 +3,7 @@ use std::path::PathBuf;
 
 use clap::ValueEnum;
 use fitting::mesh::{MeshDefects, MeshOptions, fit_mesh};
-use fitting::points::{OrientedPoints, PointOptions, fit_points};
+use fitting::points::{NormalForm, OrientedPoints, PointOptions, fit_points};
 use fitting::volume::{VolumeMethod, VolumeOptions, VolumeView, fit_volume, otsu_threshold};
 use fitting::{Cancel, Control, FitError, FitReport, StopReason};
 use formats::Unit;
@@ -69,9 +69,10 @@ pub struct Choice {
     /// at every voxel
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=16))]
     pub max_depth: Option<u8>,
-    /// How to fit a volume
-    #[arg(long, value_enum, default_value_t = Method::Adaptive)]
-    pub method: Method,
+    /// How to fit: a volume adaptively or by interpolation, a cloud by gradients or by offset pairs [default:
+    /// adaptive; gradient]
+    #[arg(long, value_enum)]
+    pub method: Option<Method>,
     /// Weight of the bending energy [default: chosen from the data]
     #[arg(long, value_name = "μ", value_parser = positive)]
     pub smoothing: Option<f64>,
@@ -79,6 +80,9 @@ pub struct Choice {
     #[arg(long, value_enum, value_name = "ROUTE", num_args = 0..=1, require_equals = true,
           default_missing_value = "winding")]
     pub unoriented: Option<Unoriented>,
+    /// Take away the weight of points that the others contradict: for clouds with outliers
+    #[arg(long)]
+    pub robust: bool,
     /// Unit of the coordinates, where the file does not tell: mm, cm or m
     #[arg(long, value_parser = unit)]
     pub unit: Option<Unit>,
@@ -87,12 +91,16 @@ pub struct Choice {
     pub precision: Precision,
 }
 
-/// How to fit a volume.
+/// How to fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Method {
-    /// Least squares with as few coefficients as the tolerance needs.
+    /// Clouds: the field is 0 at each point and its gradient the normal.
+    Gradient,
+    /// Clouds: the field is 0 at each point and ∓d at two points at ±d along the normal.
+    OffsetPairs,
+    /// Volumes: least squares with as few coefficients as the tolerance needs.
     Adaptive,
-    /// Exactly through all voxels, with a coefficient for each.
+    /// Volumes: exactly through all voxels, with a coefficient for each.
     Interpolate,
 }
 
@@ -201,11 +209,15 @@ pub fn fit(input: &Input, choice: &Choice, control: &mut Control) -> Outcome<Fit
 }
 
 fn fit_cloud<T: Stored>(cloud: &PointCloud, choice: &Choice, control: &mut Control) -> Outcome<Fitted> {
-    if choice.method == Method::Interpolate {
-        return Err(Failure::usage(
-            "--method interpolate is for volumes; leave it out for a point cloud",
-        ));
-    }
+    let form = match choice.method {
+        None | Some(Method::Gradient) => NormalForm::Gradient,
+        Some(Method::OffsetPairs) => NormalForm::OffsetPairs,
+        Some(Method::Adaptive | Method::Interpolate) => {
+            return Err(Failure::usage(
+                "--method adaptive and interpolate are for volumes; a point cloud takes gradient or offset-pairs",
+            ));
+        }
+    };
     if cloud.positions.is_empty() {
         return Err(FitError::NotEnoughSamples { found: 0, needed: 10 }.into());
     }
@@ -225,7 +237,8 @@ fn fit_cloud<T: Stored>(cloud: &PointCloud, choice: &Choice, control: &mut Contr
         coefficients: choice.coefficients.map(NonZeroUsize::get),
         max_depth: choice.max_depth.map(usize::from),
         smoothing: choice.smoothing,
-        ..Default::default()
+        robust: choice.robust,
+        form,
     };
     let (field, mut report) = fit_points::<T>(&points, &options, control).map_err(|e| explain(e, control))?;
     oriented.complete(&mut report, field.lattice());
@@ -241,9 +254,9 @@ fn fit_cloud<T: Stored>(cloud: &PointCloud, choice: &Choice, control: &mut Contr
 }
 
 fn fit_triangles<T: Stored>(mesh: &TriangleMesh, choice: &Choice, control: &mut Control) -> Outcome<Fitted> {
-    if choice.method == Method::Interpolate {
+    if choice.method.is_some() {
         return Err(Failure::usage(
-            "--method interpolate is for volumes; leave it out for a mesh",
+            "--method is for point clouds and volumes; leave it out for a mesh",
         ));
     }
     if choice.smoothing.is_some() {
@@ -283,6 +296,20 @@ fn fit_voxels<T: Stored>(volume: &Volume, choice: &Choice, control: &mut Control
             "--unoriented is for point clouds; leave it out for a volume",
         ));
     }
+    let method = match choice.method {
+        None | Some(Method::Adaptive) => VolumeMethod::Adaptive,
+        Some(Method::Interpolate) => VolumeMethod::Interpolate,
+        Some(Method::Gradient | Method::OffsetPairs) => {
+            return Err(Failure::usage(
+                "--method gradient and offset-pairs are for point clouds; a volume takes adaptive or interpolate",
+            ));
+        }
+    };
+    if choice.robust {
+        return Err(Failure::usage(
+            "--robust is for point clouds; leave it out for a volume",
+        ));
+    }
     let header = &volume.header;
     let unit = stated_unit(header.unit, choice.unit)?;
     let view = VolumeView {
@@ -296,10 +323,7 @@ fn fit_voxels<T: Stored>(volume: &Volume, choice: &Choice, control: &mut Control
         _ => 1.0,
     };
     let options = VolumeOptions {
-        method: match choice.method {
-            Method::Adaptive => VolumeMethod::Adaptive,
-            Method::Interpolate => VolumeMethod::Interpolate,
-        },
+        method,
         tolerance: choice
             .tolerance
             .map(|t| t.density(range))

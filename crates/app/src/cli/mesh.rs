@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use bspline::polygonize::{Mesh, MeshReport, PolygonizeError, PolygonizeOptions, polygonize_with};
 use bspline::{Field, Frame};
 use fitting::Cancel;
+use formats::field::SourceKind;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -15,6 +16,7 @@ use super::input::{check_output, writing};
 use super::progress::Bar;
 use super::quantity::{Tolerance, finite, human_number};
 use super::summary::Summary;
+use super::trim::{self, Sampled};
 use super::{interrupt, set_threads};
 
 /// Arguments of `isoclay mesh`.
@@ -39,6 +41,10 @@ pub struct Args {
     /// Leave the surface open where it meets the box, instead of closing it
     #[arg(long)]
     open: bool,
+    /// Leave out what is invented: triangles farther than this from every cell with points, in the field's unit, in mm,
+    /// or in per cent of the solid's diagonal [default of the distance: 4 times the mean spacing of the points]
+    #[arg(long, value_name = "DISTANCE[mm|%]", num_args = 0..=1)]
+    trim: Option<Option<Tolerance>>,
     /// Threads to work with [default: all cores]
     #[arg(long, value_name = "N")]
     threads: Option<NonZeroUsize>,
@@ -71,7 +77,7 @@ pub fn run(args: &Args) -> Outcome {
         bar: &bar,
     };
     let mut notes = Vec::new();
-    let (mesh, report, frame) = match args.tolerance {
+    let (mut mesh, report, frame) = match args.tolerance {
         Some(tolerance) => mesher.within_tolerance(&open, tolerance, &mut notes)?,
         None => mesher.on(match args.resolution {
             Some(n) => open.frame_of_resolution(n),
@@ -91,6 +97,7 @@ pub fn run(args: &Args) -> Outcome {
         return Err(open.no_surface(&args.field, options.iso));
     }
     interrupt::check(&cancel)?;
+    trim(&mut mesh, &open, args.trim, &mut notes)?;
     bar.show("writing", 0.99);
     let written = formats::meshes::Mesh {
         vertices: &mesh.positions,
@@ -116,6 +123,62 @@ pub fn run(args: &Args) -> Outcome {
     }
     .with_cost(&cost)
     .print(args.json)
+}
+
+/// Mean spacings of the points from the next cell with points at which the surface counts as invented.
+const TRIM_SPACINGS: f64 = 4.0;
+
+/// Tells which share of the surface of a cloud is invented, and leaves that part out if `asked`.
+fn trim(
+    mesh: &mut Mesh,
+    open: &OpenField,
+    asked: Option<Option<Tolerance>>,
+    notes: &mut Vec<String>,
+) -> Outcome {
+    let report = open.report();
+    if open.source() != SourceKind::Cloud || report.used_count == 0 {
+        return match asked {
+            Some(_) => Err(Failure::usage(
+                "--trim needs a field that was fitted to points; leave it out",
+            )),
+            None => Ok(()),
+        };
+    }
+    let distance = match asked.flatten() {
+        Some(distance) => {
+            let diagonal = mesh.bounding_box().map_or(0.0, |b| b.size().length());
+            distance.length(diagonal, open.unit()).map_err(Failure::usage)?
+        }
+        None => TRIM_SPACINGS * (trim::total_area(mesh) / report.used_count as f64).sqrt(),
+    };
+    if distance.is_nan() || distance <= 0.0 {
+        return Ok(());
+    }
+    let invented = Sampled::new(open.lattice(), &report.leaves, distance).invented(mesh);
+    let share = trim::share(mesh, &invented);
+    if share == 0.0 {
+        return Ok(());
+    }
+    if asked.is_some() {
+        trim::drop_marked(mesh, &invented);
+    }
+    if mesh.triangles.is_empty() {
+        return Err(Failure::input(format!(
+            "--trim: no part of the surface lies within {} of a cell with points; give a larger distance",
+            human_number(distance)
+        )));
+    }
+    notes.push(format!(
+        "{:.1} % of the area is invented: it lies farther than {} from every cell with points{}",
+        100.0 * share,
+        human_number(distance),
+        if asked.is_some() {
+            ", and was left out"
+        } else {
+            " (--trim leaves it out)"
+        }
+    ));
+    Ok(())
 }
 
 /// What the mesher met that a careful user wants to know.

@@ -21,6 +21,7 @@ mod progress;
 mod quantity;
 mod sample;
 mod summary;
+mod trim;
 mod unoriented;
 mod volume_choice;
 

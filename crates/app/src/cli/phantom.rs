@@ -48,7 +48,7 @@ pub struct Args {
 
 /// A phantom's name.
 #[derive(Clone, Copy)]
-enum Name {
+pub enum Name {
     /// A solid, as points on its surface.
     Solid(Solid),
     /// A head of ellipsoids, as a volume.

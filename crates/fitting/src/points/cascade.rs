@@ -5,6 +5,7 @@ use std::ops::Range;
 use bspline::Real;
 use bspline::hierarchical::{BRICK, BrickKey, HALO};
 
+use super::NormalForm;
 use super::band::{Band, Coarser, REACH, bricks_near};
 use super::band_solve::{BandProblem, BandSample, BrickSamples, SolveReport};
 use super::cells::{Cell, LeafCell, cell_quality, children, judge, root_cells};
@@ -185,7 +186,7 @@ fn band_samples<T: Real>(
                 None => (samples.targets[i], samples.normals[i]),
                 Some(probe) => (probe[i], [0.0; 3]),
             };
-            let gradient_weight = if samples.is_sign_condition(i) {
+            let gradient_weight = if samples.is_sign_condition(i) || plan.form == NormalForm::OffsetPairs {
                 T::zero()
             } else {
                 weight

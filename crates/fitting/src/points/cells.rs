@@ -159,7 +159,12 @@ pub(crate) fn cell_quality<T: Real>(
             let (v, g) = gather(&values, sample.spot, [HALO * HALO, HALO]);
             let g = g.map(|g| g.as_f64() * n);
             let steepness: f64 = g.iter().map(|g| g * g).sum();
-            let w = sample.gradient_weight.as_f64();
+            // Conditions on the value alone are no points of the surface.
+            let w = if sample.normal == [T::zero(); 3] {
+                0.0
+            } else {
+                sample.weight.as_f64()
+            };
             let q = &mut out[owners[i] as usize];
             q.weight += w;
             q.distance += w * v.as_f64().powi(2) / steepness.max(1e-4);

@@ -11,9 +11,11 @@ mod cross_validation;
 mod far_field;
 mod feet;
 pub(crate) mod full_grid;
+mod invented;
 #[cfg(test)]
 mod iteration_growth;
 pub(crate) mod noise;
+mod pairs;
 mod plan;
 mod residual;
 pub use residual::newton_distance;
@@ -43,6 +45,18 @@ pub struct PointOptions {
     pub smoothing: Option<f64>,
     /// Whether points that the others contradict lose their weight.
     pub robust: bool,
+    /// What a sample asks of the field beside its value.
+    pub form: NormalForm,
+}
+
+/// How the normal of a sample enters the fit, on the levels that follow the surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum NormalForm {
+    /// As the gradient: `∇f(x) = -n`.
+    #[default]
+    Gradient,
+    /// As two points off the surface, `f(x ± d n) = ∓d`.
+    OffsetPairs,
 }
 
 /// Rounds of conditions against pieces that no sample speaks for.
@@ -102,6 +116,15 @@ pub fn fit_points<T: Real>(
         let start = plan.smoothing.at(plan.max_depth, plan.max_depth);
         let mu = cross_validation::choose::<T>(&samples, &base, &plan, start, sigma, control)?;
         plan.smoothing = Smoothing::Halving(mu);
+    }
+    if options.form == NormalForm::OffsetPairs
+        && let Some(tree) = support::tree(&samples.positions)
+    {
+        let spacing = samples.mean_spacing(0.0);
+        let (paired, account) = pairs::with_offset_pairs(&samples, &tree, spacing);
+        samples = paired;
+        samples.notes.push(account);
+        plan.form = NormalForm::OffsetPairs;
     }
     let mut rounds = 0;
     let (cascade, field) = loop {

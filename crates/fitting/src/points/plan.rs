@@ -1,8 +1,8 @@
 //! The one rule that turns data and options into depths and weights.
 
-use super::PointOptions;
 use super::band_solve::Weights;
 use super::samples::{BASE_DEPTH, MAX_DEPTH, Samples};
+use super::{NormalForm, PointOptions};
 use crate::StopReason;
 
 /// How a cascade runs.
@@ -32,6 +32,8 @@ pub(crate) struct Plan {
     pub limited_by: StopReason,
     /// Whether points without weight are outliers, which no figure counts.
     pub robust: bool,
+    /// What the samples ask for beside their values.
+    pub form: NormalForm,
     /// Value targets in the place of 0, and no normals: for the trace of the smoother.
     pub probe: Option<Vec<f32>>,
 }
@@ -95,6 +97,7 @@ impl Plan {
             thin: true,
             limited_by: StopReason::Depth,
             robust: options.robust,
+            form: NormalForm::Gradient,
             probe: None,
         };
         let Some(sigma) = noise else { return clean };

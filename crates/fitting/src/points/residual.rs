@@ -81,6 +81,17 @@ pub(crate) fn report<T: Real>(
             },
         }
     });
+    let mut leaves: Vec<Leaf> = leaves.collect();
+    let mut notes = samples.notes.clone();
+    let invented = super::invented::leaves(field, samples, &leaves);
+    if !invented.is_empty() {
+        notes.push(format!(
+            "the surface crosses {} cells of 1/64 of the box far from all points: it is invented there (leaves without \
+             samples; isoclay mesh --trim leaves it open)",
+            invented.len()
+        ));
+        leaves.extend(invented);
+    }
     let mut distances: Vec<f64> = measured.iter().flatten().map(|m| m.0).collect();
     let count = distances.len();
     let rms = (distances.iter().map(|d| d * d).sum::<f64>() / count as f64).sqrt();
@@ -103,8 +114,8 @@ pub(crate) fn report<T: Real>(
             Smoothing::Steps { finest, .. } => finest,
             Smoothing::Halving(mu) => mu,
         },
-        leaves: leaves.collect(),
+        leaves,
         signs: None,
-        notes: samples.notes.clone(),
+        notes,
     }
 }
