@@ -263,7 +263,7 @@ fn a_directory_an_empty_file_no_file_and_a_strange_name_are_named() {
     let folder = scratch.directory.path().join("scan.ply");
     std::fs::create_dir(&folder).unwrap();
     for (path, part) in [
-        (folder, "scan.ply: a directory without slices is not"),
+        (folder, "scan.ply: a directory without DICOM or TIFF files is not"),
         (scratch.file("none.ply", b""), "none.ply: is empty"),
         (scratch.file("none.nii.gz", &gzip(b"")), "is empty"),
         (
