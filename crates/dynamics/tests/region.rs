@@ -123,8 +123,9 @@ fn points(cells: Cells, count: usize) -> Vec<(DVec3, bool)> {
             if i % 4 == 0 {
                 q[i / 4 % 3] = [before, behind][i / 12 % 2][i / 4 % 3];
             }
-            // The way through the world rounds by less.
-            let inside = q.cmpgt(low - 1e-9).all() && q.cmplt(high + 1e-9).all();
+            // Outside the lattice the field continues its face. The way through the world rounds by less than 1e-9.
+            let at = q.clamp(DVec3::ZERO, lattice.extent());
+            let inside = at.cmpgt(low - 1e-9).all() && at.cmplt(high + 1e-9).all();
             (lattice.world_from_lattice.transform_point3(q), inside)
         })
         .collect()

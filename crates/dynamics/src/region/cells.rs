@@ -50,6 +50,7 @@ impl Cells {
     ///
     /// Where the field has no bricks of the level yet, baking makes them, and all levels between, and what they cover is
     /// from then on evaluated at the new level: the same but for rounding. The box takes in all such bricks.
+    /// Outside the lattice, what lies behind a face of the box counts as the box.
     ///
     /// # Errors
     /// [`RegionError`] for a box that is not in the field, or becomes too large.

@@ -14,9 +14,9 @@
 //! let field = HierarchicalSpline::<f32>::from_corrections(lattice, 1.0, vec![BTreeMap::new()]);
 //! let cells = Cells { level: 0, first: [1; 3], count: [10; 3] };
 //! let mut region = Region::new(&field, cells, Matter::default(), &RegionOptions::of(&field, 0))?;
-//! let mut force = vec![0.0; region.patch().lattice().sample_count()];
-//! let middle = force.len() / 2;
-//! force[middle] = 1.0;
+//! let [nx, ny, nz] = region.patch().lattice().sample_dims();
+//! let mut force = vec![0.0; nx * ny * nz];
+//! force[(nx / 2 * ny + ny / 2) * nz + nz / 2] = 1.0;
 //! region.set_force(&force)?;
 //! region.step(Integrator::TrBdf2, 0.1)?;
 //! let pulled = region.release_clay(&field)?;
