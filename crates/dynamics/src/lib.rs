@@ -32,12 +32,16 @@
 //!
 //! Sources: J. Hua and H. Qin, *Haptics-Based Dynamic Implicit Solid Modeling*, 2004 (DIS).
 //!
-//! What it cannot do yet: constraints, sleeping parts, more than one thread.
+//! A [`Region`](region::Region) cuts a patch out of a hierarchical field and bakes its change back.
+//!
+//! What it cannot do yet: constraints, sleep of parts of a region (whole ones do), more than one thread.
 
 pub mod integrators;
 pub mod lattice;
 pub mod matter;
 pub mod patch;
+pub mod region;
+mod rest;
 pub mod solve;
 pub mod springs;
 pub mod study;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::brick::{BRICK, NONE};
+use super::brick::{BRICK, BrickKey, NONE};
 use super::spline::HierarchicalSpline;
 use crate::{Aabb, Real};
 
@@ -27,6 +27,12 @@ impl<T: Real> HierarchicalSpline<T> {
             changes.compare(0, root, root);
         }
         changes.boxes
+    }
+
+    /// Whether `level` has a brick at `key`: its cells are then evaluated at this level or a finer one, and editing
+    /// functions of the level changes no rounding beside their supports.
+    pub fn has_brick(&self, level: usize, key: BrickKey) -> bool {
+        self.find(level, key).is_some()
     }
 
     /// Bricks of totals that are not the very bricks of `other`.

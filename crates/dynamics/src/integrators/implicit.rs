@@ -15,7 +15,7 @@ pub(super) type Moved = (SolveReport, usize, Option<f64>);
 impl<T: Real> Patch<T> {
     /// All forces on the samples at the present state: external, springs, ground, but not damping. With them, of the
     /// 4-D law, the tangent `stiffness·σ²kτ`. Returns the number of springs with a negative tangent.
-    pub(super) fn forces(&mut self, stiffness: Option<f64>) -> usize {
+    pub(crate) fn forces(&mut self, stiffness: Option<f64>) -> usize {
         let (force, d) = (&mut self.work.force, &self.state.d);
         force.copy_from_slice(&self.external);
         let springs = match (self.network.law(), stiffness) {

@@ -1,0 +1,55 @@
+//! A patch at rest: how far from it, and making the present shape the one that rests.
+
+use bspline::Real;
+
+use crate::patch::Patch;
+use crate::springs::Weights;
+
+impl<T: Real> Patch<T> {
+    /// Makes the present densities the ones the patch was cut at: rest := current with rest scale 1, also of the ground
+    /// springs, velocity := 0, force := 0, `p` := 0.
+    ///
+    /// No force is left, exactly, so later steps change no bit.
+    pub fn rest_here(&mut self) {
+        self.network.rest_mut().scale = Weights::Constant(T::one());
+        self.network.rest_at(&self.state.d);
+        self.base.copy_from_slice(&self.state.d);
+        self.state.p.fill(T::zero());
+        self.external.fill(T::zero());
+        self.stop();
+    }
+
+    /// Velocity := 0.
+    pub(crate) fn stop(&mut self) {
+        self.state.v.fill(T::zero());
+        self.state.w.fill(T::zero());
+    }
+
+    /// `σ√(2E/M)` with the kinetic energy `E` and the mass `M` of all samples: a length per second.
+    pub(crate) fn mean_speed(&self) -> f64 {
+        let count = self.state.d.len();
+        let mass: f64 = match &self.lumped.mass {
+            Weights::Constant(m) => m.as_f64() * count as f64,
+            Weights::Each(m) => m.iter().map(|m| m.as_f64()).sum(),
+        };
+        self.network.law().scale() * (2.0 * self.kinetic() / mass).sqrt()
+    }
+
+    /// Largest `σ|Aᵀf|/(AᵀM1)` over the free coefficients, `f` all forces but damping: a length per second squared, the
+    /// acceleration of matter that hangs together only within the support of a coefficient.
+    pub(crate) fn unbalanced(&mut self) -> f64 {
+        self.forces(None);
+        let work = &mut self.work;
+        let lattice = self.solver.lattice();
+        lattice.gather(&work.force, &mut work.first_x, &mut self.workspace);
+        for (i, m) in work.first_dx.iter_mut().enumerate() {
+            *m = self.lumped.mass.at(i);
+        }
+        lattice.gather(&work.first_dx, &mut work.x, &mut self.workspace);
+        let pairs = work.first_x.iter().zip(&work.x);
+        let largest = pairs
+            .map(|(f, m)| f.as_f64().abs() / m.as_f64())
+            .fold(0.0, f64::max);
+        self.network.law().scale() * largest
+    }
+}
