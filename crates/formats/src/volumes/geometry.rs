@@ -38,8 +38,9 @@ pub(super) fn usable(map: DAffine3) -> Result<DAffine3, Fault> {
     Err(Fault::Value {
         what: "the map from voxels to the world",
         value: format!(
-            "axes {}, {}, {} from {}",
-            m.x_axis, m.y_axis, m.z_axis, map.translation
+            "axes {:?} from {:?}",
+            m.to_cols_array_2d(),
+            map.translation.to_array()
         ),
         remedy: "the axes are finite, not 0 and not in one plane; correct the header",
     })
