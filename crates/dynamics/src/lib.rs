@@ -32,8 +32,9 @@
 //!
 //! Sources: J. Hua and H. Qin, *Haptics-Based Dynamic Implicit Solid Modeling*, 2004 (DIS).
 //!
-//! What it cannot do yet: constraints, sleeping parts, more than one thread.
+//! What it cannot do yet: sleeping parts, more than one thread.
 
+pub mod constraints;
 pub mod integrators;
 pub mod lattice;
 pub mod matter;
