@@ -34,8 +34,9 @@
 //!
 //! A [`Region`](region::Region) cuts a patch out of a hierarchical field and bakes its change back.
 //!
-//! What it cannot do yet: constraints, sleep of parts of a region (whole ones do), more than one thread.
+//! What it cannot do yet: sleep of parts of a region (whole ones do), more than one thread.
 
+pub mod constraints;
 pub mod integrators;
 pub mod lattice;
 pub mod matter;

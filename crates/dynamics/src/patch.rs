@@ -2,6 +2,7 @@
 
 use bspline::Real;
 
+use crate::constraints::{ConstraintError, Held};
 use crate::lattice::{Lattice, TensorWorkspace};
 use crate::matter::{Lumped, Matter, MatterError};
 use crate::solve::{SolveError, SolverOptions, StepSolver};
@@ -16,6 +17,9 @@ pub enum PatchError {
     /// The step cannot be solved.
     #[error(transparent)]
     Solve(#[from] SolveError),
+    /// Constraints are refused.
+    #[error(transparent)]
+    Constraint(#[from] ConstraintError),
     /// A list that does not fit the lattice.
     #[error("{found} {what}; the patch has {needed}")]
     Length {
@@ -80,12 +84,14 @@ pub struct Energy {
     pub springs: f64,
     /// Of the ground springs.
     pub ground: f64,
+    /// Of the constraint springs.
+    pub constraints: f64,
 }
 
 impl Energy {
     /// Their sum.
     pub fn total(self) -> f64 {
-        self.kinetic + self.springs + self.ground
+        self.kinetic + self.springs + self.ground + self.constraints
     }
 }
 
@@ -124,6 +130,7 @@ pub struct Patch<T> {
     /// Densities of the field the patch was cut from, and where the ground springs rest.
     pub(crate) base: Vec<T>,
     pub(crate) external: Vec<T>,
+    pub(crate) held: Option<Box<Held<T>>>,
     pub(crate) solver: StepSolver<T>,
     /// For the mass alone, made by the first explicit step.
     pub(crate) mass_solver: Option<Box<StepSolver<T>>>,
@@ -212,6 +219,7 @@ impl<T: Real> Patch<T> {
             network,
             base: d.to_vec(),
             external: zeros(m),
+            held: None,
             solver: StepSolver::new(lattice, &steps, options),
             mass_solver: None,
             mass_matrix: None,
@@ -243,7 +251,8 @@ impl<T: Real> Patch<T> {
         &self.state
     }
 
-    /// Puts the patch into a state given by changes of the coefficients and their rates.
+    /// Puts the patch into a state given by changes of the coefficients and their rates, and from there by the least
+    /// change onto its hard constraints.
     ///
     /// # Errors
     /// [`PatchError::Length`], [`PatchError::NotFinite`].
@@ -254,6 +263,7 @@ impl<T: Real> Patch<T> {
         self.state.p.copy_from_slice(p);
         self.state.v.copy_from_slice(v);
         self.sample_state();
+        self.meet_constraints();
         Ok(())
     }
 
@@ -312,6 +322,7 @@ impl<T: Real> Patch<T> {
             kinetic: self.kinetic(),
             springs: springs.energy,
             ground: self.ground_energy(),
+            constraints: self.constraint_energy(),
         }
     }
 

@@ -1,9 +1,10 @@
 use bspline::Real;
 
 use super::implicit::Moved;
+use crate::constraints::Held;
 use crate::lattice::TensorWorkspace;
 use crate::patch::{Patch, PatchError};
-use crate::solve::{Lanczos, StepSolver, System, dot};
+use crate::solve::{Lanczos, StepSolver, System, add_spring, dot};
 use crate::springs::{SpringWeights, StepMatrix, Weights};
 
 /// Share of the bound that a step may use: the bound is an estimate from below of the largest eigenvalue.
@@ -13,6 +14,8 @@ const LANCZOS_STEPS: usize = 30;
 /// `K̃`, preconditioned by the inverse of `M̃`; on a square lattice, where `A` changes nothing, `K` and `M` themselves.
 struct Stiffness<'a, T> {
     stiffness: &'a StepMatrix<T>,
+    /// Of constraint springs: rows on the unknowns with their stiffness.
+    springs: &'a [(Vec<(usize, f64)>, f64)],
     mass: &'a StepMatrix<T>,
     solver: &'a mut StepSolver<T>,
     samples: [Vec<T>; 2],
@@ -21,15 +24,20 @@ struct Stiffness<'a, T> {
 
 impl<T: Real> System<T> for Stiffness<'_, T> {
     fn apply(&mut self, p: &[T], q: &mut [T]) -> f64 {
-        if self.solver.lattice().is_square() {
+        let mut curvature = if self.solver.lattice().is_square() {
             self.stiffness.apply(p, q);
-            return dot(p, q);
+            dot(p, q)
+        } else {
+            let [d, s] = &mut self.samples;
+            self.solver.lattice().sample(p, d, &mut self.workspace);
+            self.stiffness.apply(d, s);
+            self.solver.lattice().gather(s, q, &mut self.workspace);
+            dot(d, s)
+        };
+        for (row, stiffness) in self.springs {
+            curvature += add_spring(row, *stiffness, p, q);
         }
-        let [d, s] = &mut self.samples;
-        self.solver.lattice().sample(p, d, &mut self.workspace);
-        self.stiffness.apply(d, s);
-        self.solver.lattice().gather(s, q, &mut self.workspace);
-        dot(d, s)
+        curvature
     }
 
     fn precondition(&mut self, r: &[T], z: &mut [T]) {
@@ -46,6 +54,7 @@ impl<T: Real> System<T> for Stiffness<'_, T> {
 /// `√λ_max(M̃⁻¹K̃)` by Lanczos steps; `solver` is prepared for the mass.
 pub(crate) fn largest_frequency<T: Real>(
     stiffness: &StepMatrix<T>,
+    springs: &[(Vec<(usize, f64)>, f64)],
     mass: &StepMatrix<T>,
     solver: &mut StepSolver<T>,
 ) -> f64 {
@@ -53,6 +62,7 @@ pub(crate) fn largest_frequency<T: Real>(
     let mut lanczos = Lanczos::new(solver.lattice().coefficient_count());
     let mut system = Stiffness {
         stiffness,
+        springs,
         mass,
         solver,
         samples: [vec![T::zero(); samples], vec![T::zero(); samples]],
@@ -88,7 +98,7 @@ impl<T: Real> Patch<T> {
         })
     }
 
-    /// The largest stable explicit step, `2/√λ_max(M̃⁻¹K̃)`, by Lanczos steps; of the 4-D law with all tangent factors 1,
+    /// The largest stable explicit step, `2/√λ_max(M̃⁻¹K̃)`, by Lanczos steps, without hard constraints, which only raise it; of the 4-D law with all tangent factors 1,
     /// which they never exceed. Infinite without stiffness.
     ///
     /// # Errors
@@ -113,7 +123,8 @@ impl<T: Real> Patch<T> {
         let mut solver = self.mass_solver();
         self.mass_matrix = None;
         solver.prepare(&mass)?;
-        let largest = largest_frequency(&stiffness, &mass, &mut solver);
+        let springs = self.held.as_deref().map_or(&[][..], Held::springs);
+        let largest = largest_frequency(&stiffness, springs, &mass, &mut solver);
         self.mass_solver = Some(solver);
         let limit = if largest > 0.0 {
             2.0 / largest
@@ -135,7 +146,15 @@ impl<T: Real> Patch<T> {
         for (i, g) in self.work.g.iter_mut().enumerate() {
             *g = t(dt) * (self.work.force[i] - self.lumped.damping.at(i) * self.state.w[i]);
         }
+        self.aim(dt, 1.0 / dt, 1.0);
         let mut solver = self.mass_solver();
+        if let (Some(held), None) = (&self.held, solver.border_mut()) {
+            solver.set_border(Some(held.border(false)));
+            self.mass_matrix = None;
+        }
+        if let (Some(held), Some(border)) = (&self.held, solver.border_mut()) {
+            held.aim(border);
+        }
         let kept = self
             .mass_matrix
             .take()

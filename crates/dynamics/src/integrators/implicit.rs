@@ -52,6 +52,7 @@ impl<T: Real> Patch<T> {
             let ratio = stiffness / p.stiffness;
             p.version == version && (1.0 / STALE..=STALE).contains(&ratio)
         });
+        self.aim_implicit(stiffness);
         // The diagonalization of constant material costs nothing to renew.
         let mut fresh = !near || (!same && self.matrix.is_uniform());
         loop {
@@ -111,6 +112,7 @@ impl<T: Real> Patch<T> {
             let momentum = t(dt) * self.lumped.mass.at(i) - t(0.5 * dt * dt) * self.lumped.damping.at(i);
             *g = momentum * self.state.w[i] + t(dt * dt) * self.work.force[i];
         }
+        self.aim(dt * dt, 1.0, 0.0);
         let report = self.solve_step(0.5 * dt, dt * dt)?;
         let (work, state) = (&self.work, &mut self.state);
         for (v, x) in state.v.iter_mut().zip(&work.x) {
@@ -149,6 +151,7 @@ impl<T: Real> Patch<T> {
             *g =
                 t(2.0 * c) * (self.lumped.mass.at(i) * self.state.w[i]) + t(2.0 * c * c) * self.work.force[i];
         }
+        self.aim(2.0 * c * c, 1.0, 0.0);
         self.solve_step(c, c * c)?;
         let (work, state) = (&mut self.work, &mut self.state);
         for (v, x) in state.v.iter_mut().zip(&work.x) {
@@ -173,6 +176,7 @@ impl<T: Real> Patch<T> {
             let first = t(beta) * work.first_dx[i];
             *g = t(c) * (m * velocity) + (m + t(c) * damping) * first + t(c * c) * work.force[i];
         }
+        self.aim(c * c, 1.0, 0.0);
         let report = self.solve_step(c, c * c)?;
         let error = self.tr_bdf2_finish(dt, gamma, beta, c);
         Ok((report, clamped, Some(error)))

@@ -127,15 +127,26 @@ impl<T: Real> Lattice<T> {
     /// # Panics
     /// If the lattice is not square.
     pub(crate) fn inverse(&self) -> TensorProduct<f64> {
+        TensorProduct::new(self.axis_inverses().each_ref())
+    }
+
+    /// Solves `Aᵀ g = b`, in double precision, on a square lattice.
+    ///
+    /// # Panics
+    /// If the lattice is not square.
+    pub(crate) fn inverse_transposed(&self) -> TensorProduct<f64> {
+        TensorProduct::new(self.axis_inverses().map(|a| a.transposed()).each_ref())
+    }
+
+    fn axis_inverses(&self) -> [Banded<f64>; 3] {
         assert!(self.is_square(), "as many coefficients as samples");
-        let inverse: [Banded<f64>; 3] = std::array::from_fn(|k| {
+        std::array::from_fn(|k| {
             let a = self.axes[k].collocation().to_dense();
             let a = a
                 .try_inverse()
                 .expect("axes are refused when their collocation is singular");
             let row = |i: usize| (0..a.ncols()).map(|j| (j, a[(i, j)])).collect::<Vec<_>>();
             Banded::from_rows(a.ncols(), (0..a.nrows()).map(row))
-        });
-        TensorProduct::new(inverse.each_ref())
+        })
     }
 }

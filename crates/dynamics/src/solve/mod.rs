@@ -1,10 +1,12 @@
 //! The increment of one implicit step: `AᵀSA x = Aᵀg` for a matrix `S` on the samples.
 
 mod band_cholesky;
+mod border;
 mod dot;
 mod fast_diagonalization;
 mod galerkin;
 mod lanczos;
+mod orthonormal;
 mod pcg;
 mod sample_multigrid;
 mod schwarz;
@@ -12,10 +14,12 @@ mod step_solver;
 mod v_cycle;
 
 pub use band_cholesky::{BandCholesky, NotPositive};
+pub(crate) use border::{Border, add_spring, spring_value};
 pub(crate) use dot::dot;
 pub use fast_diagonalization::FastDiagonalization;
 pub use galerkin::Galerkin;
 pub(crate) use lanczos::Lanczos;
+pub(crate) use orthonormal::OrthonormalRows;
 pub use pcg::{CoefficientSystem, ConjugateGradients, PcgReport, Preconditioner, System, Unpreconditioned};
 pub use sample_multigrid::SampleMultigrid;
 pub use schwarz::Schwarz;

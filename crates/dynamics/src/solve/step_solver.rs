@@ -3,6 +3,7 @@
 use bspline::Real;
 
 use super::band_cholesky::{BandCholesky, NotPositive};
+use super::border::Border;
 use super::dot::dot;
 use super::fast_diagonalization::FastDiagonalization;
 use super::galerkin::Galerkin;
@@ -103,6 +104,7 @@ pub struct StepSolver<T> {
     painted: Painted<T>,
     inverse: Option<SampleInverse>,
     iteration: ConjugateGradients<T>,
+    border: Option<Box<Border<T>>>,
     b: Vec<T>,
     samples: [Vec<T>; 2],
     workspace: TensorWorkspace<T>,
@@ -164,6 +166,7 @@ impl<T: Real> StepSolver<T> {
                 workspace: TensorWorkspace::new(),
             }),
             iteration: ConjugateGradients::new(lattice.coefficient_count()),
+            border: None,
             b: zeros(lattice.coefficient_count()),
             samples: [zeros(m), zeros(m)],
             workspace: TensorWorkspace::new(),
@@ -197,6 +200,7 @@ impl<T: Real> StepSolver<T> {
         if s.is_uniform() && s.springs.len() == 3 {
             self.diagonalization.set_constant(s);
             self.method = Method::FastDiagonalization;
+            self.prepare_border(s);
             return Ok(());
         }
         if matches!(self.painted, Painted::None) {
@@ -224,7 +228,26 @@ impl<T: Real> StepSolver<T> {
                 Method::SampleMultigrid
             }
         };
+        self.prepare_border(s);
         Ok(())
+    }
+
+    fn prepare_border(&mut self, s: &StepMatrix<T>) {
+        if let Some(border) = &mut self.border {
+            let preconditioner = active(self.method, &mut self.painted, &mut self.diagonalization);
+            border.prepare(|r, z| preconditioner.apply(s, r, z));
+        }
+    }
+
+    /// Constraints on the unknowns, which are the samples on a square lattice and the coefficients on others; in force
+    /// from the next [`prepare`](Self::prepare) on.
+    pub(crate) fn set_border(&mut self, border: Option<Border<T>>) {
+        self.border = border.map(Box::new);
+    }
+
+    /// The constraints.
+    pub(crate) fn border_mut(&mut self) -> Option<&mut Border<T>> {
+        self.border.as_deref_mut()
     }
 
     fn make_painted(&self) -> Painted<T> {
@@ -261,17 +284,14 @@ impl<T: Real> StepSolver<T> {
         });
         let cap = self.options.iterations;
         let iteration = if let Some(inverse) = &mut self.inverse {
-            let mut run = |preconditioner: &mut dyn Preconditioner<T>| {
-                let mut system = SampleSystem {
-                    matrix: s,
-                    preconditioner: &mut Dynamic(preconditioner),
-                };
-                self.iteration.solve(&mut system, g, dx, cap, tolerance)
+            let preconditioner = active(self.method, &mut self.painted, &mut self.diagonalization);
+            let mut system = SampleSystem {
+                matrix: s,
+                preconditioner: &mut Dynamic(preconditioner),
             };
-            let report = match (self.method, &mut self.painted) {
-                (Method::SampleDirect, Painted::SampleDirect(factor)) => run(factor),
-                (Method::SampleMultigrid, Painted::SampleMultigrid(multigrid)) => run(&mut **multigrid),
-                _ => run(&mut self.diagonalization),
+            let report = match &mut self.border {
+                Some(border) => border.solve(&mut system, g, dx, cap, tolerance),
+                None => self.iteration.solve(&mut system, g, dx, cap, tolerance),
             };
             for (d, dx) in inverse.d.iter_mut().zip(dx.iter()) {
                 *d = dx.as_f64();
@@ -285,7 +305,7 @@ impl<T: Real> StepSolver<T> {
             report
         } else {
             self.lattice.gather(g, &mut self.b, &mut self.workspace);
-            let report = self.iterate(s, x, cap, tolerance);
+            let report = self.iterate(s, x, cap, tolerance, true);
             self.lattice.sample(x, dx, &mut self.workspace);
             report
         };
@@ -295,30 +315,49 @@ impl<T: Real> StepSolver<T> {
         }
     }
 
-    /// The same for forces `b` on the coefficients, of lattices with fewer coefficients than samples.
+    /// The same without constraints for forces `b` on the coefficients, of lattices with fewer coefficients than samples.
     pub(crate) fn solve_coefficients(&mut self, s: &StepMatrix<T>, b: &[T], x: &mut [T]) {
         debug_assert!(self.inverse.is_none());
         self.b.copy_from_slice(b);
-        self.iterate(s, x, self.options.iterations, 16.0 * T::UNIT_ROUND_OFF);
+        self.iterate(s, x, self.options.iterations, 16.0 * T::UNIT_ROUND_OFF, false);
     }
 
     /// Solves for the right-hand side in `self.b`.
-    fn iterate(&mut self, s: &StepMatrix<T>, x: &mut [T], cap: usize, tolerance: f64) -> PcgReport {
-        let mut run = |preconditioner: &mut dyn Preconditioner<T>| {
-            let mut system = CoefficientSystem {
-                lattice: &self.lattice,
-                matrix: s,
-                preconditioner: &mut Dynamic(preconditioner),
-                samples: &mut self.samples,
-                workspace: &mut self.workspace,
-            };
-            self.iteration.solve(&mut system, &self.b, x, cap, tolerance)
+    fn iterate(
+        &mut self,
+        s: &StepMatrix<T>,
+        x: &mut [T],
+        cap: usize,
+        tolerance: f64,
+        constrained: bool,
+    ) -> PcgReport {
+        let preconditioner = active(self.method, &mut self.painted, &mut self.diagonalization);
+        let mut system = CoefficientSystem {
+            lattice: &self.lattice,
+            matrix: s,
+            preconditioner: &mut Dynamic(preconditioner),
+            samples: &mut self.samples,
+            workspace: &mut self.workspace,
         };
-        match (self.method, &mut self.painted) {
-            (Method::Direct, Painted::Direct(direct)) => run(&mut direct.1),
-            (Method::VCycle, Painted::VCycle(cycle)) => run(&mut **cycle),
-            _ => run(&mut self.diagonalization),
+        match &mut self.border {
+            Some(border) if constrained => border.solve(&mut system, &self.b, x, cap, tolerance),
+            _ => self.iteration.solve(&mut system, &self.b, x, cap, tolerance),
         }
+    }
+}
+
+/// What the matrix was prepared with.
+fn active<'a, T: Real>(
+    method: Method,
+    painted: &'a mut Painted<T>,
+    diagonalization: &'a mut FastDiagonalization<T>,
+) -> &'a mut dyn Preconditioner<T> {
+    match (method, painted) {
+        (Method::Direct, Painted::Direct(direct)) => &mut direct.1,
+        (Method::VCycle, Painted::VCycle(cycle)) => &mut **cycle,
+        (Method::SampleDirect, Painted::SampleDirect(factor)) => factor,
+        (Method::SampleMultigrid, Painted::SampleMultigrid(multigrid)) => &mut **multigrid,
+        _ => diagonalization,
     }
 }
 

@@ -127,7 +127,7 @@ impl Reference {
         let mut mass_solver = StepSolver::new(lattice.clone(), &axial, SolverOptions::default());
         mass_solver.prepare(&mass_matrix)?;
         let stiffness = StepMatrix::new([m; 3], Weights::Constant(0.0), springs);
-        let dt = c.dt_over_limit * 2.0 / largest_frequency(&stiffness, &mass_matrix, &mut mass_solver);
+        let dt = c.dt_over_limit * 2.0 / largest_frequency(&stiffness, &[], &mass_matrix, &mut mass_solver);
         let scaled = stiffness.springs.iter().map(|s| SpringWeights {
             direction: s.direction,
             weights: s.weights.scaled(dt * dt),

@@ -1,0 +1,219 @@
+use bspline::Real;
+
+use super::constraint::{Constraint, ConstraintError, Hold, Row};
+use super::independent::Independent;
+use crate::lattice::{Lattice, TensorWorkspace};
+use crate::patch::{Patch, PatchError};
+use crate::solve::{Border, spring_value};
+
+/// The constraints of a patch, as rows on the unknowns of its solver: the coefficients, or on a square lattice the
+/// samples.
+#[derive(Clone, Debug)]
+pub(crate) struct Held<T> {
+    constraints: Vec<Constraint>,
+    /// On the coefficients, one per constraint.
+    rows: Vec<Row>,
+    /// Rows and `σ²k`.
+    springs: Vec<(Vec<(usize, f64)>, f64)>,
+    targets: Vec<f64>,
+    hard: Independent,
+    impulses: Vec<f64>,
+    gaps: Vec<f64>,
+    /// Displacement and velocity of the unknowns.
+    moved: [Vec<T>; 2],
+}
+
+impl<T: Real> Held<T> {
+    fn new(
+        constraints: &[Constraint],
+        lattice: &Lattice<T>,
+        base: &[T],
+        sigma2: f64,
+    ) -> Result<Self, ConstraintError> {
+        let rows = constraints.iter().map(|c| Row::new(c, lattice, base));
+        let rows: Vec<Row> = rows.collect::<Result<_, _>>()?;
+        let mut on_unknowns = rows.clone();
+        if lattice.is_square() {
+            // r·p = (A⁻ᵀr)·d
+            let inverse = lattice.inverse_transposed();
+            let mut w = TensorWorkspace::new();
+            let (mut from, mut to) = (vec![0.0; base.len()], vec![0.0; base.len()]);
+            for row in &mut on_unknowns {
+                from.fill(0.0);
+                for (i, v) in &row.terms {
+                    from[*i] = *v;
+                }
+                inverse.apply(&from, &mut to, &mut w);
+                let terms = to.iter().copied().enumerate();
+                row.terms = terms.filter(|(_, v)| v.abs() > 1e-14 * row.weight).collect();
+            }
+        }
+        let all = constraints.iter().zip(&on_unknowns);
+        let hard = all.clone().filter(|(c, _)| c.hold == Hold::Hard);
+        let hard: Vec<(&str, &Row)> = hard.map(|(c, r)| (c.label.as_str(), r)).collect();
+        let hard = Independent::new(&hard)?;
+        let soft = all.filter_map(|(c, r)| match c.hold {
+            Hold::Spring(k) => Some(((r.terms.clone(), sigma2 * k), r.target)),
+            Hold::Hard => None,
+        });
+        let (springs, targets): (Vec<_>, Vec<_>) = soft.unzip();
+        let zeros = || vec![T::zero(); lattice.coefficient_count()];
+        Ok(Self {
+            constraints: constraints.to_vec(),
+            rows,
+            impulses: vec![0.0; springs.len()],
+            gaps: vec![0.0; hard.c.len()],
+            springs,
+            targets,
+            hard,
+            moved: [zeros(), zeros()],
+        })
+    }
+
+    /// Rows on the unknowns of the constraint springs, with `σ²k`.
+    pub fn springs(&self) -> &[(Vec<(usize, f64)>, f64)] {
+        &self.springs
+    }
+
+    /// For a solver of steps in which the springs are implicit, or not.
+    pub fn border(&self, implicit: bool) -> Border<T> {
+        let springs = self.springs.iter().map(|s| s.0.clone()).collect();
+        Border::new(self.moved[0].len(), springs, implicit, self.hard.rows.clone())
+    }
+
+    /// Writes what the next solve has to do.
+    pub fn aim(&self, border: &mut Border<T>) {
+        border.impulses.copy_from_slice(&self.impulses);
+        border.gaps.copy_from_slice(&self.gaps);
+    }
+}
+
+impl<T: Real> Patch<T> {
+    /// Replaces all constraints, also while the patch moves. Hard ones are met at once by the least change of the
+    /// unknowns; to bring matter to them slowly, move their densities from step to step. Hard constraints that follow
+    /// from others are accepted.
+    ///
+    /// Costs a solve per constraint at the next step and as many vectors of coefficients.
+    ///
+    /// # Errors
+    /// [`PatchError::Constraint`]; the old constraints then stay.
+    pub fn set_constraints(&mut self, constraints: &[Constraint]) -> Result<(), PatchError> {
+        let sigma2 = self.network.law().scale().powi(2);
+        let held = match constraints {
+            [] => None,
+            list => Some(Box::new(Held::new(
+                list,
+                self.solver.lattice(),
+                &self.base,
+                sigma2,
+            )?)),
+        };
+        self.solver.set_border(held.as_ref().map(|h| h.border(true)));
+        self.held = held;
+        self.mass_solver = None;
+        self.mass_matrix = None;
+        self.version += 1;
+        self.meet_constraints();
+        Ok(())
+    }
+
+    /// The constraints.
+    pub fn constraints(&self) -> &[Constraint] {
+        self.held.as_ref().map_or(&[], |h| &h.constraints)
+    }
+
+    /// What is missing to the density of each constraint.
+    pub fn constraint_gaps(&self) -> impl Iterator<Item = f64> + '_ {
+        let rows = self.held.iter().flat_map(|h| &h.rows);
+        rows.map(|r| r.target - r.value(&self.state.p))
+    }
+
+    /// Energy of the constraint springs.
+    pub(crate) fn constraint_energy(&self) -> f64 {
+        let sigma2 = self.network.law().scale().powi(2);
+        let springs = self.constraints().iter().zip(self.constraint_gaps());
+        let energies = springs.map(|(c, gap)| match c.hold {
+            Hold::Spring(k) => 0.5 * sigma2 * k * gap * gap,
+            Hold::Hard => 0.0,
+        });
+        energies.sum()
+    }
+
+    /// Brings the state onto the hard constraints, and its velocity into their null space.
+    pub(crate) fn meet_constraints(&mut self) {
+        let Some(mut held) = self.held.take() else {
+            return;
+        };
+        if !held.hard.c.is_empty() {
+            self.displace(&mut held);
+            let Held { hard, moved, .. } = &mut *held;
+            let before = moved.clone();
+            hard.rows.close(&mut moved[0], |h| hard.c[h]);
+            hard.rows.close(&mut moved[1], |_| 0.0);
+            if self.lattice().is_square() {
+                let inverse = self.lattice().inverse();
+                let mut w = TensorWorkspace::new();
+                let mut change = vec![0.0; before[0].len()];
+                for ((now, then), p) in moved
+                    .iter()
+                    .zip(&before)
+                    .zip([&mut self.state.p, &mut self.state.v])
+                {
+                    let moved = now.iter().zip(then);
+                    let moved: Vec<f64> = moved.map(|(a, b)| (*a - *b).as_f64()).collect();
+                    inverse.apply(&moved, &mut change, &mut w);
+                    for (p, c) in p.iter_mut().zip(&change) {
+                        *p += T::from_f64(*c);
+                    }
+                }
+            } else {
+                self.state.p.copy_from_slice(&moved[0]);
+                self.state.v.copy_from_slice(&moved[1]);
+            }
+            self.sample_state();
+        }
+        self.held = Some(held);
+    }
+
+    /// Reads displacement and velocity of the unknowns.
+    fn displace(&self, held: &mut Held<T>) {
+        let [u, v] = &mut held.moved;
+        if self.lattice().is_square() {
+            for ((u, d), base) in u.iter_mut().zip(&self.state.d).zip(&self.base) {
+                *u = *d - *base;
+            }
+            v.copy_from_slice(&self.state.w);
+        } else {
+            u.copy_from_slice(&self.state.p);
+            v.copy_from_slice(&self.state.v);
+        }
+    }
+
+    /// Sets what the constraints do in the next solve: springs push with `force` times their force, and the hard ones
+    /// want `position` times what is missing less `rate` times their velocity.
+    pub(crate) fn aim(&mut self, force: f64, position: f64, rate: f64) {
+        let Some(mut held) = self.held.take() else {
+            return;
+        };
+        self.displace(&mut held);
+        let [u, v] = &held.moved;
+        let springs = held.springs.iter().zip(&held.targets);
+        for (impulse, ((row, stiffness), target)) in held.impulses.iter_mut().zip(springs) {
+            *impulse = force * stiffness * (target - spring_value(row, u));
+        }
+        let hard = &held.hard;
+        for (h, gap) in held.gaps.iter_mut().enumerate() {
+            let missing = hard.c[h] - hard.rows.times(h, u);
+            *gap = position * missing - rate * hard.rows.times(h, v);
+        }
+        self.held = Some(held);
+    }
+
+    /// Hands the constraints to the solver of implicit steps; `stiffness` is that of the springs in its matrix.
+    pub(crate) fn aim_implicit(&mut self, stiffness: f64) {
+        if let (Some(held), Some(border)) = (&self.held, self.solver.border_mut()) {
+            border.set_weights(held.springs.iter().map(|(_, k)| stiffness * k));
+            held.aim(border);
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! Hard constraints as few orthonormal rows.
+
+use super::constraint::{ConstraintError, Row};
+use crate::solve::OrthonormalRows;
+
+/// Length of what a normalized row adds to the others, below which it counts as implied by them.
+const RANK: f64 = 1e-7;
+/// Share of the densities that an implied row may be off by: that of single-precision input.
+const CONSISTENT: f64 = 1e-6;
+/// Share of its weight that a row has to have on free coefficients.
+const REACH: f64 = 1e-6;
+
+/// `Q u = c`.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Independent {
+    pub rows: OrthonormalRows,
+    pub c: Vec<f64>,
+}
+
+/// A row in the making: `rest = (row - Σ along_k q_k)/length`, `c` likewise.
+struct Candidate<'a> {
+    label: &'a str,
+    row: &'a Row,
+    rest: Vec<f64>,
+    c: f64,
+    along: Vec<f64>,
+    /// Length of the row, by which all is divided.
+    length: f64,
+    done: bool,
+}
+
+fn product(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+impl Candidate<'_> {
+    /// Takes out the part along `q`, which is row `k`.
+    fn reduce(&mut self, q: &[f64], c: f64, k: usize) {
+        let along = product(&self.rest, q);
+        for (r, q) in self.rest.iter_mut().zip(q) {
+            *r -= along * q;
+        }
+        self.c -= along * c;
+        self.along[k] += along;
+    }
+}
+
+impl Independent {
+    /// From rows on the unknowns, by Gram–Schmidt with the longest remaining row next and every chosen row
+    /// orthogonalized twice.
+    ///
+    /// # Errors
+    /// [`ConstraintError::Inconsistent`].
+    pub fn new(rows: &[(&str, &Row)]) -> Result<Self, ConstraintError> {
+        let mut columns: Vec<usize> = rows.iter().flat_map(|r| r.1.terms.iter().map(|t| t.0)).collect();
+        columns.sort_unstable();
+        columns.dedup();
+        let width = columns.len();
+        let mut out = Self::default();
+        out.rows.columns = columns;
+        let mut left = Vec::new();
+        for (label, row) in rows {
+            let length = row.terms.iter().map(|t| t.1 * t.1).sum::<f64>().sqrt();
+            if length <= REACH * row.weight {
+                if row.target.abs() > CONSISTENT * row.size {
+                    return Err(ConstraintError::Inconsistent {
+                        rows: vec![(*label).to_owned()],
+                        gap: row.target,
+                    });
+                }
+                continue;
+            }
+            let mut rest = vec![0.0; width];
+            for (i, w) in &row.terms {
+                let place = out.rows.columns.binary_search(i).expect("collected above");
+                rest[place] = w / length;
+            }
+            left.push(Candidate {
+                label,
+                row,
+                rest,
+                c: row.target / length,
+                along: vec![0.0; rows.len()],
+                length,
+                done: false,
+            });
+        }
+        let mut chosen: Vec<(usize, f64)> = Vec::new();
+        loop {
+            let lengths = left.iter().enumerate().filter(|(_, r)| !r.done);
+            let lengths = lengths.map(|(i, r)| (i, product(&r.rest, &r.rest)));
+            let longest = lengths.reduce(|a, b| if b.1 > a.1 { b } else { a });
+            let Some((next, _)) = longest else { break };
+            let row = &mut left[next];
+            for (k, q) in out.rows.q.chunks_exact(width).enumerate() {
+                row.reduce(q, out.c[k], k);
+            }
+            let length = product(&row.rest, &row.rest).sqrt();
+            if length <= RANK {
+                break;
+            }
+            row.done = true;
+            let q: Vec<f64> = row.rest.iter().map(|r| r / length).collect();
+            let c = row.c / length;
+            let k = chosen.len();
+            for other in left.iter_mut().filter(|r| !r.done) {
+                other.reduce(&q, c, k);
+            }
+            out.rows.q.extend(q);
+            out.c.push(c);
+            chosen.push((next, length));
+        }
+        for row in left.iter().filter(|r| !r.done) {
+            out.check(row, &left, &chosen)?;
+        }
+        Ok(out)
+    }
+
+    /// Whether a row that the chosen ones imply has the value that they give it.
+    fn check(
+        &self,
+        row: &Candidate<'_>,
+        all: &[Candidate<'_>],
+        chosen: &[(usize, f64)],
+    ) -> Result<(), ConstraintError> {
+        // row = Σ share_k chosen_k, from the last to the first.
+        let mut along = row.along[..chosen.len()].to_vec();
+        let mut shares = vec![0.0; chosen.len()];
+        for k in (0..chosen.len()).rev() {
+            let (index, length) = chosen[k];
+            shares[k] = along[k] / length;
+            for (a, l) in along[..k].iter_mut().zip(&all[index].along) {
+                *a -= shares[k] * l;
+            }
+        }
+        let others = chosen.iter().zip(&shares);
+        let sizes = others.map(|((i, _), s)| s.abs() * all[*i].row.size / all[*i].length);
+        let size = row.row.size / row.length + sizes.sum::<f64>();
+        if row.c.abs() <= CONSISTENT * size {
+            return Ok(());
+        }
+        let largest = shares.iter().fold(0.0_f64, |a, s| a.max(s.abs()));
+        let involved = chosen
+            .iter()
+            .zip(&shares)
+            .filter(|(_, s)| s.abs() > 1e-6 * largest);
+        let mut named: Vec<usize> = involved.map(|((i, _), _)| *i).collect();
+        named.sort_unstable();
+        let mut rows: Vec<String> = named.iter().map(|i| all[*i].label.to_owned()).collect();
+        rows.push(row.label.to_owned());
+        Err(ConstraintError::Inconsistent {
+            rows,
+            gap: row.c * row.length,
+        })
+    }
+}

@@ -1,0 +1,272 @@
+//! Steps with constraint springs and hard constraints.
+//!
+//! `(H + RᵀER) x = b` under `Q x = g`, with rows of springs `R`, their weights `E`, and orthonormal rows `Q`. With
+//! `B = [R; Q]` and a preconditioner `P` of `H`, the inverse of `P` with the same border is
+//! `P⁻¹ - Y (BY + [E⁻¹, 0])⁻¹ BP⁻¹`, `Y = P⁻¹Bᵀ`. Conjugate gradients with it stay in the null space of `Q` and need as
+//! many iterations as without constraints: one when `P = H`.
+
+use bspline::Real;
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use super::dot::dot;
+use super::orthonormal::OrthonormalRows;
+use super::pcg::{PcgReport, System, add_scaled};
+
+/// Share of the diagonal that is added to the small matrix of the border, from one try to the next, until it has a
+/// factor: in single precision its small eigenvalues drown.
+const SHIFT: f64 = 16.0;
+
+/// Rows that border the matrix of a step.
+#[derive(Clone, Debug)]
+pub(crate) struct Border<T> {
+    springs: Vec<Vec<(usize, f64)>>,
+    /// Whether the springs are part of the matrix, not of the right side alone.
+    implicit: bool,
+    /// `Q`.
+    hard: OrthonormalRows,
+    /// `E`, of an implicit border.
+    weights: Vec<f64>,
+    /// Impulse of each spring.
+    pub impulses: Vec<f64>,
+    /// `g`.
+    pub gaps: Vec<f64>,
+    /// `Y`, a row per row of the border.
+    y: Vec<T>,
+    /// `BY`, made symmetric.
+    gram: DMatrix<f64>,
+    factor: Option<Cholesky<f64, Dyn>>,
+    vectors: [Vec<T>; 5],
+}
+
+impl<T: Real> Border<T> {
+    /// For `n` unknowns.
+    pub fn new(n: usize, springs: Vec<Vec<(usize, f64)>>, implicit: bool, hard: OrthonormalRows) -> Self {
+        let rows = hard.count() + if implicit { springs.len() } else { 0 };
+        Self {
+            implicit,
+            weights: vec![0.0; springs.len()],
+            impulses: vec![0.0; springs.len()],
+            gaps: vec![0.0; hard.count()],
+            y: vec![T::zero(); rows * n],
+            gram: DMatrix::zeros(rows, rows),
+            factor: None,
+            vectors: std::array::from_fn(|_| vec![T::zero(); n]),
+            springs,
+            hard,
+        }
+    }
+
+    /// Rows of springs in the border.
+    fn soft(&self) -> usize {
+        if self.implicit { self.springs.len() } else { 0 }
+    }
+
+    fn rows(&self) -> usize {
+        self.soft() + self.gaps.len()
+    }
+
+    /// Sets `E`.
+    pub fn set_weights(&mut self, weights: impl Iterator<Item = f64>) {
+        for (to, from) in self.weights.iter_mut().zip(weights) {
+            if *to != from {
+                *to = from;
+                self.factor = None;
+            }
+        }
+    }
+
+    /// `row·x` of a row of the border.
+    fn row_times(&self, row: usize, x: &[T]) -> f64 {
+        match row.checked_sub(self.soft()) {
+            None => spring_value(&self.springs[row], x),
+            Some(h) => self.hard.times(h, x),
+        }
+    }
+
+    /// Takes the part along `Q` out.
+    fn project(&self, x: &mut [T]) {
+        self.hard.close(x, |_| 0.0);
+    }
+
+    /// Makes `Y` for a new `P`.
+    pub fn prepare(&mut self, mut precondition: impl FnMut(&[T], &mut [T])) {
+        let n = self.vectors[0].len();
+        let mut y = std::mem::take(&mut self.y);
+        for (row, y) in y.chunks_exact_mut(n).enumerate() {
+            let soft = self.soft();
+            let [r, ..] = &mut self.vectors;
+            r.fill(T::zero());
+            match row.checked_sub(soft) {
+                None => {
+                    for (i, w) in &self.springs[row] {
+                        r[*i] = T::from_f64(*w);
+                    }
+                }
+                Some(h) => {
+                    for (q, i) in self.hard.row(h).iter().zip(&self.hard.columns) {
+                        r[*i] = T::from_f64(*q);
+                    }
+                }
+            }
+            precondition(r, y);
+        }
+        for (j, y) in y.chunks_exact(n).enumerate() {
+            for i in 0..self.rows() {
+                self.gram[(i, j)] = self.row_times(i, y);
+            }
+        }
+        self.gram = 0.5 * (&self.gram + self.gram.transpose());
+        self.y = y;
+        self.factor = None;
+    }
+
+    /// Factor of `BY + [E⁻¹, 0]`.
+    fn factorize(&mut self) {
+        if self.factor.is_some() || self.rows() == 0 {
+            return;
+        }
+        let mut shift = 0.0;
+        loop {
+            let mut matrix = self.gram.clone();
+            for i in 0..self.rows() {
+                if i < self.soft() {
+                    matrix[(i, i)] += 1.0 / self.weights[i];
+                }
+                matrix[(i, i)] += shift * self.gram[(i, i)].abs();
+            }
+            self.factor = Cholesky::new(matrix);
+            // A border of numbers that are not finite has no factor at any shift.
+            if self.factor.is_some() || shift > 1.0 {
+                return;
+            }
+            shift = if shift == 0.0 {
+                SHIFT * T::UNIT_ROUND_OFF
+            } else {
+                shift * SHIFT
+            };
+        }
+    }
+
+    /// `z += sign Y (BY + [E⁻¹, 0])⁻¹ a`.
+    fn add_border(&self, z: &mut [T], mut a: DVector<f64>, sign: f64) {
+        if let Some(factor) = &self.factor {
+            factor.solve_mut(&mut a);
+            for (a, y) in a.iter().zip(self.y.chunks_exact(z.len())) {
+                add_scaled(z, T::from_f64(sign * a), y);
+            }
+        }
+    }
+
+    /// Solves from `x` that fulfils the hard constraints, as [`ConjugateGradients`](super::ConjugateGradients) do; the
+    /// residual is that within their null space.
+    pub fn solve(
+        &mut self,
+        system: &mut impl System<T>,
+        b: &[T],
+        x: &mut [T],
+        cap: usize,
+        tolerance: f64,
+    ) -> PcgReport {
+        self.factorize();
+        let mut vectors = std::mem::take(&mut self.vectors);
+        let report = self.iterate(system, b, x, cap, tolerance, &mut vectors);
+        self.vectors = vectors;
+        report
+    }
+
+    fn iterate(
+        &self,
+        system: &mut impl System<T>,
+        b: &[T],
+        x: &mut [T],
+        cap: usize,
+        tolerance: f64,
+        [r, z, p, q, last]: &mut [Vec<T>; 5],
+    ) -> PcgReport {
+        let mut report = PcgReport::default();
+        r.copy_from_slice(b);
+        for (row, impulse) in self.springs.iter().zip(&self.impulses) {
+            for (i, w) in row {
+                r[*i] += T::from_f64(w * impulse);
+            }
+        }
+        x.fill(T::zero());
+        let mut size = dot(r, r).sqrt();
+        if self.gaps.iter().any(|g| *g != 0.0) {
+            let soft = self.soft();
+            let wanted = DVector::from_fn(
+                self.rows(),
+                |i, _| if i < soft { 0.0 } else { self.gaps[i - soft] },
+            );
+            self.add_border(x, wanted, 1.0);
+            self.hard.close(x, |h| self.gaps[h]);
+            self.apply(system, x, q);
+            add_scaled(r, -T::one(), q);
+            size += dot(q, q).sqrt();
+        }
+        self.project(r);
+        let impulse = dot(r, r).sqrt();
+        // What is left then is the rounding of forces that the constraints bear.
+        if impulse <= 16.0 * T::UNIT_ROUND_OFF * size {
+            return report;
+        }
+        report.residual = 1.0;
+        let mut before = 1.0;
+        while report.iterations < cap && report.residual > tolerance {
+            system.precondition(r, z);
+            let along = DVector::from_fn(self.rows(), |i, _| self.row_times(i, z));
+            self.add_border(z, along, -1.0);
+            self.project(z);
+            let rz = dot(r, z);
+            if report.iterations == 0 {
+                p.copy_from_slice(z);
+            } else {
+                // Polak and Ribière's form bears a preconditioner that is off by rounding, or one matrix late.
+                let beta = T::from_f64(((rz - dot(last, z)) / before).max(0.0));
+                for (p, z) in p.iter_mut().zip(z.iter()) {
+                    *p = *z + beta * *p;
+                }
+            }
+            before = rz;
+            let curvature = self.apply(system, p, q);
+            if !(curvature > 0.0 && rz > 0.0) {
+                report.negative_curvature = Some(curvature.min(rz));
+                break;
+            }
+            let alpha = T::from_f64(rz / curvature);
+            last.copy_from_slice(r);
+            add_scaled(x, alpha, p);
+            add_scaled(r, -alpha, q);
+            self.project(r);
+            report.iterations += 1;
+            report.residual = dot(r, r).sqrt() / impulse;
+        }
+        self.hard.close(x, |h| self.gaps[h]);
+        report
+    }
+
+    /// `q = (H + RᵀER) p`; returns `pᵀq`.
+    fn apply(&self, system: &mut impl System<T>, p: &[T], q: &mut [T]) -> f64 {
+        let mut curvature = system.apply(p, q);
+        if self.implicit {
+            for (row, weight) in self.springs.iter().zip(&self.weights) {
+                curvature += add_spring(row, *weight, p, q);
+            }
+        }
+        curvature
+    }
+}
+
+/// `row·x`.
+pub(crate) fn spring_value<T: Real>(row: &[(usize, f64)], x: &[T]) -> f64 {
+    row.iter().map(|(i, w)| w * x[*i].as_f64()).sum()
+}
+
+/// `q += weight row (row·p)`; returns what that adds to `pᵀq`.
+pub(crate) fn add_spring<T: Real>(row: &[(usize, f64)], weight: f64, p: &[T], q: &mut [T]) -> f64 {
+    let along = spring_value(row, p);
+    for (i, w) in row {
+        q[*i] += T::from_f64(weight * along * w);
+    }
+    weight * along * along
+}
