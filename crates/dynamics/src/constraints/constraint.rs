@@ -101,6 +101,17 @@ pub enum ConstraintError {
         /// Distance of samples asked for.
         spacing: f64,
     },
+    /// A lattice whose multigrid does not bear constraints.
+    #[error(
+        "{coefficients} coefficients, as many as samples, are more than the direct limit of {limit}, and the multigrid \
+         on the samples does not take constraints: sample more finely, or raise the limit"
+    )]
+    Multigrid {
+        /// Free coefficients.
+        coefficients: usize,
+        /// Up to how many the matrix is factorized.
+        limit: usize,
+    },
     /// Hard constraints that contradict each other, or one that no free coefficient reaches.
     #[error(
         "hard constraints {} contradict each other: the last would have to give up {gap:.3e}; leave one out, \

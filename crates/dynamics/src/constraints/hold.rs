@@ -99,6 +99,14 @@ impl<T: Real> Patch<T> {
     /// [`PatchError::Constraint`]; the old constraints then stay.
     pub fn set_constraints(&mut self, constraints: &[Constraint]) -> Result<(), PatchError> {
         let sigma2 = self.network.law().scale().powi(2);
+        let (coefficients, limit) = (
+            self.lattice().coefficient_count(),
+            self.solver.options().direct_limit,
+        );
+        // Multigrid solves to 3e-4, and A⁻¹ of a bordered solve as rough as that was seen to grow from step to step.
+        if !constraints.is_empty() && self.lattice().is_square() && coefficients > limit {
+            return Err(ConstraintError::Multigrid { coefficients, limit }.into());
+        }
         let held = match constraints {
             [] => None,
             list => Some(Box::new(Held::new(
