@@ -212,11 +212,11 @@ fn nrrd_headers_that_cannot_be_used_say_why() {
             "at most 4 files",
         ),
         (
-            "\n\n",
+            "\n\nabcdefgh",
             "\ndata file: LIST\nslice_07.raw\nslice_09.raw\nslice_11.raw\n",
             "3 for 8 voxels",
         ),
-        ("\n\n", "\ndata file: LIST\n", "0 for 8 voxels"),
+        ("\n\nabcdefgh", "\ndata file: LIST\n", "0 for 8 voxels"),
     ] {
         assert!(NRRD.contains(old), "{old}");
         let message = refused(&scratch, "a.nrrd", NRRD.replacen(old, new, 1).as_bytes());
