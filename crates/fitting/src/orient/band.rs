@@ -239,10 +239,11 @@ mod tests {
                 .iter()
                 .map(|&p| place(p).distance(at))
                 .fold(f64::INFINITY, f64::min);
-            // A leaf learns from its neighbours only, so the nearest point may be missed for one almost as near.
+            // A leaf learns from its neighbours only, so the nearest point may be missed, but for one no farther away than
+            // the leaf is wide.
             let width = 0.5f64.powi(i32::from(c.level));
             assert!(
-                band.distance[i] >= exact - 1e-12 && band.distance[i] < exact + 0.5 * width,
+                band.distance[i] >= exact - 1e-12 && band.distance[i] < exact + width,
                 "leaf {i}, {width} wide: {} for {exact}",
                 band.distance[i]
             );
