@@ -1,4 +1,4 @@
-"""Orientation of clouds by other programs, as lines of CSV for `isoclay charts orient --peers`.
+"""Orientation of clouds by other programs, as lines of CSV for `isoclay charts orient --measured`.
 
   orientation.py CLOUD.ply... > orientation.csv
 

@@ -16,15 +16,13 @@ pub struct Oriented {
 }
 
 impl Oriented {
-    /// Reads `cloud,method,points,wrong,cpu_seconds` a line; the first line names the columns.
+    /// First line of a CSV.
+    pub const COLUMNS: &str = "cloud,method,points,wrong,cpu_seconds";
+
+    /// Reads a run a line; the first line names the columns.
     pub fn read_csv(text: &str) -> Result<Vec<Self>, String> {
         let line = |(i, line): (usize, &str)| {
-            let bad = || {
-                format!(
-                    "line {}: {line:?} is not cloud,method,points,wrong,cpu_seconds",
-                    i + 1
-                )
-            };
+            let bad = || format!("line {}: {line:?} is not {}", i + 1, Self::COLUMNS);
             let [cloud, method, points, wrong, cpu_seconds] =
                 <[&str; 5]>::try_from(line.split(',').collect::<Vec<_>>()).map_err(|_| bad())?;
             Ok(Self {

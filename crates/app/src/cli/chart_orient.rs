@@ -16,30 +16,31 @@ use crate::charts::{Chart, Oriented};
 #[derive(clap::Args)]
 pub struct Args {
     /// Clouds with their true normals, of which only the positions are used; a zero normal is that of an outlier
-    #[arg(required = true)]
     inputs: Vec<PathBuf>,
-    /// Other methods on clouds of the same names, as benches/peers/orientation.py measures them
-    #[arg(long, value_name = "CSV")]
-    peers: Option<PathBuf>,
+    /// What was measured before, as this command and benches/peers/orientation.py print it, to be drawn too
+    #[arg(long, value_name = "CSV", required_unless_present = "inputs")]
+    measured: Vec<PathBuf>,
     /// Directory for the chart orient.svg; made if missing
     #[arg(short, long, value_name = "DIR", default_value = "docs/charts")]
     output: PathBuf,
 }
 
+<<<<<<< HEAD
 /// Orients every cloud on both routes, prints a line of CSV each, and draws the chart.
 pub fn run(args: &Args, cancel: &Cancel) -> Outcome {
+=======
+/// Orients every cloud on both routes, prints a line of CSV each, and draws them and what was measured before.
+pub fn run(args: &Args) -> Outcome {
+    let cancel = Cancel::new();
+    interrupt::cancel_on_interrupt(&cancel)?;
+>>>>>>> orient
     std::fs::create_dir_all(&args.output)
         .map_err(|e| anyhow::anyhow!("-o {}: cannot be made ({e})", args.output.display()))
         .or_limit()?;
-    let mut peers = match &args.peers {
-        Some(path) => {
-            let text = std::fs::read_to_string(path)
-                .map_err(|e| Failure::input(format!("{}: {e}", path.display())))?;
-            Oriented::read_csv(&text).map_err(|e| Failure::input(format!("{}: {e}", path.display())))?
-        }
-        None => Vec::new(),
-    };
     let mut runs = Vec::new();
+    if !args.inputs.is_empty() {
+        writeln!(io::stdout().lock(), "{}", Oriented::COLUMNS).or_limit()?;
+    }
     for route in Route::ALL {
         for path in &args.inputs {
             interrupt::check(cancel)?;
@@ -48,8 +49,11 @@ pub fn run(args: &Args, cancel: &Cancel) -> Outcome {
             runs.push(run);
         }
     }
-    peers.retain(|p| runs.iter().any(|r| r.cloud == p.cloud));
-    runs.append(&mut peers);
+    for path in &args.measured {
+        let bad = |e: String| Failure::input(format!("{}: {e}", path.display()));
+        let text = std::fs::read_to_string(path).map_err(|e| bad(e.to_string()))?;
+        runs.extend(Oriented::read_csv(&text).map_err(bad)?);
+    }
     let svg = Chart::of_orientation(&runs).svg().map_err(Failure::limit)?;
     let target = args.output.join("orient.svg");
     formats::atomic::replace(&target, |out| out.write_all(svg.as_bytes())).map_err(writing)

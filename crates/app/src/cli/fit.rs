@@ -221,7 +221,7 @@ fn fit_cloud<T: Stored>(cloud: &PointCloud, choice: &Choice, control: &mut Contr
     if cloud.positions.is_empty() {
         return Err(FitError::NotEnoughSamples { found: 0, needed: 10 }.into());
     }
-    let oriented = Oriented::new(cloud, choice.unoriented, control)?.map_err(|e| explain(e, control))?;
+    let oriented = Oriented::new(cloud, choice.unoriented, control)?;
     let unit = stated_unit(cloud.unit, choice.unit)?;
     let points = OrientedPoints {
         positions: oriented.positions(),
@@ -359,7 +359,7 @@ fn stated_unit(known: Unit, stated: Option<Unit>) -> Outcome<Unit> {
 }
 
 /// A memory limit in terms of the whole process, which is what the user gave.
-fn explain(e: FitError, control: &Control) -> Failure {
+pub(super) fn explain(e: FitError, control: &Control) -> Failure {
     match (&e, control.memory_limit) {
         (FitError::MemoryLimit { needed, limit }, Some(_)) => {
             let held = rss_bytes().unwrap_or(0);

@@ -1,11 +1,12 @@
 use bspline::hierarchical::Lattice;
 use clap::ValueEnum;
 use fitting::orient::{OrientOptions, Orientation, Route, leaf_confidence, orient_points};
-use fitting::{Control, FitError, FitReport, SignReport};
+use fitting::{Control, FitReport, SignReport};
 use formats::points::PointCloud;
 use glam::DVec3;
 
 use super::failure::{Failure, Outcome};
+use super::fit::explain;
 
 /// How to tell inside from outside where a cloud has no normals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -24,11 +25,7 @@ pub struct Oriented<'a> {
 
 impl<'a> Oriented<'a> {
     /// The normals of the file, or estimated ones if the user asks for them.
-    pub fn new(
-        cloud: &'a PointCloud,
-        asked: Option<Unoriented>,
-        control: &mut Control,
-    ) -> Outcome<Result<Self, FitError>> {
+    pub fn new(cloud: &'a PointCloud, asked: Option<Unoriented>, control: &mut Control) -> Outcome<Self> {
         let Some(asked) = asked else {
             if cloud.normals.is_none() {
                 return Err(Failure::input(
@@ -36,7 +33,7 @@ impl<'a> Oriented<'a> {
                      or give a file with columns nx ny nz, or a mesh with faces",
                 ));
             }
-            return Ok(Ok(Self { cloud, kept: None }));
+            return Ok(Self { cloud, kept: None });
         };
         let options = OrientOptions {
             route: match asked {
@@ -44,10 +41,8 @@ impl<'a> Oriented<'a> {
                 Unoriented::Tagging => Route::Tagging,
             },
         };
-        let mut orientation = match orient_points(&cloud.positions, &options, control) {
-            Ok(orientation) => orientation,
-            Err(e) => return Ok(Err(e)),
-        };
+        let mut orientation =
+            orient_points(&cloud.positions, &options, control).map_err(|e| explain(e, control))?;
         if cloud.normals.is_some() {
             orientation
                 .notes
@@ -58,10 +53,10 @@ impl<'a> Oriented<'a> {
             on_surface.map(|p| *p.0).collect::<Vec<_>>()
         };
         let (positions, normals) = (kept(&cloud.positions), kept(&orientation.normals));
-        Ok(Ok(Self {
+        Ok(Self {
             cloud,
             kept: Some((positions, normals, orientation)),
-        }))
+        })
     }
 
     /// Positions of the points to fit.
