@@ -25,15 +25,8 @@ pub struct Args {
     output: PathBuf,
 }
 
-<<<<<<< HEAD
-/// Orients every cloud on both routes, prints a line of CSV each, and draws the chart.
-pub fn run(args: &Args, cancel: &Cancel) -> Outcome {
-=======
 /// Orients every cloud on both routes, prints a line of CSV each, and draws them and what was measured before.
-pub fn run(args: &Args) -> Outcome {
-    let cancel = Cancel::new();
-    interrupt::cancel_on_interrupt(&cancel)?;
->>>>>>> orient
+pub fn run(args: &Args, cancel: &Cancel) -> Outcome {
     std::fs::create_dir_all(&args.output)
         .map_err(|e| anyhow::anyhow!("-o {}: cannot be made ({e})", args.output.display()))
         .or_limit()?;
