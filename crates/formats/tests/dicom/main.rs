@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use formats::volumes::{self, DicomOptions, Volume, VolumeOptions};
 use formats::{Fault, Kind, ReadLimits};
 use serde_json::Value;
+use writer::Picture;
 
 fn data() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/dicom")
@@ -179,18 +180,50 @@ fn what_cannot_be_decoded_is_refused_by_name() {
 
 #[test]
 fn the_peak_of_a_reading_is_what_was_stated() {
-    // Less is refused, and names what would be needed.
-    let path = data().join("ct");
-    let need = volumes::peek(&path, &VolumeOptions::default())
-        .unwrap()
-        .read_bytes;
-    let read = |max_bytes| volumes::read(&path, &VolumeOptions::default(), &ReadLimits { max_bytes });
-    assert!(read(need).is_ok());
-    let e = read(need - 1).unwrap_err();
-    assert!(
-        matches!(e.fault, Fault::Limit { needed, .. } if needed == need),
-        "{e}"
-    );
+    let directory = tempfile::tempdir().unwrap();
+    for z in 0..40 {
+        let mut p = Picture::axial(f64::from(z));
+        (p.columns, p.rows) = (64, 64);
+        p.pixels = vec![1; 64 * 64];
+        p.save(&directory.path().join(format!("{z:02}")));
+    }
+    let paths = [
+        "ct",
+        "pet",
+        "enhanced",
+        "compressed/split.dcm",
+        "syntax/jpeg2000-u12.dcm",
+        "syntax/deflated-s16.dcm",
+    ];
+    let mut paths: Vec<PathBuf> = paths.iter().map(|p| data().join(p)).collect();
+    paths.push(directory.path().into());
+    // Allocations of this thread are counted, so this one decodes.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    for path in paths {
+        let options = VolumeOptions::default();
+        let need = pool.install(|| volumes::peek(&path, &options).unwrap().read_bytes);
+        let limits = ReadLimits { max_bytes: need };
+        let held = pool.install(|| {
+            let mut result = None;
+            let held = allocation_counter::measure(|| result = Some(volumes::read(&path, &options, &limits)));
+            result.unwrap().unwrap();
+            held.bytes_max
+        });
+        assert!(
+            held <= need,
+            "{}: {held} bytes held, {need} stated",
+            path.display()
+        );
+        // Less is refused, and names what would be needed.
+        let less = ReadLimits { max_bytes: need - 1 };
+        let e = pool
+            .install(|| volumes::read(&path, &options, &less))
+            .unwrap_err();
+        assert!(
+            matches!(e.fault, Fault::Limit { needed, .. } if needed == need),
+            "{e}"
+        );
+    }
 }
 
 #[test]
