@@ -67,7 +67,8 @@ impl<T: Real> Region<T> {
         }
         let solves = match integrator {
             Integrator::Paper | Integrator::Symplectic => 1,
-            Integrator::TrBdf2 => 2,
+            // Auto takes explicit sub-steps only where they cost less than the two solves.
+            Integrator::Verlet | Integrator::TrBdf2 | Integrator::Auto => 2,
         };
         solves * self.patch.lattice().sample_count() as u64
     }
