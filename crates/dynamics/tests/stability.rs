@@ -463,3 +463,63 @@ fn a_nan_in_the_force_is_refused_and_the_motion_goes_on() {
     ];
     assert_eq!(a, b);
 }
+
+#[test]
+fn an_explicit_step_of_ten_times_the_bound_is_refused_or_cut() {
+    // Painted beyond the direct limit, where an implicit step is dear.
+    let m = 12;
+    let mut scene = Scene {
+        coefficients: m,
+        rim: Rim::Free,
+        options: SolverOptions {
+            direct_limit: 100,
+            ..SolverOptions::default()
+        },
+        ..Scene::small(
+            Matter {
+                damping: Quantity::Constant(0.0),
+                ..painted(m, 10.0, ball(m))
+            },
+            LINEAR,
+        )
+    };
+    let mut p = scene.patch();
+    let dt = 10.0 * p.explicit_limit().unwrap();
+    for integrator in [Integrator::Symplectic, Integrator::Verlet] {
+        let before = p.state().clone();
+        let refused = p.step(integrator, dt).unwrap_err();
+        assert!(matches!(refused, PatchError::Unstable { .. }), "{refused}");
+        assert_eq!(*p.state(), before);
+    }
+    let report = p.step(Integrator::Auto, dt).unwrap();
+    assert_eq!(report.integrator, Integrator::Verlet);
+    assert!((11..=12).contains(&report.substeps), "{}", report.substeps);
+    // Explicit sub-steps keep an energy near the true one, not the energy: the motion is what is asked for.
+    scene.steps = vec![dt; 12];
+    let run = |integrator: Integrator, fine: usize| {
+        let mut p = scene.patch();
+        pulled(&mut p);
+        let mut largest = 0.0_f64;
+        let mut worst = f64::NEG_INFINITY;
+        let mut scale = 0.0_f64;
+        for _ in 0..scene.steps.len() * fine {
+            let before = p.energy().total();
+            let work = p.step(integrator, dt / fine as f64).unwrap().work;
+            let gained = p.energy().total() - before - work;
+            scale = scale.max(before + work.abs());
+            worst = worst.max(gained / scale);
+            assert!(p.state().d.iter().chain(&p.state().w).all(|d| d.is_finite()));
+            let from = slope(m);
+            let moved = p.state().d.iter().zip(&from).map(|(d, f)| (d - f).powi(2));
+            largest = largest.max(moved.sum::<f64>().sqrt());
+        }
+        (largest, worst)
+    };
+    let ((found, gained), (reference, _)) = (run(Integrator::Auto, 1), run(Integrator::TrBdf2, FINE));
+    println!("cut: {found:.4} of {reference:.4}, {gained:.1e} gained");
+    assert!(
+        (0.5..2.0).contains(&(found / reference)),
+        "{found} of {reference}"
+    );
+    assert!(gained < 0.02, "{gained}");
+}

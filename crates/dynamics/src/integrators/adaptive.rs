@@ -15,7 +15,8 @@ pub struct AdaptiveOptions {
     /// Share of the energy that a step may create: what it holds more than before, less the work, with at least what its
     /// damping took (`ΔdᵀDΔd/Δt`, which no path of the same ends goes below).
     pub energy_gain: f64,
-    /// Largest acceleration of a density, beyond which the step is halved [DIS §7]; `None` leaves it to the error.
+    /// Acceleration of a density beyond which the next step is half as long as this one [DIS §7]; `None` leaves it to the
+    /// error.
     pub acceleration: Option<f64>,
 }
 
@@ -58,10 +59,10 @@ impl<T: Real> Patch<T> {
             let fast = options.acceleration.is_some_and(|a| self.acceleration(dt) > a);
             // Of a method of second order the error of a step falls with its cube.
             let factor = 0.9 * (options.tolerance / error.max(1e-30)).cbrt();
-            let accepted = error <= options.tolerance && balanced && !fast && error.is_finite();
+            let accepted = error <= options.tolerance && balanced && error.is_finite();
             if accepted || dt <= options.shortest {
                 self.flow(dt);
-                let next = dt * factor.clamp(0.2, 2.0);
+                let next = dt * if fast { 0.5 } else { factor.clamp(0.2, 2.0) };
                 return Ok(AdaptiveReport {
                     step,
                     rejected,
@@ -71,7 +72,7 @@ impl<T: Real> Patch<T> {
             }
             self.restore();
             rejected += 1;
-            let factor = if !balanced || fast || !error.is_finite() {
+            let factor = if !balanced || !error.is_finite() {
                 0.5
             } else {
                 factor.clamp(0.1, 0.9)
