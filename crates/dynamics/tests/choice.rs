@@ -5,7 +5,7 @@ use dynamics::lattice::{Lattice, Rim};
 use dynamics::matter::{Matter, Quantity};
 use dynamics::patch::Patch;
 use dynamics::solve::SolverOptions;
-use dynamics::springs::{Law, Neighbours};
+use dynamics::springs::{Law, Neighbours, Weights};
 
 const M: usize = 12;
 
@@ -41,7 +41,7 @@ fn patch(coefficients: usize, rim: Rim, direct_limit: usize, matter: Matter) -> 
 fn short_steps_are_explicit_and_long_ones_implicit_where_matter_is_painted() {
     // Direct, V-cycle and multigrid.
     for (n, rim, limit, least) in [
-        (11, Rim::Fixed, 1000, 2),
+        (11, Rim::Fixed, 1000, 1),
         (8, Rim::Free, 100, 4),
         (M, Rim::Free, 100, 4),
     ] {
@@ -132,38 +132,30 @@ fn the_explicit_choice_is_not_less_accurate() {
             println!(
                 "γ {damping}, {parts} × 0.9 of the bound: explicit {explicit:.2e}, implicit {implicit:.2e}"
             );
-            assert!(explicit <= 1.03 * implicit, "{explicit} {implicit}");
+            // Beyond the leading term of its error a single sub-step near the bound misses up to 5 % more.
+            assert!(
+                explicit <= if parts == 1.0 { 1.05 } else { 0.6 } * implicit,
+                "{explicit} {implicit}"
+            );
         }
     }
 }
 
-/// 4-D springs turned inside out, far from rest.
-fn inverted() -> Patch<f64> {
+/// 4-D springs compressed to half their length, nearly flat: unstable, with tangents that the matrix takes as 0.
+fn compressed() -> Patch<f64> {
     let lattice = Lattice::cube(11, M, Rim::Fixed, 1.0).unwrap();
-    let rest: Vec<f64> = (0..M * M * M)
-        .map(|i| 2.0 * ((i / (M * M)) as f64 - 5.2))
-        .collect();
+    let d: Vec<f64> = (0..M * M * M).map(|i| 0.1 * (1.9 * i as f64).sin()).collect();
     let law = Law::FourD { scale: 1.0 };
     let options = SolverOptions::default();
-    let mut p = Patch::new(
-        lattice,
-        Matter::default(),
-        law,
-        Neighbours::Eighteen,
-        &rest,
-        options,
-    )
-    .unwrap();
-    let n = p.lattice().coefficient_count();
-    let start: Vec<f64> = (0..n).map(|i| 30.0 * (1.9 * i as f64).sin()).collect();
-    p.set_state(&start, &vec![0.0; n]).unwrap();
+    let mut p = Patch::new(lattice, Matter::default(), law, Neighbours::Eighteen, &d, options).unwrap();
+    p.springs_mut().rest_mut().scale = Weights::Constant(2.0);
     p
 }
 
 const LOOSE: AdaptiveOptions = AdaptiveOptions {
     tolerance: 1e9,
     shortest: 1e-6,
-    longest: 2.0,
+    longest: 1e6,
     energy_gain: 0.01,
     acceleration: None,
 };
@@ -171,20 +163,20 @@ const LOOSE: AdaptiveOptions = AdaptiveOptions {
 #[test]
 fn four_d_steps_that_create_a_hundredth_of_the_energy_are_rejected() {
     // Without the rule such steps are made: the scene is one that needs it.
-    let mut p = inverted();
+    let mut p = compressed();
     let mut most = 0.0_f64;
     for _ in 0..60 {
         let before = p.energy().total();
-        p.step(Integrator::TrBdf2, 0.4).unwrap();
+        p.step(Integrator::TrBdf2, 4.0).unwrap();
         most = most.max(p.energy().total() / before - 1.0);
     }
     assert!(most > 0.02, "{most}");
-    let mut p = inverted();
-    let (mut dt, mut rejected) = (0.4, 0);
+    let mut p = compressed();
+    let (mut dt, mut rejected) = (4.0, 0);
     for step in 0..60 {
         let before = p.energy().total();
         let report = p.adaptive_step(dt, &LOOSE).unwrap();
-        dt = report.next_dt.min(0.4);
+        dt = report.next_dt.min(4.0);
         rejected += report.rejected;
         let gained = p.energy().total() - before;
         assert!(
@@ -193,10 +185,7 @@ fn four_d_steps_that_create_a_hundredth_of_the_energy_are_rejected() {
         );
         assert!(report.gained <= 0.01 && report.step.dt > 1e-4, "{report:?}");
     }
-    println!(
-        "steps of 0.4 gain up to {:.0} %; {rejected} rejected",
-        100.0 * most
-    );
+    println!("steps of 4 gain up to {:.0} %; {rejected} rejected", 100.0 * most);
     assert!(rejected > 0);
 }
 

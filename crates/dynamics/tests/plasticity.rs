@@ -107,8 +107,8 @@ fn clay_creeps_as_a_maxwell_body() {
     assert!((speed / expected - 1.0).abs() < 0.01, "{speed} {expected}");
     // Elastic, it stands.
     p.set_plasticity(Plasticity::Elastic).unwrap();
-    for _ in 0..400 {
-        p.step(Integrator::TrBdf2, 10.0 * dt).unwrap();
+    for _ in 0..100 {
+        p.step(Integrator::TrBdf2, 20.0).unwrap();
     }
     assert!(p.state().v[0].abs() < 1e-6 * expected);
 }

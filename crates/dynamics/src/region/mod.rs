@@ -28,11 +28,14 @@
 mod cells;
 mod parts;
 mod sleep;
+mod tensor;
 
 pub use cells::{Cells, MAX_EDGE, MAX_SIZE, MIN_CELLS};
 pub use sleep::{Schedule, Thresholds, Turn};
+pub use tensor::{TensorOptions, TensorRegion};
 
 use bspline::hierarchical::{EditError, Lattice as FieldLattice, LevelEdit};
+use bspline::tensor::TensorError;
 use bspline::{Field, Frame, HierarchicalSpline, KnotVector, Real};
 use glam::{DAffine3, DMat3, DVec3};
 
@@ -122,6 +125,9 @@ pub enum RegionError {
         /// Behind its last cell.
         end: [u32; 3],
     },
+    /// A tensor-product patch with coefficients that are none.
+    #[error(transparent)]
+    Tensor(#[from] TensorError),
     /// Baked onto a field on other knots.
     #[error("the region was cut from a field on another lattice; bake it onto a version of that field")]
     OtherLattice,
