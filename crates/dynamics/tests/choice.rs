@@ -39,12 +39,8 @@ fn patch(coefficients: usize, rim: Rim, direct_limit: usize, matter: Matter) -> 
 
 #[test]
 fn short_steps_are_explicit_and_long_ones_implicit_where_matter_is_painted() {
-    // Direct, V-cycle and multigrid.
-    for (n, rim, limit, least) in [
-        (11, Rim::Fixed, 1000, 1),
-        (8, Rim::Free, 100, 4),
-        (M, Rim::Free, 100, 4),
-    ] {
+    // V-cycle and multigrid.
+    for (n, rim, limit, least) in [(8, Rim::Free, 100, 4), (M, Rim::Free, 100, 4)] {
         let mut p = patch(n, rim, limit, painted());
         let bound = p.explicit_limit().unwrap();
         let choices: Vec<_> = (0..10)
@@ -70,7 +66,10 @@ fn short_steps_are_explicit_and_long_ones_implicit_where_matter_is_painted() {
             let cheaper = choice.explicit_work < choice.implicit_work;
             assert_eq!(cheaper, choice.integrator == Integrator::Verlet);
             if cheaper {
-                assert_eq!(choice.substeps, (0.9 * f64::from(1 << k) / 0.95).ceil() as usize);
+                assert_eq!(
+                    choice.substeps,
+                    ((0.9 * f64::from(1 << k) / 0.95).ceil() as usize).max(2)
+                );
             }
             let dt = 0.9 * bound * f64::from(1 << k);
             let report = p.step(Integrator::Auto, dt).unwrap();
@@ -80,10 +79,12 @@ fn short_steps_are_explicit_and_long_ones_implicit_where_matter_is_painted() {
             );
         }
     }
-    // Uniform matter is solved as cheaply with springs as without.
-    let mut p = patch(8, Rim::Free, 1000, Matter::default());
-    let bound = p.explicit_limit().unwrap();
-    assert_eq!(p.choose(0.5 * bound).unwrap().integrator, Integrator::TrBdf2);
+    // Uniform matter, and few coefficients, are solved as cheaply with springs as without.
+    for (matter, n, rim) in [(Matter::default(), 8, Rim::Free), (painted(), 11, Rim::Fixed)] {
+        let mut p = patch(n, rim, 1000, matter);
+        let bound = p.explicit_limit().unwrap();
+        assert_eq!(p.choose(0.5 * bound).unwrap().integrator, Integrator::TrBdf2);
+    }
 }
 
 #[test]
@@ -132,11 +133,7 @@ fn the_explicit_choice_is_not_less_accurate() {
             println!(
                 "γ {damping}, {parts} × 0.9 of the bound: explicit {explicit:.2e}, implicit {implicit:.2e}"
             );
-            // Beyond the leading term of its error a single sub-step near the bound misses up to 5 % more.
-            assert!(
-                explicit <= if parts == 1.0 { 1.05 } else { 0.6 } * implicit,
-                "{explicit} {implicit}"
-            );
+            assert!(explicit < 0.6 * implicit, "{explicit} {implicit}");
         }
     }
 }

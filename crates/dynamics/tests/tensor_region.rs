@@ -61,7 +61,7 @@ fn pushed(rim: Rim) -> (TensorRegion<f64>, Vec<f64>) {
         .collect();
     region.patch_mut().set_force(&force).unwrap();
     for _ in 0..60 {
-        region.step(Integrator::TrBdf2, 20.0).unwrap();
+        region.step(Integrator::TrBdf2, 2000.0).unwrap();
     }
     (region, force)
 }

@@ -1,8 +1,9 @@
 //! Which scheme a step takes when it may choose.
 //!
 //! Of a mode of frequency `ω` a step of TR-BDF2 misses `0.0404(ωΔt)³` in phase and size, a step of the Verlet scheme
-//! `0.0417(ωΔt)³`; `N` Verlet sub-steps miss `1/N²` of that. With as many sub-steps as its bound asks for, the explicit
-//! scheme is never less accurate than the implicit step (but for 5 % with a single one near the bound), so the cheaper one is taken.
+//! `0.0417(ωΔt)³`; `N` Verlet sub-steps miss `1/N²` of that. With as many sub-steps as its bound asks for, and two at
+//! least, the explicit scheme is more accurate than the implicit step, so the cheaper one is taken. (A single one may miss
+//! up to 7 % more near the bound.)
 //! What they cost is counted in operations, not in time: the same input takes the same scheme on every machine.
 
 use bspline::Real;

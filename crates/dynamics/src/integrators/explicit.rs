@@ -144,11 +144,11 @@ impl<T: Real> Patch<T> {
         Ok(())
     }
 
-    /// Least number of equal parts of `dt` that are all within the bound.
+    /// Least number of equal parts of `dt`, two or more, that are all within the bound.
     pub(super) fn explicit_parts(&mut self, dt: f64) -> Result<f64, PatchError> {
         let limit = SAFETY * self.explicit_limit()?;
         // Rounding of the quotient must not leave parts beyond the bound.
-        Ok((dt / limit * (1.0 + 1e-12)).ceil().max(1.0))
+        Ok((dt / limit * (1.0 + 1e-12)).ceil().max(2.0))
     }
 
     /// `v += Δt (M̃ + ΔtD̃)⁻¹ Aᵀ(f - Dw)`, `p += Δt v`.
