@@ -27,6 +27,7 @@
 
 mod cells;
 mod sleep;
+mod watch;
 
 pub use cells::{Cells, MAX_EDGE, MAX_SIZE, MIN_CELLS};
 pub use sleep::{Schedule, Thresholds, Turn};
