@@ -11,8 +11,17 @@ use dynamics::study::{Configuration, loads, spring_weights};
 
 use super::{DynamicsError, median_seconds};
 
-/// A patch of the study at rest, and the densities it rests at.
+/// A patch of the study at rest.
 pub fn patch<T: Real>(c: &Configuration, options: SolverOptions) -> Result<Patch<T>, DynamicsError> {
+    patch_of(c, options, false)
+}
+
+/// `painted`: even material is given per spring, so that it is solved as if it were painted.
+fn patch_of<T: Real>(
+    c: &Configuration,
+    options: SolverOptions,
+    painted: bool,
+) -> Result<Patch<T>, DynamicsError> {
     let m = c.samples;
     let lattice = |e: LatticeError| DynamicsError::Study(e.into());
     let lattice = Lattice::cube(c.coefficients, m, c.rim, 1.0).map_err(lattice)?;
@@ -23,7 +32,7 @@ pub fn patch<T: Real>(c: &Configuration, options: SolverOptions) -> Result<Patch
         (0..m * m * m).map(|i| s.weights.at(i) / share).collect()
     });
     let matter = Matter {
-        spring_factors: (!springs.iter().all(|s| constant(&s.weights))).then(|| factors.collect()),
+        spring_factors: (painted || !springs.iter().all(|s| constant(&s.weights))).then(|| factors.collect()),
         ..Matter::default()
     };
     // The distance field of a ball, as the study has for the tangents of the 4-D law.
@@ -46,7 +55,7 @@ pub fn patch<T: Real>(c: &Configuration, options: SolverOptions) -> Result<Patch
 pub struct Increments {
     integrator: Integrator,
     dt: f64,
-    /// Forces, of a size that leaves 4-D springs near where they rest.
+    /// Forces, of the size at which the change is compared.
     forces: Vec<Vec<f64>>,
     exact: Vec<Vec<f64>>,
 }
@@ -63,8 +72,10 @@ pub struct Stepped {
     pub seconds: f64,
 }
 
-/// Largest change of a density that a load may make, relative to the distance of the samples.
-const SMALL: f64 = 1e-2;
+/// Largest change of a density by a load over the distance of the samples: as far as a tool moves matter in a step, and so
+/// little of 4-D springs that their tangents stay.
+const LINEAR: f64 = 1.0;
+const FOUR_D: f64 = 0.1;
 
 impl Increments {
     /// Solves directly in double precision.
@@ -75,7 +86,8 @@ impl Increments {
             direct_limit: 4000,
             ..SolverOptions::default()
         };
-        let mut patch = patch::<f64>(c, options)?;
+        // A factor, also where fast diagonalization would do.
+        let mut patch = patch_of::<f64>(c, options, true)?;
         let dt = c.dt_over_limit * patch.explicit_limit()?;
         let mut out = Self {
             integrator,
@@ -83,12 +95,13 @@ impl Increments {
             forces: Vec::new(),
             exact: Vec::new(),
         };
+        let size = if c.four_d { FOUR_D } else { LINEAR };
         for load in loads(c.samples) {
             // A first trial tells the size.
-            let trial: Vec<f64> = load.iter().map(|f| f / (dt * dt) * SMALL).collect();
+            let trial: Vec<f64> = load.iter().map(|f| f / (dt * dt) * size).collect();
             let (moved, _) = out.one(&mut patch, &trial)?;
             let largest = moved.iter().fold(0.0f64, |a, x| a.max(x.abs()));
-            let force: Vec<f64> = trial.iter().map(|f| f * SMALL / largest).collect();
+            let force: Vec<f64> = trial.iter().map(|f| f * size / largest).collect();
             out.exact.push(out.one(&mut patch, &force)?.0);
             out.forces.push(force);
         }

@@ -189,11 +189,25 @@ fn solvers(c: &Configuration, clock: fn() -> f64, lines: &mut Vec<Line>) -> Resu
         if square && solver == Solver::ScaledDiagonalization {
             continue;
         }
-        for cap in [1, 2, 4, 8, 16] {
-            lines.push(solved::<f32>(&reference, solver, cap, clock)?);
-            if cap == 2 || cap == 8 {
-                lines.push(solved::<f64>(&reference, solver, cap, clock)?);
-            }
+        iterations::<f32>(&reference, solver, clock, lines)?;
+        iterations::<f64>(&reference, solver, clock, lines)?;
+    }
+    Ok(())
+}
+
+/// A solver with more and more iterations, until it stops by itself.
+fn iterations<T: Real>(
+    reference: &Reference,
+    solver: Solver,
+    clock: fn() -> f64,
+    lines: &mut Vec<Line>,
+) -> Result<(), DynamicsError> {
+    for cap in [1, 2, 4, 8, 16] {
+        let line = solved::<T>(reference, solver, cap, clock)?;
+        let done = line.iterations < cap;
+        lines.push(line);
+        if done {
+            break;
         }
     }
     Ok(())
