@@ -34,7 +34,7 @@
 //!
 //! A [`Region`](region::Region) cuts a patch out of a hierarchical field and bakes its change back.
 //!
-//! What it cannot do yet: sleep of parts of a region (whole ones do), more than one thread.
+//! What it cannot do yet: patches of a `TensorSpline`, more than one thread.
 
 pub mod constraints;
 pub mod integrators;

@@ -26,6 +26,7 @@
 //! ```
 
 mod cells;
+mod parts;
 mod sleep;
 mod watch;
 
@@ -171,6 +172,10 @@ pub struct Region<T> {
     patch: Patch<T>,
     thresholds: Thresholds,
     asleep: bool,
+    parts_sleep: bool,
+    part: Option<Box<parts::Part<T>>>,
+    /// Steps until it is looked at again what is awake.
+    steps_to_look: usize,
 }
 
 impl<T: Real> Region<T> {
@@ -230,6 +235,9 @@ impl<T: Real> Region<T> {
             patch,
             thresholds: options.sleep,
             asleep: true,
+            parts_sleep: false,
+            part: None,
+            steps_to_look: 0,
         })
     }
 
@@ -245,7 +253,7 @@ impl<T: Real> Region<T> {
 
     /// The patch, to change its matter, rest or state; wakes the region.
     pub fn patch_mut(&mut self) -> &mut Patch<T> {
-        self.asleep = false;
+        self.wake();
         &mut self.patch
     }
 
@@ -263,7 +271,7 @@ impl<T: Real> Region<T> {
         if self.asleep {
             return Ok(None);
         }
-        let report = self.patch.step(integrator, dt)?;
+        let report = self.step_parts(integrator, dt)?;
         self.rest_if_quiet();
         Ok(Some(report))
     }
@@ -311,6 +319,7 @@ impl<T: Real> Region<T> {
     ) -> Result<HierarchicalSpline<T>, RegionError> {
         let baked = self.bake(onto)?;
         self.patch.rest_here();
+        self.part = None;
         self.asleep = true;
         Ok(baked)
     }
@@ -319,7 +328,7 @@ impl<T: Real> Region<T> {
     /// that it returns to.
     pub fn release_elastic(&mut self) {
         self.patch.external.fill(T::zero());
-        self.asleep = false;
+        self.wake();
     }
 }
 
