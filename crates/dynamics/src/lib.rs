@@ -46,3 +46,4 @@ mod rest;
 pub mod solve;
 pub mod springs;
 pub mod study;
+mod vectorized;

@@ -39,6 +39,8 @@ pub struct Configuration {
 pub enum Solver {
     /// What a patch uses.
     Default,
+    /// What it uses in the steps after painting, while a factor is made beside them; where none is, the default.
+    Bridge,
     /// Conjugate gradients without preconditioner, as the source paper has them.
     Plain,
     /// Fast diagonalization between the square roots of the diagonals.
@@ -52,6 +54,7 @@ impl Solver {
     pub fn name(self) -> &'static str {
         match self {
             Self::Default => "default",
+            Self::Bridge => "bridge",
             Self::Plain => "none",
             Self::ScaledDiagonalization => "scaled-diagonalization",
             Self::SmoothedCycle => "v-cycle-without-blocks",
@@ -231,8 +234,12 @@ impl Reference {
         };
         let steps = self.steps();
         match solver {
-            Solver::Default => {
+            Solver::Default | Solver::Bridge => {
+                let settled = solver == Solver::Default;
                 let (mut solver, matrix) = self.prepared::<T>(cap)?;
+                if settled {
+                    solver.settle();
+                }
                 out.method = solver.method().name();
                 let mut x = vec![T::zero(); lattice.coefficient_count()];
                 let mut dx = vec![T::zero(); lattice.sample_count()];
