@@ -32,9 +32,14 @@ pub fn solve_seconds<T: Real>(
         Ok(cycle)
     };
     Ok(match solver {
-        Solver::Default => median_seconds(clock, || {
-            default.solve(&matrix, &g, &mut x, &mut dx);
-        }),
+        Solver::Default | Solver::Bridge => {
+            if solver == Solver::Default {
+                default.settle();
+            }
+            median_seconds(clock, || {
+                default.solve(&matrix, &g, &mut x, &mut dx);
+            })
+        }
         Solver::Plain => iterate(&default, &matrix, &mut Unpreconditioned, &g, cap, clock),
         Solver::ScaledDiagonalization => {
             let options = VCycleOptions {
