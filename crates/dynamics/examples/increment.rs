@@ -1,5 +1,7 @@
 //! Increment errors of the default solver, one JSON object a line:
-//! `cargo run --release -p dynamics --example increment -- 15/20 rim|free CONTRAST DT [MASS] [18]`.
+//! `cargo run --release -p dynamics --example increment -- 15/20 rim|free CONTRAST DT [MASS] [18|slack]`.
+//!
+//! "bridge" lines are the steps after painting, while a factor is made beside them.
 
 use dynamics::lattice::Rim;
 use dynamics::springs::Neighbours;
@@ -32,10 +34,17 @@ fn main() {
             },
             four_d,
         };
-        let reference = Reference::new(configuration).expect("a possible configuration");
+        let reference = if args.get(5).is_some_and(|a| a == "slack") {
+            Reference::with_slack_springs(configuration)
+        } else {
+            Reference::new(configuration)
+        };
+        let reference = reference.expect("a possible configuration");
         let start = cpu_seconds();
         let (mut solver, matrix) = reference.prepared::<f32>(8).expect("positive definite");
         let prepare = cpu_seconds() - start;
+        solver.settle();
+        let settle = cpu_seconds() - start - prepare;
         let g = reference.load::<f32>(0);
         let mut x = vec![0.0; solver.lattice().coefficient_count()];
         let mut dx = g.clone();
@@ -47,17 +56,25 @@ fn main() {
             })
             .collect();
         times.sort_by(f64::total_cmp);
-        for cap in [2, 4, 8] {
-            let o = reference
-                .judge::<f32>(Solver::Default, cap)
-                .expect("prepared before");
+        for (solver, cap) in [
+            (Solver::Default, 2),
+            (Solver::Default, 4),
+            (Solver::Default, 8),
+            (Solver::Bridge, 8),
+        ] {
+            let o = reference.judge::<f32>(solver, cap).expect("prepared before");
+            if solver == Solver::Bridge && settle < 1e-3 {
+                continue;
+            }
             println!(
-                "{{\"coefficients\":{n},\"samples\":{m},\"rim\":\"{}\",\"pattern\":\"{}\",\"contrast\":{},\"mass_contrast\":{},\"dt_over_limit\":{},\"preconditioner\":\"{}\",\"iterations\":{},\"increment_error\":{:.2e},\"residual\":{:.1e},\"reference_residual\":{:.0e},\"prepare_seconds\":{prepare:.2e},\"least_solve_seconds\":{:.2e}}}",
+                "{{\"coefficients\":{n},\"samples\":{m},\"rim\":\"{}\",\"pattern\":\"{}\",\"contrast\":{},\"mass_contrast\":{},\"dt_over_limit\":{},\"springs\":\"{}\",\"solver\":\"{}\",\"preconditioner\":\"{}\",\"iterations\":{},\"increment_error\":{:.2e},\"residual\":{:.1e},\"reference_residual\":{:.0e},\"prepare_seconds\":{prepare:.2e},\"settle_seconds\":{settle:.2e},\"least_solve_seconds\":{:.2e}}}",
                 args[1],
                 pattern.name(),
                 configuration.contrast,
                 configuration.mass_contrast,
                 configuration.dt_over_limit,
+                args.get(5).map_or("6", |a| a),
+                solver.name(),
                 o.method,
                 o.iterations,
                 o.increment_error,

@@ -84,7 +84,7 @@ fn small_regions_are_solved_at_any_contrast() {
 
 #[test]
 fn large_regions_are_solved_in_eight_iterations() {
-    // The bars: 0.3 % at a contrast of 100, 1 % at 10³, 3 % at 10⁴.
+    // The bars: 0.3 % at a contrast of 100, 1 % at 10³, 3 % at 10⁴; at 15/20 of the steps while a factor is made.
     for (coefficients, samples) in [(15, 15), (15, 20)] {
         for pattern in [Pattern::StiffBall, Pattern::Plate, Pattern::Bone, Pattern::Random] {
             for (contrast, bar) in [(1e2, 3e-3), (1e3, 1e-2), (1e4, 3e-2)] {
@@ -95,10 +95,75 @@ fn large_regions_are_solved_in_eight_iterations() {
                     contrast,
                     ..BASE
                 };
-                let outcome = default_f32(c);
-                assert!(outcome.increment_error < bar, "{c:?}: {outcome:?}");
+                let reference = Reference::new(c).unwrap();
+                let bridge = reference.judge::<f32>(Solver::Bridge, 8).unwrap();
+                assert!(bridge.increment_error < bar, "{c:?}: {bridge:?}");
             }
         }
+    }
+}
+
+#[test]
+fn blocks_reach_what_rings_beside_a_thin_wall() {
+    // The wall is two samples thick. 24/32 stands for 32/32, whose reference takes ten times as long.
+    let c = Configuration {
+        coefficients: 24,
+        samples: 32,
+        rim: Rim::Fixed,
+        pattern: Pattern::Bone,
+        contrast: 1e4,
+        ..BASE
+    };
+    let outcome = default_f32(c);
+    assert!(outcome.increment_error < 1e-2, "{outcome:?}");
+}
+
+#[test]
+fn a_factor_made_beside_the_steps_solves_at_any_contrast() {
+    // 3375 coefficients; the bar is 0.1 %, of masses and slack springs too, which leave a V-cycle at several per cent.
+    for (pattern, contrast, mass_contrast) in [
+        (Pattern::Bone, 1e4, 1.0),
+        (Pattern::HalfSpace, 1e4, 1e4),
+        (Pattern::SoftBall, 1e2, 1.0),
+    ] {
+        let c = Configuration {
+            coefficients: 15,
+            samples: 20,
+            pattern,
+            contrast,
+            mass_contrast,
+            ..BASE
+        };
+        for slack in [false, true] {
+            let reference = if slack {
+                Reference::with_slack_springs(c).unwrap()
+            } else {
+                Reference::new(c).unwrap()
+            };
+            let outcome = reference.judge::<f32>(Solver::Default, 8).unwrap();
+            assert_eq!((outcome.method, outcome.iterations), ("direct", 1));
+            assert!(outcome.increment_error < 1e-3, "{c:?} {slack}: {outcome:?}");
+        }
+    }
+}
+
+#[test]
+fn the_limits_of_masses_and_slack_springs_are_known() {
+    // Far beyond what is asked of stiffness alone; no factor, so that the cycle has to do it.
+    let c = Configuration {
+        coefficients: 15,
+        samples: 20,
+        pattern: Pattern::Plate,
+        contrast: 1e4,
+        ..BASE
+    };
+    let heavy = Reference::new(Configuration {
+        mass_contrast: 1e4,
+        ..c
+    });
+    for reference in [heavy, Reference::with_slack_springs(c)] {
+        let outcome = reference.unwrap().judge::<f32>(Solver::Bridge, 8).unwrap();
+        assert!(outcome.increment_error < 0.3, "{outcome:?}");
     }
 }
 

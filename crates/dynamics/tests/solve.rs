@@ -171,3 +171,81 @@ fn negative_curvature_is_reported_and_not_divided_by() {
     );
     assert!(x.iter().all(|x| x.is_finite()));
 }
+
+#[test]
+fn a_factor_takes_over_when_it_is_made_and_is_renewed_when_it_is_old() {
+    let (n, m) = (11, 14);
+    let lattice = Lattice::<f32>::cube(n, m, Rim::Free, 1.0).unwrap();
+    let s: StepMatrix<f32> = matrix(Pattern::StiffBall, 100.0, m, Neighbours::Six, 30.0).convert();
+    let steps: Vec<_> = s.springs.iter().map(|s| s.direction.step).collect();
+    let mut solver = StepSolver::new(lattice.clone(), &steps, SolverOptions::default());
+    solver.prepare(&s).unwrap();
+    let g: Vec<f32> = (0..m * m * m).map(|i| (0.1 * i as f32).sin()).collect();
+    let (mut x, mut dx) = (vec![0.0; n * n * n], vec![0.0; m * m * m]);
+    let mut methods = Vec::new();
+    let mut solve = |solver: &mut StepSolver<f32>, s: &StepMatrix<f32>| {
+        let report = solver.solve(s, &g, &mut x, &mut dx);
+        methods.push(report.method);
+        (report.iteration.iterations, dx.clone())
+    };
+    // One part of the work is the assembly, each of the others 32 rows.
+    let parts = 1 + (n * n * n).div_ceil(32);
+    for _ in 0..parts {
+        solve(&mut solver, &s);
+    }
+    let (iterations, by_parts) = solve(&mut solver, &s);
+    assert_eq!(iterations, 1);
+    // Made at once the factor has the same bits.
+    let mut settled = StepSolver::new(lattice, &steps, SolverOptions::default());
+    settled.prepare(&s).unwrap();
+    settled.settle();
+    let (iterations, at_once) = solve(&mut settled, &s);
+    assert_eq!((iterations, &at_once), (1, &by_parts));
+    // A step twice as long: the old factor does it slowly, a new one is begun.
+    let longer = s.springs.iter().map(|s| SpringWeights {
+        direction: s.direction,
+        weights: s.weights.scaled(4.0),
+    });
+    let longer = StepMatrix::new([m; 3], s.mass.clone(), longer.collect());
+    for _ in 0..4 {
+        assert!(solve(&mut solver, &longer).0 > 2);
+    }
+    for _ in 0..parts {
+        solve(&mut solver, &longer);
+    }
+    assert_eq!(solve(&mut solver, &longer).0, 1);
+    let used = |from: usize, count: usize, method| methods[from..from + count].iter().all(|m| *m == method);
+    assert!(used(0, parts, Method::VCycle) && used(parts, 6, Method::Direct));
+    assert!(used(parts + 6, parts, Method::VCycle) && used(2 * parts + 6, 1, Method::Direct));
+}
+
+#[test]
+fn solves_allocate_nothing_whatever_the_method() {
+    let cases = [
+        (7, 10, Pattern::Uniform, Method::FastDiagonalization),
+        (7, 10, Pattern::Bone, Method::Direct),
+        (11, 14, Pattern::Bone, Method::VCycle),
+        (17, 20, Pattern::StiffBall, Method::VCycle),
+        (7, 7, Pattern::Random, Method::SampleDirect),
+        (11, 11, Pattern::StiffBall, Method::SampleMultigrid),
+    ];
+    for (n, m, pattern, method) in cases {
+        let lattice = Lattice::<f32>::cube(n, m, Rim::Free, 1.0).unwrap();
+        let s: StepMatrix<f32> = matrix(pattern, 1e3, m, Neighbours::Six, 30.0).convert();
+        let steps: Vec<_> = s.springs.iter().map(|s| s.direction.step).collect();
+        let mut solver = StepSolver::new(lattice, &steps, SolverOptions::default());
+        solver.prepare(&s).unwrap();
+        let g: Vec<f32> = (0..m * m * m).map(|i| (0.1 * i as f32).sin()).collect();
+        let (mut x, mut dx) = (vec![0.0; n * n * n], vec![0.0; m * m * m]);
+        // The second solve of a factor made beside the steps assembles its matrix; workspaces grow once.
+        for _ in 0..2 {
+            assert_eq!(solver.solve(&s, &g, &mut x, &mut dx).method, method);
+        }
+        for _ in 0..50 {
+            let counted = allocation_counter::measure(|| {
+                solver.solve(&s, &g, &mut x, &mut dx);
+            });
+            assert_eq!(counted.count_total, 0, "{n}/{m} {method:?} {counted:?}");
+        }
+    }
+}

@@ -1,7 +1,7 @@
 use bspline::Real;
 
 use crate::patch::{Patch, PatchError, Prepared};
-use crate::solve::SolveReport;
+use crate::solve::{ITERATED, Method, SolveReport};
 use crate::springs::{Law, Weights};
 
 /// Beyond this ratio of step sizes a factor is not tried again: four in `Δt²` costs about eight iterations.
@@ -77,7 +77,12 @@ impl<T: Real> Patch<T> {
                 return Ok(report);
             }
             let known = self.prepared.map_or(0.0, |p| p.residual);
-            if residual <= TRUSTED.max(2.0 * known) && report.iteration.negative_curvature.is_none() {
+            // Those that iterate stop there.
+            let trusted = match report.method {
+                Method::VCycle | Method::SampleMultigrid => 3.0 * ITERATED,
+                _ => TRUSTED,
+            };
+            if residual <= trusted.max(2.0 * known) && report.iteration.negative_curvature.is_none() {
                 return Ok(report);
             }
             fresh = true;

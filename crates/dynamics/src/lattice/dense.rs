@@ -7,7 +7,8 @@ use nalgebra::DMatrix;
 
 /// Lanes that the fastest axis is padded to.
 pub(crate) const PAD: usize = 8;
-const ROWS: usize = 4;
+/// Rows of the product computed together.
+const ROWS: usize = 6;
 
 /// A square matrix and its transpose, padded for products along any axis.
 #[derive(Clone, Debug)]
@@ -69,83 +70,50 @@ fn strips<T: Real>(
     k: usize,
 ) {
     debug_assert!(n.is_multiple_of(PAD) && a.len() >= (m - 1) * a_stride + k && c.len() >= m * n);
-    // Eight vector registers of sums, four bytes to a lane: two strips of eight lanes for single precision.
+    // Twelve vector registers of sums: two strips of eight lanes in single precision, of four in double.
     let wide = if size_of::<T>() == 4 { 2 * PAD } else { PAD };
     let mut j = 0;
     while j + wide <= n {
-        let rows = m / ROWS * ROWS;
-        for i in (0..rows).step_by(ROWS) {
-            if size_of::<T>() == 4 {
-                tile::<T, ROWS, 16>(
-                    &a[i * a_stride..],
-                    a_stride,
-                    &b[j..],
-                    b_stride,
-                    &mut c[i * n + j..],
-                    n,
-                    k,
-                );
-            } else {
-                tile::<T, ROWS, PAD>(
-                    &a[i * a_stride..],
-                    a_stride,
-                    &b[j..],
-                    b_stride,
-                    &mut c[i * n + j..],
-                    n,
-                    k,
-                );
-            }
-        }
-        for i in rows..m {
-            if size_of::<T>() == 4 {
-                tile::<T, 1, 16>(
-                    &a[i * a_stride..],
-                    a_stride,
-                    &b[j..],
-                    b_stride,
-                    &mut c[i * n + j..],
-                    n,
-                    k,
-                );
-            } else {
-                tile::<T, 1, PAD>(
-                    &a[i * a_stride..],
-                    a_stride,
-                    &b[j..],
-                    b_stride,
-                    &mut c[i * n + j..],
-                    n,
-                    k,
-                );
-            }
+        let (b, c) = (&b[j..], &mut c[j..]);
+        if size_of::<T>() == 4 {
+            strip::<T, 16>(a, a_stride, b, b_stride, c, n, m, k);
+        } else {
+            strip::<T, PAD>(a, a_stride, b, b_stride, c, n, m, k);
         }
         j += wide;
     }
     if j < n {
-        let rows = m / ROWS * ROWS;
-        for i in (0..rows).step_by(ROWS) {
-            tile::<T, ROWS, PAD>(
-                &a[i * a_stride..],
-                a_stride,
-                &b[j..],
-                b_stride,
-                &mut c[i * n + j..],
-                n,
-                k,
-            );
-        }
-        for i in rows..m {
-            tile::<T, 1, PAD>(
-                &a[i * a_stride..],
-                a_stride,
-                &b[j..],
-                b_stride,
-                &mut c[i * n + j..],
-                n,
-                k,
-            );
-        }
+        strip::<T, PAD>(a, a_stride, &b[j..], b_stride, &mut c[j..], n, m, k);
+    }
+}
+
+/// `L` columns of the product.
+#[inline(always)]
+fn strip<T: Real, const L: usize>(
+    a: &[T],
+    a_stride: usize,
+    b: &[T],
+    b_stride: usize,
+    c: &mut [T],
+    c_stride: usize,
+    m: usize,
+    k: usize,
+) {
+    let whole = m / ROWS * ROWS;
+    for i in (0..whole).step_by(ROWS) {
+        let (a, c) = (&a[i * a_stride..], &mut c[i * c_stride..]);
+        tile::<T, ROWS, L>(a, a_stride, b, b_stride, c, c_stride, k);
+    }
+    if whole == m {
+        return;
+    }
+    let (a, c) = (&a[whole * a_stride..], &mut c[whole * c_stride..]);
+    match m - whole {
+        1 => tile::<T, 1, L>(a, a_stride, b, b_stride, c, c_stride, k),
+        2 => tile::<T, 2, L>(a, a_stride, b, b_stride, c, c_stride, k),
+        3 => tile::<T, 3, L>(a, a_stride, b, b_stride, c, c_stride, k),
+        4 => tile::<T, 4, L>(a, a_stride, b, b_stride, c, c_stride, k),
+        _ => tile::<T, 5, L>(a, a_stride, b, b_stride, c, c_stride, k),
     }
 }
 
@@ -162,8 +130,8 @@ fn tile<T: Real, const R: usize, const L: usize>(
 ) {
     let rows: [&[T]; R] = std::array::from_fn(|r| &a[r * a_stride..r * a_stride + k]);
     let mut sum = [[T::zero(); L]; R];
-    for p in 0..k {
-        let line: &[T; L] = b[p * b_stride..p * b_stride + L].try_into().expect("L lanes");
+    for (p, line) in b.chunks(b_stride).take(k).enumerate() {
+        let line: &[T; L] = line.first_chunk().expect("L lanes");
         for r in 0..R {
             let v = rows[r][p];
             for l in 0..L {

@@ -1,5 +1,5 @@
+use crate::vectorized::vectorized;
 use bspline::Real;
-use pulp::Arch;
 
 use super::banded::{Banded, BandedLanes};
 
@@ -79,7 +79,7 @@ impl<T: Real> TensorProduct<T> {
         match self.order {
             Order::FastFirst => {
                 let (along_z, along_y) = w.split(ix * iy * oz, ix * oy * oz);
-                Arch::new().dispatch(
+                vectorized(
                     #[inline(always)]
                     || {
                         self.z.apply_lines(input, along_z);
@@ -93,7 +93,7 @@ impl<T: Real> TensorProduct<T> {
             }
             Order::SlowFirst => {
                 let (along_x, along_y) = w.split(ox * iy * iz, ox * oy * iz);
-                Arch::new().dispatch(
+                vectorized(
                     #[inline(always)]
                     || {
                         self.x.apply_planes(iy * iz, input, along_x);

@@ -29,6 +29,7 @@ mod cells;
 mod parts;
 mod sleep;
 mod tensor;
+mod watch;
 
 pub use cells::{Cells, MAX_EDGE, MAX_SIZE, MIN_CELLS};
 pub use sleep::{Schedule, Thresholds, Turn};

@@ -1,16 +1,17 @@
 //! Cholesky factorization inside the band of a matrix.
 
+use crate::vectorized::vectorized;
 use bspline::Real;
-use pulp::Arch;
 
 use super::pcg::Preconditioner;
 use crate::springs::StepMatrix;
 
-/// Rows and columns that are eliminated together.
+/// Columns that are eliminated together.
 const TILE: usize = 4;
 const LANES: usize = 16;
 const HALF: usize = LANES / 2;
-const MARGIN: usize = 2 * TILE;
+/// Rows that are eliminated together, a multiple of [`LANES`]: of a band of 1000 they stay in the second cache.
+pub(super) const SLICE: usize = 32;
 
 /// The factor `H = L Lᵀ` of a symmetric matrix of half-bandwidth `b`, stored by rows: row `i` holds columns
 /// `i-b ..= i`, the diagonal as its inverse.
@@ -19,10 +20,11 @@ pub struct BandCholesky<T> {
     n: usize,
     layout: Layout,
     rows: Vec<T>,
+    /// The rows in work, by columns, so that rows are the lanes.
+    panel: Vec<T>,
 }
 
-/// Where the elements lie. Before the first column of a row there are [`MARGIN`] zeros, so that a tile may read
-/// beyond the band of its lower rows.
+/// Where the elements lie.
 #[derive(Clone, Copy, Debug)]
 struct Layout {
     band: usize,
@@ -32,7 +34,7 @@ struct Layout {
 impl Layout {
     #[inline(always)]
     fn at(self, row: usize, column: usize) -> usize {
-        row * self.stride + MARGIN + column + self.band - row
+        row * self.stride + column + self.band - row
     }
 }
 
@@ -49,11 +51,12 @@ pub struct NotPositive {
 impl<T: Real> BandCholesky<T> {
     /// Room for a matrix of `n` rows and half-bandwidth `band`.
     pub fn new(n: usize, band: usize) -> Self {
-        let stride = (MARGIN + band + 1).next_multiple_of(LANES);
+        let stride = (band + 1).next_multiple_of(LANES);
         Self {
             n,
             layout: Layout { band, stride },
             rows: vec![T::zero(); n * stride],
+            panel: vec![T::zero(); (band + SLICE) * SLICE],
         }
     }
 
@@ -89,48 +92,45 @@ impl<T: Real> BandCholesky<T> {
     /// # Errors
     /// [`NotPositive`]; the contents are then of no use.
     pub fn factorize(&mut self) -> Result<(), NotPositive> {
-        let this = &mut *self;
-        Arch::new().dispatch(
-            #[inline(always)]
-            move || this.eliminate(),
-        )
+        (0..self.n)
+            .step_by(SLICE)
+            .try_for_each(|row| self.factorize_slice(row))
     }
 
-    /// Row by row in tiles of four by four: the columns before the tile, which both its rows and its columns have
-    /// done, then the tile itself.
-    #[inline(always)]
-    fn eliminate(&mut self) -> Result<(), NotPositive> {
-        let (n, layout) = (self.n, self.layout);
-        for i in (0..n).step_by(TILE) {
-            let tall = TILE.min(n - i);
-            let (done, open) = self.rows.split_at_mut(i * layout.stride);
-            let first = i.saturating_sub(layout.band) / TILE * TILE;
-            for j in (first..i).step_by(TILE) {
-                if tall == TILE {
-                    tile(layout, done, open, i, j, first);
-                } else {
-                    for r in i..i + tall {
-                        for c in j..j + TILE {
-                            single(layout, done, open, i, r, c);
-                        }
-                    }
-                }
+    /// Overwrites rows `row .. row + SLICE` of the matrix by those of its factor, those before being done: for a factor
+    /// that is made in parts. The bits are those of [`factorize`](Self::factorize).
+    ///
+    /// # Errors
+    /// [`NotPositive`]; the contents are then of no use.
+    pub(super) fn factorize_slice(&mut self, row: usize) -> Result<(), NotPositive> {
+        let end = (row + SLICE).min(self.n);
+        let first = row.saturating_sub(self.layout.band);
+        let (layout, rows, panel) = (self.layout, &mut self.rows, &mut self.panel);
+        let panel = &mut panel[..(row + SLICE - first) * SLICE];
+        panel.fill(T::zero());
+        for r in row..end {
+            let low = r.saturating_sub(layout.band);
+            let from = &rows[layout.at(r, low)..=layout.at(r, r)];
+            for (to, v) in panel[(low - first) * SLICE..].chunks_exact_mut(SLICE).zip(from) {
+                to[r - row] = *v;
             }
-            for r in i..i + tall {
-                for c in i..=r {
-                    let at = |row: usize, column: usize| layout.at(row, column) - i * layout.stride;
-                    let low = r.saturating_sub(layout.band).min(c);
-                    let sum = lanes_dot(&open[at(r, low)..at(r, c)], &open[at(c, low)..at(c, c)]);
-                    let value = open[at(r, c)] - sum;
-                    open[at(r, c)] = if r > c {
-                        value * open[at(c, c)]
-                    } else if value > T::zero() {
-                        T::one() / value.sqrt()
-                    } else {
-                        let pivot = value.as_f64();
-                        return Err(NotPositive { row: r, pivot });
-                    };
+        }
+        let done = &rows[..row * layout.stride];
+        vectorized(
+            #[inline(always)]
+            || {
+                if size_of::<T>() == 4 {
+                    eliminate::<T, LANES>(layout, done, panel, [first, row, end])
+                } else {
+                    eliminate::<T, HALF>(layout, done, panel, [first, row, end])
                 }
+            },
+        )?;
+        for r in row..end {
+            let low = r.saturating_sub(layout.band);
+            let to = &mut rows[layout.at(r, low)..=layout.at(r, r)];
+            for (from, v) in panel[(low - first) * SLICE..].chunks_exact(SLICE).zip(to) {
+                *v = from[r - row];
             }
         }
         Ok(())
@@ -143,7 +143,7 @@ impl<T: Real> BandCholesky<T> {
     pub fn solve(&self, x: &mut [T]) {
         assert_eq!(x.len(), self.n, "a right-hand side of the matrix' size");
         let layout = self.layout;
-        Arch::new().dispatch(
+        vectorized(
             #[inline(always)]
             || {
                 for i in 0..x.len() {
@@ -174,62 +174,109 @@ impl<T: Real> Preconditioner<T> for BandCholesky<T> {
     }
 }
 
-/// Element `(r, c)` of the rows that are open (from `i` on), `c < i`.
+/// Rows `start .. end` in `panel`, whose first column is `first`: first the columns of the rows that are done, then their
+/// own. Lanes of columns that a row does not have stay zero.
 #[inline(always)]
-fn single<T: Real>(layout: Layout, done: &[T], open: &mut [T], i: usize, r: usize, c: usize) {
-    let low = r.saturating_sub(layout.band);
-    if c < low {
-        return;
-    }
-    let here = |column: usize| layout.at(r, column) - i * layout.stride;
-    let there = |column: usize| layout.at(c, column);
-    let sum = lanes_dot(&open[here(low)..here(c)], &done[there(low)..there(c)]);
-    open[here(c)] = (open[here(c)] - sum) * done[there(c)];
-}
-
-/// Elements `(i .. i+4, j .. j+4)` with the columns from `first` on.
-#[inline(always)]
-fn tile<T: Real>(layout: Layout, done: &[T], open: &mut [T], i: usize, j: usize, first: usize) {
-    let length = j - first;
-    let here: [usize; TILE] = std::array::from_fn(|r| layout.at(i + r, first) - i * layout.stride);
-    let there: [usize; TILE] = std::array::from_fn(|c| layout.at(j + c, first));
-    let mut value = [[T::zero(); TILE]; TILE];
-    {
-        let a: [&[T]; TILE] = std::array::from_fn(|r| &open[here[r]..here[r] + length]);
-        let b: [&[T]; TILE] = std::array::from_fn(|c| &done[there[c]..there[c] + length]);
-        let mut sum = [[[T::zero(); HALF]; TILE]; TILE];
-        let whole = length / HALF * HALF;
-        for k in (0..whole).step_by(HALF) {
-            let eight = |v: &[T]| -> [T; HALF] { v[k..k + HALF].try_into().expect("eight lanes") };
-            let (x, y) = (a.map(eight), b.map(eight));
-            for r in 0..TILE {
-                for c in 0..TILE {
-                    for l in 0..HALF {
-                        sum[r][c][l] += x[r][l] * y[c][l];
+fn eliminate<T: Real, const L: usize>(
+    layout: Layout,
+    done: &[T],
+    panel: &mut [T],
+    [first, start, end]: [usize; 3],
+) -> Result<(), NotPositive> {
+    for j in (first..start).step_by(TILE) {
+        let count = TILE.min(start - j);
+        let (before, open) = panel.split_at_mut((j - first) * SLICE);
+        // A tile that is not whole repeats its last row.
+        let rows = [0, 1, 2, 3].map(
+            #[inline(always)]
+            |c| {
+                let row = j + c.min(count - 1);
+                &done[layout.at(row, first)..=layout.at(row, row)]
+            },
+        );
+        for lanes in (0..SLICE).step_by(L) {
+            let sums = products::<T, L>(before, lanes, rows);
+            for c in 0..count {
+                let mut v = lanes_of::<T, L>(open, c, lanes);
+                subtract(&mut v, &sums[c]);
+                for k in 0..c {
+                    let solved = lanes_of::<T, L>(open, k, lanes);
+                    let l = rows[c][j - first + k];
+                    for (v, s) in v.iter_mut().zip(&solved) {
+                        *v -= *s * l;
                     }
                 }
-            }
-        }
-        for r in 0..TILE {
-            for c in 0..TILE {
-                let mut v = tree(&sum[r][c]);
-                for k in whole..length {
-                    v += a[r][k] * b[c][k];
+                let inverse = rows[c][j - first + c];
+                for (to, v) in open[c * SLICE + lanes..][..L].iter_mut().zip(&v) {
+                    *to = *v * inverse;
                 }
-                value[r][c] = v;
             }
         }
     }
-    for r in 0..TILE {
-        for c in 0..TILE {
-            let (row, column) = (here[r] + length, there[c] + length);
-            let mut v = open[row + c] - value[r][c];
-            for k in 0..c {
-                v -= open[row + k] * done[column + k];
+    for c in start..end {
+        let (before, open) = panel.split_at_mut((c - first) * SLICE);
+        let column = &mut open[..SLICE];
+        let own = c - start;
+        for lanes in (0..SLICE).step_by(L) {
+            let mut v = lanes_of::<T, L>(column, 0, lanes);
+            for line in before.chunks_exact(SLICE) {
+                let l = line[own];
+                let line = &line[lanes..lanes + L];
+                for k in 0..L {
+                    v[k] -= line[k] * l;
+                }
             }
-            open[row + c] = v * done[column + c];
+            column[lanes..lanes + L].copy_from_slice(&v);
+        }
+        let pivot = column[own];
+        if pivot.is_nan() || pivot <= T::zero() {
+            return Err(NotPositive {
+                row: c,
+                pivot: pivot.as_f64(),
+            });
+        }
+        let inverse = T::one() / pivot.sqrt();
+        column[..own].fill(T::zero());
+        for v in &mut column[own..] {
+            *v *= inverse;
+        }
+        column[own] = inverse;
+    }
+    Ok(())
+}
+
+/// Lanes from `lanes` on of column `c`.
+#[inline(always)]
+fn lanes_of<T: Real, const L: usize>(columns: &[T], c: usize, lanes: usize) -> [T; L] {
+    let mut out = [T::zero(); L];
+    out.copy_from_slice(&columns[c * SLICE + lanes..][..L]);
+    out
+}
+
+#[inline(always)]
+fn subtract<T: Real, const L: usize>(v: &mut [T; L], sum: &[T; L]) {
+    for l in 0..L {
+        v[l] -= sum[l];
+    }
+}
+
+/// `Σ_k row_k·panel_k` over all columns of `panel`, for `L` of its lanes and each of the rows.
+#[inline(always)]
+fn products<T: Real, const L: usize>(panel: &[T], lanes: usize, rows: [&[T]; TILE]) -> [[T; L]; TILE] {
+    let mut sum = [[T::zero(); L]; TILE];
+    let columns = panel.len() / SLICE;
+    let [r0, r1, r2, r3] = rows;
+    let rows = [&r0[..columns], &r1[..columns], &r2[..columns], &r3[..columns]];
+    for (k, line) in panel.chunks_exact(SLICE).enumerate() {
+        let line = &line[lanes..lanes + L];
+        for r in 0..TILE {
+            let v = rows[r][k];
+            for l in 0..L {
+                sum[r][l] += v * line[l];
+            }
         }
     }
+    sum
 }
 
 #[inline(always)]

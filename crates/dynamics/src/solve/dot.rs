@@ -1,5 +1,5 @@
+use crate::vectorized::vectorized;
 use bspline::Real;
-use pulp::Arch;
 
 const LANES: usize = 16;
 const CHUNK: usize = 1024;
@@ -8,7 +8,7 @@ const CHUNK: usize = 1024;
 /// however the work is divided.
 pub(crate) fn dot<T: Real>(a: &[T], b: &[T]) -> f64 {
     assert_eq!(a.len(), b.len(), "vectors of one length");
-    Arch::new().dispatch(
+    vectorized(
         #[inline(always)]
         || {
             let chunks = a.chunks(CHUNK).zip(b.chunks(CHUNK));

@@ -1,9 +1,9 @@
 //! Fast diagonalization: the exact inverse of a constant material on a tensor-product lattice [R. E. Lynch,
 //! J. R. Rice and D. H. Thomas, *Direct solution of partial difference equations by tensor product methods*, 1964].
 
+use crate::vectorized::vectorized;
 use bspline::Real;
 use nalgebra::{Cholesky, DMatrix, SymmetricEigen};
-use pulp::Arch;
 
 use super::pcg::Preconditioner;
 use crate::lattice::{Banded, DenseAxis, Lattice, PAD, multiply, multiply_last};
@@ -116,7 +116,7 @@ impl<T: Real> FastDiagonalization<T> {
         assert_eq!(z.len(), r.len(), "coefficients");
         let (ping, pong) = (&mut self.ping[..], &mut self.pong[..]);
         let ([x, y, zed], inverse, scale) = (&self.axes, &self.inverse, &self.scale);
-        Arch::new().dispatch(
+        vectorized(
             #[inline(always)]
             || {
                 let rows = r.chunks_exact(nz).zip(scale.chunks_exact(nz));

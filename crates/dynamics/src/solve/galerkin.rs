@@ -175,8 +175,8 @@ impl Galerkin {
 
     /// Sums of all pairs.
     pub fn accumulate<T: Real>(&mut self, s: &StepMatrix<T>) {
-        let own: Vec<_> = s.springs.iter().map(|s| s.direction.step).collect();
-        assert_eq!(own, self.steps, "springs as planned");
+        let steps = s.springs.iter().map(|s| &s.direction.step);
+        assert!(steps.eq(&self.steps), "springs as planned");
         fill(&mut self.weights, &s.mass);
         // A diagonal spring w (a - a')(a - a')ᵀ is w (aaᵀ + a'a'ᵀ), which acts like mass at its ends, less its cross
         // terms; one along an axis is taken as the difference itself, since that one is a tensor product.

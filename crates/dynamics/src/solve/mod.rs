@@ -1,5 +1,6 @@
 //! The increment of one implicit step: `AᵀSA x = Aᵀg` for a matrix `S` on the samples.
 
+mod background;
 mod band_cholesky;
 mod border;
 mod dot;

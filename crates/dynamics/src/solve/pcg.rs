@@ -12,6 +12,8 @@ pub trait System<T> {
     fn apply(&mut self, p: &[T], q: &mut [T]) -> f64;
     /// `z ≈ H⁻¹ r`, symmetric and positive definite.
     fn precondition(&mut self, r: &[T], z: &mut [T]);
+    /// Told that the solution moved by `alpha` along the `p` that [`apply`](Self::apply) had last.
+    fn moved(&mut self, _alpha: T) {}
 }
 
 /// An approximate inverse of `AᵀSA`, symmetric and positive definite.
@@ -136,6 +138,7 @@ impl<T: Real> ConjugateGradients<T> {
             }
             let alpha = T::from_f64(rz / curvature);
             add_scaled(x, alpha, p);
+            system.moved(alpha);
             add_scaled(r, -alpha, q);
             report.iterations += 1;
             report.residual = dot(r, r).sqrt() / impulse;

@@ -1,8 +1,8 @@
 //! Multigrid on the samples, for lattices with as many free coefficients as samples: there `H⁻¹ = A⁻¹S⁻¹A⁻ᵀ`, and `S`
 //! is a Laplacian with painted weights, while `H` itself is too badly conditioned for anything.
 
+use crate::vectorized::vectorized;
 use bspline::Real;
-use pulp::Arch;
 
 use super::band_cholesky::{BandCholesky, NotPositive};
 use super::pcg::Preconditioner;
@@ -57,7 +57,7 @@ impl<T: Real> Stencil<T> {
     /// `out = S x`.
     fn apply(&self, x: &[T], out: &mut [T]) {
         let [mx, my, mz] = self.dims;
-        Arch::new().dispatch(
+        vectorized(
             #[inline(always)]
             || {
                 for i in 0..mx {

@@ -1,7 +1,7 @@
 //! Overlapping blocks of coefficients, each solved exactly: the additive Schwarz method, where material is painted.
 
+use crate::vectorized::vectorized;
 use bspline::Real;
-use pulp::Arch;
 
 use super::galerkin::Galerkin;
 
@@ -112,7 +112,7 @@ impl<T: Real> Schwarz<T> {
                 }
             }
             let inverse = &self.inverses[block.at..block.at + n * pad];
-            Arch::new().dispatch(
+            vectorized(
                 #[inline(always)]
                 || symmetric_product(inverse, &local[..n], &mut out[..pad]),
             );
@@ -154,7 +154,7 @@ fn invert(h: &mut [f64], n: usize, pad: usize) {
         row[n..].fill(0.0);
     }
     let mut pivot_row = vec![0.0; pad];
-    Arch::new().dispatch(
+    vectorized(
         #[inline(always)]
         || {
             for p in 0..n {

@@ -2,12 +2,13 @@
 
 use bspline::Real;
 
+use super::background::Background;
 use super::band_cholesky::{BandCholesky, NotPositive};
 use super::border::Border;
 use super::dot::dot;
 use super::fast_diagonalization::FastDiagonalization;
 use super::galerkin::Galerkin;
-use super::pcg::{CoefficientSystem, ConjugateGradients, PcgReport, Preconditioner, System};
+use super::pcg::{CoefficientSystem, ConjugateGradients, PcgReport, Preconditioner, System, add_scaled};
 use super::sample_multigrid::SampleMultigrid;
 use super::v_cycle::{VCycle, VCycleOptions};
 use crate::lattice::{Lattice, TensorProduct, TensorWorkspace};
@@ -23,6 +24,9 @@ pub struct SolverOptions {
     pub tolerance: Option<f64>,
     /// Free coefficients up to which the matrix is factorized.
     pub direct_limit: usize,
+    /// Free coefficients up to which a factor is made beside the steps, a V-cycle solving them until it is done: 4096
+    /// take 16 MB in single precision, which is read twice a step.
+    pub background_limit: usize,
     /// Of the V-cycle for more.
     pub v_cycle: VCycleOptions,
 }
@@ -33,6 +37,7 @@ impl Default for SolverOptions {
             iterations: 8,
             tolerance: None,
             direct_limit: 1000,
+            background_limit: 4096,
             v_cycle: VCycleOptions::default(),
         }
     }
@@ -40,7 +45,15 @@ impl Default for SolverOptions {
 
 /// Residual, relative to the impulse, at which the V-cycle and the multigrid stop by default. The increment is then
 /// wrong by about as much, far less than the 0.3 % asked of a step; halving it costs one iteration.
-pub const ITERATED: f64 = 3e-4;
+pub const ITERATED: f64 = 1e-3;
+
+/// Residual, in units of rounding, at which solves by a factor stop.
+const EXACT: f64 = 64.0;
+
+/// The same of fast diagonalization. On coefficients the residual is mostly that of combinations that hardly move a
+/// sample: one iteration leaves up to 2000 units of it in single precision, and increments of the samples that are wrong
+/// by a few units.
+const DIAGONALIZED: f64 = 4096.0;
 
 /// How a step was solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -93,6 +106,7 @@ pub enum SolveError {
 /// | --- | --- | --- |
 /// | as many coefficients as samples | fast diagonalization on the samples | factor (few) or multigrid on the samples, then `x = A⁻¹d` |
 /// | up to `direct_limit` coefficients | fast diagonalization | banded Cholesky factor |
+/// | up to `background_limit` | fast diagonalization | V-cycle, until a factor is made beside the steps |
 /// | more | fast diagonalization | V-cycle |
 #[derive(Clone, Debug)]
 pub struct StepSolver<T> {
@@ -115,6 +129,7 @@ pub struct StepSolver<T> {
 enum Painted<T> {
     None,
     Direct(Box<(Galerkin, BandCholesky<T>)>),
+    Background(Box<Background<T>>),
     VCycle(Box<VCycle<T>>),
     SampleDirect(BandCholesky<T>),
     SampleMultigrid(Box<SampleMultigrid<T>>),
@@ -204,7 +219,7 @@ impl<T: Real> StepSolver<T> {
             return Ok(());
         }
         if matches!(self.painted, Painted::None) {
-            self.painted = self.make_painted();
+            self.painted = self.make_painted(s);
         }
         self.method = match &mut self.painted {
             Painted::None => unreachable!("made above"),
@@ -213,6 +228,10 @@ impl<T: Real> StepSolver<T> {
                 galerkin.assemble(s, factor);
                 factor.factorize()?;
                 Method::Direct
+            }
+            Painted::Background(background) => {
+                background.prepare(s)?;
+                Method::VCycle
             }
             Painted::VCycle(cycle) => {
                 cycle.prepare(s)?;
@@ -250,7 +269,7 @@ impl<T: Real> StepSolver<T> {
         self.border.as_deref_mut()
     }
 
-    fn make_painted(&self) -> Painted<T> {
+    fn make_painted(&self, s: &StepMatrix<T>) -> Painted<T> {
         let [_, my, mz] = self.lattice.sample_dims();
         let (n, m) = (self.lattice.coefficient_count(), self.lattice.sample_count());
         let few = n <= self.options.direct_limit;
@@ -264,6 +283,9 @@ impl<T: Real> StepSolver<T> {
                 let factor = BandCholesky::new(n, galerkin.band());
                 Painted::Direct(Box::new((galerkin, factor)))
             }
+            (false, false) if n <= self.options.background_limit => Painted::Background(Box::new(
+                Background::new(&self.lattice, s, &self.steps, self.options.v_cycle),
+            )),
             (false, false) => Painted::VCycle(Box::new(VCycle::new(
                 &self.lattice,
                 &self.steps,
@@ -280,7 +302,9 @@ impl<T: Real> StepSolver<T> {
     pub fn solve(&mut self, s: &StepMatrix<T>, g: &[T], x: &mut [T], dx: &mut [T]) -> SolveReport {
         let tolerance = self.options.tolerance.unwrap_or(match self.method {
             Method::VCycle | Method::SampleMultigrid => ITERATED,
-            _ => 16.0 * T::UNIT_ROUND_OFF,
+            Method::Direct if matches!(self.painted, Painted::Background(_)) => ITERATED,
+            Method::FastDiagonalization => DIAGONALIZED * T::UNIT_ROUND_OFF,
+            _ => EXACT * T::UNIT_ROUND_OFF,
         });
         let cap = self.options.iterations;
         let iteration = if let Some(inverse) = &mut self.inverse {
@@ -305,9 +329,18 @@ impl<T: Real> StepSolver<T> {
             report
         } else {
             self.lattice.gather(g, &mut self.b, &mut self.workspace);
-            let report = self.iterate(s, x, cap, tolerance, true);
-            self.lattice.sample(x, dx, &mut self.workspace);
-            report
+            let report = self.iterate(s, x, Some(dx), cap, tolerance);
+            let solved_by = self.method;
+            if let (Painted::Background(background), None) = (&mut self.painted, &self.border)
+                && solved_by != Method::FastDiagonalization
+            {
+                background.advance(s, report);
+                self.settle_method();
+            }
+            return SolveReport {
+                method: solved_by,
+                iteration: report,
+            };
         };
         SolveReport {
             method: self.method,
@@ -315,21 +348,41 @@ impl<T: Real> StepSolver<T> {
         }
     }
 
+    fn settle_method(&mut self) {
+        if let Painted::Background(background) = &self.painted {
+            self.method = if background.is_done() {
+                Method::Direct
+            } else {
+                Method::VCycle
+            };
+        }
+    }
+
+    /// Finishes a factor that is being made beside the steps: what some hundred steps would do.
+    pub fn settle(&mut self) {
+        if let (Painted::Background(background), None, Method::VCycle) =
+            (&mut self.painted, &self.border, self.method)
+        {
+            background.finish();
+            self.settle_method();
+        }
+    }
+
     /// The same without constraints for forces `b` on the coefficients, of lattices with fewer coefficients than samples.
     pub(crate) fn solve_coefficients(&mut self, s: &StepMatrix<T>, b: &[T], x: &mut [T]) {
         debug_assert!(self.inverse.is_none());
         self.b.copy_from_slice(b);
-        self.iterate(s, x, self.options.iterations, 16.0 * T::UNIT_ROUND_OFF, false);
+        self.iterate(s, x, None, self.options.iterations, 16.0 * T::UNIT_ROUND_OFF);
     }
 
-    /// Solves for the right-hand side in `self.b`.
+    /// Solves for the right-hand side in `self.b`: with constraints if the samples are asked for too.
     fn iterate(
         &mut self,
         s: &StepMatrix<T>,
         x: &mut [T],
+        dx: Option<&mut [T]>,
         cap: usize,
         tolerance: f64,
-        constrained: bool,
     ) -> PcgReport {
         let preconditioner = active(self.method, &mut self.painted, &mut self.diagonalization);
         let mut system = CoefficientSystem {
@@ -339,10 +392,37 @@ impl<T: Real> StepSolver<T> {
             samples: &mut self.samples,
             workspace: &mut self.workspace,
         };
-        match &mut self.border {
-            Some(border) if constrained => border.solve(&mut system, &self.b, x, cap, tolerance),
-            _ => self.iteration.solve(&mut system, &self.b, x, cap, tolerance),
+        match (dx, &mut self.border) {
+            (None, _) => self.iteration.solve(&mut system, &self.b, x, cap, tolerance),
+            (Some(dx), None) => {
+                dx.fill(T::zero());
+                let mut system = Sampled { system, dx };
+                self.iteration.solve(&mut system, &self.b, x, cap, tolerance)
+            }
+            (Some(dx), Some(border)) => {
+                let report = border.solve(&mut system, &self.b, x, cap, tolerance);
+                self.lattice.sample(x, dx, &mut self.workspace);
+                report
+            }
         }
+    }
+}
+
+/// Sums the solution on the samples from what the iteration samples anyway.
+struct Sampled<'a, 'b, T, P> {
+    system: CoefficientSystem<'a, T, P>,
+    dx: &'b mut [T],
+}
+
+impl<T: Real, P: Preconditioner<T>> System<T> for Sampled<'_, '_, T, P> {
+    fn apply(&mut self, p: &[T], q: &mut [T]) -> f64 {
+        self.system.apply(p, q)
+    }
+    fn precondition(&mut self, r: &[T], z: &mut [T]) {
+        self.system.precondition(r, z);
+    }
+    fn moved(&mut self, alpha: T) {
+        add_scaled(self.dx, alpha, &self.system.samples[0]);
     }
 }
 
@@ -354,6 +434,7 @@ fn active<'a, T: Real>(
 ) -> &'a mut dyn Preconditioner<T> {
     match (method, painted) {
         (Method::Direct, Painted::Direct(direct)) => &mut direct.1,
+        (Method::Direct | Method::VCycle, Painted::Background(background)) => &mut **background,
         (Method::VCycle, Painted::VCycle(cycle)) => &mut **cycle,
         (Method::SampleDirect, Painted::SampleDirect(factor)) => factor,
         (Method::SampleMultigrid, Painted::SampleMultigrid(multigrid)) => &mut **multigrid,

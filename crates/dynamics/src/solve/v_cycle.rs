@@ -11,6 +11,9 @@ use super::schwarz::Schwarz;
 use crate::lattice::{Lattice, TensorProduct, TensorWorkspace};
 use crate::springs::{StepMatrix, Weights};
 
+/// Where the Chebyshev polynomials begin, relative to the largest eigenvalue.
+const LOWER: f64 = 1.0 / 12.0;
+
 /// How a [`VCycle`] is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VCycleOptions {
@@ -24,6 +27,8 @@ pub struct VCycleOptions {
     pub blocks: usize,
     /// Distance of the blocks.
     pub stride: usize,
+    /// Degree of the Chebyshev polynomial of the blocks.
+    pub block_degree: usize,
     /// Ratio within a block, of the actual diagonal to that of constant material, from which on it is solved.
     pub block_contrast: f64,
     /// Coefficients of a level up to which it has blocks: their matrix takes 3 kB a coefficient.
@@ -38,6 +43,7 @@ impl Default for VCycleOptions {
             eigenvalue_steps: 10,
             blocks: 5,
             stride: 3,
+            block_degree: 3,
             block_contrast: 3.0,
             block_limit: 20_000,
         }
@@ -266,18 +272,11 @@ impl<T: Real> VCycle<T> {
         self.smooth(s, l, false);
     }
 
-    /// One step over the blocks, where there are any; 1.7 of 2 is what keeps it convergent.
+    /// Chebyshev steps over the blocks, where there are any.
     fn solve_blocks(&mut self, s: &StepMatrix<T>, l: usize) {
-        if self.levels[l].schwarz.is_none() {
-            return;
+        if self.levels[l].schwarz.is_some() {
+            self.chebyshev(s, l, false, true);
         }
-        self.residual(s, l);
-        let level = &mut self.levels[l];
-        let omega = T::from_f64(1.7 / level.schwarz_eigenvalue);
-        if let Some(schwarz) = &mut level.schwarz {
-            schwarz.apply(&level.r, &mut level.z);
-        }
-        add_scaled(&mut self.solution[l], omega, &level.z);
     }
 
     /// `r = b - Hx`.
@@ -296,8 +295,13 @@ impl<T: Real> VCycle<T> {
         }
     }
 
-    /// Chebyshev smoothing on the upper 12/13 of the spectrum, from zero or from what is there.
+    /// Chebyshev smoothing by the diagonalization, from zero or from what is there.
     fn smooth(&mut self, s: &StepMatrix<T>, l: usize, from_zero: bool) {
+        self.chebyshev(s, l, from_zero, false);
+    }
+
+    /// Chebyshev steps on the upper part of the spectrum.
+    fn chebyshev(&mut self, s: &StepMatrix<T>, l: usize, from_zero: bool, blocks: bool) {
         if from_zero {
             let level = &mut self.levels[l];
             level.r.copy_from_slice(&self.right[l]);
@@ -308,7 +312,9 @@ impl<T: Real> VCycle<T> {
         let Level {
             lattice,
             smoother,
+            schwarz,
             largest_eigenvalue,
+            schwarz_eigenvalue,
             r,
             d,
             z,
@@ -316,14 +322,20 @@ impl<T: Real> VCycle<T> {
             ..
         } = &mut self.levels[l];
         let x = &mut self.solution[l];
-        let (theta, delta) = (
-            *largest_eigenvalue * (1.0 + 1.0 / 12.0) / 2.0,
-            *largest_eigenvalue * (1.0 - 1.0 / 12.0) / 2.0,
-        );
+        let (degree, largest) = if blocks {
+            (self.options.block_degree, *schwarz_eigenvalue)
+        } else {
+            (self.options.degree, *largest_eigenvalue)
+        };
+        let mut smoother = Smoothing {
+            diagonalization: smoother,
+            blocks: schwarz.as_mut().filter(|_| blocks),
+        };
+        let (theta, delta) = (largest * (1.0 + LOWER) / 2.0, largest * (1.0 - LOWER) / 2.0);
         let sigma = theta / delta;
         let mut rho = 1.0 / sigma;
-        for step in 0..self.options.degree {
-            smoother.apply(r, z);
+        for step in 0..degree {
+            smoother.apply(s, r, z);
             let (keep, take) = if step == 0 {
                 (0.0, 1.0 / theta)
             } else {
@@ -343,7 +355,7 @@ impl<T: Real> VCycle<T> {
                 }
             }
             add_scaled(x, T::one(), d);
-            if step + 1 < self.options.degree {
+            if step + 1 < degree {
                 operator(lattice, s, d, q, &mut self.samples, &mut self.workspace);
                 add_scaled(r, -T::one(), q);
             }

@@ -2,8 +2,8 @@
 //!
 //! A spring joins two samples at the distance `h` whose densities differ by `Δ = σ(d_i - d_j)`, a length.
 
+use crate::vectorized::vectorized;
 use bspline::Real;
-use pulp::Arch;
 
 use super::stencil::{SpringWeights, Weights};
 
@@ -248,7 +248,7 @@ impl<T: Real> SpringNetwork<T> {
         let scale = &self.rest.scale;
         let [energies, forces] = &mut self.row;
         let mut report = SpringReport::default();
-        Arch::new().dispatch(
+        vectorized(
             #[inline(always)]
             || {
                 rows_of(self.dims, springs.direction.step, |from, to, count| {

@@ -1,5 +1,5 @@
+use crate::vectorized::vectorized;
 use bspline::Real;
-use pulp::Arch;
 
 use super::neighbours::Direction;
 
@@ -130,7 +130,7 @@ impl<T: Real> StepMatrix<T> {
         let [mx, my, mz] = self.dims;
         assert_eq!(d.len(), mx * my * mz, "samples");
         assert_eq!(out.len(), d.len(), "samples");
-        Arch::new().dispatch(
+        vectorized(
             #[inline(always)]
             || {
                 for i in 0..mx {

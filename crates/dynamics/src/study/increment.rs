@@ -2,7 +2,7 @@
 
 use bspline::Real;
 
-use super::patterns::{Pattern, loads, random_masses, spring_weights};
+use super::patterns::{Pattern, loads, random_masses, spring_weights, unit_random};
 use crate::integrators::largest_frequency;
 use crate::lattice::{Lattice, LatticeError, Rim, TensorWorkspace};
 use crate::solve::{
@@ -39,6 +39,8 @@ pub struct Configuration {
 pub enum Solver {
     /// What a patch uses.
     Default,
+    /// What it uses in the steps after painting, while a factor is made beside them; where none is, the default.
+    Bridge,
     /// Conjugate gradients without preconditioner, as the source paper has them.
     Plain,
     /// Fast diagonalization between the square roots of the diagonals.
@@ -52,6 +54,7 @@ impl Solver {
     pub fn name(self) -> &'static str {
         match self {
             Self::Default => "default",
+            Self::Bridge => "bridge",
             Self::Plain => "none",
             Self::ScaledDiagonalization => "scaled-diagonalization",
             Self::SmoothedCycle => "v-cycle-without-blocks",
@@ -106,12 +109,27 @@ impl Reference {
     /// # Errors
     /// [`StudyError`] if the configuration is impossible.
     pub fn new(configuration: Configuration) -> Result<Self, StudyError> {
+        Self::made(configuration, false)
+    }
+
+    /// The same with half of all springs slack, each at random: a tangent factor `τ` of 0, as flattened 4-D springs have.
+    ///
+    /// # Errors
+    /// [`StudyError`] if the configuration is impossible.
+    pub fn with_slack_springs(configuration: Configuration) -> Result<Self, StudyError> {
+        Self::made(configuration, true)
+    }
+
+    fn made(configuration: Configuration, slack: bool) -> Result<Self, StudyError> {
         let c = configuration;
         let m = c.samples;
         let lattice = Lattice::<f64>::cube(c.coefficients, m, c.rim, 1.0)?;
         let mut springs = spring_weights(c.pattern, c.contrast, m, c.neighbours, 1.0);
         if c.four_d {
             tangents_in_a_ball(&mut springs, m);
+        }
+        if slack {
+            slacken(&mut springs, m);
         }
         let mass = if c.mass_contrast == 1.0 {
             Weights::Constant(1.0)
@@ -231,8 +249,12 @@ impl Reference {
         };
         let steps = self.steps();
         match solver {
-            Solver::Default => {
+            Solver::Default | Solver::Bridge => {
+                let settled = solver == Solver::Default;
                 let (mut solver, matrix) = self.prepared::<T>(cap)?;
+                if settled {
+                    solver.settle();
+                }
                 out.method = solver.method().name();
                 let mut x = vec![T::zero(); lattice.coefficient_count()];
                 let mut dx = vec![T::zero(); lattice.sample_count()];
@@ -273,6 +295,25 @@ impl Reference {
                 self.judge_with(&mut cycle, cap, &mut out, std::marker::PhantomData::<T>);
             }
         }
+        Ok(out)
+    }
+
+    /// What a V-cycle with options of its own makes of the loads in at most `cap` iterations, in precision `T`.
+    ///
+    /// # Errors
+    /// [`StudyError::Solve`] if it cannot be prepared.
+    pub fn judge_cycle<T: Real>(&self, options: VCycleOptions, cap: usize) -> Result<Outcome, StudyError> {
+        let matrix: StepMatrix<T> = self.matrix.convert();
+        let lattice = Lattice::<T>::new(self.lattice.axes().clone());
+        let mut cycle = VCycle::new(&lattice, &self.steps(), options);
+        cycle.prepare(&matrix).map_err(SolveError::from)?;
+        let mut out = Outcome {
+            increment_error: 0.0,
+            iterations: 0,
+            residual: 0.0,
+            method: "v-cycle",
+        };
+        self.judge_with(&mut cycle, cap, &mut out, std::marker::PhantomData::<T>);
         Ok(out)
     }
 
@@ -318,6 +359,14 @@ impl Outcome {
         self.increment_error = self.increment_error.max((wrong / size).sqrt());
         self.iterations = self.iterations.max(report.iterations);
         self.residual = self.residual.max(report.residual);
+    }
+}
+
+/// Lets half of the springs of a cube be 0, each at random.
+fn slacken(springs: &mut [SpringWeights<f64>], m: usize) {
+    for (n, s) in springs.iter_mut().enumerate() {
+        let kept = |i: usize| f64::from(unit_random((i * 31 + n) as u64 ^ 0x51AC) < 0.5);
+        s.weights = Weights::Each((0..m * m * m).map(|i| kept(i) * s.weights.at(i)).collect());
     }
 }
 
