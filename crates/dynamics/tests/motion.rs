@@ -121,37 +121,6 @@ fn internal_forces_keep_the_momentum() {
 }
 
 #[test]
-fn implicit_steps_of_any_length_do_not_create_energy() {
-    let mut matter = Matter::default();
-    for (i, k) in matter.stiffness.paint(M * M * M).iter_mut().enumerate() {
-        *k = if i % (M * M) < M * M / 2 { 1000.0 } else { 1.0 };
-    }
-    for integrator in [Integrator::Paper, Integrator::TrBdf2] {
-        let mut p = patch(
-            matter.clone(),
-            Rim::Fixed,
-            Law::Linear { scale: 1.0 },
-            Neighbours::Six,
-        );
-        let n = p.lattice().coefficient_count();
-        let start: Vec<f64> = (0..n).map(|i| (2.1 * i as f64).sin()).collect();
-        p.set_state(&start, &vec![0.0; n]).unwrap();
-        let first = p.energy().total();
-        let mut last = first;
-        for step in 0..600 {
-            let dt = [0.001, 0.03, 1.0, 0.3, 0.01][step % 5];
-            p.step(integrator, dt).unwrap();
-            let now = p.energy().total();
-            assert!(
-                now <= last + 1e-6 * first,
-                "{integrator:?} step {step}: {last} → {now}"
-            );
-            last = now;
-        }
-    }
-}
-
-#[test]
 fn an_explicit_step_beyond_the_bound_is_refused_and_one_below_is_stable() {
     let mut p = linear(Matter::default());
     let n = p.lattice().coefficient_count();
@@ -216,33 +185,6 @@ fn a_pulled_patch_settles_at_the_static_solution() {
         (energy.springs - 0.5 * moved).abs() < 1e-8 * moved,
         "{energy:?} {moved}"
     );
-}
-
-#[test]
-fn painting_while_it_moves_stays_finite_and_keeps_the_energy_rule() {
-    let mut p = patch(
-        Matter::default(),
-        Rim::Fixed,
-        Law::Linear { scale: 1.0 },
-        Neighbours::Six,
-    );
-    let n = p.lattice().coefficient_count();
-    let v: Vec<f64> = (0..n).map(|i| (1.1 * i as f64).cos()).collect();
-    p.set_state(&vec![0.0; n], &v).unwrap();
-    for stroke in 0..30 {
-        let mut matter = p.matter().clone();
-        for (i, k) in matter.stiffness.paint(M * M * M).iter_mut().enumerate() {
-            if i % 30 == stroke {
-                *k *= if stroke % 2 == 0 { 1e4 } else { 10.0 };
-            }
-        }
-        p.set_matter(matter).unwrap();
-        // The stroke itself changes the stored energy; the step must not add to it.
-        let before = p.energy().total();
-        p.step(Integrator::TrBdf2, 0.5).unwrap();
-        assert!(p.energy().total() <= before * (1.0 + 1e-6), "stroke {stroke}");
-        assert!(p.state().d.iter().all(|d| d.is_finite()));
-    }
 }
 
 #[test]

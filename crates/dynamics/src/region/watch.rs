@@ -19,6 +19,8 @@ impl<T: Real> Region<T> {
         if self.asleep {
             return Ok(None);
         }
+        // The whole of it: its balance of energy is judged.
+        self.wake();
         let report = self.patch.adaptive_step(dt, options)?;
         self.rest_if_quiet();
         Ok(Some(report))
