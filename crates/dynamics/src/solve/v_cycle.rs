@@ -17,7 +17,7 @@ const LOWER: f64 = 1.0 / 12.0;
 /// How a [`VCycle`] is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VCycleOptions {
-    /// Degree of the Chebyshev polynomial of the smoother.
+    /// Degree of the Chebyshev polynomial of the smoother, one more where there are no blocks.
     pub degree: usize,
     /// Coefficients up to which a level is factorized.
     pub direct_limit: usize,
@@ -31,7 +31,7 @@ pub struct VCycleOptions {
     pub block_degree: usize,
     /// Ratio within a block, of the actual diagonal to that of constant material, from which on it is solved.
     pub block_contrast: f64,
-    /// Coefficients of a level up to which it has blocks: their matrix takes 3 kB a coefficient.
+    /// Coefficients of the finest level up to which it has blocks: their matrix takes 3 kB a coefficient.
     pub block_limit: usize,
 }
 
@@ -132,7 +132,9 @@ impl<T: Real> VCycle<T> {
                 unit_diagonals,
                 largest_eigenvalue: 1.0,
                 variation: vec![1.0; n],
-                all: (options.blocks > 0 && n <= options.block_limit).then(|| Galerkin::new(&here, steps)),
+                // What blocks are for, material that changes within a few splines, coarse levels do not see.
+                all: (levels.is_empty() && options.blocks > 0 && n <= options.block_limit)
+                    .then(|| Galerkin::new(&here, steps)),
                 schwarz: None,
                 schwarz_eigenvalue: 1.0,
                 lanczos: Lanczos::new(n),
@@ -309,6 +311,7 @@ impl<T: Real> VCycle<T> {
         } else {
             self.residual(s, l);
         }
+        let degree = self.options.degree + usize::from(self.levels[0].all.is_none());
         let Level {
             lattice,
             smoother,
@@ -325,7 +328,7 @@ impl<T: Real> VCycle<T> {
         let (degree, largest) = if blocks {
             (self.options.block_degree, *schwarz_eigenvalue)
         } else {
-            (self.options.degree, *largest_eigenvalue)
+            (degree, *largest_eigenvalue)
         };
         let mut smoother = Smoothing {
             diagonalization: smoother,
