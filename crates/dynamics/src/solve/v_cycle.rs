@@ -31,6 +31,9 @@ pub struct VCycleOptions {
     pub block_degree: usize,
     /// Ratio within a block, of the actual diagonal to that of constant material, from which on it is solved.
     pub block_contrast: f64,
+    /// The same ratio over the whole level from which on there are blocks at all: they cost several times what the rest of
+    /// a cycle does, and up to a contrast of some hundred three iterations without them do as well.
+    pub block_onset: f64,
     /// Coefficients of the finest level up to which it has blocks: their matrix takes 3 kB a coefficient.
     pub block_limit: usize,
 }
@@ -45,6 +48,7 @@ impl Default for VCycleOptions {
             stride: 3,
             block_degree: 3,
             block_contrast: 3.0,
+            block_onset: 200.0,
             block_limit: 20_000,
         }
     }
@@ -219,7 +223,10 @@ impl<T: Real> VCycle<T> {
             }
             self.levels[l].largest_eigenvalue = self.largest_eigenvalue(s, l, false);
             let level = &mut self.levels[l];
-            if let Some(all) = &mut level.all {
+            level.schwarz = None;
+            let range = |(low, high): (f64, f64), v: &f64| (low.min(*v), high.max(*v));
+            let (low, high) = level.variation.iter().fold((f64::INFINITY, 0.0), range);
+            if let (Some(all), true) = (&mut level.all, high > self.options.block_onset * low) {
                 all.accumulate(s);
                 let (size, stride) = (self.options.blocks, self.options.stride);
                 let blocks = Schwarz::new(all, size, stride, &level.variation, self.options.block_contrast);
@@ -311,7 +318,7 @@ impl<T: Real> VCycle<T> {
         } else {
             self.residual(s, l);
         }
-        let degree = self.options.degree + usize::from(self.levels[0].all.is_none());
+        let degree = self.options.degree + usize::from(self.levels[0].schwarz.is_none());
         let Level {
             lattice,
             smoother,
