@@ -32,9 +32,10 @@
 //!
 //! Sources: J. Hua and H. Qin, *Haptics-Based Dynamic Implicit Solid Modeling*, 2004 (DIS).
 //!
-//! A [`Region`](region::Region) cuts a patch out of a hierarchical field and bakes its change back.
+//! A [`Region`](region::Region) cuts a patch out of a hierarchical field and bakes its change back; a
+//! [`TensorRegion`](region::TensorRegion) moves a whole patch on knots of its own.
 //!
-//! What it cannot do yet: sleep of parts of a region (whole ones do), more than one thread.
+//! What it cannot do yet: use more than one thread.
 
 pub mod constraints;
 pub mod integrators;

@@ -6,7 +6,7 @@ use crate::constraints::{ConstraintError, Held};
 use crate::lattice::{Lattice, TensorWorkspace};
 use crate::matter::{Lumped, Matter, MatterError};
 use crate::solve::{SolveError, SolverOptions, StepSolver};
-use crate::springs::{Law, Neighbours, SpringNetwork, SpringWeights, StepMatrix, Weights};
+use crate::springs::{Law, Neighbours, Plasticity, SpringNetwork, SpringWeights, StepMatrix, Weights};
 
 /// Why a patch cannot be made or moved.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -56,6 +56,20 @@ pub enum PatchError {
     NotCubic {
         /// Spacing along x, y and z.
         spacing: [f64; 3],
+    },
+    /// A rate of relaxation that is none.
+    #[error("the rate of relaxation is {rate} per second; it has to be finite and at least 0 (0 is elastic)")]
+    Rate {
+        /// The rate.
+        rate: f64,
+    },
+    /// A weight that is no share.
+    #[error("the weight of sample {index} is {value}; weights of relaxation lie between 0 and 1")]
+    Weight {
+        /// Which sample.
+        index: usize,
+        /// Its weight.
+        value: f64,
     },
     /// A time step that is no step.
     #[error("the time step is {dt}; it has to be positive and finite")]
@@ -126,6 +140,7 @@ pub struct Patch<T> {
     pub(crate) matter: Matter,
     pub(crate) lumped: Lumped<T>,
     pub(crate) network: SpringNetwork<T>,
+    pub(crate) plasticity: Plasticity<T>,
     pub(crate) state: State<T>,
     /// Densities of the field the patch was cut from, and where the ground springs rest.
     pub(crate) base: Vec<T>,
@@ -137,7 +152,9 @@ pub struct Patch<T> {
     /// `M + ΔtD` with the version and the step it was made for.
     pub(crate) mass_matrix: Option<(u64, f64, StepMatrix<T>)>,
     pub(crate) matrix: StepMatrix<T>,
-    /// What the matrix and the solver were made for.
+    /// Version, damping and stiffness that the matrix holds.
+    pub(crate) filled: Option<(u64, f64, f64)>,
+    /// What the solver was made for.
     pub(crate) prepared: Option<Prepared>,
     /// Counts changes of the matter.
     pub(crate) version: u64,
@@ -146,7 +163,7 @@ pub struct Patch<T> {
     pub(crate) workspace: TensorWorkspace<T>,
 }
 
-/// Key of the matrix in use.
+/// Key of the matrix that the solver was made for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Prepared {
     pub version: u64,
@@ -217,6 +234,7 @@ impl<T: Real> Patch<T> {
             matter,
             lumped,
             network,
+            plasticity: Plasticity::Elastic,
             base: d.to_vec(),
             external: zeros(m),
             held: None,
@@ -224,6 +242,7 @@ impl<T: Real> Patch<T> {
             mass_solver: None,
             mass_matrix: None,
             matrix,
+            filled: None,
             prepared: None,
             version: 0,
             limit: None,
@@ -348,13 +367,14 @@ impl<T: Real> Patch<T> {
 }
 
 /// Refuses lists of the wrong length or with NaN or infinity.
-fn finite<T: Real>(what: &'static str, list: &[T], needed: usize) -> Result<(), PatchError> {
+pub(crate) fn finite<T: Real>(what: &'static str, list: &[T], needed: usize) -> Result<(), PatchError> {
     if list.len() != needed {
         return Err(PatchError::Length {
             what: match what {
                 "density" => "densities",
                 "force" => "forces",
                 "velocity" => "velocities",
+                "weight" => "weights",
                 _ => "coefficients",
             },
             found: list.len(),

@@ -38,6 +38,12 @@ impl<T: Real> Patch<T> {
     /// Largest `σ|Aᵀf|/(AᵀM1)` over the free coefficients, `f` all forces but damping: a length per second squared, the
     /// acceleration of matter that hangs together only within the support of a coefficient.
     pub(crate) fn unbalanced(&mut self) -> f64 {
+        let scale = self.network.law().scale();
+        scale * self.unbalanced_each().fold(0.0, f64::max)
+    }
+
+    /// The same of each coefficient, without `σ`.
+    pub(crate) fn unbalanced_each(&mut self) -> impl Iterator<Item = f64> + '_ {
         self.forces(None);
         let work = &mut self.work;
         let lattice = self.solver.lattice();
@@ -47,9 +53,12 @@ impl<T: Real> Patch<T> {
         }
         lattice.gather(&work.first_dx, &mut work.x, &mut self.workspace);
         let pairs = work.first_x.iter().zip(&work.x);
-        let largest = pairs
-            .map(|(f, m)| f.as_f64().abs() / m.as_f64())
-            .fold(0.0, f64::max);
-        self.network.law().scale() * largest
+        pairs.map(|(f, m)| f.as_f64().abs() / m.as_f64())
+    }
+
+    /// Rates of the samples from those of the coefficients.
+    pub(crate) fn sample_velocities(&mut self) {
+        let (lattice, state) = (self.solver.lattice(), &mut self.state);
+        lattice.sample(&state.v, &mut state.w, &mut self.workspace);
     }
 }

@@ -12,7 +12,12 @@ use nalgebra::{DMatrix, DVector};
 
 const M: usize = 10;
 const SIGMA: f64 = 0.5;
-const INTEGRATORS: [Integrator; 3] = [Integrator::Paper, Integrator::Symplectic, Integrator::TrBdf2];
+const INTEGRATORS: [Integrator; 4] = [
+    Integrator::Paper,
+    Integrator::Symplectic,
+    Integrator::Verlet,
+    Integrator::TrBdf2,
+];
 
 /// Density of the undeformed field, linear in the distance along x so that every lattice holds it exactly.
 fn field(at: [f64; 3]) -> f64 {
@@ -308,14 +313,14 @@ fn held_over_many_steps<T: Real>(
         });
         p.set_constraints(&list).unwrap();
         let longest = match integrator {
-            Integrator::Symplectic => 0.9 * p.explicit_limit().unwrap(),
+            Integrator::Symplectic | Integrator::Verlet => 0.9 * p.explicit_limit().unwrap(),
             _ => 0.7,
         };
         let mut worst = 0.0_f64;
         for step in 0..150 {
             let dt = if step % 3 == 0 { 0.5 * longest } else { longest };
             let report = p.step(integrator, dt).unwrap();
-            if integrator != Integrator::Symplectic {
+            if ![Integrator::Symplectic, Integrator::Verlet].contains(&integrator) {
                 assert_eq!(report.solve.method, method);
             }
             let gaps = list

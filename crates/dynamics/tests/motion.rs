@@ -8,6 +8,13 @@ use dynamics::solve::SolverOptions;
 use dynamics::springs::{Law, Neighbours};
 
 const M: usize = 12;
+const ALL: [Integrator; 5] = [
+    Integrator::Paper,
+    Integrator::Symplectic,
+    Integrator::Verlet,
+    Integrator::TrBdf2,
+    Integrator::Auto,
+];
 
 fn patch(matter: Matter, rim: Rim, law: Law, neighbours: Neighbours) -> Patch<f64> {
     let n = if rim == Rim::Fixed { 11 } else { 8 };
@@ -59,6 +66,7 @@ fn a_free_mode_converges_with_the_order_of_its_integrator() {
     for (integrator, order) in [
         (Integrator::Paper, 1.0),
         (Integrator::Symplectic, 1.0),
+        (Integrator::Verlet, 2.0),
         (Integrator::TrBdf2, 2.0),
     ] {
         for damping in [0.0, 0.4] {
@@ -77,7 +85,7 @@ fn a_free_mode_converges_with_the_order_of_its_integrator() {
 #[test]
 fn halving_the_step_keeps_the_velocity() {
     // The three-level form reads p_i - p_{i-1} with the new step, which doubles the velocity.
-    for integrator in [Integrator::Paper, Integrator::Symplectic, Integrator::TrBdf2] {
+    for integrator in ALL {
         let mut p = linear(Matter::default());
         let n = p.lattice().coefficient_count();
         p.set_state(&vec![0.0; n], &vec![0.5; n]).unwrap();
@@ -95,7 +103,7 @@ fn halving_the_step_keeps_the_velocity() {
 #[test]
 fn internal_forces_keep_the_momentum() {
     for law in [Law::Linear { scale: 1.0 }, Law::FourD { scale: 0.5 }] {
-        for integrator in [Integrator::Paper, Integrator::Symplectic, Integrator::TrBdf2] {
+        for integrator in ALL {
             let mut p = patch(Matter::default(), Rim::Free, law, Neighbours::Eighteen);
             let n = p.lattice().coefficient_count();
             let v: Vec<f64> = (0..n).map(|i| 0.3 + (0.9 * i as f64).sin()).collect();

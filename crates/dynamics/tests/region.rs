@@ -13,7 +13,12 @@ use dynamics::region::{Cells, Region, RegionError, RegionOptions, Schedule, Thre
 use dynamics::springs::{Law, Neighbours, Weights};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
-const INTEGRATORS: [Integrator; 3] = [Integrator::Paper, Integrator::Symplectic, Integrator::TrBdf2];
+const INTEGRATORS: [Integrator; 4] = [
+    Integrator::Paper,
+    Integrator::Symplectic,
+    Integrator::Verlet,
+    Integrator::TrBdf2,
+];
 
 /// Numbers in `0..1`.
 struct Random(u64);
@@ -417,6 +422,126 @@ fn a_budget_gives_every_region_its_turn() {
             .iter()
             .all(|t| matches!(t, Turn::Failed(PatchError::TimeStep { .. })))
     );
+}
+
+/// A long half-space of 48 cells with a push near one end.
+fn long() -> (HierarchicalSpline<f64>, Region<f64>, Vec<f64>) {
+    let mut lattice = lattice();
+    lattice.cells = [48, 12, 12];
+    lattice.world_from_lattice.matrix3 = DMat3::IDENTITY;
+    let flat = HierarchicalSpline::<f64>::from_corrections(lattice, 1.0, vec![BTreeMap::new()]);
+    let cells = Cells {
+        level: 0,
+        first: [0; 3],
+        count: [48, 12, 12],
+    };
+    let options = RegionOptions {
+        sleep: Thresholds {
+            speed: 2e-4,
+            acceleration: 1e-3,
+        },
+        ..RegionOptions::of(&flat, 0)
+    };
+    let region = Region::new(&flat, cells, damped(), &options).unwrap();
+    let [nx, ny, nz] = region.patch().lattice().sample_dims();
+    let at = |i: usize| [i / nz / ny, i / nz % ny, i % nz].map(|k| k as f64);
+    let near = |i: usize| {
+        let [x, y, z] = at(i);
+        (x - 12.0).powi(2) + (y - 8.0).powi(2) + (z - 8.0).powi(2)
+    };
+    let force = (0..nx * ny * nz).map(|i| 0.05 * (-0.2 * near(i)).exp()).collect();
+    (flat, region, force)
+}
+
+#[test]
+fn parts_sleep_that_a_push_does_not_reach() {
+    let (flat, mut whole, force) = long();
+    let mut parts = whole.clone();
+    parts.set_parts_sleep(true);
+    for region in [&mut whole, &mut parts] {
+        region.set_force(&force).unwrap();
+    }
+    let all = whole.awake_samples();
+    let [_, ny, nz] = whole.patch().lattice().coefficient_dims();
+    let mut most = 0;
+    for step in 0..60 {
+        for region in [&mut whole, &mut parts] {
+            region.step(Integrator::TrBdf2, 0.1).unwrap();
+        }
+        most = most.max(parts.awake_samples());
+        let far = &parts.patch().state().p[40 * ny * nz..];
+        assert!(
+            far.iter().all(|p| *p == 0.0),
+            "step {step}: nothing moves at the far end"
+        );
+    }
+    assert!(most < all / 2, "{most} of {all} samples awake");
+    assert_eq!(
+        parts.step_work(Integrator::TrBdf2),
+        2 * parts.awake_samples() as u64
+    );
+    let peak = whole
+        .patch()
+        .state()
+        .p
+        .iter()
+        .fold(0.0_f64, |m, p| m.max(p.abs()));
+    let pairs = whole.patch().state().p.iter().zip(&parts.patch().state().p);
+    let worst = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(peak > 0.03 && worst < 0.02 * peak, "{worst:.1e} of {peak:.1e}");
+    // The bits of what sleeps are those of the field, baked or not.
+    let baked = parts.bake(&flat).unwrap();
+    let far = DVec3::new(46.0, 6.0, 6.0) + flat.lattice().world_from_lattice.translation;
+    assert_eq!(baked.value(far).to_bits(), flat.value(far).to_bits());
+    // Let go, all of it comes to rest, part by part.
+    parts.release_elastic();
+    let mut steps = 0;
+    while parts.step(Integrator::TrBdf2, 0.2).unwrap().is_some() {
+        steps += 1;
+        assert!(steps < 1000, "never falls asleep");
+    }
+    assert_eq!(parts.awake_samples(), 0);
+    let left = parts
+        .patch()
+        .state()
+        .p
+        .iter()
+        .fold(0.0_f64, |m, p| m.max(p.abs()));
+    assert!(left < 0.05 * peak, "{left} of {peak}");
+}
+
+#[test]
+fn a_frame_ends_when_its_time_is_spent() {
+    let old = field::<f32>(2);
+    let new = |x: u32| {
+        let cells = Cells {
+            level: 1,
+            first: [x, 2, 3],
+            count: [7, 7, 7],
+        };
+        let mut region = Region::new(&old, cells, damped(), &options(&old)).unwrap();
+        region.set_force(&push(&region, 0.3)).unwrap();
+        region
+    };
+    let mut regions = vec![new(0), new(8), new(16)];
+    let mut schedule = Schedule::default();
+    // A clock that a step advances by 4 ms, and frames of 6 ms.
+    let mut frame = |regions: &mut [Region<f32>]| {
+        let mut clock = 0.0;
+        let turns = schedule.step_while(regions, Integrator::TrBdf2, 0.1, |work| {
+            assert_eq!(work, 2 * 15 * 15 * 15);
+            let may = clock < 0.006;
+            clock += 0.004;
+            may
+        });
+        turns
+            .iter()
+            .map(|t| matches!(t, Turn::Stepped(_)))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(frame(&mut regions), [true, true, false]);
+    assert_eq!(frame(&mut regions), [true, false, true]);
+    assert_eq!(frame(&mut regions), [false, true, true]);
 }
 
 #[test]

@@ -1,81 +1,21 @@
 //! What a file is: by its content where that tells, otherwise by its name.
 
-use std::fmt;
 use std::io::Read;
 use std::path::Path;
 
+use crate::file_name::extension;
 use crate::input::{self, read_fault};
-use crate::volumes::{self, VolumeFormat};
-use crate::{Fault, FormatError, field, meshes, points};
-
-/// What a file holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// Points, for [`crate::points::read`]; PLY and OBJ may hold faces too, for [`crate::meshes::read`].
-    Cloud(PointFormat),
-    /// A mesh, for [`crate::meshes::read`]; [`crate::points::read`] takes its vertices.
-    Mesh(MeshFileFormat),
-    /// A volume, for [`crate::volumes::read`].
-    Volume(VolumeFormat),
-    /// A fitted field, for [`crate::field::load`].
-    Field,
-}
-
-/// Formats of point clouds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PointFormat {
-    /// Polygon file format.
-    Ply,
-    /// A point a line.
-    Xyz,
-    /// Wavefront OBJ.
-    Obj,
-    /// Point Cloud Library.
-    Pcd,
-    /// LAS, compressed (LAZ) or not.
-    Las,
-    /// ASTM E57.
-    E57,
-}
-
-/// Formats that hold meshes and nothing else.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MeshFileFormat {
-    /// Stereolithography, ascii or binary.
-    Stl,
-    /// glTF 2.0, text or binary.
-    Gltf,
-    /// 3D Manufacturing Format.
-    ThreeMf,
-    /// VRML97.
-    Vrml,
-}
-
-impl fmt::Display for Kind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Volume(format) => return write!(f, "volume ({format})"),
-            Self::Cloud(PointFormat::Ply) => "point cloud (PLY)",
-            Self::Cloud(PointFormat::Xyz) => "point cloud (XYZ)",
-            Self::Cloud(PointFormat::Obj) => "point cloud (OBJ)",
-            Self::Cloud(PointFormat::Pcd) => "point cloud (PCD)",
-            Self::Cloud(PointFormat::Las) => "point cloud (LAS)",
-            Self::Cloud(PointFormat::E57) => "point cloud (E57)",
-            Self::Mesh(MeshFileFormat::Stl) => "mesh (STL)",
-            Self::Mesh(MeshFileFormat::ThreeMf) => "mesh (3MF)",
-            Self::Mesh(MeshFileFormat::Vrml) => "mesh (VRML)",
-            Self::Mesh(MeshFileFormat::Gltf) => "mesh (glTF)",
-            Self::Field => "field",
-        })
-    }
-}
-
-pub(crate) const CLOUDS: &str =
-    "point clouds .ply .obj .pcd .las .laz .e57 .xyz .xyzn .txt .asc .csv .pts, each also .gz";
-pub(crate) const MESHES: &str = "meshes .ply .obj .stl .gltf .glb .3mf .wrl, each also .gz";
-const SUPPORTED: &str = "point clouds .ply .obj .pcd .las .laz .e57 .xyz .xyzn .txt .asc .csv .pts, meshes .ply .obj .stl .gltf .glb \
-                         .3mf .wrl, volumes .nii .hdr .nrrd .nhdr .mha .mhd .tif, each also .gz, directories of DICOM \
-                         or .tif slices, and fields .iclay; voxels without a header need their layout stated";
+use crate::kind::{Kind, MeshFileFormat, PointFormat, SUPPORTED, VolumeFormat};
+use crate::meshes::gltf::looks_like_gltf;
+use crate::meshes::threemf::looks_like_3mf;
+use crate::meshes::vrml::looks_like_vrml;
+use crate::points::pcd::looks_like_pcd;
+use crate::volumes::dicom::{holds_dicom, looks_like_dicom};
+use crate::volumes::metaimage::looks_like_metaimage;
+use crate::volumes::nifti::nifti_format;
+use crate::volumes::nrrd::looks_like_nrrd;
+use crate::volumes::tiff::{is_stack_folder, looks_like_tiff};
+use crate::{Fault, FormatError, field};
 
 /// Bytes that are enough to know every content that can be known.
 const LOOK: usize = 400;
@@ -103,10 +43,10 @@ pub fn detect(path: &Path) -> Result<Kind, FormatError> {
 
 /// What a directory holds, seen by the files in it.
 fn kind_of_directory(path: &Path) -> Result<Kind, Fault> {
-    if volumes::holds_dicom(path)? {
+    if holds_dicom(path)? {
         return Ok(Kind::Volume(VolumeFormat::Dicom));
     }
-    if volumes::is_stack_folder(path)? {
+    if is_stack_folder(path)? {
         return Ok(Kind::Volume(VolumeFormat::TiffFolder));
     }
     Err(Fault::UnknownKind {
@@ -124,13 +64,13 @@ pub(crate) fn kind_of(head: &[u8], path: &Path) -> Result<Kind, Fault> {
     if head.starts_with(b"ply\n") || head.starts_with(b"ply\r") || head.starts_with(b"ply ") {
         return Ok(Kind::Cloud(PointFormat::Ply));
     }
-    if points::looks_like_pcd(head) {
+    if looks_like_pcd(head) {
         return Ok(Kind::Cloud(PointFormat::Pcd));
     }
     if head.starts_with(&field::MAGIC) {
         return Ok(Kind::Field);
     }
-    if let Some(format) = volumes::nifti_format(head) {
+    if let Some(format) = nifti_format(head) {
         return Ok(Kind::Volume(format));
     }
     if head.starts_with(b"LASF") {
@@ -139,28 +79,28 @@ pub(crate) fn kind_of(head: &[u8], path: &Path) -> Result<Kind, Fault> {
     if head.starts_with(b"ASTM-E57") {
         return Ok(Kind::Cloud(PointFormat::E57));
     }
-    if meshes::looks_like_gltf(head) {
+    if looks_like_gltf(head) {
         return Ok(Kind::Mesh(MeshFileFormat::Gltf));
     }
-    if meshes::looks_like_3mf(head) {
+    if looks_like_3mf(head) {
         return Ok(Kind::Mesh(MeshFileFormat::ThreeMf));
     }
-    if meshes::looks_like_vrml(head) {
+    if looks_like_vrml(head) {
         return Ok(Kind::Mesh(MeshFileFormat::Vrml));
     }
     if head.starts_with(b"solid") && memchr::memmem::find(head, b"facet").is_some() {
         return Ok(Kind::Mesh(MeshFileFormat::Stl));
     }
-    if volumes::looks_like_dicom(head) {
+    if looks_like_dicom(head) {
         return Ok(Kind::Volume(VolumeFormat::Dicom));
     }
-    if volumes::looks_like_nrrd(head) {
+    if looks_like_nrrd(head) {
         return Ok(Kind::Volume(VolumeFormat::Nrrd));
     }
-    if volumes::looks_like_metaimage(head) {
+    if looks_like_metaimage(head) {
         return Ok(Kind::Volume(VolumeFormat::MetaImage));
     }
-    if volumes::looks_like_tiff(head) {
+    if looks_like_tiff(head) {
         return Ok(Kind::Volume(VolumeFormat::Tiff));
     }
     let extension = extension(path);
@@ -192,23 +132,6 @@ pub(crate) fn kind_of(head: &[u8], path: &Path) -> Result<Kind, Fault> {
             supported: SUPPORTED,
         }),
     }
-}
-
-/// Extension in lower case, the one before `.gz` if there is one.
-pub(crate) fn extension(path: &Path) -> String {
-    let name = path
-        .file_name()
-        .map(|n| n.to_string_lossy().to_ascii_lowercase())
-        .unwrap_or_default();
-    let name = name.strip_suffix(".gz").unwrap_or(&name);
-    name.rsplit_once('.')
-        .map(|(_, e)| e.to_owned())
-        .unwrap_or_default()
-}
-
-/// Whether a name ends in `.gz`.
-pub(crate) fn is_gz_name(path: &Path) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"))
 }
 
 #[cfg(test)]

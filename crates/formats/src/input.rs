@@ -7,6 +7,7 @@ use std::path::Path;
 use flate2::bufread::MultiGzDecoder;
 
 use crate::Fault;
+use crate::file_name::is_gz_name;
 use crate::limits::Budget;
 
 const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
@@ -83,7 +84,7 @@ pub(crate) fn open(path: &Path) -> Result<Input, Fault> {
 
 /// Opens a file of bare voxels, whose first ones may look like any magic: gzip is told by the name.
 pub(crate) fn open_by_name(path: &Path) -> Result<Input, Fault> {
-    open_with(path, crate::detect::is_gz_name(path))
+    open_with(path, is_gz_name(path))
 }
 
 /// Opens `path` as it is.

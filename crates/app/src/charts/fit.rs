@@ -1,6 +1,7 @@
 use serde::Serialize;
 use serde_json::{Map, Value};
 
+use super::plot::DEPTH;
 use super::{Chart, Series};
 
 /// What kind of data a sweep runs over.
@@ -186,6 +187,7 @@ impl Chart {
             title,
             x_title: x_title.into(),
             y_title,
+            depth: DEPTH,
             series,
         }
     }

@@ -1,5 +1,6 @@
 //! Speed against accuracy: sweeps over the options, and their charts.
 
+mod dynamics;
 mod fit;
 mod hard;
 mod noise;
@@ -7,6 +8,7 @@ mod orient;
 mod outliers;
 mod plot;
 
+pub use dynamics::{DynamicsError, Extent, Line, Run, cost, sampling, sweep};
 pub use fit::{Configuration, Input, Measurement, sweeps};
 pub use hard::Scene;
 pub use noise::noise;

@@ -2,6 +2,7 @@ use fitting::FitError;
 use fitting::points::PointOptions;
 
 use super::hard::{COUNT, Scene};
+use super::plot::DEPTH;
 use super::{Chart, Series};
 
 /// Noise levels, per cent of the diagonal.
@@ -56,6 +57,7 @@ pub fn noise(scene: &Scene, name: &str, mut progress: impl FnMut(f64)) -> Result
         title: format!("{name}: {COUNT} noisy points with exact normals"),
         x_title: "standard deviation of the noise, % of the diagonal".into(),
         y_title: "length, % of the diagonal".into(),
+        depth: DEPTH,
         series: series.into(),
     })
 }

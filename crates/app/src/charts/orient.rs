@@ -1,3 +1,4 @@
+use super::plot::DEPTH;
 use super::{Chart, Series};
 
 /// How well one method oriented one cloud.
@@ -69,6 +70,7 @@ impl Chart {
             title: "orientation of clouds without normals".into(),
             x_title: "processor time, s".into(),
             y_title: "normals pointing inward, % (none: drawn as half a point)".into(),
+            depth: DEPTH,
             series,
         }
     }

@@ -46,6 +46,7 @@ pub fn outliers(scene: &Scene, name: &str, mut progress: impl FnMut(f64)) -> Res
         title: format!("{name}: {COUNT} points and outliers, even in the box"),
         x_title: "outliers, % of the points on the surface".into(),
         y_title: "rms distance between the surfaces, % of the diagonal".into(),
+        depth: super::plot::DEPTH,
         series,
     })
 }

@@ -21,6 +21,9 @@ pub struct Chart {
     pub x_title: String,
     /// Quantity and unit of the vertical axis.
     pub y_title: String,
+    /// Points lower than this share of the highest are named in the legend instead of drawn; [`DEPTH`] unless small
+    /// values matter.
+    pub depth: f64,
     /// What is drawn; points whose coordinates are not above 0 are left out.
     pub series: Vec<Series>,
 }
@@ -31,8 +34,8 @@ type PlotContext<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCo
 const LEFT: i32 = 100;
 /// Height of a line of the legend.
 const ROW: i32 = 24;
-/// Points lower than this share of the highest are named in the legend instead of drawn.
-const DEPTH: f64 = 1e-5;
+/// Points lower than this share of the highest press all others together.
+pub const DEPTH: f64 = 1e-5;
 
 /// Colours that the colour-blind tell apart (Okabe & Ito 2008).
 const COLORS: [RGBColor; 6] = [
@@ -55,8 +58,7 @@ impl Chart {
         Ok(text)
     }
 
-    /// Logarithms of the points that can be drawn: those of positive, finite coordinates that are not lower than
-    /// [`DEPTH`] of the highest, which would press all others together.
+    /// Logarithms of the points that can be drawn: those of positive, finite coordinates that are not too low.
     fn logarithms<'a>(&self, series: &'a Series) -> Vec<(f64, f64, &'a str)> {
         let floor = self.floor();
         series
@@ -69,7 +71,7 @@ impl Chart {
 
     fn floor(&self) -> f64 {
         let all = self.series.iter().flat_map(|s| &s.points).map(|p| p.1);
-        DEPTH * all.filter(|y| y.is_finite()).fold(0.0, f64::max)
+        self.depth * all.filter(|y| y.is_finite()).fold(0.0, f64::max)
     }
 
     /// Name of a series, with the figures of its points that lie below the chart.
@@ -278,6 +280,7 @@ mod tests {
             title: "Error against time".into(),
             x_title: "processor time / s".into(),
             y_title: "rms / mm".into(),
+            depth: DEPTH,
             series: vec![Series {
                 name: "tolerance, f32".into(),
                 points: vec![

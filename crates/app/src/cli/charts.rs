@@ -7,7 +7,7 @@ use fitting::Cancel;
 use formats::Kind;
 use serde_json::{Map, Value};
 
-use super::chart_orient;
+use super::{chart_dynamics, chart_orient};
 use super::failure::{Failure, OrFail, Outcome};
 use super::input::{reading, writing};
 use super::interrupt;
@@ -28,6 +28,8 @@ enum Subject {
     Fit(FitArgs),
     /// Wrong normals of clouds without any against the time of their estimation
     Orient(chart_orient::Args),
+    /// Error of a step's increment against its time, over solvers, laws, schemes and steps; sampling; cost by size
+    Dynamics(chart_dynamics::Args),
     /// Noise against the resolution chosen and the error, and outliers against the error with and without --robust
     Hard(HardArgs),
 }
@@ -66,6 +68,7 @@ pub fn run(args: &Args) -> Outcome {
     match &args.subject {
         Subject::Fit(args) => fits(args, &cancel),
         Subject::Orient(args) => chart_orient::run(args, &cancel),
+        Subject::Dynamics(args) => chart_dynamics::run(args, &cancel),
         Subject::Hard(args) => hard(args, &cancel),
     }
 }

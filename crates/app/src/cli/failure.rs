@@ -1,7 +1,10 @@
 use std::fmt;
 use std::io;
 
-use fitting::FitError;
+use fitting::{Control, FitError};
+
+use super::cost::rss_bytes;
+use super::quantity::human_bytes;
 
 /// What a subcommand gives back.
 pub type Outcome<T = ()> = Result<T, Failure>;
@@ -116,6 +119,24 @@ impl From<FitError> for Failure {
             cause,
             error: e.into(),
         }
+    }
+}
+
+/// A memory limit in terms of the whole process, which is what the user gave.
+pub fn explain(e: FitError, control: &Control) -> Failure {
+    match (&e, control.memory_limit) {
+        (FitError::MemoryLimit { needed, limit }, Some(_)) => {
+            let held = rss_bytes().unwrap_or(0);
+            Failure::limit(format!(
+                "the fit needs about {} beside what is already held ({}), and --memory leaves {}; raise --memory \
+                 to {} or lower --max-depth",
+                human_bytes(*needed),
+                human_bytes(held),
+                human_bytes(*limit),
+                human_bytes(needed + held),
+            ))
+        }
+        _ => e.into(),
     }
 }
 

@@ -95,6 +95,11 @@ impl OpenField {
         Ok(Self { loaded, report })
     }
 
+    /// The file as it was read.
+    pub fn loaded(&self) -> &LoadedField {
+        &self.loaded
+    }
+
     /// The field, to be asked.
     pub fn field(&self) -> &dyn Field {
         self.loaded.field.as_field()
@@ -187,12 +192,21 @@ impl OpenField {
         self.frame(self.lattice().cells_at(finest).map(|c| c.saturating_mul(n)))
     }
 
-    /// The grid with two cells in every knot interval of the level that holds the surface `{ f = iso }`: the finest one
-    /// on which, or on finer ones, at least a tenth of the surface's area lies; and how many finer levels there are.
+    /// The grid with two cells in every knot interval of the level that holds the surface `{ f = iso }`, and how many finer
+    /// levels there are.
     pub fn frame_of_surface(&self, iso: f64) -> (Frame, usize) {
-        let level = either!(&self.loaded.field, f => f.level_of_surface(iso, 0.1));
-        let frame = self.frame(self.lattice().cells_at(level).map(|c| c.saturating_mul(2)));
-        (frame, self.level_count() - 1 - level)
+        let level = self.level_of_surface(iso);
+        (self.frame_of_level(level), self.level_count() - 1 - level)
+    }
+
+    /// The finest level on which, or on finer ones, at least a tenth of the surface's area lies.
+    pub fn level_of_surface(&self, iso: f64) -> usize {
+        either!(&self.loaded.field, f => f.level_of_surface(iso, 0.1))
+    }
+
+    /// The grid with two cells in every knot interval of `level`.
+    pub fn frame_of_level(&self, level: usize) -> Frame {
+        self.frame(self.lattice().cells_at(level).map(|c| c.saturating_mul(2)))
     }
 
     /// The grid with `n` cells along the longest side of the box and as many on the others as their lengths ask.

@@ -12,12 +12,12 @@ use formats::meshes::TriangleMesh;
 use formats::points::PointCloud;
 use formats::volumes::Volume;
 
-use super::cost::{Cost, rss_bytes};
-use super::failure::{Failure, Outcome};
+use super::cost::Cost;
+use super::failure::{Failure, Outcome, explain};
 use super::field::{self, either};
 use super::input::{self, Input, Shape, bounding_box, check_output, remaining};
 use super::progress::Bar;
-use super::quantity::{Memory, Tolerance, human_bytes, positive};
+use super::quantity::{Memory, Tolerance, positive};
 use super::summary::Summary;
 use super::unoriented::{Oriented, Unoriented};
 use super::volume_choice::VolumeChoice;
@@ -355,24 +355,6 @@ fn stated_unit(known: Unit, stated: Option<Unit>) -> Outcome<Unit> {
         (known, Some(stated)) => Err(Failure::usage(format!(
             "--unit {stated}: the file says that its lengths are in {known}; leave the option out"
         ))),
-    }
-}
-
-/// A memory limit in terms of the whole process, which is what the user gave.
-pub(super) fn explain(e: FitError, control: &Control) -> Failure {
-    match (&e, control.memory_limit) {
-        (FitError::MemoryLimit { needed, limit }, Some(_)) => {
-            let held = rss_bytes().unwrap_or(0);
-            Failure::limit(format!(
-                "the fit needs about {} beside what is already held ({}), and --memory leaves {}; raise --memory \
-                 to {} or lower --max-depth",
-                human_bytes(*needed),
-                human_bytes(held),
-                human_bytes(*limit),
-                human_bytes(needed + held),
-            ))
-        }
-        _ => e.into(),
     }
 }
 

@@ -2,6 +2,7 @@
 //!
 //! Exit codes: 0 done, 2 wrong usage, 3 bad input, 4 a limit was reached or the work was cancelled.
 
+mod chart_dynamics;
 mod chart_orient;
 mod charts;
 mod check;
@@ -20,6 +21,7 @@ mod picture;
 mod progress;
 mod quantity;
 mod sample;
+mod simulate;
 mod summary;
 mod trim;
 mod unoriented;
@@ -64,6 +66,8 @@ enum Command {
     Phantom(phantom::Args),
     /// Draw the solid into a PNG picture
     Picture(picture::Args),
+    /// Move a region of a field by a scripted scene: forces, matter and constraints over time
+    Simulate(simulate::Args),
     /// Draw speed against accuracy
     Charts(charts::Args),
 }
@@ -88,6 +92,7 @@ pub fn main() -> ExitCode {
         Command::Convert(a) => convert::run(a),
         Command::Phantom(a) => phantom::run(a),
         Command::Picture(a) => picture::run(a),
+        Command::Simulate(a) => simulate::run(a),
         Command::Charts(a) => charts::run(a),
     };
     match outcome {

@@ -147,6 +147,11 @@ impl Summary {
     }
 
     fn table(&self) -> String {
+        table(self.rows(), &self.notes)
+    }
+
+    /// What applies, for people.
+    pub fn rows(&self) -> impl Iterator<Item = (&'static str, String)> + use<> {
         let unit = self.unit.as_deref().map(|u| format!(" {u}")).unwrap_or_default();
         let count = |n: usize| human_count(n);
         let size = |x: f64| format!("{}{unit}", human_number(x));
@@ -197,11 +202,8 @@ impl Summary {
             ("field sha256", self.field_sha256.clone()),
             ("written", self.output.clone()),
         ];
-        table(
-            rows.into_iter()
-                .filter_map(|(label, value)| Some((label, value?))),
-            &self.notes,
-        )
+        rows.into_iter()
+            .filter_map(|(label, value)| Some((label, value?)))
     }
 }
 

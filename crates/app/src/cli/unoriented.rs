@@ -5,8 +5,7 @@ use fitting::{Control, FitReport, SignReport};
 use formats::points::PointCloud;
 use glam::DVec3;
 
-use super::failure::{Failure, Outcome};
-use super::fit::explain;
+use super::failure::{Failure, Outcome, explain};
 
 /// How to tell inside from outside where a cloud has no normals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

@@ -19,6 +19,18 @@ pub(super) const MAX_CELLS: u32 = 1 << 22;
 /// Place of a block: it holds the cells `8b .. 8b + 8` of the frame on each axis.
 pub(super) type BlockKey = [i32; 3];
 
+/// First node of an edge, counted from its block's first node, and its axis.
+pub(super) type Edge = ([usize; 3], usize);
+
+/// What a block adds to the report.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct BlockCounts {
+    pub cells_crossed: u32,
+    pub root_evaluations: u32,
+    pub cap_vertices: u32,
+    pub unconverged: u32,
+}
+
 /// The blocks of a frame.
 ///
 /// A block owns the nodes `8b .. 8b + 8` and the edges that start there. Where the surface is capped, the nodes

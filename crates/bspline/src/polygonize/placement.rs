@@ -3,8 +3,8 @@
 use glam::DVec3;
 
 use super::Placement;
+use super::blocks::{BlockCounts, Edge};
 use super::roots::{Bracket, Step};
-use super::surface::{BlockCounts, Edge};
 use crate::{Field, Frame};
 
 /// Vertices keep this share of an edge from its ends, so that the up to six vertices round a node, and with

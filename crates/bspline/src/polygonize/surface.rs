@@ -3,13 +3,10 @@
 use glam::DVec3;
 
 use super::PolygonizeOptions;
-use super::blocks::{BlockGrid, BlockKey, CELLS, NODES};
+use super::blocks::{BlockCounts, BlockGrid, BlockKey, CELLS, Edge, NODES};
 use super::placement::{PlacementScratch, SampledNodes, edge_point, place_vertices};
 use super::table::CaseTable;
 use crate::{Field, Frame};
-
-/// First node of an edge, counted from its block's first node, and its axis.
-pub(super) type Edge = ([usize; 3], usize);
 
 /// Words of [`BlockSurface::crossed`].
 const WORDS: usize = 3 * CELLS;
@@ -31,15 +28,6 @@ pub(super) struct BlockSurface {
     pub triangle_count: u32,
     /// What it cost.
     pub counts: BlockCounts,
-}
-
-/// Sums for the report.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct BlockCounts {
-    pub cells_crossed: u32,
-    pub root_evaluations: u32,
-    pub cap_vertices: u32,
-    pub unconverged: u32,
 }
 
 /// Buffers that a thread uses again from block to block.

@@ -4,7 +4,7 @@ use super::implicit::Moved;
 use crate::constraints::Held;
 use crate::lattice::TensorWorkspace;
 use crate::patch::{Patch, PatchError};
-use crate::solve::{Lanczos, StepSolver, System, add_spring, dot};
+use crate::solve::{Lanczos, SolveReport, StepSolver, System, add_spring, dot};
 use crate::springs::{SpringWeights, StepMatrix, Weights};
 
 /// Share of the bound that a step may use: the bound is an estimate from below of the largest eigenvalue.
@@ -135,18 +135,78 @@ impl<T: Real> Patch<T> {
         Ok(limit)
     }
 
-    /// `v += Δt (M̃ + ΔtD̃)⁻¹ Aᵀ(f - Dw)`, `p += Δt v`.
-    pub(super) fn symplectic_step(&mut self, dt: f64) -> Result<Moved, PatchError> {
+    /// Refuses steps beyond the bound.
+    pub(super) fn check_explicit(&mut self, dt: f64) -> Result<(), PatchError> {
         let limit = SAFETY * self.explicit_limit()?;
         if dt > limit {
             return Err(PatchError::Unstable { dt, limit });
         }
+        Ok(())
+    }
+
+    /// Least number of equal parts of `dt` that are all within the bound.
+    pub(super) fn explicit_parts(&mut self, dt: f64) -> Result<f64, PatchError> {
+        let limit = SAFETY * self.explicit_limit()?;
+        // Rounding of the quotient must not leave parts beyond the bound.
+        Ok((dt / limit * (1.0 + 1e-12)).ceil().max(1.0))
+    }
+
+    /// `v += Δt (M̃ + ΔtD̃)⁻¹ Aᵀ(f - Dw)`, `p += Δt v`.
+    pub(super) fn symplectic_step(&mut self, dt: f64) -> Result<Moved, PatchError> {
+        self.check_explicit(dt)?;
+        self.aim(dt, 1.0 / dt, 1.0);
+        let (report, clamped) = self.kick(dt, dt)?;
+        self.drift(dt);
+        Ok((report, clamped, None))
+    }
+
+    /// `parts` steps of the velocity Verlet scheme: half a kick, the drift, half a kick; kicks of neighbouring steps
+    /// are one where nothing damps. In each the damping is that of the mean velocity, which keeps the bound.
+    pub(super) fn verlet_steps(&mut self, dt: f64, parts: usize) -> Result<Moved, PatchError> {
+        let h = dt / parts as f64;
+        self.check_explicit(h)?;
+        let merge = matches!(&self.lumped.damping, Weights::Constant(c) if *c == T::zero());
+        let mut kick = 0.5 * h;
+        let mut clamped = 0;
+        for part in 0..parts {
+            // Hard constraints are met by the drift, then by the velocity.
+            self.aim(kick, 1.0 / h, 1.0);
+            clamped = clamped.max(self.kick(kick, 0.5 * kick)?.1);
+            self.drift(h);
+            if merge && part + 1 < parts {
+                kick = h;
+                continue;
+            }
+            kick = 0.5 * h;
+            self.aim(kick, 0.0, 1.0);
+            let (report, count) = self.kick(kick, 0.5 * kick)?;
+            clamped = clamped.max(count);
+            if part + 1 == parts {
+                return Ok((report, clamped, None));
+            }
+        }
+        unreachable!("there is a last part")
+    }
+
+    /// `p += Δt v`.
+    fn drift(&mut self, dt: f64) {
+        let (state, t) = (&mut self.state, T::from_f64(dt));
+        for (p, v) in state.p.iter_mut().zip(&state.v) {
+            *p += t * *v;
+        }
+        for (d, w) in state.d.iter_mut().zip(&state.w) {
+            *d += t * *w;
+        }
+    }
+
+    /// `v += Δt (M̃ + aD̃)⁻¹ Aᵀ(f - Dw)`: the damping of the velocity after the kick with `a = Δt`, of the mean one with
+    /// `a = Δt/2`.
+    fn kick(&mut self, dt: f64, damping: f64) -> Result<(SolveReport, usize), PatchError> {
         let clamped = self.forces(None);
         let t = T::from_f64;
         for (i, g) in self.work.g.iter_mut().enumerate() {
             *g = t(dt) * (self.work.force[i] - self.lumped.damping.at(i) * self.state.w[i]);
         }
-        self.aim(dt, 1.0 / dt, 1.0);
         let mut solver = self.mass_solver();
         if let (Some(held), None) = (&self.held, solver.border_mut()) {
             solver.set_border(Some(held.border(false)));
@@ -158,11 +218,11 @@ impl<T: Real> Patch<T> {
         let kept = self
             .mass_matrix
             .take()
-            .filter(|m| (m.0, m.1) == (self.version, dt));
+            .filter(|m| (m.0, m.1) == (self.version, damping));
         let (matrix, prepared) = match kept {
             Some((.., matrix)) => (matrix, Ok(())),
             None => {
-                let matrix = self.mass_matrix(dt);
+                let matrix = self.mass_matrix(damping);
                 let prepared = solver.prepare(&matrix);
                 (matrix, prepared)
             }
@@ -171,16 +231,14 @@ impl<T: Real> Patch<T> {
         let report = prepared.map(|()| solver.solve(&matrix, &work.g, &mut work.x, &mut work.dx));
         self.mass_solver = Some(solver);
         let report = report?;
-        self.mass_matrix = Some((self.version, dt, matrix));
+        self.mass_matrix = Some((self.version, damping, matrix));
         let state = &mut self.state;
-        for ((p, v), x) in state.p.iter_mut().zip(&mut state.v).zip(&work.x) {
+        for (v, x) in state.v.iter_mut().zip(&work.x) {
             *v += *x;
-            *p += t(dt) * *v;
         }
-        for ((d, w), dx) in state.d.iter_mut().zip(&mut state.w).zip(&work.dx) {
+        for (w, dx) in state.w.iter_mut().zip(&work.dx) {
             *w += *dx;
-            *d += t(dt) * *w;
         }
-        Ok((report, clamped, None))
+        Ok((report, clamped))
     }
 }

@@ -45,8 +45,10 @@ impl<T: Real> Patch<T> {
         let same = self
             .prepared
             .is_some_and(|p| p.version == version && p.damping == damping && p.stiffness == stiffness);
-        if !same || four_d {
+        // An old factor may solve for the matrix of another step.
+        if four_d || self.filled != Some((version, damping, stiffness)) {
             self.fill_matrix(damping, stiffness);
+            self.filled = Some((version, damping, stiffness));
         }
         let near = self.prepared.is_some_and(|p| {
             let ratio = stiffness / p.stiffness;

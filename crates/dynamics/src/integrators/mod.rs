@@ -2,10 +2,12 @@
 //! state, so its length may change from step to step.
 
 mod adaptive;
+mod auto;
 mod explicit;
 mod implicit;
 
 pub use adaptive::{AdaptiveOptions, AdaptiveReport};
+pub use auto::Choice;
 pub(crate) use explicit::largest_frequency;
 
 use bspline::Real;
@@ -21,9 +23,15 @@ pub enum Integrator {
     /// The velocity from the present forces, then the position from the new velocity; only the damping is implicit.
     /// First order, symplectic where nothing damps, stable up to a bound.
     Symplectic,
+    /// Velocity Verlet: half a kick by the forces, the drift, half a kick; the damping is that of the mean velocity of
+    /// each kick. Second order, symplectic where nothing damps, two solves, stable up to the bound of `Symplectic`.
+    Verlet,
     /// Trapezoidal rule to `2 - √2` of the step, then backward differences: second order, L-stable [R. E. Bank et
     /// al., *Transient simulation of silicon devices and circuits*, 1985].
     TrBdf2,
+    /// `Verlet` in sub-steps within its bound where these cost less than a step of `TrBdf2`, which is no more accurate;
+    /// else `TrBdf2`. See [`Patch::choose`].
+    Auto,
 }
 
 impl Integrator {
@@ -32,7 +40,9 @@ impl Integrator {
         match self {
             Self::Paper => "paper",
             Self::Symplectic => "symplectic",
+            Self::Verlet => "verlet",
             Self::TrBdf2 => "tr-bdf2",
+            Self::Auto => "auto",
         }
     }
 }
@@ -42,6 +52,10 @@ impl Integrator {
 pub struct StepReport {
     /// Length of the step, in seconds.
     pub dt: f64,
+    /// The scheme taken; of [`Integrator::Auto`] what it chose.
+    pub integrator: Integrator,
+    /// Equal parts that the step was made of.
+    pub substeps: usize,
     /// The last solve of the step.
     pub solve: SolveReport,
     /// Springs whose negative tangent was taken as 0.
@@ -53,20 +67,35 @@ pub struct StepReport {
 }
 
 impl<T: Real> Patch<T> {
-    /// Moves the patch by `dt` seconds.
+    /// Moves the patch by `dt` seconds; then rest lengths follow as the [plasticity](crate::springs::Plasticity) says.
     ///
     /// # Errors
     /// [`PatchError::TimeStep`], [`PatchError::Unstable`] of an explicit step beyond its bound, [`PatchError::Solve`].
     /// The state is then the one before.
     pub fn step(&mut self, integrator: Integrator, dt: f64) -> Result<StepReport, PatchError> {
+        let report = self.try_step(integrator, dt)?;
+        self.flow(dt);
+        Ok(report)
+    }
+
+    /// A step that can be [taken back](Self::restore): rest lengths do not follow yet.
+    fn try_step(&mut self, integrator: Integrator, dt: f64) -> Result<StepReport, PatchError> {
         if !(dt.is_finite() && dt > 0.0) {
             return Err(PatchError::TimeStep { dt });
         }
         self.work.before.copy_from(&self.state);
+        let (integrator, substeps) = match integrator {
+            Integrator::Auto => {
+                let choice = self.choose(dt)?;
+                (choice.integrator, choice.substeps)
+            }
+            other => (other, 1),
+        };
         let moved = match integrator {
             Integrator::Paper => self.paper_step(dt),
             Integrator::Symplectic => self.symplectic_step(dt),
-            Integrator::TrBdf2 => self.tr_bdf2_step(dt),
+            Integrator::Verlet => self.verlet_steps(dt, substeps),
+            Integrator::TrBdf2 | Integrator::Auto => self.tr_bdf2_step(dt),
         };
         if moved.is_err() {
             self.restore();
@@ -79,6 +108,8 @@ impl<T: Real> Patch<T> {
             .sum();
         Ok(StepReport {
             dt,
+            integrator,
+            substeps,
             solve,
             clamped,
             work,
@@ -87,7 +118,7 @@ impl<T: Real> Patch<T> {
     }
 
     /// Back to the state before the step.
-    pub(crate) fn restore(&mut self) {
+    fn restore(&mut self) {
         self.state.copy_from(&self.work.before);
     }
 }

@@ -26,12 +26,17 @@
 //! ```
 
 mod cells;
+mod parts;
 mod sleep;
+mod tensor;
+mod watch;
 
 pub use cells::{Cells, MAX_EDGE, MAX_SIZE, MIN_CELLS};
 pub use sleep::{Schedule, Thresholds, Turn};
+pub use tensor::{TensorOptions, TensorRegion};
 
 use bspline::hierarchical::{EditError, Lattice as FieldLattice, LevelEdit};
+use bspline::tensor::TensorError;
 use bspline::{Field, Frame, HierarchicalSpline, KnotVector, Real};
 use glam::{DAffine3, DMat3, DVec3};
 
@@ -121,6 +126,9 @@ pub enum RegionError {
         /// Behind its last cell.
         end: [u32; 3],
     },
+    /// A tensor-product patch with coefficients that are none.
+    #[error(transparent)]
+    Tensor(#[from] TensorError),
     /// Baked onto a field on other knots.
     #[error("the region was cut from a field on another lattice; bake it onto a version of that field")]
     OtherLattice,
@@ -170,6 +178,10 @@ pub struct Region<T> {
     patch: Patch<T>,
     thresholds: Thresholds,
     asleep: bool,
+    parts_sleep: bool,
+    part: Option<Box<parts::Part<T>>>,
+    /// Steps until it is looked at again what is awake.
+    steps_to_look: usize,
 }
 
 impl<T: Real> Region<T> {
@@ -229,6 +241,9 @@ impl<T: Real> Region<T> {
             patch,
             thresholds: options.sleep,
             asleep: true,
+            parts_sleep: false,
+            part: None,
+            steps_to_look: 0,
         })
     }
 
@@ -244,7 +259,7 @@ impl<T: Real> Region<T> {
 
     /// The patch, to change its matter, rest or state; wakes the region.
     pub fn patch_mut(&mut self) -> &mut Patch<T> {
-        self.asleep = false;
+        self.wake();
         &mut self.patch
     }
 
@@ -262,7 +277,7 @@ impl<T: Real> Region<T> {
         if self.asleep {
             return Ok(None);
         }
-        let report = self.patch.step(integrator, dt)?;
+        let report = self.step_parts(integrator, dt)?;
         self.rest_if_quiet();
         Ok(Some(report))
     }
@@ -310,6 +325,7 @@ impl<T: Real> Region<T> {
     ) -> Result<HierarchicalSpline<T>, RegionError> {
         let baked = self.bake(onto)?;
         self.patch.rest_here();
+        self.part = None;
         self.asleep = true;
         Ok(baked)
     }
@@ -318,7 +334,7 @@ impl<T: Real> Region<T> {
     /// that it returns to.
     pub fn release_elastic(&mut self) {
         self.patch.external.fill(T::zero());
-        self.asleep = false;
+        self.wake();
     }
 }
 

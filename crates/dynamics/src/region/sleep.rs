@@ -27,9 +27,11 @@ impl<T: Real> Region<T> {
         self.asleep
     }
 
-    /// Wakes the region.
+    /// Wakes the region, all of it until it is looked at which parts may sleep.
     pub fn wake(&mut self) {
         self.asleep = false;
+        self.part = None;
+        self.steps_to_look = 0;
     }
 
     /// Sets the external forces on the samples. A region asleep wakes if they leave more unbalanced than the threshold;
@@ -42,6 +44,8 @@ impl<T: Real> Region<T> {
             return Ok(());
         }
         self.patch.set_force(force)?;
+        self.part = None;
+        self.steps_to_look = 0;
         if self.asleep {
             self.asleep = self.patch.unbalanced() <= self.thresholds.acceleration;
         }
@@ -51,15 +55,19 @@ impl<T: Real> Region<T> {
     /// Falls asleep, and drops what is left of the velocity, where both thresholds hold.
     pub(super) fn rest_if_quiet(&mut self) {
         // The speed is cheap and decides most of the time. NaN stays awake.
-        if self.patch.mean_speed() <= self.thresholds.speed
-            && self.patch.unbalanced() <= self.thresholds.acceleration
+        let moving = self.part.as_mut().map_or(&mut self.patch, |part| &mut part.patch);
+        if moving.mean_speed() <= self.thresholds.speed
+            && moving.unbalanced() <= self.thresholds.acceleration
+            // Of the whole, when a part is quiet.
+            && (self.part.is_none() || self.patch.unbalanced() <= self.thresholds.acceleration)
         {
             self.patch.stop();
+            self.part = None;
             self.asleep = true;
         }
     }
 
-    /// Work of a step: solves times samples; 0 asleep. Wall time is not in it, so that the same input moves the same
+    /// Work of a step: solves times samples awake; 0 asleep. Wall time is not in it, so that the same input moves the same
     /// regions on every machine.
     pub fn step_work(&self, integrator: Integrator) -> u64 {
         if self.asleep {
@@ -67,9 +75,10 @@ impl<T: Real> Region<T> {
         }
         let solves = match integrator {
             Integrator::Paper | Integrator::Symplectic => 1,
-            Integrator::TrBdf2 => 2,
+            // Auto takes explicit sub-steps only where they cost less than the two solves.
+            Integrator::Verlet | Integrator::TrBdf2 | Integrator::Auto => 2,
         };
-        solves * self.patch.lattice().sample_count() as u64
+        solves * self.awake_samples() as u64
     }
 }
 
@@ -95,7 +104,7 @@ pub struct Schedule {
 impl Schedule {
     /// Moves the regions that are awake by one step of `dt` each, beginning with the first one given up the last time,
     /// until the next would exceed `budget` in units of [`Region::step_work`]. The first one awake always moves, so no
-    /// region waits for ever. A caller with a clock sets the budget from the time that its last frames took.
+    /// region waits for ever. The same input moves the same regions on every machine.
     pub fn step<T: Real>(
         &mut self,
         regions: &mut [Region<T>],
@@ -103,21 +112,37 @@ impl Schedule {
         dt: f64,
         budget: u64,
     ) -> Vec<Turn> {
+        let mut spent = 0u64;
+        self.step_while(regions, integrator, dt, |work| {
+            spent = spent.saturating_add(work);
+            spent <= budget
+        })
+    }
+
+    /// The same until `may_move` says no, which is asked before each region with the work of its step. A caller with a
+    /// clock, and the seconds that a unit of work took in its last frames, keeps to a budget of time with it.
+    pub fn step_while<T: Real>(
+        &mut self,
+        regions: &mut [Region<T>],
+        integrator: Integrator,
+        dt: f64,
+        mut may_move: impl FnMut(u64) -> bool,
+    ) -> Vec<Turn> {
         let count = regions.len();
         let mut turns = vec![Turn::Asleep; count];
-        let (mut spent, mut given_up) = (0u64, None);
+        let (mut first, mut given_up) = (true, None);
         for place in (0..count).map(|i| (self.next % count + i) % count) {
             let region = &mut regions[place];
-            let work = region.step_work(integrator);
             if region.is_asleep() {
                 continue;
             }
-            if given_up.is_some() || (spent > 0 && spent.saturating_add(work) > budget) {
+            let may = given_up.is_none() && (may_move(region.step_work(integrator)) || first);
+            first = false;
+            if !may {
                 given_up.get_or_insert(place);
                 turns[place] = Turn::GivenUp;
                 continue;
             }
-            spent = spent.saturating_add(work);
             turns[place] = match region.step(integrator, dt) {
                 Ok(Some(report)) => Turn::Stepped(report),
                 Ok(None) => Turn::Asleep,

@@ -90,13 +90,13 @@ pub struct SpringReport {
 /// All springs of a patch under a law.
 #[derive(Clone, Debug)]
 pub struct SpringNetwork<T> {
-    dims: [usize; 3],
-    law: Law,
+    pub(super) dims: [usize; 3],
+    pub(super) law: Law,
     /// `k` per direction.
-    springs: Vec<SpringWeights<T>>,
+    pub(super) springs: Vec<SpringWeights<T>>,
     /// `h²` per direction.
-    lengths: Vec<f64>,
-    rest: Rest<T>,
+    pub(super) lengths: Vec<f64>,
+    pub(super) rest: Rest<T>,
     row: [Vec<T>; 2],
 }
 
@@ -167,31 +167,17 @@ impl<T: Real> SpringNetwork<T> {
         &mut self.rest
     }
 
-    /// Lets all springs rest at the densities `d`, which then have no spring force, exactly.
-    pub fn rest_at(&mut self, d: &[T]) {
-        self.relax(d, 1.0);
-    }
-
-    /// Moves the rest differences towards the current ones by the share `share`, `0..=1`.
+    /// Lets all springs rest at the densities `d`, which then have no spring force, exactly, where the rest scale is 1.
     ///
     /// # Panics
     /// If `d` has another length than the lattice.
-    pub fn relax(&mut self, d: &[T], share: f64) {
+    pub fn rest_at(&mut self, d: &[T]) {
         assert_eq!(d.len(), self.dims.iter().product::<usize>(), "samples");
         let sigma = T::from_f64(self.law.scale());
-        let keep = T::from_f64(1.0 - share);
-        let share = T::from_f64(share);
         for (rest, s) in self.rest.differences.iter_mut().zip(&self.springs) {
             rows_of(self.dims, s.direction.step, |from, to, count| {
-                let (a, b) = (&d[from..from + count], &d[to..to + count]);
-                for ((r, a), b) in rest[from..from + count].iter_mut().zip(a).zip(b) {
-                    let now = sigma * (*a - *b);
-                    // Exactly the current difference when nothing is kept.
-                    *r = if keep == T::zero() {
-                        now
-                    } else {
-                        keep * *r + share * now
-                    };
+                for z in 0..count {
+                    rest[from + z] = sigma * (d[from + z] - d[to + z]);
                 }
             });
         }
@@ -297,7 +283,11 @@ impl<T: Real> SpringNetwork<T> {
 /// Calls `f(from, to, count)` for every stretch of springs of one direction that start in one row: springs join the
 /// samples `from + z` and `to + z`, `z < count`.
 #[inline(always)]
-fn rows_of([mx, my, mz]: [usize; 3], [dx, dy, dz]: [isize; 3], mut f: impl FnMut(usize, usize, usize)) {
+pub(super) fn rows_of(
+    [mx, my, mz]: [usize; 3],
+    [dx, dy, dz]: [isize; 3],
+    mut f: impl FnMut(usize, usize, usize),
+) {
     let (here, there) = ((-dz).max(0) as usize, dz.max(0) as usize);
     let count = mz.saturating_sub(here + there);
     for i in 0..mx {

@@ -2,8 +2,10 @@
 
 mod law;
 mod neighbours;
+mod plasticity;
 mod stencil;
 
 pub use law::{Law, Rest, SpringNetwork, SpringReport};
 pub use neighbours::{Direction, Neighbours};
+pub use plasticity::Plasticity;
 pub use stencil::{SpringWeights, StepMatrix, Weights};

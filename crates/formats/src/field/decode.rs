@@ -11,7 +11,8 @@ use super::levels::{self, Level};
 use super::{AnyField, FieldMeta, LeafRecord, LoadedField, MAGIC, MAX_LEVELS, SourceKind, Stored, VERSION};
 use crate::error::excerpt;
 use crate::limits::Budget;
-use crate::{Fault, ReadLimits, Unit, volumes};
+use crate::volumes::geometry::is_usable;
+use crate::{Fault, ReadLimits, Unit};
 
 /// Most cells of the finest level along an axis; bricks and slots are counted in 32 bits.
 const MAX_CELLS: u64 = 1 << 30;
@@ -136,7 +137,7 @@ impl Header {
             );
         }
         let world_from_lattice = DAffine3::from_cols_array(&map);
-        if !volumes::is_usable_affine(&world_from_lattice) {
+        if !is_usable(&world_from_lattice) {
             return bad("the map from lattice to world", format!("{map:?}"));
         }
         if !(slope.is_finite() && slope >= 0.0) {

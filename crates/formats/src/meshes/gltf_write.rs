@@ -6,7 +6,7 @@ use base64::engine::general_purpose::STANDARD;
 use base64::write::EncoderWriter;
 use glam::{DVec3, Vec3};
 
-use super::{CHUNK, Mesh, needs_double, spill};
+use super::mesh::{CHUNK, Mesh, needs_double, spill};
 
 /// Positions and how they are stored: single precision about an origin of double precision.
 struct Layout {

@@ -1,47 +1,33 @@
 //! Meshes in and out, and coloured points out.
 
-mod gltf;
+pub(crate) mod gltf;
 mod gltf_write;
+mod mesh;
 mod obj_write;
 mod ply_write;
 mod read;
 mod stl;
 mod stl_write;
-mod threemf;
+pub(crate) mod threemf;
 mod threemf_write;
 mod triangle_mesh;
-mod vrml;
+pub(crate) mod vrml;
 mod vrml_write;
 mod weld;
 
 use std::io::{self, Write};
 use std::path::Path;
 
-use glam::DVec3;
-
-pub(crate) use gltf::looks_like_gltf;
+pub use mesh::Mesh;
+pub(crate) use mesh::needs_double;
 pub use ply_write::save_points;
 pub(crate) use ply_write::write_points as write_ply_points;
 pub(crate) use read::parse;
 pub use read::{parse_gltf, parse_stl, parse_threemf, parse_vrml, read};
-pub(crate) use threemf::looks_like_3mf;
 pub use triangle_mesh::TriangleMesh;
-pub(crate) use vrml::looks_like_vrml;
 
-use crate::{Fault, FormatError, Unit, atomic, detect};
-
-/// A triangle mesh to be written; triangles are counterclockwise seen from outside.
-#[derive(Clone, Copy, Debug)]
-pub struct Mesh<'a> {
-    /// Positions in world space.
-    pub vertices: &'a [DVec3],
-    /// Indices of the corners, from 0.
-    pub triangles: &'a [[u32; 3]],
-    /// Red, green, blue of each vertex; kept by PLY and glTF.
-    pub colors: Option<&'a [[u8; 3]]>,
-    /// Unit of the positions.
-    pub unit: Unit,
-}
+use crate::file_name::{extension, is_gz_name};
+use crate::{Fault, FormatError, Unit, atomic};
 
 /// Formats of meshes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,10 +54,10 @@ impl MeshFormat {
     /// # Errors
     /// [`Fault::UnknownKind`] with what is supported.
     pub fn from_path(path: &Path) -> Result<Self, FormatError> {
-        let extension = if detect::is_gz_name(path) {
+        let extension = if is_gz_name(path) {
             "gz".into()
         } else {
-            detect::extension(path)
+            extension(path)
         };
         match extension.as_str() {
             "ply" => Ok(Self::Ply),
@@ -182,30 +168,6 @@ pub fn write(out: &mut dyn Write, mesh: &Mesh, format: MeshFormat) -> io::Result
         MeshFormat::ThreeMf => threemf_write::write(out, mesh),
         MeshFormat::Vrml => vrml_write::write(out, mesh),
     }
-}
-
-/// Whether rounding to `f32` moves a vertex by more than a millionth of the diagonal.
-pub(crate) fn needs_double(vertices: &[DVec3]) -> bool {
-    let Some(first) = vertices.first() else {
-        return false;
-    };
-    let (min, max) = vertices
-        .iter()
-        .fold((*first, *first), |(lo, hi), v| (lo.min(*v), hi.max(*v)));
-    let furthest = min.abs().max(max.abs()).max_element();
-    furthest * f64::from(f32::EPSILON) * 0.5 > 1e-6 * (max - min).length()
-}
-
-/// Bytes gathered before they are handed on.
-const CHUNK: usize = 1 << 16;
-
-/// Hands `bytes` on once there are enough.
-fn spill(out: &mut dyn Write, bytes: &mut Vec<u8>) -> io::Result<()> {
-    if bytes.len() >= CHUNK {
-        out.write_all(bytes)?;
-        bytes.clear();
-    }
-    Ok(())
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use super::{CHUNK, Mesh, needs_double, spill};
+use super::mesh::{CHUNK, Mesh, needs_double, spill};
 
 pub(super) fn write(out: &mut dyn Write, mesh: &Mesh) -> io::Result<()> {
     let double = needs_double(mesh.vertices);

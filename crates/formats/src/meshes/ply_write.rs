@@ -5,8 +5,9 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::{CHUNK, Mesh, needs_double, spill};
-use crate::{Fault, FormatError, atomic, detect};
+use super::mesh::{CHUNK, Mesh, needs_double, spill};
+use crate::file_name::{extension, is_gz_name};
+use crate::{Fault, FormatError, atomic};
 
 /// Writes points with an optional colour each as binary PLY, atomically.
 ///
@@ -21,7 +22,7 @@ pub fn save_points(
     normals: Option<&[DVec3]>,
     colors: Option<&[[u8; 3]]>,
 ) -> Result<(), FormatError> {
-    if detect::extension(path) != "ply" || detect::is_gz_name(path) {
+    if extension(path) != "ply" || is_gz_name(path) {
         let found = path
             .extension()
             .map(|e| format!(".{}", e.to_string_lossy()))

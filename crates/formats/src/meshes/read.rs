@@ -4,7 +4,8 @@ use std::path::Path;
 
 use super::triangle_mesh::{TriangleMesh, finish};
 use super::{gltf, stl, threemf, vrml};
-use crate::detect::{self, Kind, MeshFileFormat, PointFormat};
+use crate::detect::kind_of;
+use crate::kind::{Kind, MESHES, MeshFileFormat, PointFormat};
 use crate::limits::Budget;
 use crate::raw::{RawShape, Wanted};
 use crate::{Fault, FormatError, ReadLimits, input, points};
@@ -23,14 +24,14 @@ fn read_faulty(path: &Path, limits: &ReadLimits) -> Result<TriangleMesh, Fault> 
     let mut budget = Budget::new(limits);
     let bytes = input::open(path)?.read_all(&mut budget)?;
     let budget = &mut budget;
-    let raw = match detect::kind_of(&bytes, path)? {
+    let raw = match kind_of(&bytes, path)? {
         Kind::Cloud(PointFormat::Ply) => points::ply::parse(&bytes, Wanted::Mesh, budget),
         Kind::Cloud(PointFormat::Obj) => points::obj::parse(&bytes, Wanted::Mesh, budget),
         Kind::Mesh(format) => parse(&bytes, format, path, budget),
         other => Err(Fault::UnknownKind {
             found: format!("a {other}"),
             purpose: "mesh",
-            supported: detect::MESHES,
+            supported: MESHES,
         }),
     }?;
     finish(raw, budget)

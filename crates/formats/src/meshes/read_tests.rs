@@ -1,3 +1,5 @@
+use glam::DVec3;
+
 use super::*;
 use crate::limits::Budget;
 use crate::raw::Wanted;

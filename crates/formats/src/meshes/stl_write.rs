@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use glam::DVec3;
 
-use super::{CHUNK, Mesh, spill};
+use super::mesh::{CHUNK, Mesh, spill};
 
 pub(super) fn write(out: &mut dyn Write, mesh: &Mesh) -> io::Result<()> {
     // The text must not start with "solid": readers would take the file for an ascii one.

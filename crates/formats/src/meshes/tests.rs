@@ -1,3 +1,5 @@
+use glam::DVec3;
+
 use super::*;
 use crate::atomic::tests::survives_a_full_disk;
 use crate::{ReadLimits, points};

@@ -5,7 +5,7 @@ use std::io::{self, Cursor, Write};
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
-use super::{CHUNK, Mesh, needs_double, spill};
+use super::mesh::{CHUNK, Mesh, needs_double, spill};
 use crate::Unit;
 
 const TYPES: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\

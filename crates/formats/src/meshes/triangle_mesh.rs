@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::Mesh;
+use super::mesh::Mesh;
 use crate::limits::Budget;
 use crate::raw::RawShape;
 use crate::{Fault, Unit};

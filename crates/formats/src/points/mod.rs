@@ -1,18 +1,18 @@
 //! Point clouds in, with the normals that a fit needs, and out.
 
+mod cloud;
 mod e57;
 mod las;
 mod normals;
 pub(crate) mod obj;
-mod pcd;
+pub(crate) mod pcd;
 pub(crate) mod ply;
 mod save;
 mod xyz;
 
 use std::path::Path;
 
-use glam::DVec3;
-
+pub use cloud::{NormalSource, PointCloud};
 pub use e57::parse_e57;
 pub use las::parse_las;
 pub use obj::parse_obj;
@@ -21,66 +21,11 @@ pub use ply::parse_ply;
 pub use save::save;
 pub use xyz::parse_xyz;
 
-pub(crate) use pcd::looks_like_pcd;
-
-use crate::detect::{self, Kind, PointFormat};
+use crate::detect::kind_of;
+use crate::kind::{CLOUDS, Kind, PointFormat};
 use crate::limits::Budget;
 use crate::raw::Wanted;
-use crate::{Fault, FormatError, ReadLimits, Unit, input, meshes};
-
-/// Points of a scan, in the file's own unit unless a unit was stated.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct PointCloud {
-    /// Finite positions, in file order.
-    pub positions: Vec<DVec3>,
-    /// One outward normal a point, of unit length, or exactly zero where the file gives none that can be used.
-    pub normals: Option<Vec<DVec3>>,
-    /// Where the normals come from.
-    pub normal_source: NormalSource,
-    /// Unit of the positions: millimetres where the file names any, otherwise unknown.
-    pub unit: Unit,
-    /// Points in the file, kept or not.
-    pub file_count: usize,
-    /// Faces in the file; 0 if it has none.
-    pub face_count: usize,
-    /// Faces of fewer than three different corners or of no area; they were left out.
-    pub degenerate_faces: usize,
-    /// Vertices that no face of any area uses, in a file that has faces; they were left out.
-    pub unused_vertices: usize,
-    /// Points with a coordinate that is NaN or infinite; they and their faces were left out.
-    pub invalid_dropped: usize,
-    /// Kept points whose normal is zero, not finite, or cancelled out between faces.
-    pub zero_normals: usize,
-    /// Repairs and doubts, each a sentence with its figures.
-    pub notes: Vec<String>,
-}
-
-/// Origin of the normals of a [`PointCloud`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum NormalSource {
-    /// There are none.
-    #[default]
-    None,
-    /// Stored with the points.
-    Stored,
-    /// Angle-weighted from the faces.
-    Faces,
-}
-
-impl PointCloud {
-    /// States the unit of the file and converts positions to millimetres.
-    ///
-    /// # Errors
-    /// [`Fault::Value`] if `stated` is [`Unit::Unknown`] or the cloud already is in a known unit.
-    pub fn to_mm(&mut self, stated: Unit) -> Result<(), Fault> {
-        let scale = stated.scale_for("cloud", self.unit)?;
-        for p in &mut self.positions {
-            *p *= scale;
-        }
-        self.unit = Unit::Millimetre;
-        Ok(())
-    }
-}
+use crate::{Fault, FormatError, ReadLimits, input, meshes};
 
 /// Reads a cloud; the format is told by content first, then by name, and `.gz` by its content.
 ///
@@ -94,7 +39,7 @@ fn read_faulty(path: &Path, limits: &ReadLimits) -> Result<PointCloud, Fault> {
     let mut budget = Budget::new(limits);
     let bytes = input::open(path)?.read_all(&mut budget)?;
     let budget = &mut budget;
-    let raw = match detect::kind_of(&bytes, path)? {
+    let raw = match kind_of(&bytes, path)? {
         Kind::Cloud(PointFormat::Ply) => ply::parse(&bytes, Wanted::Cloud, budget),
         Kind::Cloud(PointFormat::Xyz) => xyz::parse(&bytes, budget),
         Kind::Cloud(PointFormat::Pcd) => pcd::parse(&bytes, budget),
@@ -105,7 +50,7 @@ fn read_faulty(path: &Path, limits: &ReadLimits) -> Result<PointCloud, Fault> {
         other => Err(Fault::UnknownKind {
             found: format!("a {other}"),
             purpose: "point cloud",
-            supported: detect::CLOUDS,
+            supported: CLOUDS,
         }),
     }?;
     normals::finish(raw, budget)

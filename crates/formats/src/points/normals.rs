@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{NormalSource, PointCloud};
+use super::cloud::{NormalSource, PointCloud};
 use crate::Fault;
 use crate::limits::Budget;
 use crate::raw::{NO_NORMAL, RawShape};

@@ -2,7 +2,8 @@
 
 use glam::{DVec3, Vec3};
 
-use super::{PointCloud, normals};
+use super::cloud::PointCloud;
+use super::normals;
 use crate::error::excerpt;
 use crate::limits::{Budget, Counted};
 use crate::raw::{Faces, NO_NORMAL, RawShape, Wanted};

@@ -3,9 +3,11 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use super::{PointCloud, e57, las, pcd};
+use super::cloud::PointCloud;
+use super::{e57, las, pcd};
+use crate::file_name::{extension, is_gz_name};
 use crate::meshes::{needs_double, write_ply_points};
-use crate::{Fault, FormatError, Unit, atomic, detect};
+use crate::{Fault, FormatError, Unit, atomic};
 
 /// Formats of point clouds to be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,9 +68,9 @@ pub fn save(path: &Path, cloud: &PointCloud) -> Result<Vec<String>, FormatError>
 }
 
 fn format_of(path: &Path) -> Result<Format, Fault> {
-    let extension = detect::extension(path);
+    let extension = extension(path);
     match extension.as_str() {
-        _ if detect::is_gz_name(path) => {}
+        _ if is_gz_name(path) => {}
         "ply" => return Ok(Format::Ply),
         "pcd" => return Ok(Format::Pcd),
         "las" => return Ok(Format::Las),

@@ -2,7 +2,8 @@
 
 use glam::DVec3;
 
-use super::{PointCloud, normals};
+use super::cloud::PointCloud;
+use super::normals;
 use crate::error::excerpt;
 use crate::limits::{Budget, Counted};
 use crate::raw::RawShape;

@@ -6,8 +6,11 @@ use std::path::Path;
 
 use glam::{DAffine3, DVec3};
 
-use super::{StoreAs, VoxelType};
+use super::voxel::{StoreAs, VoxelType};
 use crate::{Fault, Unit};
+
+/// Deflate level: densities hardly compress, so the higher ones cost time and save a few percent.
+pub(super) const LEVEL: u32 = 3;
 
 /// Grid of a volume that is written.
 #[derive(Clone, Copy, Debug, PartialEq)]

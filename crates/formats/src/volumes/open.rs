@@ -2,10 +2,12 @@
 
 use std::path::Path;
 
+use super::options::VolumeOptions;
 use super::part::Part;
 use super::slices::SliceSource;
-use super::{VolumeFormat, VolumeOptions, dicom, metaimage, nifti, nrrd, raw, tiff};
-use crate::detect::{self, Kind};
+use super::{dicom, metaimage, nifti, nrrd, raw, tiff};
+use crate::detect::detect;
+use crate::kind::{Kind, VolumeFormat};
 use crate::limits::Budget;
 use crate::{Fault, FormatError};
 
@@ -48,7 +50,7 @@ fn format_of(path: &Path) -> Result<VolumeFormat, Fault> {
     if path.metadata().is_ok_and(|m| !m.is_file() && !m.is_dir()) {
         return Ok(VolumeFormat::Nifti);
     }
-    match detect::detect(path).map_err(|FormatError { fault, .. }| fault)? {
+    match detect(path).map_err(|FormatError { fault, .. }| fault)? {
         Kind::Volume(format) => Ok(format),
         other => Err(Fault::UnknownKind {
             found: format!("a {other}"),

@@ -1,6 +1,7 @@
 //! What a caller may ask of a volume before it is read.
 
-use super::{DicomOptions, RawLayout};
+use super::dicom::DicomOptions;
+use super::raw::RawLayout;
 
 /// Which part of a volume is read, and what its file does not say.
 #[derive(Clone, Debug, PartialEq)]

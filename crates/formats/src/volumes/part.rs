@@ -3,8 +3,9 @@
 use glam::{DAffine3, DMat3, DVec3};
 
 use super::geometry::is_usable;
+use super::options::VolumeOptions;
 use super::slices::{SliceSource, zeros};
-use super::{VolumeHeader, VolumeOptions};
+use super::volume::VolumeHeader;
 use crate::{Fault, Unit};
 
 /// The part of `inner` that the options ask for.

@@ -6,11 +6,10 @@ use std::path::Path;
 use glam::DAffine3;
 
 use super::encode::{Grid, NextSlice, Slices};
-use super::{StoreAs, metaimage, nifti, nrrd, vti};
-use crate::{Fault, FormatError, Unit, detect};
-
-/// Deflate level: densities hardly compress, so the higher ones cost time and save a few percent.
-pub(super) const LEVEL: u32 = 3;
+use super::voxel::StoreAs;
+use super::{metaimage, nifti, nrrd, vti};
+use crate::file_name::{extension, is_gz_name};
+use crate::{Fault, FormatError, Unit};
 
 /// Writes a volume that is in memory: see [`save_slices`].
 ///
@@ -93,8 +92,8 @@ fn save_with(path: &Path, grid: &Grid, store: StoreAs, next: &mut NextSlice) -> 
         next,
         scratch,
     };
-    let is_gz = detect::is_gz_name(path);
-    match detect::extension(path).as_str() {
+    let is_gz = is_gz_name(path);
+    match extension(path).as_str() {
         "nii" => nifti::write(path, slices, is_gz),
         "nrrd" if !is_gz => nrrd::write(path, slices),
         "mha" if !is_gz => metaimage::write(path, slices),

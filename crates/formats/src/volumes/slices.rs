@@ -1,7 +1,8 @@
 //! Slices of a volume in order: the one thing that every volume reader gives. What stands above it (a region, a
 //! stride, the check of the densities, the memory) is written once, here and in [`super::part`].
 
-use super::{ValueRange, Volume, VolumeHeader, VoxelType};
+use super::volume::{ValueRange, Volume, VolumeHeader};
+use super::voxel::VoxelType;
 use crate::Fault;
 use crate::limits::Budget;
 

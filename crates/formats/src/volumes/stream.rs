@@ -3,7 +3,8 @@
 use std::io::Read;
 
 use super::slices::SliceSource;
-use super::{VolumeHeader, VoxelType};
+use super::volume::VolumeHeader;
+use super::voxel::VoxelType;
 use crate::Fault;
 use crate::input::{SkipRead, read_fault};
 

@@ -7,9 +7,10 @@ use std::path::Path;
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
 
+use super::encode::Grid;
+use super::encode::LEVEL;
 use super::encode::{Slices, spacing_and_directions, words};
-use super::save::LEVEL;
-use super::{Grid, VoxelType};
+use super::voxel::VoxelType;
 use crate::{FormatError, atomic};
 
 /// Bytes that are compressed together; a multiple of every voxel's size.

@@ -9,7 +9,8 @@ use e57::{E57Reader, RawValues, Record, RecordDataType, RecordName};
 use glam::{DAffine3, DQuat, DVec3};
 
 use self::meter::{Meter, Metered};
-use super::{PointCloud, normals};
+use super::cloud::PointCloud;
+use super::normals;
 use crate::limits::{Budget, Counted};
 use crate::raw::RawShape;
 use crate::{Fault, ReadLimits, Unit, guard};

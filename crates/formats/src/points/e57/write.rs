@@ -4,7 +4,7 @@ use std::io::{self, Cursor, Write};
 
 use e57::{E57Writer, Extension, Record, RecordDataType, RecordName, RecordValue};
 
-use super::super::PointCloud;
+use crate::points::cloud::PointCloud;
 
 const NORMALS: &str = "http://www.libe57.org/E57_NOR_surface_normals.txt";
 

@@ -11,7 +11,8 @@ mod write;
 use glam::DVec3;
 
 use self::header::Header;
-use super::{PointCloud, normals};
+use super::cloud::PointCloud;
+use super::normals;
 use crate::limits::{Budget, Counted};
 use crate::raw::RawShape;
 use crate::{Fault, ReadLimits, Unit};

@@ -5,8 +5,8 @@ use std::io::{self, Cursor, Write};
 use glam::DVec3;
 use laz::laszip::{LasZipCompressor, LazItemRecordBuilder, LazVlrBuilder};
 
-use super::super::PointCloud;
 use crate::Unit;
+use crate::points::cloud::PointCloud;
 
 const HEADER: usize = 227;
 const VLR_HEAD: usize = 54;

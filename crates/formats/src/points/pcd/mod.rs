@@ -10,7 +10,8 @@ use std::io::{self, Write};
 use glam::DVec3;
 
 use self::header::{Column, Encoding, Header};
-use super::{PointCloud, normals};
+use super::cloud::PointCloud;
+use super::normals;
 use crate::limits::{Budget, Counted};
 use crate::raw::RawShape;
 use crate::text::{Lines, number};

@@ -7,7 +7,8 @@ use glam::DVec3;
 
 use self::body::{Binary, Values, check_count, walk};
 use self::header::{Element, Encoding, Header, Scalar, Shape};
-use super::{PointCloud, normals};
+use super::cloud::PointCloud;
+use super::normals;
 use crate::error::Place;
 use crate::limits::Budget;
 use crate::raw::{Faces, RawShape, Wanted};

@@ -6,8 +6,8 @@ use std::path::{Component, Path, PathBuf};
 use super::{Content, Encoding, Layout, decoded};
 use crate::Fault;
 use crate::input::{self, SkipRead};
-use crate::volumes::VolumeHeader;
 use crate::volumes::stream::stored_bytes;
+use crate::volumes::volume::VolumeHeader;
 
 /// The file called `name` in the directory of `header`: no other directory can be reached by a header, so that a
 /// file from elsewhere cannot make a program read what it should not.

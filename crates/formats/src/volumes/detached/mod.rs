@@ -9,16 +9,17 @@ mod text;
 pub(super) use files::{beside, numbered};
 pub(super) use lines::Lines;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use inflate::{GzipBody, ZlibBody};
 use text::{HexBody, TextSlices};
 
-use super::VolumeHeader;
-use super::slices::SliceSource;
+use super::slices::{self, SliceSource};
 use super::stream::{self, StreamSlices, check_length, stored_bytes};
-use crate::Fault;
-use crate::input::{Input, SkipRead, Source, read_fault};
+use super::volume::{Volume, VolumeHeader};
+use crate::input::{self, Input, SkipRead, Source, read_fault};
+use crate::limits::Budget;
+use crate::{Fault, ReadLimits};
 
 /// A content, standing somewhere in it.
 pub(super) struct Content<'a> {
@@ -85,8 +86,49 @@ pub(super) struct Layout {
     pub start: Start,
 }
 
+/// A header and where its voxels are.
+pub(super) struct Parsed {
+    pub header: VolumeHeader,
+    pub notes: Vec<String>,
+    pub layout: Layout,
+    /// Data files; `None`: the voxels follow the header.
+    pub files: Option<Vec<PathBuf>>,
+}
+
+/// Reads a header: of a content, of the file it is in if any.
+pub(super) type ReadHeader = fn(&mut Content<'_>, Option<&Path>, &mut Budget) -> Result<Parsed, Fault>;
+
+/// Opens a header, and the voxels behind it or those it names.
+pub(super) fn open(
+    path: &Path,
+    read: ReadHeader,
+    budget: &mut Budget,
+) -> Result<Box<dyn SliceSource>, Fault> {
+    voxels_behind(input::open(path)?.into(), Some(path), read, budget)
+}
+
+/// Reads a header and the voxels that follow it.
+pub(super) fn parse(bytes: &[u8], read: ReadHeader, limits: &ReadLimits) -> Result<Volume, Fault> {
+    let mut budget = Budget::new(limits);
+    let mut source = voxels_behind(Content::of_bytes(bytes), None, read, &mut budget)?;
+    slices::read(&mut *source, &mut budget)
+}
+
+fn voxels_behind<'a>(
+    mut content: Content<'a>,
+    path: Option<&Path>,
+    read: ReadHeader,
+    budget: &mut Budget,
+) -> Result<Box<dyn SliceSource + 'a>, Fault> {
+    let parsed = read(&mut content, path, budget)?;
+    match parsed.files {
+        None => attached(parsed.header, parsed.notes, parsed.layout, content),
+        Some(paths) => in_files(parsed.header, parsed.notes, parsed.layout, paths),
+    }
+}
+
 /// Voxels that follow their header.
-pub(super) fn attached<'a>(
+fn attached<'a>(
     header: VolumeHeader,
     notes: Vec<String>,
     layout: Layout,
@@ -98,7 +140,7 @@ pub(super) fn attached<'a>(
 }
 
 /// Voxels in files of their own, each with as many as the others.
-pub(super) fn in_files(
+fn in_files(
     header: VolumeHeader,
     notes: Vec<String>,
     layout: Layout,

@@ -6,7 +6,8 @@ use crate::Fault;
 use crate::error::{Place, excerpt};
 use crate::input::{SkipRead, read_fault, skip_by_reading};
 use crate::volumes::slices::SliceSource;
-use crate::volumes::{VolumeHeader, VoxelType};
+use crate::volumes::volume::VolumeHeader;
+use crate::volumes::voxel::VoxelType;
 
 const BUFFER: usize = 1 << 16;
 /// Longest number: all digits of a double and a few more.

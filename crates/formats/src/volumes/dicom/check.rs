@@ -5,7 +5,7 @@ use super::pixels::Layout;
 use super::scan::File;
 use super::syntax::{self, Codec};
 use crate::Fault;
-use crate::volumes::VoxelType;
+use crate::volumes::voxel::VoxelType;
 
 /// Refuses pictures that are no densities: colour, bits, tables instead of a rescaling.
 pub(super) fn is_scalar(data: &DataSet) -> Result<(), Fault> {

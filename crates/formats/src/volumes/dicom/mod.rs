@@ -28,7 +28,8 @@ pub(crate) use dataset::looks_like_dicom;
 pub(crate) use scan::holds_dicom;
 
 use super::slices;
-use super::{SliceSource, Volume};
+use super::slices::SliceSource;
+use super::volume::Volume;
 use crate::limits::Budget;
 use crate::{Fault, ReadLimits};
 

@@ -12,7 +12,8 @@ use super::scan::{File, Found};
 use super::stack::{self, Grid, Slice};
 use crate::limits::Budget;
 use crate::volumes::geometry::{RAS_FROM_LPS, checked_dims, in_world, usable};
-use crate::volumes::{Orientation, SliceSource, VolumeHeader};
+use crate::volumes::slices::SliceSource;
+use crate::volumes::volume::{Orientation, VolumeHeader};
 use crate::{Fault, Unit};
 
 /// The slices of a series, each decoded when it is asked for.

@@ -8,19 +8,11 @@ use glam::{DAffine3, DMat3, DVec3};
 
 use crate::error::excerpt;
 use crate::limits::Budget;
-use crate::volumes::detached::{Content, Encoding, Layout, Lines, Start, beside, numbered};
+use crate::volumes::detached::{Content, Encoding, Layout, Lines, Parsed, Start, beside, numbered};
 use crate::volumes::geometry::{RAS_FROM_LPS, checked_dims, in_world, usable};
-use crate::volumes::{Orientation, VolumeHeader, VoxelType};
+use crate::volumes::volume::{Orientation, VolumeHeader};
+use crate::volumes::voxel::VoxelType;
 use crate::{Fault, Unit};
-
-/// A header and where its voxels are.
-pub(super) struct Parsed {
-    pub header: VolumeHeader,
-    pub notes: Vec<String>,
-    pub layout: Layout,
-    /// Data files; `None`: the voxels follow the header.
-    pub files: Option<Vec<PathBuf>>,
-}
 
 /// Values by the names of their fields, in small letters.
 #[derive(Debug, Default)]

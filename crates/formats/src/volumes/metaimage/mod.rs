@@ -5,11 +5,11 @@ mod write;
 
 use std::path::Path;
 
-use super::Volume;
-use super::detached::{Content, attached, in_files};
-use super::slices::{self, SliceSource};
+use super::detached;
+use super::slices::SliceSource;
+use super::volume::Volume;
 use crate::limits::Budget;
-use crate::{Fault, ReadLimits, input};
+use crate::{Fault, ReadLimits};
 
 pub(super) use write::write;
 
@@ -31,23 +31,9 @@ pub(crate) fn looks_like_metaimage(head: &[u8]) -> bool {
 /// # Errors
 /// As [`super::read`], without the path.
 pub fn parse_metaimage(bytes: &[u8], limits: &ReadLimits) -> Result<Volume, Fault> {
-    let mut budget = Budget::new(limits);
-    let mut source = slices(Content::of_bytes(bytes), None, &mut budget)?;
-    slices::read(&mut *source, &mut budget)
+    detached::parse(bytes, header::read, limits)
 }
 
 pub(super) fn open(path: &Path, budget: &mut Budget) -> Result<Box<dyn SliceSource>, Fault> {
-    slices(input::open(path)?.into(), Some(path), budget)
-}
-
-fn slices<'a>(
-    mut content: Content<'a>,
-    path: Option<&Path>,
-    budget: &mut Budget,
-) -> Result<Box<dyn SliceSource + 'a>, Fault> {
-    let parsed = header::read(&mut content, path, budget)?;
-    match parsed.files {
-        None => attached(parsed.header, parsed.notes, parsed.layout, content),
-        Some(paths) => in_files(parsed.header, parsed.notes, parsed.layout, paths),
-    }
+    detached::open(path, header::read, budget)
 }

@@ -6,10 +6,11 @@ use std::path::Path;
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
 
+use crate::volumes::encode::Grid;
+use crate::volumes::encode::LEVEL;
 use crate::volumes::encode::{Slices, spacing_and_directions, words};
 use crate::volumes::geometry::{RAS_FROM_LPS, in_world};
-use crate::volumes::save::LEVEL;
-use crate::volumes::{Grid, VoxelType};
+use crate::volumes::voxel::VoxelType;
 use crate::{FormatError, Unit, atomic};
 
 /// Writes `path`.

@@ -3,8 +3,8 @@
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
 use crate::Fault;
-use crate::volumes::Orientation;
 use crate::volumes::geometry::is_usable;
+use crate::volumes::volume::Orientation;
 
 /// The fields of a header that bear on the transform, widened to f64.
 #[derive(Debug)]

@@ -4,8 +4,10 @@ use std::io::Read;
 
 use super::affine::{self, Transforms};
 use crate::input::read_fault;
+use crate::kind::VolumeFormat;
 use crate::volumes::geometry::checked_dims;
-use crate::volumes::{VolumeFormat, VolumeHeader, VoxelType};
+use crate::volumes::volume::VolumeHeader;
+use crate::volumes::voxel::VoxelType;
 use crate::{Fault, Unit};
 
 pub(super) const SIZE_1: usize = 348;

@@ -10,9 +10,9 @@ pub(crate) use header::nifti_format;
 pub(super) use write::write;
 pub use write::write_nifti;
 
-use super::Volume;
 use super::slices;
 use super::stream::{StreamSlices, check_length, skip};
+use super::volume::Volume;
 use crate::input::{self, SkipRead};
 use crate::limits::Budget;
 use crate::{Fault, ReadLimits};
@@ -78,7 +78,7 @@ fn header_of(path: &Path) -> PathBuf {
 
 /// The file of a pair that has the voxels.
 fn image_of(path: &Path) -> Result<PathBuf, Fault> {
-    if crate::detect::extension(path) == "img" {
+    if crate::file_name::extension(path) == "img" {
         return Ok(path.to_path_buf());
     }
     other_of(path, "hdr", "img").ok_or_else(|| Fault::Value {
@@ -90,10 +90,10 @@ fn image_of(path: &Path) -> Result<PathBuf, Fault> {
 
 /// `name.to` or `name.to.gz` beside `name.from` or `name.from.gz`, if there.
 fn other_of(path: &Path, from: &str, to: &str) -> Option<PathBuf> {
-    if crate::detect::extension(path) != from {
+    if crate::file_name::extension(path) != from {
         return None;
     }
-    let plain = if crate::detect::is_gz_name(path) {
+    let plain = if crate::file_name::is_gz_name(path) {
         path.with_extension("")
     } else {
         path.to_path_buf()

@@ -8,9 +8,10 @@ use flate2::write::GzEncoder;
 use glam::DAffine3;
 
 use super::header::SIZE_1;
+use crate::volumes::encode::Grid;
+use crate::volumes::encode::LEVEL;
 use crate::volumes::encode::Slices;
-use crate::volumes::save::LEVEL;
-use crate::volumes::{Grid, StoreAs, VoxelType};
+use crate::volumes::voxel::{StoreAs, VoxelType};
 use crate::{Fault, FormatError, Unit, atomic};
 
 /// Writes `path`.

@@ -2,9 +2,9 @@
 
 use glam::{DAffine3, DMat3, DVec3};
 
-use super::header::Fields;
-use crate::volumes::Orientation;
+use super::fields::Fields;
 use crate::volumes::geometry::{RAS_FROM_LPS, in_world, usable};
+use crate::volumes::volume::Orientation;
 use crate::{Fault, Unit};
 
 /// The three axes of space among those of the file.

@@ -5,9 +5,10 @@ use std::path::Path;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 
+use crate::volumes::encode::Grid;
+use crate::volumes::encode::LEVEL;
 use crate::volumes::encode::{Slices, words};
-use crate::volumes::save::LEVEL;
-use crate::volumes::{Grid, VoxelType};
+use crate::volumes::voxel::VoxelType;
 use crate::{FormatError, Unit, atomic};
 
 /// Writes `path`.

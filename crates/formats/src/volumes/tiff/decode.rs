@@ -4,7 +4,7 @@ use flate2::{Decompress, FlushDecompress, Status};
 use weezl::{BitOrder, LzwStatus};
 
 use crate::Fault;
-use crate::volumes::VoxelType;
+use crate::volumes::voxel::VoxelType;
 
 /// How a strip or tile is packed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -16,7 +16,7 @@ use page::{Page, Stack};
 
 use super::slices::{self, SliceSource};
 use super::stream::{StreamSlices, check_length, convert};
-use super::{Volume, VolumeHeader};
+use super::volume::{Volume, VolumeHeader};
 use crate::input::{self, SkipRead, io_fault};
 use crate::limits::Budget;
 use crate::{Fault, ReadLimits};
@@ -99,7 +99,7 @@ fn contiguous<'a>(
     stack: &mut Stack<'a>,
     count: usize,
     length: u64,
-    described: &spacing::Description,
+    described: &page::Description,
     again: impl FnOnce() -> Result<Box<dyn SkipRead + 'a>, Fault>,
     mut notes: Vec<String>,
 ) -> Result<Box<dyn SliceSource + 'a>, Fault> {

@@ -6,11 +6,10 @@ use std::fmt;
 use super::Random;
 use super::decode::{Compression, Predictor, inflate, undo_predictor};
 use super::directory::{Bytes, Directory, damaged};
-use super::spacing::Description;
 use crate::Fault;
 use crate::limits::Budget;
-use crate::volumes::VoxelType;
 use crate::volumes::geometry::checked_dims;
+use crate::volumes::voxel::VoxelType;
 
 /// What is held for each page: its place, twice.
 const PAGE: usize = 64;
@@ -39,6 +38,17 @@ mod tag {
     pub const TILE_OFFSETS: u16 = 324;
     pub const TILE_BYTES: u16 = 325;
     pub const SAMPLE_FORMAT: u16 = 339;
+}
+
+/// Tags of the first page that tell of lengths.
+#[derive(Debug, Default)]
+pub(super) struct Description {
+    /// Free text, in ImageJ's files lines of `key=value`.
+    pub text: String,
+    /// Pixels per unit along x and y.
+    pub resolution: [Option<f64>; 2],
+    /// 1: none, 2: inch, 3: centimetre.
+    pub unit: Option<u64>,
 }
 
 /// What all pages have in common.

@@ -2,21 +2,10 @@
 
 use glam::{DAffine3, DVec3};
 
-use super::page::Page;
+use super::page::{Description, Page};
 use crate::volumes::geometry::{checked_dims, usable};
-use crate::volumes::{Orientation, VolumeHeader};
+use crate::volumes::volume::{Orientation, VolumeHeader};
 use crate::{Fault, Unit};
-
-/// Tags of the first page.
-#[derive(Debug, Default)]
-pub(super) struct Description {
-    /// Free text, in ImageJ's files lines of `key=value`.
-    pub text: String,
-    /// Pixels per unit along x and y.
-    pub resolution: [Option<f64>; 2],
-    /// 1: none, 2: inch, 3: centimetre.
-    pub unit: Option<u64>,
-}
 
 impl Description {
     /// A value of ImageJ's description.

@@ -1,0 +1,88 @@
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use fitting::{Cancel, FitError};
+
+use super::cost::cpu_seconds;
+use super::failure::{Failure, OrFail, Outcome};
+use super::input::writing;
+use super::progress::Bar;
+use crate::charts::{Chart, DynamicsError, Extent, Line, Run, cost, sampling, sweep};
+
+/// Arguments of `isoclay charts dynamics`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Directory for the charts dynamics-NAME.svg; made if missing
+    #[arg(short, long, value_name = "DIR", default_value = "docs/charts")]
+    output: PathBuf,
+    /// Small patches alone, in seconds
+    #[arg(long, conflicts_with = "all")]
+    quick: bool,
+    /// All sizes up to 32 coefficients an axis, all patterns, contrasts and steps: takes hours
+    #[arg(long)]
+    all: bool,
+    /// Print one JSON object a configuration
+    #[arg(long)]
+    json: bool,
+}
+
+/// Measures steps, sampling and cost, and draws them.
+pub fn run(args: &Args, cancel: &Cancel) -> Outcome {
+    std::fs::create_dir_all(&args.output)
+        .map_err(|e| anyhow::anyhow!("-o {}: cannot be made ({e})", args.output.display()))
+        .or_limit()?;
+    let extent = match (args.quick, args.all) {
+        (true, _) => Extent::Quick,
+        (_, true) => Extent::All,
+        _ => Extent::Charts,
+    };
+    let bar = Bar::new();
+    let mut closed = None;
+    let mut show = |line: &Line| {
+        if args.json {
+            let text = serde_json::to_string(line).expect("a struct of plain fields is always JSON");
+            if let Err(e) = writeln!(io::stdout().lock(), "{text}") {
+                closed.get_or_insert(e);
+            }
+        }
+    };
+    let mut go_on = |fraction: f64| {
+        bar.show("measuring", fraction);
+        !cancel.is_cancelled()
+    };
+    let mut run = Run {
+        clock: cpu_seconds,
+        go_on: &mut go_on,
+        show: &mut show,
+    };
+    let lines = sweep(extent, &mut run).map_err(failed)?;
+    let profiles = sampling(extent, &mut run).map_err(failed)?;
+    let costs = cost(extent, &mut run).map_err(failed)?;
+    bar.clear();
+    if let Some(e) = closed {
+        return Err(e).or_limit();
+    }
+    let mut charts = Chart::of_steps(&lines);
+    charts.extend(Chart::of_sampling(&profiles));
+    charts.push(("cost".into(), Chart::of_cost(&costs)));
+    for (name, chart) in charts {
+        write(&chart, &args.output.join(format!("dynamics-{name}.svg")), args.json)?;
+    }
+    Ok(())
+}
+
+fn write(chart: &Chart, target: &Path, quiet: bool) -> Outcome {
+    let svg = chart.svg().map_err(Failure::limit)?;
+    formats::atomic::replace(target, |out| out.write_all(svg.as_bytes())).map_err(writing)?;
+    if !quiet {
+        writeln!(io::stdout().lock(), "written  {}", target.display()).or_limit()?;
+    }
+    Ok(())
+}
+
+fn failed(e: DynamicsError) -> Failure {
+    match e {
+        DynamicsError::Cancelled => FitError::Cancelled.into(),
+        e => Failure::limit(e),
+    }
+}

@@ -1,0 +1,106 @@
+//! Matter of a scene on the samples of its region.
+
+use bspline::Real;
+use dynamics::matter::{Matter, Quantity};
+use dynamics::region::Region;
+use dynamics::springs::Weights;
+use glam::DVec3;
+
+use super::error::{SimulateError, wrong};
+use super::place::Samples;
+use super::scene::{Amount, Material, Paint, Substance};
+
+/// Matter and scale of rest lengths.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Clay {
+    matter: Matter,
+    rest_scale: Quantity,
+}
+
+impl Clay {
+    /// The material on the samples.
+    pub fn new(material: &Material, samples: &Samples) -> Result<Self, SimulateError> {
+        let on = |key: &str, amount: &Option<Amount>, default: f64, zero: bool| {
+            let place = || format!("[material] {key}");
+            let check = |v: f64| {
+                if v > 0.0 || (zero && v == 0.0) {
+                    Ok(v)
+                } else {
+                    Err(wrong(
+                        place(),
+                        format!("is {v}; it has to be {} everywhere", if zero { "0 or above" } else { "above 0" }),
+                    ))
+                }
+            };
+            Ok::<_, SimulateError>(match amount {
+                None => Quantity::Constant(default),
+                Some(Amount::Constant(v)) => Quantity::Constant(check(*v)?),
+                Some(Amount::Formula(f)) => {
+                    let all = samples.positions.iter().zip(&samples.densities);
+                    let values = all.map(|(p, d)| check(f.at(*p, *d).map_err(|e| wrong(place(), e))?));
+                    Quantity::PerSample(values.collect::<Result<_, _>>()?)
+                }
+            })
+        };
+        Ok(Self {
+            matter: Matter {
+                mass: on("mass", &material.mass, 1.0, false)?,
+                damping: on("damping", &material.damping, 0.0, true)?,
+                stiffness: on("stiffness", &material.stiffness, 1.0, true)?,
+                ground: on("ground", &material.ground, 0.0, true)?,
+                spring_factors: None,
+            },
+            rest_scale: on("rest-scale", &material.rest_scale, 1.0, true)?,
+        })
+    }
+
+    /// Lays paint on. Between the edge and where it is full the value changes linearly.
+    pub fn paint(&mut self, paint: &Paint, samples: &Samples) {
+        let quantity = match paint.substance {
+            Substance::Mass => &mut self.matter.mass,
+            Substance::Damping => &mut self.matter.damping,
+            Substance::Stiffness => &mut self.matter.stiffness,
+            Substance::Ground => &mut self.matter.ground,
+            Substance::RestScale => &mut self.rest_scale,
+        };
+        let values = quantity.paint(samples.positions.len());
+        let fade = paint.fade.map_or(0.0, |f| f.0.min(1.0)) * paint.radius.0;
+        for (value, p) in values.iter_mut().zip(&samples.positions) {
+            let inside = paint.radius.0 - distance(*p, paint);
+            if inside >= 0.0 {
+                let w = if fade > 0.0 { (inside / fade).min(1.0) } else { 1.0 };
+                *value += w * (paint.value.0 - *value);
+            }
+        }
+    }
+
+    /// Hands the matter to a region.
+    pub fn give<T: Real>(&self, region: &mut Region<T>) -> Result<(), SimulateError> {
+        let patch = region.patch_mut();
+        patch
+            .set_matter(self.matter.clone())
+            .map_err(|e| wrong("[material]", e))?;
+        patch.springs_mut().rest_mut().scale = match &self.rest_scale {
+            Quantity::Constant(s) => Weights::Constant(T::from_f64(*s)),
+            Quantity::PerSample(s) => Weights::Each(s.iter().map(|s| T::from_f64(*s)).collect()),
+        };
+        Ok(())
+    }
+}
+
+/// From a place to the ball's centre or to the stroke.
+fn distance(p: DVec3, paint: &Paint) -> f64 {
+    let points = paint.along.iter().map(|p| p.0);
+    let to_segment = |(a, b): (DVec3, DVec3)| {
+        let ab = b - a;
+        let t = if ab == DVec3::ZERO {
+            0.0
+        } else {
+            ((p - a).dot(ab) / ab.length_squared()).clamp(0.0, 1.0)
+        };
+        p.distance(a + t * ab)
+    };
+    let ends = points.clone().map(|a| p.distance(a));
+    let segments = points.clone().zip(points.skip(1)).map(to_segment);
+    ends.chain(segments).fold(f64::INFINITY, f64::min)
+}
