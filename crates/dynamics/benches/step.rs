@@ -46,8 +46,8 @@ impl Measurement for CpuTime {
     }
 }
 
-/// Steps of painted patches of up to 4096 coefficients until their factor is made.
-const SETTLED: usize = 150;
+/// Steps of painted patches until their factor is made.
+const SETTLED: usize = 200;
 
 fn patch(n: usize, m: usize, rim: Rim, contrast: f64) -> Patch<f32> {
     let lattice = Lattice::cube(n, m, rim, 1.0).expect("a lattice");

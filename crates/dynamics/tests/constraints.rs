@@ -368,7 +368,7 @@ fn hard_constraints_hold_where_coefficients_are_as_many_as_samples() {
     assert!(
         matches!(
             refused,
-            PatchError::Constraint(ConstraintError::Multigrid { limit: 100, .. })
+            PatchError::Constraint(ConstraintError::Multigrid { limit: 400, .. })
         ),
         "{refused}"
     );

@@ -97,7 +97,7 @@ fn every_method_solves_its_own_kind_of_step() {
     let cases = [
         (7, 10, Rim::Free, Pattern::Uniform, Method::FastDiagonalization),
         (9, 9, Rim::Free, Pattern::Uniform, Method::FastDiagonalization),
-        (7, 10, Rim::Free, Pattern::Bone, Method::Direct),
+        (5, 8, Rim::Free, Pattern::Bone, Method::Direct),
         (7, 7, Rim::Free, Pattern::Random, Method::SampleDirect),
         (9, 9, Rim::Free, Pattern::StiffBall, Method::SampleMultigrid),
         (9, 12, Rim::Free, Pattern::StiffBall, Method::VCycle),
@@ -110,7 +110,7 @@ fn every_method_solves_its_own_kind_of_step() {
             .map(|i| (0.31 * i as f64).sin() * (1.0 + (i % 11) as f64))
             .collect();
         let options = SolverOptions {
-            direct_limit: 500,
+            direct_limit: 180,
             iterations: 30,
             tolerance: Some(1e-12),
             ..SolverOptions::default()
@@ -188,8 +188,8 @@ fn a_factor_takes_over_when_it_is_made_and_is_renewed_when_it_is_old() {
         methods.push(report.method);
         (report.iteration.iterations, dx.clone())
     };
-    // One part of the work is the assembly, each of the others 32 rows.
-    let parts = 1 + (n * n * n).div_ceil(32);
+    // The first solve adds nothing to the V-cycle's preparation, the next assembles, each of the others takes 32 rows.
+    let parts = 2 + (n * n * n).div_ceil(32);
     for _ in 0..parts {
         solve(&mut solver, &s);
     }
@@ -225,9 +225,9 @@ fn solves_allocate_nothing_whatever_the_method() {
         (7, 10, Pattern::Uniform, Method::FastDiagonalization),
         (7, 10, Pattern::Bone, Method::Direct),
         (11, 14, Pattern::Bone, Method::VCycle),
-        (17, 20, Pattern::StiffBall, Method::VCycle),
+        (19, 22, Pattern::StiffBall, Method::VCycle),
         (7, 7, Pattern::Random, Method::SampleDirect),
-        (11, 11, Pattern::StiffBall, Method::SampleMultigrid),
+        (17, 17, Pattern::StiffBall, Method::SampleMultigrid),
     ];
     for (n, m, pattern, method) in cases {
         let lattice = Lattice::<f32>::cube(n, m, Rim::Free, 1.0).unwrap();
@@ -237,7 +237,7 @@ fn solves_allocate_nothing_whatever_the_method() {
         solver.prepare(&s).unwrap();
         let g: Vec<f32> = (0..m * m * m).map(|i| (0.1 * i as f32).sin()).collect();
         let (mut x, mut dx) = (vec![0.0; n * n * n], vec![0.0; m * m * m]);
-        // The second solve of a factor made beside the steps assembles its matrix; workspaces grow once.
+        // After the second solve the matrix of a factor made beside the steps is assembled; workspaces grow once.
         for _ in 0..2 {
             assert_eq!(solver.solve(&s, &g, &mut x, &mut dx).method, method);
         }

@@ -101,7 +101,7 @@ impl<T: Real> Patch<T> {
         let sigma2 = self.network.law().scale().powi(2);
         let (coefficients, limit) = (
             self.lattice().coefficient_count(),
-            self.solver.options().direct_limit,
+            self.solver.options().sample_direct_limit(),
         );
         // Multigrid solves to 3e-4, and A⁻¹ of a bordered solve as rough as that was seen to grow from step to step.
         if !constraints.is_empty() && self.lattice().is_square() && coefficients > limit {

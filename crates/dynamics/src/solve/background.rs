@@ -30,6 +30,8 @@ pub(super) struct Background<T> {
 /// What comes next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Work {
+    /// Nothing in the solve for which the V-cycle was prepared.
+    Prepared,
     Assembly,
     /// Rows from here on.
     Rows(usize),
@@ -47,19 +49,11 @@ impl<T: Real> Background<T> {
     ) -> Self {
         let galerkin = Galerkin::new(lattice, steps);
         Self {
-            cycle: VCycle::new(
-                lattice,
-                steps,
-                VCycleOptions {
-                    blocks: 0,
-                    degree: 3,
-                    ..options
-                },
-            ),
+            cycle: VCycle::new(lattice, steps, VCycleOptions { blocks: 0, ..options }),
             factor: BandCholesky::new(lattice.coefficient_count(), galerkin.band()),
             galerkin,
             matrix: s.clone(),
-            work: Work::Assembly,
+            work: Work::Prepared,
             slow: 0,
         }
     }
@@ -74,7 +68,7 @@ impl<T: Real> Background<T> {
             copy(&mut to.weights, &from.weights);
         }
         self.matrix.refresh();
-        self.work = Work::Assembly;
+        self.work = Work::Prepared;
         self.slow = 0;
         self.cycle.prepare(s)
     }
@@ -87,6 +81,7 @@ impl<T: Real> Background<T> {
     /// After a solve of `s`: the next part of the work, or a new factor if this one is too old.
     pub fn advance(&mut self, s: &StepMatrix<T>, report: PcgReport) {
         match self.work {
+            Work::Prepared => self.work = Work::Assembly,
             Work::Assembly => {
                 self.galerkin.assemble(&self.matrix, &mut self.factor);
                 self.work = Work::Rows(0);
@@ -111,7 +106,7 @@ impl<T: Real> Background<T> {
 
     /// All the work at once.
     pub fn finish(&mut self) {
-        while matches!(self.work, Work::Assembly | Work::Rows(_)) {
+        while !matches!(self.work, Work::Done | Work::Impossible) {
             let matrix = self.matrix.clone();
             self.advance(&matrix, PcgReport::default());
         }

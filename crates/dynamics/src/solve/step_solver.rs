@@ -22,10 +22,11 @@ pub struct SolverOptions {
     /// Residual, relative to the impulse, that ends them earlier. `None`: what the precision can reach where a solve is
     /// exact but for rounding, [`ITERATED`] where it is iterated.
     pub tolerance: Option<f64>,
-    /// Free coefficients up to which the matrix is factorized.
+    /// Free coefficients up to which the matrix is factorized; four times as many on lattices with as many samples, whose
+    /// band is a quarter as wide.
     pub direct_limit: usize,
-    /// Free coefficients up to which a factor is made beside the steps, a V-cycle solving them until it is done: 4096
-    /// take 16 MB in single precision, which is read twice a step.
+    /// Free coefficients up to which a factor is made beside the steps, a V-cycle solving them until it is done: 5832
+    /// take 33 MB in single precision, which is read twice a step.
     pub background_limit: usize,
     /// Of the V-cycle for more.
     pub v_cycle: VCycleOptions,
@@ -37,9 +38,16 @@ impl Default for SolverOptions {
             iterations: 8,
             tolerance: None,
             direct_limit: 1000,
-            background_limit: 4096,
+            background_limit: 6000,
             v_cycle: VCycleOptions::default(),
         }
+    }
+}
+
+impl SolverOptions {
+    /// Free coefficients up to which the matrix of a lattice with as many samples is factorized.
+    pub fn sample_direct_limit(&self) -> usize {
+        4 * self.direct_limit
     }
 }
 
@@ -272,7 +280,12 @@ impl<T: Real> StepSolver<T> {
     fn make_painted(&self, s: &StepMatrix<T>) -> Painted<T> {
         let [_, my, mz] = self.lattice.sample_dims();
         let (n, m) = (self.lattice.coefficient_count(), self.lattice.sample_count());
-        let few = n <= self.options.direct_limit;
+        let few = n
+            <= if self.inverse.is_some() {
+                self.options.sample_direct_limit()
+            } else {
+                self.options.direct_limit
+            };
         match (self.inverse.is_some(), few) {
             (true, true) => Painted::SampleDirect(BandCholesky::new(m, ((my + 1) * mz + 1).min(m - 1))),
             (true, false) => {

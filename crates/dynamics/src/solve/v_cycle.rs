@@ -17,7 +17,7 @@ const LOWER: f64 = 1.0 / 12.0;
 /// How a [`VCycle`] is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VCycleOptions {
-    /// Degree of the Chebyshev polynomial of the smoother.
+    /// Degree of the Chebyshev polynomial of the smoother, one more where there are no blocks.
     pub degree: usize,
     /// Coefficients up to which a level is factorized.
     pub direct_limit: usize,
@@ -31,7 +31,10 @@ pub struct VCycleOptions {
     pub block_degree: usize,
     /// Ratio within a block, of the actual diagonal to that of constant material, from which on it is solved.
     pub block_contrast: f64,
-    /// Coefficients of a level up to which it has blocks: their matrix takes 3 kB a coefficient.
+    /// The same ratio over the whole level from which on there are blocks at all: they cost several times what the rest of
+    /// a cycle does, and up to a contrast of some hundred three iterations without them do as well.
+    pub block_onset: f64,
+    /// Coefficients of the finest level up to which it has blocks: their matrix takes 3 kB a coefficient.
     pub block_limit: usize,
 }
 
@@ -45,6 +48,7 @@ impl Default for VCycleOptions {
             stride: 3,
             block_degree: 3,
             block_contrast: 3.0,
+            block_onset: 200.0,
             block_limit: 20_000,
         }
     }
@@ -132,7 +136,9 @@ impl<T: Real> VCycle<T> {
                 unit_diagonals,
                 largest_eigenvalue: 1.0,
                 variation: vec![1.0; n],
-                all: (options.blocks > 0 && n <= options.block_limit).then(|| Galerkin::new(&here, steps)),
+                // What blocks are for, material that changes within a few splines, coarse levels do not see.
+                all: (levels.is_empty() && options.blocks > 0 && n <= options.block_limit)
+                    .then(|| Galerkin::new(&here, steps)),
                 schwarz: None,
                 schwarz_eigenvalue: 1.0,
                 lanczos: Lanczos::new(n),
@@ -217,7 +223,10 @@ impl<T: Real> VCycle<T> {
             }
             self.levels[l].largest_eigenvalue = self.largest_eigenvalue(s, l, false);
             let level = &mut self.levels[l];
-            if let Some(all) = &mut level.all {
+            level.schwarz = None;
+            let range = |(low, high): (f64, f64), v: &f64| (low.min(*v), high.max(*v));
+            let (low, high) = level.variation.iter().fold((f64::INFINITY, 0.0), range);
+            if let (Some(all), true) = (&mut level.all, high > self.options.block_onset * low) {
                 all.accumulate(s);
                 let (size, stride) = (self.options.blocks, self.options.stride);
                 let blocks = Schwarz::new(all, size, stride, &level.variation, self.options.block_contrast);
@@ -309,6 +318,7 @@ impl<T: Real> VCycle<T> {
         } else {
             self.residual(s, l);
         }
+        let degree = self.options.degree + usize::from(self.levels[0].schwarz.is_none());
         let Level {
             lattice,
             smoother,
@@ -325,7 +335,7 @@ impl<T: Real> VCycle<T> {
         let (degree, largest) = if blocks {
             (self.options.block_degree, *schwarz_eigenvalue)
         } else {
-            (self.options.degree, *largest_eigenvalue)
+            (degree, *largest_eigenvalue)
         };
         let mut smoother = Smoothing {
             diagonalization: smoother,
