@@ -187,6 +187,7 @@ impl Chart {
             x_title: x_title.into(),
             y_title,
             series,
+            is_joined: true,
         }
     }
 }

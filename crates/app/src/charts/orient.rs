@@ -70,6 +70,7 @@ impl Chart {
             x_title: "processor time, s".into(),
             y_title: "normals pointing inward, % (none: drawn as half a point)".into(),
             series,
+            is_joined: false,
         }
     }
 }
