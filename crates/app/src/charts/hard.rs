@@ -70,6 +70,7 @@ impl Scene {
         let points = OrientedPoints {
             positions: &cloud.positions,
             normals: &cloud.normals,
+            certainty: None,
         };
         let (field, report) = fit_points::<f32>(&points, options, &mut Control::default())?;
         let forth = rms(self.on_truth.iter().map(|p| newton_distance(&field, *p).0));
