@@ -5,8 +5,10 @@
 # Debian needs, for the libraries that Open3D, MeshLab and VTK load at run time, and for peak memory:
 #   apt-get install python3-venv libusb-1.0-0 libgl1 libgomp1 libx11-6 libxrender1 libegl1 time
 #
-# PoissonRecon and SSDRecon themselves are in neither Debian nor PyPI; Open3D and MeshLab both carry the screened
-# Poisson reconstruction of the same authors.
+# PoissonRecon and SSDRecon themselves are in neither Debian nor PyPI (Open3D and MeshLab both carry the screened Poisson
+# reconstruction of the same authors). With g++, libpng-dev, libjpeg-dev and zlib1g-dev:
+#   git clone https://github.com/mkazhdan/PoissonRecon && make -C PoissonRecon poissonrecon ssdrecon
+#   POISSONRECON=PoissonRecon/Bin/Linux benches/peers/venv/bin/python benches/peers/compare.py ... --peers PoissonRecon:8,SSDRecon:8
 set -euo pipefail
 venv=${1:-"$(dirname "$0")/venv"}
 python3 -m venv "$venv"

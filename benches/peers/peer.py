@@ -1,11 +1,21 @@
 """One reconstruction by a peer in this process, timed without start-up, reading and writing (which favours the peer).
   peer.py NAME SETTING CLOUD.ply OUT.ply THREADS       prints one JSON object
-NAME: open3d (Poisson, depth) | apss (MeshLab, grid) | poisson (MeshLab's screened Poisson, depth)"""
+NAME: open3d (Poisson, depth) | apss (MeshLab, grid) | poisson (MeshLab's screened Poisson, depth) | PoissonRecon | SSDRecon
+(depth, or depth/samples per node; whole processes, reading and writing included, from the folder $POISSONRECON)"""
 import json, os, sys
-name, setting, cloud, out, threads = sys.argv[1], int(sys.argv[2]), sys.argv[3], sys.argv[4], int(sys.argv[5])
+name, setting, cloud, out, threads = sys.argv[1], sys.argv[2], sys.argv[3], sys.argv[4], int(sys.argv[5])
 os.environ.update(OMP_NUM_THREADS=str(threads), OMP_WAIT_POLICY='passive')
 import numpy as np
-from common import Clock, read_cloud, write_mesh
+from common import Clock, read_cloud, run, write_mesh
+if name in ('PoissonRecon', 'SSDRecon'):
+    depth, _, samples = setting.partition('/')
+    program = os.path.join(os.environ.get('POISSONRECON', ''), name)
+    done = run([program, '--in', cloud, '--out', out, '--depth', depth] + (['--samplesPerNode', samples] if samples else []))
+    if done['code']:
+        sys.exit(done['text'][-300:])
+    print(json.dumps({k: done[k] for k in ('wall', 'cpu', 'peak_mib')}), flush=True)
+    sys.exit()
+setting = int(setting)
 points, normals = read_cloud(cloud)
 if name == 'open3d':
     import open3d as o3d

@@ -21,7 +21,11 @@ use glam::{DAffine3, DVec3};
 const CELLS: u32 = 512;
 
 fn fit(positions: &[DVec3], normals: &[DVec3], depth: usize) -> HierarchicalSpline<f32> {
-    let cloud = OrientedPoints { positions, normals };
+    let cloud = OrientedPoints {
+        positions,
+        normals,
+        certainty: None,
+    };
     let options = PointOptions {
         max_depth: Some(depth),
         ..Default::default()

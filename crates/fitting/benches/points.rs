@@ -32,6 +32,7 @@ fn points(c: &mut Criterion) {
         let cloud = OrientedPoints {
             positions: &cloud.positions,
             normals: &cloud.normals,
+            certainty: None,
         };
         for depth in [6, 7, 8] {
             let options = PointOptions {

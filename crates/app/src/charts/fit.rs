@@ -189,6 +189,7 @@ impl Chart {
             y_title,
             depth: DEPTH,
             series,
+            is_joined: true,
         }
     }
 }

@@ -5,30 +5,36 @@ use fitting::points::{OrientedPoints, PointOptions, fit_points, newton_distance}
 use fitting::{Control, FitError, FitReport};
 use glam::DVec3;
 
+/// Points of a cloud.
+pub const COUNT: usize = 20_000;
+
 /// A phantom whose clouds are made hard.
 pub struct Scene {
     truth: std::sync::Arc<dyn Field>,
     within: Aabb,
+    /// The cloud before it is spoiled.
+    clean: SampledCloud,
     /// Points of the true surface, others than are fitted.
     on_truth: Vec<DVec3>,
 }
-
-/// Points of a cloud.
-pub const COUNT: usize = 50_000;
 
 impl Scene {
     /// The scene of a solid, if it has a surface.
     pub fn new(solid: Solid) -> Option<Self> {
         let (truth, within) = (solid.field(), solid.within());
-        let options = CloudOptions {
-            count: 10_000,
-            seed: 2,
-            ..Default::default()
+        let sampled = |count, seed| {
+            let options = CloudOptions {
+                count,
+                seed,
+                ..Default::default()
+            };
+            sample_cloud(&*truth, &within, &options)
         };
-        let on_truth = sample_cloud(&*truth, &within, &options)?.positions;
+        let (clean, on_truth) = (sampled(COUNT, 1)?, sampled(5000, 2)?.positions);
         Some(Self {
             truth,
             within,
+            clean,
             on_truth,
         })
     }
@@ -40,21 +46,19 @@ impl Scene {
 
     /// A cloud with noise (a share of the diagonal; normals stay exact) and with outliers beside its points, a share of
     /// their number, even in the box and facing anywhere.
-    pub fn cloud(&self, noise: f64, outliers: f64) -> Option<SampledCloud> {
-        let options = CloudOptions {
-            count: COUNT,
-            noise: noise * self.diagonal(),
-            ..Default::default()
-        };
-        let mut cloud = sample_cloud(&*self.truth, &self.within, &options)?;
+    pub fn cloud(&self, noise: f64, outliers: f64) -> SampledCloud {
+        let mut cloud = self.clean.clone();
         let mut random = SplitMix64::new(3);
+        for p in &mut cloud.positions {
+            *p += noise * self.diagonal() * random.normal3();
+        }
         for _ in 0..(outliers * COUNT as f64) as usize {
             cloud
                 .positions
                 .push(self.within.min + self.within.size() * random.uniform3());
             cloud.normals.push(random.normal3().normalize_or(DVec3::Z));
         }
-        Some(cloud)
+        cloud
     }
 
     /// Fits a cloud, and measures the rms distance between the true surface and the fitted one both ways, as a share
@@ -66,6 +70,7 @@ impl Scene {
         let points = OrientedPoints {
             positions: &cloud.positions,
             normals: &cloud.normals,
+            certainty: None,
         };
         let (field, report) = fit_points::<f32>(&points, options, &mut Control::default())?;
         let forth = rms(self.on_truth.iter().map(|p| newton_distance(&field, *p).0));
@@ -78,7 +83,12 @@ impl Scene {
         let Ok((mesh, _)) = polygonize(field, &frame, &PolygonizeOptions::default()) else {
             return f64::NAN;
         };
-        rms(mesh.positions.iter().map(|p| newton_distance(&*self.truth, *p).0))
+        let stride = mesh.positions.len().div_ceil(10_000).max(1);
+        rms(mesh
+            .positions
+            .iter()
+            .step_by(stride)
+            .map(|p| newton_distance(&*self.truth, *p).0))
     }
 }
 

@@ -26,9 +26,7 @@ pub fn noise(scene: &Scene, name: &str, mut progress: impl FnMut(f64)) -> Result
     });
     for (i, level) in LEVELS.into_iter().enumerate() {
         progress(i as f64 / LEVELS.len() as f64);
-        let Some(cloud) = scene.cloud(level / 100.0, 0.0) else {
-            continue;
-        };
+        let cloud = scene.cloud(level / 100.0, 0.0);
         let (error, report) = scene.error(&cloud, &PointOptions::default())?;
         let longest = cloud.positions.iter().fold(
             (glam::DVec3::INFINITY, glam::DVec3::NEG_INFINITY),
@@ -59,5 +57,6 @@ pub fn noise(scene: &Scene, name: &str, mut progress: impl FnMut(f64)) -> Result
         y_title: "length, % of the diagonal".into(),
         depth: DEPTH,
         series: series.into(),
+        is_joined: true,
     })
 }

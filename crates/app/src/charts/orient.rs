@@ -72,6 +72,7 @@ impl Chart {
             y_title: "normals pointing inward, % (none: drawn as half a point)".into(),
             depth: DEPTH,
             series,
+            is_joined: false,
         }
     }
 }

@@ -27,10 +27,9 @@ pub fn outliers(scene: &Scene, name: &str, mut progress: impl FnMut(f64)) -> Res
         let mut points = Vec::new();
         for (k, share) in SHARES.into_iter().enumerate() {
             progress((i * SHARES.len() + k) as f64 / (4 * SHARES.len()) as f64);
-            if let Some(cloud) = scene.cloud(noise / 100.0, share / 100.0) {
-                let (error, _) = scene.error(&cloud, &options)?;
-                points.push((share, 100.0 * error, format!("{share}%")));
-            }
+            let cloud = scene.cloud(noise / 100.0, share / 100.0);
+            let (error, _) = scene.error(&cloud, &options)?;
+            points.push((share, 100.0 * error, String::new()));
         }
         let with = if robust { "--robust" } else { "default" };
         series.push(Series {
@@ -48,5 +47,6 @@ pub fn outliers(scene: &Scene, name: &str, mut progress: impl FnMut(f64)) -> Res
         y_title: "rms distance between the surfaces, % of the diagonal".into(),
         depth: super::plot::DEPTH,
         series,
+        is_joined: true,
     })
 }

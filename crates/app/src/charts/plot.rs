@@ -9,7 +9,7 @@ use plotters::prelude::*;
 pub struct Series {
     /// Name in the legend.
     pub name: String,
-    /// `x`, `y` and a word beside the point, in the order in which they are joined.
+    /// `x`, `y` and a word beside the point, in the order in which they are joined if they are.
     pub points: Vec<(f64, f64, String)>,
 }
 
@@ -26,10 +26,14 @@ pub struct Chart {
     pub depth: f64,
     /// What is drawn; points whose coordinates are not above 0 are left out.
     pub series: Vec<Series>,
+    /// Whether lines join the points of a series: from one to the next some quantity grows.
+    pub is_joined: bool,
 }
 
 type PlotContext<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
+/// Width of a chart.
+const WIDTH: i32 = 960;
 /// Where the legend begins, from the left.
 const LEFT: i32 = 100;
 /// Height of a line of the legend.
@@ -94,7 +98,7 @@ impl Chart {
     fn draw(&self, text: &mut String) -> Result<(), Box<dyn Error + '_>> {
         let legend = self.legend_places();
         let depth = legend.last().map_or(0, |p| p.1) + ROW;
-        let root = SVGBackend::with_string(text, (960, 600 + depth as u32)).into_drawing_area();
+        let root = SVGBackend::with_string(text, (WIDTH as u32, 600 + depth as u32)).into_drawing_area();
         root.fill(&WHITE)?;
         let (above, below) = root.split_vertically(600);
         let all: Vec<_> = self.series.iter().flat_map(|s| self.logarithms(s)).collect();
@@ -111,7 +115,9 @@ impl Chart {
             let color = COLORS[i % COLORS.len()];
             let points = self.logarithms(series);
             let line: Vec<(f64, f64)> = points.iter().map(|p| (p.0, p.1)).collect();
-            chart.draw_series(LineSeries::new(line.iter().copied(), color.stroke_width(2)))?;
+            if self.is_joined {
+                chart.draw_series(LineSeries::new(line.iter().copied(), color.stroke_width(2)))?;
+            }
             // A series of one point would hide under the others.
             let radius = if line.len() == 1 { 7 } else { 4 };
             chart.draw_series(line.iter().map(|&p| Circle::new(p, radius, color.filled())))?;
@@ -224,7 +230,10 @@ fn write_words(
             (x - width / 2, y + 7),
         ];
         let free = sides.into_iter().map(|(x, y)| [x, y, x + width, y + HEIGHT]);
-        if let Some(place) = free.into_iter().find(|p| taken.iter().all(|t| !touch(p, t))) {
+        if let Some(place) = free
+            .into_iter()
+            .find(|p| p[2] < WIDTH && taken.iter().all(|t| !touch(p, t)))
+        {
             let font = ("sans-serif", 12).into_font().color(color);
             root.draw(&Text::new(word.to_string(), (place[0], place[1]), font))
                 .map_err(|e| e.to_string())?;
@@ -276,7 +285,7 @@ mod tests {
 
     #[test]
     fn chart_has_titles_legend_labels_and_every_point_that_can_be_drawn() {
-        let chart = Chart {
+        let mut chart = Chart {
             title: "Error against time".into(),
             x_title: "processor time / s".into(),
             y_title: "rms / mm".into(),
@@ -290,6 +299,7 @@ mod tests {
                     (0.2, 1e-12, "f64".into()),
                 ],
             }],
+            is_joined: true,
         };
         let svg = chart.svg().unwrap();
         for word in [
@@ -303,6 +313,9 @@ mod tests {
         }
         assert!(!svg.contains("never"));
         assert!(svg.contains("not drawn: f64: 1e-12 at 0.20"));
+        chart.is_joined = false;
+        let lines = |svg: &str| svg.matches("<polyline").count();
+        assert_eq!(lines(&chart.svg().unwrap()) + 1, lines(&svg));
         // The marker of the legend and the two points.
         assert_eq!(svg.matches("<circle").count(), 3);
     }

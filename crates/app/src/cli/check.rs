@@ -3,6 +3,7 @@ use std::path::{Path, PathBuf};
 
 use fitting::mesh::MeshDistance;
 use fitting::{Cancel, StopReason, UnsupportedComponent, unsupported_components};
+use formats::field::SourceKind;
 use formats::meshes::TriangleMesh;
 use formats::points::PointCloud;
 use formats::volumes::Volume;
@@ -100,6 +101,12 @@ pub fn run(args: &Args) -> Outcome {
         notes.push(format!(
             "{} leaves are above the tolerance although the fit calls them below",
             audit.claimed_below
+        ));
+    }
+    let invented = leaves.iter().filter(|l| l.sample_count == 0).count();
+    if invented > 0 && open.source() == SourceKind::Cloud {
+        notes.push(format!(
+            "{invented} leaves hold surface, but no sample: it is invented there (isoclay mesh tells its area)"
         ));
     }
     notes.extend(measured.unsupported.iter().map(|c| {

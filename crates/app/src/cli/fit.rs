@@ -226,6 +226,7 @@ fn fit_cloud<T: Stored>(cloud: &PointCloud, choice: &Choice, control: &mut Contr
     let points = OrientedPoints {
         positions: oriented.positions(),
         normals: oriented.normals(),
+        certainty: oriented.certainty(),
     };
     let diagonal = points.diagonal();
     let options = PointOptions {

@@ -16,10 +16,18 @@ pub enum Unoriented {
     Tagging,
 }
 
+/// What lies on a surface.
+struct Kept {
+    positions: Vec<DVec3>,
+    normals: Vec<DVec3>,
+    certainty: Vec<f32>,
+    orientation: Orientation,
+}
+
 /// The points that a fit may use, with normals.
 pub struct Oriented<'a> {
     cloud: &'a PointCloud,
-    kept: Option<(Vec<DVec3>, Vec<DVec3>, Orientation)>,
+    kept: Option<Kept>,
 }
 
 impl<'a> Oriented<'a> {
@@ -47,41 +55,46 @@ impl<'a> Oriented<'a> {
                 .notes
                 .insert(0, "--unoriented: the normals of the file were not used".into());
         }
-        let kept = |all: &[DVec3]| {
-            let on_surface = all.iter().zip(&orientation.outlier).filter(|p| !p.1);
-            on_surface.map(|p| *p.0).collect::<Vec<_>>()
+        let kept = Kept {
+            positions: orientation.on_surface(&cloud.positions),
+            normals: orientation.on_surface(&orientation.normals),
+            certainty: orientation.on_surface(&orientation.certainty),
+            orientation,
         };
-        let (positions, normals) = (kept(&cloud.positions), kept(&orientation.normals));
         Ok(Self {
             cloud,
-            kept: Some((positions, normals, orientation)),
+            kept: Some(kept),
         })
     }
 
     /// Positions of the points to fit.
     pub fn positions(&self) -> &[DVec3] {
-        self.kept.as_ref().map_or(&self.cloud.positions, |k| &k.0)
+        self.kept.as_ref().map_or(&self.cloud.positions, |k| &k.positions)
     }
 
     /// Their normals.
     pub fn normals(&self) -> &[DVec3] {
         let given = || self.cloud.normals.as_deref().unwrap_or_default();
-        self.kept.as_ref().map_or_else(given, |k| &k.1)
+        self.kept.as_ref().map_or_else(given, |k| &k.normals)
+    }
+
+    /// How far to trust their directions, if they were estimated.
+    pub fn certainty(&self) -> Option<&[f32]> {
+        self.kept.as_ref().map(|k| &k.certainty[..])
     }
 
     /// Tells in the report of the fit how the normals were found.
     pub fn complete(self, report: &mut FitReport, lattice: &Lattice) {
-        let Some((positions, _, orientation)) = self.kept else {
+        let Some(Kept {
+            positions,
+            orientation,
+            ..
+        }) = self.kept
+        else {
             return;
         };
         report.input_count = self.cloud.positions.len();
-        let confidence: Vec<f32> = orientation
-            .confidence
-            .iter()
-            .zip(&orientation.outlier)
-            .filter(|c| !c.1)
-            .map(|c| *c.0)
-            .collect();
+        let confidence = orientation.on_surface(&orientation.confidence);
         report.signs = Some(SignReport {
             route: orientation.route,
             outlier_count: orientation.outlier.iter().filter(|o| **o).count(),

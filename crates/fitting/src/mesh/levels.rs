@@ -369,6 +369,7 @@ impl Octree<'_> {
                 },
                 weight: T::from_f64(f64::from(weight)),
                 gradient_weight: T::from_f64(if has_gradient { f64::from(weight) } else { 0.0 }),
+                tangential: T::one(),
                 target: T::from_f64(probe.value),
                 normal: probe.normal.map(|c| T::from_f64(f64::from(c))),
             });

@@ -22,6 +22,8 @@ pub(crate) struct Surroundings {
     pub spread: f64,
     /// Distance of the point from the quadric of its neighbours.
     pub residual: f64,
+    /// Standard error of the direction of the normal, radians: that of the slopes of the quadric.
+    pub doubt: f64,
 }
 
 impl<'a> Neighbours<'a> {
@@ -77,22 +79,28 @@ fn surroundings(near: &[(DVec3, f64)]) -> Surroundings {
     let mut order = [0, 1, 2];
     order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
     let [normal, e1, e2] = order.map(|i| DVec3::from_slice(eigen.eigenvectors.column(i).as_slice()));
-    let (tilt, height) = quadric(around, reach2, [e1, e2, normal]).unwrap_or((DVec3::Z, 0.0));
+    let (tilt, height, doubt) = quadric(around, reach2, [e1, e2, normal]).unwrap_or((DVec3::Z, 0.0, 1.0));
     Surroundings {
         normal: (e1 * tilt.x + e2 * tilt.y + normal * tilt.z).normalize_or(normal),
         spread: around.iter().map(|p| p.1).sum::<f64>() / n,
         residual: height.abs(),
+        doubt,
     }
 }
 
-/// Normal (in the frame) and height at the origin of the height field `h(x, y)` of second degree that is nearest
+/// Normal (in the frame), height at the origin and standard error of the slopes of the height field `h(x, y)` of second degree that is nearest
 /// to the points, with Gaussian weights of a standard deviation of half the reach.
-fn quadric(around: &[(DVec3, f64)], reach2: f64, [e1, e2, e3]: [DVec3; 3]) -> Option<(DVec3, f64)> {
+fn quadric(around: &[(DVec3, f64)], reach2: f64, [e1, e2, e3]: [DVec3; 3]) -> Option<(DVec3, f64, f64)> {
     if around.len() < 8 {
         return None;
     }
     let scale = reach2.sqrt();
-    let (mut matrix, mut right) = (SMatrix::<f64, 6, 6>::zeros(), SVector::<f64, 6>::zeros());
+    let (mut matrix, mut right, mut square, mut total) = (
+        SMatrix::<f64, 6, 6>::zeros(),
+        SVector::<f64, 6>::zeros(),
+        0.0,
+        0.0,
+    );
     for (d, d2) in around {
         let (x, y, z) = (d.dot(e1) / scale, d.dot(e2) / scale, d.dot(e3) / scale);
         let weight = (-2.0 * d2 / reach2).exp();
@@ -104,11 +112,18 @@ fn quadric(around: &[(DVec3, f64)], reach2: f64, [e1, e2, e3]: [DVec3; 3]) -> Op
             }
             right[i] += weighted[i] * z;
         }
+        square += weight * z * z;
+        total += weight;
     }
     let trace = matrix.trace();
     for i in 0..6 {
         matrix[(i, i)] += 1e-9 * trace;
     }
-    let h = matrix.cholesky()?.solve(&right);
-    Some((DVec3::new(-h[1], -h[2], 1.0), h[0] * scale))
+    let factor = matrix.cholesky()?;
+    let h = factor.solve(&right);
+    // As for points of equal weights, of which as many count as the weights add up to.
+    let variance = (square - h.dot(&right)).max(0.0) / (total * (1.0 - 6.0 / around.len() as f64)).max(1e-9);
+    let inverse = factor.inverse();
+    let doubt = (variance * (inverse[(1, 1)] + inverse[(2, 2)])).sqrt();
+    Some((DVec3::new(-h[1], -h[2], 1.0), h[0] * scale, doubt))
 }

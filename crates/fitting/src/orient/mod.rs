@@ -64,6 +64,8 @@ pub struct Orientation {
     /// Confidence in the sign of each, 0 to 1: how far the winding number is from ½ on both sides of the point, on
     /// the right side each.
     pub confidence: Vec<f32>,
+    /// How far to trust the direction of each, 0 to 1; see [`OrientedPoints::certainty`](crate::points::OrientedPoints).
+    pub certainty: Vec<f32>,
     /// Points that no surface passes through.
     pub outlier: Vec<bool>,
     /// How it was done.
@@ -74,6 +76,14 @@ pub struct Orientation {
     pub unsure_count: usize,
     /// Repairs and doubts, each a sentence with its figures.
     pub notes: Vec<String>,
+}
+
+impl Orientation {
+    /// Of a list with an entry for every point, those of points that are no outliers.
+    pub fn on_surface<T: Copy>(&self, all: &[T]) -> Vec<T> {
+        let kept = all.iter().zip(&self.outlier).filter(|p| !p.1);
+        kept.map(|p| *p.0).collect()
+    }
 }
 
 /// Confidence below which a sign is called unsure.
@@ -210,22 +220,25 @@ fn assemble(
     let mut out = Orientation {
         normals: vec![DVec3::ZERO; given],
         confidence: vec![0.0; given],
+        certainty: vec![0.0; given],
         outlier: vec![true; given],
         route,
         noise: surface.noise.map(|s| s * cloud.scale),
         unsure_count: 0,
         notes: cloud.notes.clone(),
     };
-    for ((&i, n), c) in kept.iter().zip(signed).zip(confidence) {
+    for (k, &i) in kept.iter().enumerate() {
         let at = cloud.source[i] as usize;
-        out.normals[at] = *n;
-        out.confidence[at] = *c;
+        out.normals[at] = signed[k];
+        out.confidence[at] = confidence[k];
+        out.certainty[at] = surface.certainty(k);
         out.outlier[at] = false;
     }
     for &(double, i) in &cloud.doubles {
         let (at, first) = (double as usize, cloud.source[i as usize] as usize);
         out.normals[at] = out.normals[first];
         out.confidence[at] = out.confidence[first];
+        out.certainty[at] = out.certainty[first];
         out.outlier[at] = out.outlier[first];
     }
     out.unsure_count = (0..given)

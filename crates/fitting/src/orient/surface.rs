@@ -17,6 +17,10 @@ const NEGLIGIBLE_NOISE: f64 = 1e-4;
 const WIDTHS_BY_SPACING: [f64; 3] = [4.0, 0.7, 0.7];
 /// The same by the standard deviation of the noise; the larger counts.
 const WIDTHS_BY_NOISE: [f64; 3] = [10.0, 2.5, 2.5];
+/// Standard error of a direction, radians, at which it counts half. On a scan that thins out to a thirtieth 0.1, 0.03 and
+/// 0.01 leave 1.53, 1.34 and 1.22 u in the median (1.64 if all are trusted).
+const SURE: f64 = 0.03;
+
 /// What is known of the surface before any sign.
 pub(crate) struct Surface {
     pub around: Vec<Surroundings>,
@@ -58,6 +62,15 @@ impl Surface {
             areas: areas(&around, count),
             around,
             noise,
+        }
+    }
+
+    /// How far to trust the direction of the normal of point `index`, 0 to 1.
+    pub fn certainty(&self, index: usize) -> f32 {
+        match self.noise {
+            // The first of two fits only finds the sheets, the second takes its normals from there.
+            Some(_) => 1.0,
+            None => (1.0 / (1.0 + (self.around[index].doubt / SURE).powi(2))) as f32,
         }
     }
 

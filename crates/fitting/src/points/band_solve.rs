@@ -1,7 +1,8 @@
 //! Least squares on one surface level, by Jacobi-preconditioned conjugate gradients without a matrix.
 //!
 //! Energy (unit box): `Σ_k w_k [(f(x_k) - d_k)² + β²|∇f(x_k) + n_k|²] + μ Σ_i (Δ C_i)²`, `Δ` the seven-point Laplacian
-//! of the level's totals, a stencil counted where all its taps exist. The unknowns are the corrections of the
+//! of the level's totals, a stencil counted where all its taps exist. Of `|∇f + n|²` the part across `n` counts by the
+//! certainty of its direction: along `n`, an error of angle `θ` is one of `θ²/2` only. The unknowns are the corrections of the
 //! active functions; the penalty sees the whole field, so the coarser levels' part is on the right-hand side.
 
 use bspline::Real;
@@ -23,10 +24,22 @@ pub(crate) struct BandSample<T> {
     pub weight: T,
     /// Weight of the gradient condition: `weight`, or 0 for a condition on the value alone.
     pub gradient_weight: T,
+    /// Share of `gradient_weight` for the part of the gradient across the normal.
+    pub tangential: T,
     /// Value asked for.
     pub target: T,
     /// Outward unit normal.
     pub normal: [T; 3],
+}
+
+impl<T: Real> BandSample<T> {
+    /// `g`, its part across the normal by its share.
+    #[inline(always)]
+    fn weigh(&self, g: [T; 3]) -> [T; 3] {
+        let n = self.normal;
+        let along = (T::one() - self.tangential) * (n[0] * g[0] + n[1] * g[1] + n[2] * g[2]);
+        std::array::from_fn(|a| self.tangential * g[a] + along * n[a])
+    }
 }
 
 /// The samples of one brick: `samples[start..end]`.
@@ -140,7 +153,8 @@ impl<'a, T: Real> BandProblem<'a, T> {
         let gw = self.gradient_weight();
         self.data_halos(dense, &mut scratch.halos, |sample, v, g, out| {
             let slope = sample.gradient_weight * gw;
-            scatter(out, sample.spot, STRIDES, sample.weight * v, g.map(|g| slope * g));
+            let g = sample.weigh(g).map(|g| slope * g);
+            scatter(out, sample.spot, STRIDES, sample.weight * v, g);
         });
         self.laplacians(dense, &mut scratch.laplacians);
         self.gathered(scratch, T::one())
@@ -153,7 +167,8 @@ impl<'a, T: Real> BandProblem<'a, T> {
         let mut scratch = Scratch::default();
         self.data_halos(&self.band.totals, &mut scratch.halos, |sample, v, g, out| {
             let slope = sample.gradient_weight * gw;
-            let miss = std::array::from_fn(|a| slope * (g[a] + h * sample.normal[a]));
+            let miss = std::array::from_fn(|a| g[a] + h * sample.normal[a]);
+            let miss = sample.weigh(miss).map(|m| slope * m);
             scatter(
                 out,
                 sample.spot,
@@ -252,13 +267,10 @@ impl<'a, T: Real> BandProblem<'a, T> {
         let gw = self.gradient_weight();
         let mut scratch = Scratch::default();
         self.data_halos(&self.band.totals, &mut scratch.halos, |sample, _, _, out| {
-            scatter_squares(
-                out,
-                sample.spot,
-                STRIDES,
-                sample.weight,
-                [sample.gradient_weight * gw; 3],
-            );
+            let slope = sample.gradient_weight * gw;
+            let along = (T::one() - sample.tangential) * slope;
+            let squares = sample.normal.map(|n| sample.tangential * slope + along * n * n);
+            scatter_squares(out, sample.spot, STRIDES, sample.weight, squares);
         });
         scratch.laplacians.resize(self.band.totals.len(), T::zero());
         let mut diagonal = self.gathered(&scratch, T::one());

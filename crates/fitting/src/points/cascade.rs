@@ -195,6 +195,7 @@ fn band_samples<T: Real>(
                 spot: Spot { start, t },
                 weight,
                 gradient_weight,
+                tangential: T::from_f64(f64::from(samples.certainty[i])),
                 target: T::from_f64(target as f64),
                 normal: normal.map(|c| T::from_f64(c as f64)),
             });

@@ -45,6 +45,7 @@ fn iterations_hardly_grow_with_depth() {
     let samples = Samples::prepare(OrientedPoints {
         positions: &cloud.positions,
         normals: &cloud.normals,
+        certainty: None,
     })
     .expect("a clean cloud");
     let counts = iterations(&samples, [6, 7, 8, 9]);

@@ -8,6 +8,7 @@ mod cells;
 mod clusters;
 mod coarse;
 mod cross_validation;
+mod directions;
 mod far_field;
 mod feet;
 pub(crate) mod full_grid;
@@ -90,6 +91,9 @@ pub fn fit_points<T: Real>(
     };
     drop(tree);
     let mut plan = Plan::new(&samples, options, tolerance, noise);
+    if noise.is_none() && directions::are_doubtful(&samples) {
+        directions::refine::<T>(&mut samples, &plan, control)?;
+    }
     control.step("fitting coarse levels", 0.05)?;
     let base = if options.robust {
         robust::reweigh::<T>(&mut samples, &plan, control)?

@@ -64,6 +64,7 @@ pub(crate) fn with_offset_pairs(samples: &Samples, tree: &Tree, spacing: f64) ->
                 normal: [0.0; 3],
                 target: own.target - *d as f32,
                 weight: own.weight,
+                certainty: 1.0,
             });
         }
     }

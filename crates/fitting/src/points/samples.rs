@@ -12,6 +12,9 @@ pub struct OrientedPoints<'a> {
     pub positions: &'a [DVec3],
     /// One normal per position.
     pub normals: &'a [DVec3],
+    /// How far to trust the direction of each normal, 0 to 1, where they were estimated: the share that the part of the
+    /// gradient across the normal has in the fit.
+    pub certainty: Option<&'a [f32]>,
 }
 
 impl OrientedPoints<'_> {
@@ -53,6 +56,8 @@ pub(crate) struct Entry {
     pub target: f32,
     /// Share in the fit.
     pub weight: f32,
+    /// Share of the part of the gradient across the normal.
+    pub certainty: f32,
 }
 
 /// The usable samples in Morton order of their position.
@@ -66,6 +71,8 @@ pub(crate) struct Samples {
     pub targets: Vec<f32>,
     /// Share of each sample in the fit, `0..=1`; 0 for points that are measured but not fitted.
     pub weights: Vec<f32>,
+    /// Of that, the share of the part of the gradient across the normal, `0..=1`.
+    pub certainty: Vec<f32>,
     /// Where the points were measured, unit box, if they were moved from there.
     measured: Option<Vec<DVec3>>,
     /// Edge of the (cubic) box in world units.
@@ -149,11 +156,16 @@ impl Samples {
         let unit = |n: DVec3| (n / n.abs().max_element()).normalize().as_vec3().to_array();
         let normals = keyed.iter().map(|k| unit(cloud.normals[k.1 as usize])).collect();
         let targets = vec![0.0; keyed.len()];
+        let certainty = keyed
+            .iter()
+            .map(|k| cloud.certainty.map_or(1.0, |c| c[k.1 as usize].clamp(0.0, 1.0)))
+            .collect();
         Ok(Self {
             positions,
             normals,
             targets,
             weights: vec![1.0; keyed.len()],
+            certainty,
             measured: None,
             scale,
             origin,
@@ -198,6 +210,7 @@ impl Samples {
             normal: self.normals[index],
             target: self.targets[index],
             weight: self.weights[index],
+            certainty: self.certainty[index],
         }
     }
 
@@ -212,6 +225,7 @@ impl Samples {
             normals: sorted().map(|e| e.normal).collect(),
             targets: sorted().map(|e| e.target).collect(),
             weights: sorted().map(|e| e.weight).collect(),
+            certainty: sorted().map(|e| e.certainty).collect(),
             measured: is_moved.then(|| sorted().map(|e| e.measured).collect()),
             notes: self.notes.clone(),
             ..*self
@@ -227,6 +241,7 @@ impl Samples {
             normal: [0.0; 3],
             target,
             weight: 1.0,
+            certainty: 1.0,
         }));
         self.with_entries(entries)
     }

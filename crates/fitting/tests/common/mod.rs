@@ -22,6 +22,7 @@ pub fn oriented(cloud: &SampledCloud) -> OrientedPoints<'_> {
     OrientedPoints {
         positions: &cloud.positions,
         normals: &cloud.normals,
+        certainty: None,
     }
 }
 
