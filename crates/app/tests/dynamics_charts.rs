@@ -25,12 +25,19 @@ fn lines_have_all_figures_and_show_what_the_default_gains_over_plain_iterations(
     let bench = Bench::new();
     let run = bench.run("charts dynamics --quick --json -o charts");
     assert_eq!(run.code, 0, "{}", run.stderr);
-    let lines: Vec<Value> = run.stdout.lines().map(|l| serde_json::from_str(l).unwrap()).collect();
+    let lines: Vec<Value> = run
+        .stdout
+        .lines()
+        .map(|l| serde_json::from_str(l).unwrap())
+        .collect();
     for line in &lines {
         let object = line.as_object().unwrap();
         assert!(KEYS.iter().all(|k| object.contains_key(*k)), "{line}");
         assert_eq!(object.len(), 12 + usize::from(line["default"] == true), "{line}");
-        assert!(number(line, "step_seconds") > 0.0 && number(line, "increment_error") >= 0.0, "{line}");
+        assert!(
+            number(line, "step_seconds") > 0.0 && number(line, "increment_error") >= 0.0,
+            "{line}"
+        );
     }
     // What is demanded of the default step: small patches ≤ 0.1 %, uniform ones ≤ 1e-5, within 8 iterations.
     let default: Vec<&Value> = lines.iter().filter(|l| l["default"] == true).collect();
@@ -42,11 +49,19 @@ fn lines_have_all_figures_and_show_what_the_default_gains_over_plain_iterations(
         assert_eq!(line["law"], "linear", "{line}");
     }
     // Two plain iterations, as the source paper has them, do not get there.
-    let plain = |l: &&Value| l["preconditioner"] == "none" && l["iterations"] == 2 && number(l, "contrast") >= 100.0;
+    let plain =
+        |l: &&Value| l["preconditioner"] == "none" && l["iterations"] == 2 && number(l, "contrast") >= 100.0;
     let mut paper = lines.iter().filter(plain).peekable();
     assert!(paper.peek().is_some());
     assert!(paper.all(|l| number(l, "increment_error") > 0.1));
-    for name in ["table2", "materials", "steps", "solvers-100", "anisotropy", "cost"] {
+    for name in [
+        "table2",
+        "materials",
+        "steps",
+        "solvers-100",
+        "anisotropy",
+        "cost",
+    ] {
         let svg = std::fs::read_to_string(bench.path(&format!("charts/dynamics-{name}.svg"))).unwrap();
         assert!(svg.starts_with("<svg") && svg.contains("<circle"), "{name}");
     }

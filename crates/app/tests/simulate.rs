@@ -37,9 +37,15 @@ impl Ball {
     /// Runs a scene; the objects of its steps and the last one.
     fn play(&self, scene: &str, options: &str) -> (Vec<Value>, Value) {
         self.0.write("scene.toml", scene);
-        let run = self.0.run(&format!("simulate scene.toml -o moved.iclay --json {options}"));
+        let run = self
+            .0
+            .run(&format!("simulate scene.toml -o moved.iclay --json {options}"));
         assert_eq!(run.code, 0, "{}", run.stderr);
-        let mut lines: Vec<Value> = run.stdout.lines().map(|l| serde_json::from_str(l).unwrap()).collect();
+        let mut lines: Vec<Value> = run
+            .stdout
+            .lines()
+            .map(|l| serde_json::from_str(l).unwrap())
+            .collect();
         let last = lines.pop().unwrap();
         (lines, last)
     }
@@ -56,32 +62,53 @@ impl Ball {
 }
 
 /// Well beside the region of [`SCENE`] and on its border.
-const OUTSIDE: [[f64; 3]; 4] = [[0.0, 0.0, -1.0], [0.9, 0.3, 0.2], [-0.7, -0.7, 0.1], [0.0, 1.0, 0.0]];
+const OUTSIDE: [[f64; 3]; 4] = [
+    [0.0, 0.0, -1.0],
+    [0.9, 0.3, 0.2],
+    [-0.7, -0.7, 0.1],
+    [0.0, 1.0, 0.0],
+];
 
 #[test]
 fn a_pull_moves_the_surface_towards_it_and_nothing_beside_the_region() {
     let ball = Ball::new();
     let (steps, last) = ball.play(SCENE, "--mesh moved.ply");
     assert_eq!(steps.len(), 20);
-    assert!(steps.iter().all(|s| s["awake"] == true && number(s, "iterations") <= 8.0));
+    assert!(
+        steps
+            .iter()
+            .all(|s| s["awake"] == true && number(s, "iterations") <= 8.0)
+    );
     assert!((number(&steps[19], "time") - 1.0).abs() < 1e-12);
     let tip = [[0.0, 0.0, 1.0], [0.0, 0.0, 1.02]];
     assert!(ball.values("ball.iclay", &tip)[0].abs() < 1e-4);
     // The surface has passed 1.02.
     assert!(ball.values("moved.iclay", &tip)[1] > 0.0);
-    assert_eq!(ball.values("ball.iclay", &OUTSIDE), ball.values("moved.iclay", &OUTSIDE));
+    assert_eq!(
+        ball.values("ball.iclay", &OUTSIDE),
+        ball.values("moved.iclay", &OUTSIDE)
+    );
     let mesh = common::read_mesh(&ball.0.path("moved.ply"));
     let highest = mesh.positions.iter().map(|p| p.z).fold(0.0, f64::max);
     let lowest = mesh.positions.iter().map(|p| p.z).fold(0.0, f64::min);
-    assert!(highest > 1.02 && (lowest + 1.0).abs() < 1e-3, "{highest} {lowest}");
+    assert!(
+        highest > 1.02 && (lowest + 1.0).abs() < 1e-3,
+        "{highest} {lowest}"
+    );
     // What is not damped is left: damping only takes.
     let (energy, work) = (
         number(&steps[19], "kinetic") + number(&steps[19], "potential"),
         number(&steps[19], "work"),
     );
-    assert!(energy > 0.0 && energy <= work * (1.0 + 1e-5), "{energy} of {work}");
+    assert!(
+        energy > 0.0 && energy <= work * (1.0 + 1e-5),
+        "{energy} of {work}"
+    );
     assert_eq!(number(&last, "work"), work);
-    assert_eq!(ball.0.json("info moved.iclay")["unit"], ball.0.json("info ball.iclay")["unit"]);
+    assert_eq!(
+        ball.0.json("info moved.iclay")["unit"],
+        ball.0.json("info ball.iclay")["unit"]
+    );
 }
 
 #[test]
@@ -95,14 +122,19 @@ fn a_pushed_ball_is_dented() {
 fn twice_the_force_moves_twice_as_far_and_twice_the_stiffness_half() {
     let ball = Ball::new();
     // Held until it rests: the static deflection of the linear law.
-    let long = SCENE.replace("duration = 1.0", "duration = 20.0").replace("step = 0.05", "step = 1.0");
+    let long = SCENE
+        .replace("duration = 1.0", "duration = 20.0")
+        .replace("step = 0.05", "step = 1.0");
     let deflection = |scene: &str| number(&ball.play(scene, "").1, "max_change");
     let once = deflection(&long);
     let force = deflection(&long.replace("strength = 0.4", "strength = 0.8"));
     let stiff = deflection(&long.replace("[material]", "[material]\nstiffness = 2"));
     let by_formula = deflection(&long.replace("[material]", "[material]\nstiffness = \"1 + 1^x + 0*d\""));
-    for (name, ratio) in [("force", force / once / 2.0), ("stiffness", 2.0 * stiff / once), ("formula", by_formula / stiff)]
-    {
+    for (name, ratio) in [
+        ("force", force / once / 2.0),
+        ("stiffness", 2.0 * stiff / once),
+        ("formula", by_formula / stiff),
+    ] {
         assert!((ratio - 1.0).abs() < 1e-3, "{name}: {ratio}");
     }
     // The surface stays where it is held.
@@ -163,9 +195,15 @@ rate = 1
 fn frames_show_the_motion() {
     let ball = Ball::new();
     ball.0.write("scene.toml", SCENE);
-    let run = ball.0.run("simulate scene.toml -o moved.iclay --frames frames --every 10");
+    let run = ball
+        .0
+        .run("simulate scene.toml -o moved.iclay --frames frames --every 10");
     assert_eq!(run.code, 0, "{}", run.stderr);
-    assert!(run.stdout.contains("steps") && run.stdout.contains("awake"), "{}", run.stdout);
+    assert!(
+        run.stdout.contains("steps") && run.stdout.contains("awake"),
+        "{}",
+        run.stdout
+    );
     let height = |n: usize| {
         let mesh = common::read_mesh(&ball.0.path(&format!("frames/frame-{n:05}.ply")));
         mesh.positions.iter().map(|p| p.z).fold(0.0, f64::max)
@@ -201,25 +239,73 @@ fn what_cannot_be_is_refused_by_line_or_table_with_a_remedy_and_writes_nothing()
         ("mass = 0.05", "mass = \"1/(x-x)\"", ["[material] mass", "finite"]),
         ("mass = 0.05", "mass = \"x^^2\"", ["line 8", "max(a, b)"]),
         ("mass = 0.05", "maas = 1", ["line 8", "maas"]),
-        ("damping = 1.0", "damping = \"w\"", ["line 9", "nothing is called w"]),
-        ("max = [0.5, 0.5, 1.14]", "max = [0.5, 0.5, 9]", ["[region]", "outside the field"]),
-        ("max = [0.5, 0.5, 1.14]", "max = [0.5, -0.6, 1.14]", ["[region]", "below max"]),
+        (
+            "damping = 1.0",
+            "damping = \"w\"",
+            ["line 9", "nothing is called w"],
+        ),
+        (
+            "max = [0.5, 0.5, 1.14]",
+            "max = [0.5, 0.5, 9]",
+            ["[region]", "outside the field"],
+        ),
+        (
+            "max = [0.5, 0.5, 1.14]",
+            "max = [0.5, -0.6, 1.14]",
+            ["[region]", "below max"],
+        ),
         ("max = [0.5, 0.5, 1.14]", "", ["[region]", "first and count"]),
         ("level = 0", "level = 60", ["[region]", "60"]),
-        ("level = 0", "level = 0\nsamples-per-cell = 0", ["line 7", "positive"]),
+        (
+            "level = 0",
+            "level = 0\nsamples-per-cell = 0",
+            ["line 7", "positive"],
+        ),
         ("radius = 0.12", "radius = 0", ["line 12", "positive"]),
-        ("radius = 0.12", "radius = 1e-4", ["[[pull]] 1 radius", "no sample"]),
-        ("at = [0.0, 0.0, 1.0]", "at = [0, 0, 5]", ["[[pull]] 1 at", "outside the region"]),
+        (
+            "radius = 0.12",
+            "radius = 1e-4",
+            ["[[pull]] 1 radius", "no sample"],
+        ),
+        (
+            "at = [0.0, 0.0, 1.0]",
+            "at = [0, 0, 5]",
+            ["[[pull]] 1 at", "outside the region"],
+        ),
         ("strength = 0.4", "strength = inf", ["line 13", "finite"]),
-        ("strength = 0.4", "strength = 1\nwhen = { from = 2, until = 1 }", ["[[pull]] 1 when", "after it begins"]),
+        (
+            "strength = 0.4",
+            "strength = 1\nwhen = { from = 2, until = 1 }",
+            ["[[pull]] 1 when", "after it begins"],
+        ),
         ("duration = 1.0", "duration = 0", ["line 15", "positive"]),
         ("step = 0.05", "step = 2", ["[time] step", "longer"]),
         ("step = 0.05", "step = 1e-9", ["[time] step", "10 million"]),
-        ("step = 0.05", "step = 0.5\nintegrator = \"symplectic\"", ["unstable beyond", "sub-steps"]),
-        ("step = 0.05", "step = 0.5\nintegrator = \"euler\"", ["line 17", "tr-bdf2"]),
-        ("step = 0.05", "step = 0.5\ntolerance = 1", ["[time] tolerance", "adaptive"]),
-        ("step = 0.05", "step = 0.5\n[release]\nat = 3\nas = \"clay\"", ["[release] at", "after the end"]),
-        ("step = 0.05", "step = 0.5\n[law]\nneighbours = 7", ["[law] neighbours", "26"]),
+        (
+            "step = 0.05",
+            "step = 0.5\nintegrator = \"symplectic\"",
+            ["unstable beyond", "sub-steps"],
+        ),
+        (
+            "step = 0.05",
+            "step = 0.5\nintegrator = \"euler\"",
+            ["line 17", "tr-bdf2"],
+        ),
+        (
+            "step = 0.05",
+            "step = 0.5\ntolerance = 1",
+            ["[time] tolerance", "adaptive"],
+        ),
+        (
+            "step = 0.05",
+            "step = 0.5\n[release]\nat = 3\nas = \"clay\"",
+            ["[release] at", "after the end"],
+        ),
+        (
+            "step = 0.05",
+            "step = 0.5\n[law]\nneighbours = 7",
+            ["[law] neighbours", "26"],
+        ),
         (
             "step = 0.05",
             "step = 0.5\n[[constraint]]\nname = \"a\"\nalong = [[0,0,1]]\n[[constraint]]\nname = \"b\"\nalong = [[0,0,1]]\ndensity = 0.1",
@@ -235,7 +321,11 @@ fn what_cannot_be_is_refused_by_line_or_table_with_a_remedy_and_writes_nothing()
             "step = 0.5\n[[paint]]\nsubstance = \"mass\"\nvalue = 0\nalong = [[0,0,1]]\nradius = 1",
             ["[[paint]] 1", "above 0"],
         ),
-        ("field = \"ball.iclay\"", "field = \"none.iclay\"", ["none.iclay", "No such file"]),
+        (
+            "field = \"ball.iclay\"",
+            "field = \"none.iclay\"",
+            ["none.iclay", "No such file"],
+        ),
         ("field = \"ball.iclay\"", "field = 3", ["line 2", "string"]),
     ];
     for (from, to, words) in cases {
@@ -256,11 +346,16 @@ fn the_example_pulls_a_hump_out_of_the_bunny() {
     let bench = Bench::new();
     bench.json(&format!("fit {} -o bunny.iclay", data("bunny.obj.gz")));
     let scene = data("bunny-pull.toml");
-    let last = bench.json(&format!("simulate {scene} --field bunny.iclay -o pulled.iclay --mesh pulled.ply"));
+    let last = bench.json(&format!(
+        "simulate {scene} --field bunny.iclay -o pulled.iclay --mesh pulled.ply"
+    ));
     assert!(number(&last, "max_change") > 0.6, "{last}");
     let mesh = common::read_mesh(&bench.path("pulled.ply"));
     // The back, whose height was 6.3; the ears are elsewhere.
-    let on_the_back = mesh.positions.iter().filter(|p| (p.x - 1.25).abs() < 0.5 && (p.z - 1.0).abs() < 0.5);
+    let on_the_back = mesh
+        .positions
+        .iter()
+        .filter(|p| (p.x - 1.25).abs() < 0.5 && (p.z - 1.0).abs() < 0.5);
     let height = on_the_back.map(|p| p.y).fold(0.0, f64::max);
     assert!((6.8..7.5).contains(&height), "{height}");
 }

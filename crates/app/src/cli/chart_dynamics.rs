@@ -66,7 +66,11 @@ pub fn run(args: &Args, cancel: &Cancel) -> Outcome {
     charts.extend(Chart::of_sampling(&profiles));
     charts.push(("cost".into(), Chart::of_cost(&costs)));
     for (name, chart) in charts {
-        write(&chart, &args.output.join(format!("dynamics-{name}.svg")), args.json)?;
+        write(
+            &chart,
+            &args.output.join(format!("dynamics-{name}.svg")),
+            args.json,
+        )?;
     }
     Ok(())
 }

@@ -7,12 +7,12 @@ use fitting::Cancel;
 use formats::Kind;
 use serde_json::{Map, Value};
 
-use super::{chart_dynamics, chart_orient};
 use super::failure::{Failure, OrFail, Outcome};
 use super::input::{reading, writing};
 use super::interrupt;
 use super::phantom::Name;
 use super::progress::Bar;
+use super::{chart_dynamics, chart_orient};
 use crate::charts::{Chart, Configuration, Input, Measurement, Scene, noise, outliers, sweeps};
 
 /// Arguments of `isoclay charts`.

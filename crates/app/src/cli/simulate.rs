@@ -176,7 +176,9 @@ impl Stage<'_> {
                 "a mesh needs the density of the surface; write iso above all tables of the scene",
             ));
         };
-        let frame: Frame = self.open.frame_of_level(self.open.level_of_surface(iso).max(level));
+        let frame: Frame = self
+            .open
+            .frame_of_level(self.open.level_of_surface(iso).max(level));
         let mut mesher = Mesher {
             field,
             options: PolygonizeOptions {
@@ -238,7 +240,10 @@ fn print(total: &Total, json: bool) -> Outcome {
         serde_json::to_string(total).expect("a struct of plain fields is always JSON")
     } else {
         let rows = [
-            ("simulated", format!("{} s", human_number(total.simulated_seconds))),
+            (
+                "simulated",
+                format!("{} s", human_number(total.simulated_seconds)),
+            ),
             ("steps", human_count(total.steps)),
             ("  awake", human_count(total.steps_awake)),
             ("samples", human_count(total.samples)),

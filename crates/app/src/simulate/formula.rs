@@ -57,9 +57,14 @@ impl Formula {
             )
         };
         if text.len() > LONGEST {
-            return Err(format!("a formula of {} bytes; at most {LONGEST} are read", text.len()));
+            return Err(format!(
+                "a formula of {} bytes; at most {LONGEST} are read",
+                text.len()
+            ));
         }
-        let mut parser = Parser { rest: text.trim_start() };
+        let mut parser = Parser {
+            rest: text.trim_start(),
+        };
         let root = parser.comparison(0).map_err(wrong)?;
         if !parser.rest.is_empty() {
             return Err(wrong(format!("{:?} is too much", parser.rest)));
@@ -189,7 +194,10 @@ impl Parser<'_> {
         if self.rest.starts_with(|c: char| c.is_ascii_digit() || c == '.') {
             return self.number();
         }
-        let end = self.rest.find(|c: char| !c.is_ascii_alphanumeric()).unwrap_or(self.rest.len());
+        let end = self
+            .rest
+            .find(|c: char| !c.is_ascii_alphanumeric())
+            .unwrap_or(self.rest.len());
         let (name, rest) = self.rest.split_at(end);
         if name.is_empty() {
             return Err(match rest {
@@ -271,8 +279,33 @@ mod tests {
     #[test]
     fn what_is_no_formula_is_refused_with_what_is_one() {
         for text in [
-            "", " ", "(", ")", "x y", "x +", "sin", "sin x", "1..2", "1,5", "w", "{x}", "min(x)", "min(x, y, z)", "x()",
-            "\u{e9}", "\0", "1e", ".", "--", "import os", "((((x)", "d d", "x;y", "1 < 2 < 3", "2x", "+",
+            "",
+            " ",
+            "(",
+            ")",
+            "x y",
+            "x +",
+            "sin",
+            "sin x",
+            "1..2",
+            "1,5",
+            "w",
+            "{x}",
+            "min(x)",
+            "min(x, y, z)",
+            "x()",
+            "\u{e9}",
+            "\0",
+            "1e",
+            ".",
+            "--",
+            "import os",
+            "((((x)",
+            "d d",
+            "x;y",
+            "1 < 2 < 3",
+            "2x",
+            "+",
         ] {
             let e = Formula::parse(text).expect_err(text);
             assert!(e.contains("max(a, b)"), "{text:?}: {e}");
@@ -281,7 +314,11 @@ mod tests {
             let deep = format!("{}x{}", open.repeat(100), close.repeat(100));
             assert!(Formula::parse(&deep).unwrap_err().contains("nested"), "{deep}");
         }
-        assert!(Formula::parse(&"1+".repeat(600)).unwrap_err().contains("1200 bytes"));
+        assert!(
+            Formula::parse(&"1+".repeat(600))
+                .unwrap_err()
+                .contains("1200 bytes")
+        );
     }
 
     #[test]

@@ -41,7 +41,12 @@ impl Holds {
             }
             let how = hold.spring.map_or(How::Hard, |k| How::Spring(k.0));
             let rows = match &hold.along[..] {
-                [] => return Err(wrong(place(" along"), "has no points; give one, or several for a curve")),
+                [] => {
+                    return Err(wrong(
+                        place(" along"),
+                        "has no points; give one, or several for a curve",
+                    ));
+                }
                 [p] => vec![Constraint {
                     label: name.clone(),
                     on: On::Point {
@@ -54,8 +59,10 @@ impl Holds {
                 points => {
                     let line: Vec<[f64; 3]> = points.iter().map(|p| samples.local(p.0)).collect();
                     let spacing = hold.spacing.map_or(0.5 * cell, |s| s.0);
-                    curve(&name, &line, spacing, density, how, |at| field.value(samples.world(at)))
-                        .map_err(|e| wrong(place(""), e))?
+                    curve(&name, &line, spacing, density, how, |at| {
+                        field.value(samples.world(at))
+                    })
+                    .map_err(|e| wrong(place(""), e))?
                 }
             };
             Ok((hold.clone(), rows))
@@ -69,7 +76,11 @@ impl Holds {
 
     /// The constraints that hold from `t` on for `dt`, if they are not those that held before.
     pub fn changed(&mut self, t: f64, dt: f64) -> Option<Vec<Constraint>> {
-        let now: Vec<bool> = self.all.iter().map(|(h, _)| h.when.strength(t, dt) > 0.0).collect();
+        let now: Vec<bool> = self
+            .all
+            .iter()
+            .map(|(h, _)| h.when.strength(t, dt) > 0.0)
+            .collect();
         if now == self.active {
             return None;
         }

@@ -32,7 +32,10 @@ impl Load {
             if kernel.iter().all(|w| *w == 0.0) {
                 return Err(wrong(
                     place(" radius"),
-                    format!("{} is so small that no sample feels it; enlarge it", pull.radius.0),
+                    format!(
+                        "{} is so small that no sample feels it; enlarge it",
+                        pull.radius.0
+                    ),
                 ));
             }
             Ok((pull.clone(), kernel))
@@ -57,7 +60,9 @@ impl Load {
                 } else {
                     Err(wrong(
                         place(" samples"),
-                        format!("[{a}, {b}, {c}]: the region has {nx} × {ny} × {nz} samples, numbered from 0"),
+                        format!(
+                            "[{a}, {b}, {c}]: the region has {nx} × {ny} × {nz} samples, numbered from 0"
+                        ),
                     ))
                 }
             };

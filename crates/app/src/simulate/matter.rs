@@ -3,12 +3,13 @@
 use bspline::Real;
 use dynamics::matter::{Matter, Quantity};
 use dynamics::region::Region;
-use dynamics::springs::Weights;
+use dynamics::springs::{Plasticity, Weights};
 use glam::DVec3;
 
 use super::error::{SimulateError, wrong};
+use super::number::Point;
 use super::place::Samples;
-use super::scene::{Amount, Material, Paint, Substance};
+use super::scene::{Amount, Material, Paint, Scene, Substance};
 
 /// Matter and scale of rest lengths.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,7 +29,10 @@ impl Clay {
                 } else {
                     Err(wrong(
                         place(),
-                        format!("is {v}; it has to be {} everywhere", if zero { "0 or above" } else { "above 0" }),
+                        format!(
+                            "is {v}; it has to be {} everywhere",
+                            if zero { "0 or above" } else { "above 0" }
+                        ),
                     ))
                 }
             };
@@ -66,7 +70,7 @@ impl Clay {
         let values = quantity.paint(samples.positions.len());
         let fade = paint.fade.map_or(0.0, |f| f.0.min(1.0)) * paint.radius.0;
         for (value, p) in values.iter_mut().zip(&samples.positions) {
-            let inside = paint.radius.0 - distance(*p, paint);
+            let inside = paint.radius.0 - distance(*p, &paint.along);
             if inside >= 0.0 {
                 let w = if fade > 0.0 { (inside / fade).min(1.0) } else { 1.0 };
                 *value += w * (paint.value.0 - *value);
@@ -88,9 +92,38 @@ impl Clay {
     }
 }
 
-/// From a place to the ball's centre or to the stroke.
-fn distance(p: DVec3, paint: &Paint) -> f64 {
-    let points = paint.along.iter().map(|p| p.0);
+/// Whether rest follows, and where.
+pub fn plasticity<T: Real>(scene: &Scene, samples: &Samples) -> Result<Plasticity<T>, SimulateError> {
+    let rate = scene.plasticity.rate.map_or(0.0, |r| r.0);
+    if rate == 0.0 {
+        return match scene.plasticity.under_pulls {
+            true => Err(wrong(
+                "[plasticity] rate",
+                "is missing; write how fast rest follows under the pulls",
+            )),
+            false => Ok(Plasticity::Elastic),
+        };
+    }
+    if !scene.plasticity.under_pulls {
+        return Ok(Plasticity::Clay { rate });
+    }
+    let weight = |p: &DVec3| {
+        let of = scene.pull.iter().map(|pull| {
+            let path = [pull.at, pull.to.unwrap_or(pull.at)];
+            let x = distance(*p, &path) / pull.radius.0;
+            libm::exp(-0.5 * x * x)
+        });
+        T::from_f64(of.fold(0.0, f64::max))
+    };
+    Ok(Plasticity::Kernel {
+        rate,
+        weights: samples.positions.iter().map(weight).collect(),
+    })
+}
+
+/// From a place to a point or a polyline.
+fn distance(p: DVec3, along: &[Point]) -> f64 {
+    let points = along.iter().map(|p| p.0);
     let to_segment = |(a, b): (DVec3, DVec3)| {
         let ab = b - a;
         let t = if ab == DVec3::ZERO {

@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::error::{SimulateError, wrong};
 use super::holds::Holds;
 use super::load::Load;
-use super::matter::Clay;
+use super::matter::{self, Clay};
 use super::place::{self, Samples};
 use super::scene::{ReleaseKind, Scene, Scheme};
 
@@ -29,6 +29,10 @@ pub struct StepLine {
     pub residual: f64,
     /// How it was solved; empty asleep.
     pub method: &'static str,
+    /// The scheme taken; empty asleep.
+    pub integrator: &'static str,
+    /// Equal parts that the step was made of.
+    pub substeps: usize,
     /// Springs whose negative tangent was taken as 0.
     pub clamped: usize,
     /// Kinetic energy at the end.
@@ -39,6 +43,8 @@ pub struct StepLine {
     pub work: f64,
     /// Whether the region was awake.
     pub awake: bool,
+    /// Samples that were moved.
+    pub awake_samples: usize,
     /// Largest change of a sample's density since the start.
     pub max_change: f64,
     /// Estimated error of the densities, root mean square; of TR-BDF2.
@@ -63,7 +69,7 @@ pub struct Simulation<'a, T> {
     holds: Holds,
     /// Which paint is laid on.
     painted: Vec<bool>,
-    released: bool,
+    released: Option<ReleaseKind>,
     force: Vec<T>,
     steps: usize,
     time: f64,
@@ -99,6 +105,10 @@ impl<'a, T: Real> Simulation<'a, T> {
         let samples = Samples::of(&region);
         let clay = Clay::new(&scene.material, &samples)?;
         clay.give(&mut region)?;
+        let plasticity = matter::plasticity(scene, &samples)?;
+        let set = region.patch_mut().set_plasticity(plasticity);
+        set.map_err(|e| wrong("[plasticity]", e))?;
+        region.set_parts_sleep(scene.sleep.parts);
         for (i, p) in scene.paint.iter().enumerate() {
             p.check().map_err(|e| wrong(format!("[[paint]] {}", i + 1), e))?;
         }
@@ -108,7 +118,7 @@ impl<'a, T: Real> Simulation<'a, T> {
             load: Load::new(scene, &samples)?,
             holds: Holds::new(scene, &field, iso, &samples, cell)?,
             painted: vec![false; scene.paint.len()],
-            released: false,
+            released: None,
             force: vec![T::zero(); samples.positions.len()],
             steps: 0,
             time: 0.0,
@@ -154,6 +164,7 @@ impl<'a, T: Real> Simulation<'a, T> {
         let start = Instant::now();
         let dt = self.length();
         self.act(dt)?;
+        let awake_samples = self.region.awake_samples();
         let (dt, report, rejected) = self.advance(dt)?;
         self.steps += 1;
         let (step, end) = (self.scene.time.step.0, self.scene.time.duration.0);
@@ -165,7 +176,6 @@ impl<'a, T: Real> Simulation<'a, T> {
         if self.time > end - ROUNDING * step {
             self.time = end;
         }
-        self.creep(dt);
         self.let_go()?;
         self.work += report.map_or(0.0, |r| r.work);
         let energy = self.region.energy();
@@ -178,11 +188,14 @@ impl<'a, T: Real> Simulation<'a, T> {
             iterations: report.map_or(0, |r| r.solve.iteration.iterations),
             residual: report.map_or(0.0, |r| r.solve.iteration.residual),
             method: report.map_or("", |r| r.solve.method.name()),
+            integrator: report.map_or("", |r| r.integrator.name()),
+            substeps: report.map_or(0, |r| r.substeps),
             clamped: report.map_or(0, |r| r.clamped),
             kinetic: energy.kinetic,
             potential: energy.springs + energy.ground + energy.constraints,
             work: self.work,
             awake: report.is_some(),
+            awake_samples: if report.is_some() { awake_samples } else { 0 },
             max_change: changes.map(|(d, b)| (d.as_f64() - b).abs()).fold(0.0, f64::max),
             error: report.and_then(|r| r.error),
             rejected,
@@ -195,10 +208,12 @@ impl<'a, T: Real> Simulation<'a, T> {
     /// # Errors
     /// [`SimulateError::Bake`].
     pub fn baked(&self) -> Result<HierarchicalSpline<T>, SimulateError> {
-        self.region.bake(&self.field).map_err(|source| SimulateError::Bake {
-            time: self.time,
-            source,
-        })
+        self.region
+            .bake(&self.field)
+            .map_err(|source| SimulateError::Bake {
+                time: self.time,
+                source,
+            })
     }
 
     /// What the next step may last: to the end, and if it can be chosen, to the next moment at which something changes.
@@ -207,7 +222,11 @@ impl<'a, T: Real> Simulation<'a, T> {
         let step = self.scene.time.step.0;
         if self.scene.time.integrator != Scheme::Adaptive {
             // A step that differs by rounding would cost a new factor.
-            return if left > (1.0 - ROUNDING) * step { step } else { left };
+            return if left > (1.0 - ROUNDING) * step {
+                step
+            } else {
+                left
+            };
         }
         let scene = self.scene;
         let whens = scene.pull.iter().map(|p| &p.when);
@@ -224,6 +243,10 @@ impl<'a, T: Real> Simulation<'a, T> {
 
     /// Paint, constraints and forces of the step that begins now.
     fn act(&mut self, dt: f64) -> Result<(), SimulateError> {
+        // Clay that was let go stays, to the bit.
+        if self.released == Some(ReleaseKind::Clay) {
+            return Ok(());
+        }
         let mut fresh = false;
         for (paint, done) in self.scene.paint.iter().zip(&mut self.painted) {
             if !*done && paint.at.map_or(0.0, |a| a.0) < self.time + 0.5 * dt {
@@ -239,13 +262,15 @@ impl<'a, T: Real> Simulation<'a, T> {
             set.map_err(|e| wrong(format!("[[constraint]] at {} s", self.time), e))?;
         }
         self.load.write(self.time, dt, &self.samples, &mut self.force);
-        if self.released {
+        if self.released.is_some() {
             return Ok(());
         }
-        self.region.set_force(&self.force).map_err(|source| SimulateError::Step {
-            time: self.time,
-            source,
-        })
+        self.region
+            .set_force(&self.force)
+            .map_err(|source| SimulateError::Step {
+                time: self.time,
+                source,
+            })
     }
 
     fn advance(&mut self, dt: f64) -> Result<(f64, Option<StepReport>, Option<usize>), SimulateError> {
@@ -254,7 +279,9 @@ impl<'a, T: Real> Simulation<'a, T> {
         let integrator = match self.scene.time.integrator {
             Scheme::Paper => Integrator::Paper,
             Scheme::Symplectic => Integrator::Symplectic,
+            Scheme::Verlet => Integrator::Verlet,
             Scheme::TrBdf2 => Integrator::TrBdf2,
+            Scheme::Auto => Integrator::Auto,
             Scheme::Adaptive => {
                 let options = self.adaptive();
                 let done = self.region.adaptive_step(dt, &options).map_err(failed)?;
@@ -274,12 +301,17 @@ impl<'a, T: Real> Simulation<'a, T> {
 
     fn adaptive(&self) -> AdaptiveOptions {
         let time = &self.scene.time;
-        let cell = self.field.lattice().spacing(self.region.cells().level).min_element();
+        let cell = self
+            .field
+            .lattice()
+            .spacing(self.region.cells().level)
+            .min_element();
         let shortest = time.shortest.map_or(time.step.0 / SHORTER, |s| s.0);
         AdaptiveOptions {
-            tolerance: time
-                .tolerance
-                .map_or(TOLERANCE * cell / self.region.patch().springs().law().scale(), |t| t.0),
+            tolerance: time.tolerance.map_or(
+                TOLERANCE * cell / self.region.patch().springs().law().scale(),
+                |t| t.0,
+            ),
             shortest,
             longest: time.longest.map_or(time.step.0 * LONGER, |l| l.0).max(shortest),
             energy_gain: ENERGY_GAIN,
@@ -287,30 +319,35 @@ impl<'a, T: Real> Simulation<'a, T> {
         }
     }
 
-    /// Lets rest follow the present shape, unless the region sleeps.
-    fn creep(&mut self, dt: f64) {
-        let rate = self.scene.plasticity.rate.map_or(0.0, |r| r.0);
-        if rate > 0.0 && !self.region.is_asleep() {
-            let patch = self.region.patch_mut();
-            let d = patch.state().d.clone();
-            patch.springs_mut().relax(&d, -libm::expm1(-rate * dt));
+    fn drop_constraints(&mut self) -> Result<(), SimulateError> {
+        if self.region.patch().constraints().is_empty() {
+            return Ok(());
         }
+        let dropped = self.region.patch_mut().set_constraints(&[]);
+        dropped.map_err(|source| SimulateError::Step {
+            time: self.time,
+            source,
+        })
     }
 
     fn let_go(&mut self) -> Result<(), SimulateError> {
-        let Some(release) = self.scene.release.filter(|_| !self.released) else {
+        let Some(release) = self.scene.release.filter(|_| self.released.is_none()) else {
             return Ok(());
         };
         if self.time < release.at.map_or(self.scene.time.duration.0, |a| a.0) {
             return Ok(());
         }
-        self.released = true;
+        self.released = Some(release.kind);
         match release.kind {
             ReleaseKind::Clay => {
-                self.field = self.region.release_clay(&self.field).map_err(|source| SimulateError::Bake {
-                    time: self.time,
-                    source,
-                })?;
+                self.drop_constraints()?;
+                self.field = self
+                    .region
+                    .release_clay(&self.field)
+                    .map_err(|source| SimulateError::Bake {
+                        time: self.time,
+                        source,
+                    })?;
             }
             ReleaseKind::Elastic => self.region.release_elastic(),
         }
@@ -337,16 +374,25 @@ fn check_times(scene: &Scene) -> Result<(), SimulateError> {
     }
     let (duration, step) = (time.duration.0, time.step.0);
     if step > duration {
-        return Err(wrong("[time] step", format!("{step} s is longer than the duration, {duration} s")));
+        return Err(wrong(
+            "[time] step",
+            format!("{step} s is longer than the duration, {duration} s"),
+        ));
     }
     if duration / step > 1e7 {
         return Err(wrong(
             "[time] step",
-            format!("{step} s makes {:.0} steps of {duration} s; at most 10 million are made", duration / step),
+            format!(
+                "{step} s makes {:.0} steps of {duration} s; at most 10 million are made",
+                duration / step
+            ),
         ));
     }
     if let Some(at) = scene.release.and_then(|r| r.at).filter(|at| at.0 > duration) {
-        return Err(wrong("[release] at", format!("{} s is after the end, {duration} s", at.0)));
+        return Err(wrong(
+            "[release] at",
+            format!("{} s is after the end, {duration} s", at.0),
+        ));
     }
     Ok(())
 }

@@ -52,7 +52,9 @@ impl TryFrom<f64> for NonNegative {
         if v.is_finite() && v >= 0.0 {
             Ok(Self(v))
         } else {
-            Err(format!("{v} is negative or not finite; write 0 or a finite number above it"))
+            Err(format!(
+                "{v} is negative or not finite; write 0 or a finite number above it"
+            ))
         }
     }
 }

@@ -94,7 +94,10 @@ pub fn cut<T: Real>(
         (Some(18), _) | (None, LawKind::FourD) => Neighbours::Eighteen,
         (Some(26), _) => Neighbours::TwentySix,
         (Some(n), _) => {
-            return Err(wrong("[law] neighbours", format!("{n} springs at a sample; write 6, 18 or 26")));
+            return Err(wrong(
+                "[law] neighbours",
+                format!("{n} springs at a sample; write 6, 18 or 26"),
+            ));
         }
     };
     let Thresholds { speed, acceleration } = options.sleep;
@@ -111,7 +114,11 @@ fn level<T: Real>(scene: &Scene, field: &HierarchicalSpline<T>) -> Result<usize,
         return Ok(usize::from(level));
     }
     let per_cell = scene.region.samples_per_cell.map_or([4.0 / 3.0; 3], |s| s.0);
-    let radius = scene.pull.iter().map(|p| p.radius.0).fold(f64::INFINITY, f64::min);
+    let radius = scene
+        .pull
+        .iter()
+        .map(|p| p.radius.0)
+        .fold(f64::INFINITY, f64::min);
     if radius == f64::INFINITY {
         return Err(wrong(
             "[region] level",
@@ -119,11 +126,16 @@ fn level<T: Real>(scene: &Scene, field: &HierarchicalSpline<T>) -> Result<usize,
         ));
     }
     let spacing = field.lattice().spacing(0) / DVec3::from_array(per_cell);
-    let level = (SPACINGS_PER_RADIUS * spacing.max_element() / radius).log2().ceil().max(0.0);
+    let level = (SPACINGS_PER_RADIUS * spacing.max_element() / radius)
+        .log2()
+        .ceil()
+        .max(0.0);
     if level > 16.0 {
         return Err(wrong(
             "[region] level",
-            format!("a pull of radius {radius} asks for level {level}; enlarge it or write a level of at most 16"),
+            format!(
+                "a pull of radius {radius} asks for level {level}; enlarge it or write a level of at most 16"
+            ),
         ));
     }
     Ok(level as usize)
@@ -140,7 +152,10 @@ fn cells<T: Real>(
         (Some(min), Some(max), None, None) => {
             let (min, max) = (min.0, max.0);
             if !min.cmplt(max).all() {
-                return Err(wrong("[region]", format!("min {min} has to lie below max {max} on every axis")));
+                return Err(wrong(
+                    "[region]",
+                    format!("min {min} has to lie below max {max} on every axis"),
+                ));
             }
             let scale = (1u64 << level.min(62)) as f64;
             let b = Aabb { min, max }.transformed(field.lattice_from_world());

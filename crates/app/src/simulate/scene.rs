@@ -182,11 +182,15 @@ pub struct Time {
 pub enum Scheme {
     /// DIS eq. 12.
     Paper,
-    /// Explicit.
+    /// Explicit, first order.
     Symplectic,
+    /// Explicit, second order.
+    Verlet,
     /// Second order, implicit.
     #[default]
     TrBdf2,
+    /// Verlet in sub-steps where these cost less than a step of TR-BDF2.
+    Auto,
     /// TR-BDF2 whose steps follow its error.
     Adaptive,
 }
@@ -246,6 +250,8 @@ pub struct Hold {
 pub struct Plasticity {
     /// Rate λ at which rest lengths follow the present ones, per second; 0 is elastic.
     pub rate: Option<NonNegative>,
+    /// Only under the kernels of the pulls.
+    pub under_pulls: bool,
 }
 
 /// When it is let go.
@@ -277,6 +283,8 @@ pub struct Sleep {
     pub speed: Option<NonNegative>,
     /// Length per second squared.
     pub acceleration: Option<NonNegative>,
+    /// Whether parts of the region sleep while others move.
+    pub parts: bool,
 }
 
 impl Paint {

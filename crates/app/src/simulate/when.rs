@@ -23,7 +23,9 @@ impl When {
     pub fn check(&self) -> Result<(), String> {
         let (from, until) = self.span();
         if until <= from {
-            return Err(format!("it lasts from {from} s until {until} s; let it end after it begins"));
+            return Err(format!(
+                "it lasts from {from} s until {until} s; let it end after it begins"
+            ));
         }
         let ramp = self.ramp.map_or(0.0, |r| r.0);
         if 2.0 * ramp > until - from {
@@ -67,7 +69,11 @@ impl When {
             let switches = [off, begin + every.0, off + every.0];
             switches.into_iter().find(|s| *s > t).unwrap_or(f64::INFINITY)
         });
-        if until > t { cycle.min(until) } else { f64::INFINITY }
+        if until > t {
+            cycle.min(until)
+        } else {
+            f64::INFINITY
+        }
     }
 
     /// Its strength, 0 to 1, over the step that begins at `t` and lasts `dt`: that in the middle.
@@ -100,7 +106,10 @@ mod tests {
         assert_eq!([all.strength(0.0, 0.1), all.strength(1e6, 0.1)], [1.0, 1.0]);
         let ramp = when("from = 1\nuntil = 3\nramp = 0.5");
         let at = |t: f64| ramp.strength(t - 0.05, 0.1);
-        assert_eq!([at(0.9), at(1.25), at(2.0), at(2.75), at(3.0)], [0.0, 0.5, 1.0, 0.5, 0.0]);
+        assert_eq!(
+            [at(0.9), at(1.25), at(2.0), at(2.75), at(3.0)],
+            [0.0, 0.5, 1.0, 0.5, 0.0]
+        );
         let cycle = when("from = 1\nevery = 1\nshare = 0.25");
         let at = |t: f64| cycle.strength(t - 0.05, 0.1);
         assert_eq!([at(1.1), at(1.4), at(2.1), at(2.9)], [1.0, 0.0, 1.0, 0.0]);

@@ -7,7 +7,7 @@ use crate::integrators::{AdaptiveOptions, AdaptiveReport};
 use crate::patch::{Energy, PatchError};
 
 impl<T: Real> Region<T> {
-    /// As [`Region::step`], of at most `dt` seconds, shortened until it keeps to the options.
+    /// As [`Region::step`], of at most `dt` seconds, shortened until it keeps to the options; all parts are awake.
     ///
     /// # Errors
     /// [`PatchError`]; the state is then the one before.

@@ -37,10 +37,17 @@ impl Profile {
     }
 }
 
-/// Half the edge of the cube, in standard deviations of the force.
+/// Half the edge of the cube, in standard deviations of the force, as the bump feels it: the fixed layers take
+/// [`RIM`] cells on each side.
 const HALF: f64 = 4.0;
+const RIM: f64 = 0.58;
 /// Force over κσ²; lifts the tip of 4-D springs by about one standard deviation.
 const FORCE: f64 = 30.0;
+
+/// Half the edge of a cube of `m` samples, 4/3 a cell.
+fn half_edge(m: usize) -> f64 {
+    HALF / (1.0 - RIM * 8.0 / 3.0 / (m - 1) as f64)
+}
 
 /// Normals of the planes with two tangents each.
 fn planes() -> [[DVec3; 3]; 3] {
@@ -59,7 +66,7 @@ fn planes() -> [[DVec3; 3]; 3] {
 pub fn sampling(extent: Extent, run: &mut Run) -> Result<Vec<Profile>, DynamicsError> {
     let samples: &[usize] = match extent {
         Extent::Quick => &[9],
-        Extent::Charts => &[9, 13, 17, 21],
+        Extent::Charts => &[9, 13, 17, 21, 25],
         Extent::All => &[9, 13, 17, 21, 25, 33],
     };
     let kinds = [
@@ -84,7 +91,7 @@ pub fn sampling(extent: Extent, run: &mut Run) -> Result<Vec<Profile>, DynamicsE
             out.push(Profile {
                 law: if four_d { "4-d" } else { "linear" },
                 neighbours: count,
-                samples_per_radius: (m - 1) as f64 / (2.0 * HALF),
+                samples_per_radius: (m - 1) as f64 / (2.0 * half_edge(m)),
                 widths,
             });
         }
@@ -95,20 +102,24 @@ pub fn sampling(extent: Extent, run: &mut Run) -> Result<Vec<Profile>, DynamicsE
 /// A bump at rest.
 struct Bump {
     lattice: Lattice<f64>,
+    half_edge: f64,
     p: Vec<f64>,
 }
 
 impl Bump {
     fn new(m: usize, four_d: bool, neighbours: Neighbours, normal: DVec3) -> Result<Self, DynamicsError> {
-        let h = 2.0 * HALF / (m - 1) as f64;
+        let half_edge = half_edge(m);
+        let h = 2.0 * half_edge / (m - 1) as f64;
         let lattice = |e: LatticeError| DynamicsError::Study(StudyError::from(e));
         let lattice = Lattice::<f64>::cube(3 * (m - 1) / 4 + 3, m, Rim::Fixed, h).map_err(lattice)?;
         let at = |i: usize| {
-            let ijk = [i / (m * m), i / m % m, i % m].map(|c| c as f64 * h - HALF);
+            let ijk = [i / (m * m), i / m % m, i % m].map(|c| c as f64 * h - half_edge);
             DVec3::from_array(ijk)
         };
         let d: Vec<f64> = (0..m * m * m).map(|i| -normal.dot(at(i))).collect();
-        let kernel: Vec<f64> = (0..m * m * m).map(|i| (-0.5 * at(i).length_squared()).exp()).collect();
+        let kernel: Vec<f64> = (0..m * m * m)
+            .map(|i| (-0.5 * at(i).length_squared()).exp())
+            .collect();
         let sum: f64 = kernel.iter().sum();
         let law = if four_d {
             Law::FourD { scale: 1.0 }
@@ -121,7 +132,14 @@ impl Bump {
             damping: Quantity::Constant(0.1),
             ..Matter::default()
         };
-        let mut patch = Patch::new(lattice.clone(), matter, law, neighbours, &d, SolverOptions::default())?;
+        let mut patch = Patch::new(
+            lattice.clone(),
+            matter,
+            law,
+            neighbours,
+            &d,
+            SolverOptions::default(),
+        )?;
         let force: Vec<f64> = kernel.iter().map(|k| FORCE * k / sum).collect();
         patch.set_force(&force)?;
         let (mut dt, mut before) = (0.05, 0.0);
@@ -135,6 +153,7 @@ impl Bump {
         }
         Ok(Self {
             p: patch.state().p.clone(),
+            half_edge,
             lattice,
         })
     }
@@ -145,10 +164,11 @@ impl Bump {
         let axes: [Vec<(usize, f64)>; 3] = std::array::from_fn(|a| {
             let axis = &self.lattice.axes()[a];
             let [start, end] = axis.knots().domain();
-            let t = start + (end - start) * (q[a] + HALF) / (2.0 * HALF);
+            let t = start + (end - start) * (q[a] + self.half_edge) / (2.0 * self.half_edge);
             let basis: Basis<f64> = Basis::at(axis.knots(), t, 0);
             let all = basis.values().iter().enumerate();
-            let free = all.filter_map(|(j, w)| Some(((basis.first() + j).checked_sub(axis.first_free())?, *w)));
+            let free =
+                all.filter_map(|(j, w)| Some(((basis.first() + j).checked_sub(axis.first_free())?, *w)));
             free.filter(|(j, _)| *j < axis.free_count()).collect()
         });
         let [x, y, z] = &axes;

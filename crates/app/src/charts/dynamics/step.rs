@@ -81,9 +81,10 @@ impl Increments {
     /// Solves directly in double precision.
     pub fn new(c: &Configuration, integrator: Integrator) -> Result<Self, DynamicsError> {
         let options = SolverOptions {
-            iterations: 40,
+            // Beyond the limit it is iterated until rounding stops it.
+            iterations: 400,
             tolerance: Some(1e-13),
-            direct_limit: 4000,
+            direct_limit: 6000,
             ..SolverOptions::default()
         };
         // A factor, also where fast diagonalization would do.

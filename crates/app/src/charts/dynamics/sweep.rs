@@ -33,30 +33,39 @@ enum Task {
 
 /// The painted patterns of a contrast; none of an even one.
 fn patterns(contrast: f64, painted: &[Pattern]) -> &[Pattern] {
-    if contrast == 1.0 { &[Pattern::Uniform] } else { painted }
+    if contrast == 1.0 {
+        &[Pattern::Uniform]
+    } else {
+        painted
+    }
 }
 
 fn tasks(extent: Extent) -> Vec<(Configuration, Task)> {
     let mut out = Vec::new();
-    let mut add = |size: (usize, usize), rim, contrast: f64, painted: &[Pattern], dts: &[f64], four_d, task| {
-        for &pattern in patterns(contrast, painted) {
-            for &dt_over_limit in dts {
-                let neighbours = if four_d { Neighbours::Eighteen } else { Neighbours::Six };
-                let configuration = Configuration {
-                    coefficients: size.0,
-                    samples: size.1,
-                    rim,
-                    pattern,
-                    contrast,
-                    mass_contrast: 1.0,
-                    dt_over_limit,
-                    neighbours,
-                    four_d,
-                };
-                out.push((configuration, task));
+    let mut add =
+        |size: (usize, usize), rim, contrast: f64, painted: &[Pattern], dts: &[f64], four_d, task| {
+            for &pattern in patterns(contrast, painted) {
+                for &dt_over_limit in dts {
+                    let neighbours = if four_d {
+                        Neighbours::Eighteen
+                    } else {
+                        Neighbours::Six
+                    };
+                    let configuration = Configuration {
+                        coefficients: size.0,
+                        samples: size.1,
+                        rim,
+                        pattern,
+                        contrast,
+                        mass_contrast: 1.0,
+                        dt_over_limit,
+                        neighbours,
+                        four_d,
+                    };
+                    out.push((configuration, task));
+                }
             }
-        }
-    };
+        };
     let (free, fixed) = (Rim::Free, Rim::Fixed);
     let default = Task::Step(DEFAULT);
     let eq12 = Task::Step(Integrator::Paper);
@@ -73,38 +82,92 @@ fn tasks(extent: Extent) -> Vec<(Configuration, Task)> {
     // Which preconditioner pays.
     let size = if quick { (5, 10) } else { (15, 20) };
     for contrast in [100.0, 1e4] {
-        add(size, free, contrast, &[Pattern::StiffBall], &[30.0], false, Task::Solvers);
+        add(
+            size,
+            free,
+            contrast,
+            &[Pattern::StiffBall],
+            &[30.0],
+            false,
+            Task::Solvers,
+        );
     }
     // The default step over materials, steps and laws.
     let steps: &[f64] = if quick { &[30.0] } else { &[0.1, 1.0, 10.0, 30.0] };
-    let small: &[(usize, usize)] = if quick { &[(5, 10)] } else { &[(5, 10), (10, 10), (10, 15)] };
+    let small: &[(usize, usize)] = if quick {
+        &[(5, 10)]
+    } else {
+        &[(5, 10), (10, 10), (10, 15)]
+    };
     for size in small {
         for contrast in [1e2, 1e3, 1e4] {
             let painted = if quick { &few[..] } else { &Pattern::PAINTED[..] };
-            add(*size, free, contrast, painted, if all { steps } else { &[30.0] }, false, default);
+            add(
+                *size,
+                free,
+                contrast,
+                painted,
+                if quick { &[30.0] } else { steps },
+                false,
+                default,
+            );
         }
     }
     if !quick {
         for contrast in [1.0, 1e2, 1e3, 1e4] {
-            add((15, 20), fixed, contrast, &Pattern::PAINTED, if all { steps } else { &[30.0] }, false, default);
+            add(
+                (15, 20),
+                fixed,
+                contrast,
+                &Pattern::PAINTED,
+                steps,
+                false,
+                default,
+            );
         }
-        let painted = if all { &Pattern::PAINTED[..] } else { &few };
         for size in [(15, 15), (15, 20)] {
-            for contrast in [1e2, 1e4] {
-                add(size, free, contrast, painted, if all { steps } else { &[30.0] }, false, default);
+            for contrast in [1e2, 1e3, 1e4] {
+                add(
+                    size,
+                    free,
+                    contrast,
+                    &Pattern::PAINTED,
+                    if all { steps } else { &[30.0] },
+                    false,
+                    default,
+                );
             }
+        }
+        if !all {
+            add((24, 32), fixed, 1e3, &few, &[30.0], false, default);
         }
     }
     let size = if quick { (8, 10) } else { (15, 20) };
-    let integrators = [Integrator::Paper, Integrator::Symplectic];
+    let integrators = [Integrator::Paper, Integrator::Symplectic, Integrator::Verlet];
     for integrator in integrators.into_iter().chain([DEFAULT]) {
         let dts: &[f64] = match integrator {
-            Integrator::Symplectic => &[0.1, 0.9],
+            Integrator::Symplectic | Integrator::Verlet => &[0.1, 0.9],
             _ => steps,
         };
-        add(size, fixed, 100.0, &[Pattern::StiffBall], dts, false, Task::Step(integrator));
+        add(
+            size,
+            fixed,
+            100.0,
+            &[Pattern::StiffBall],
+            dts,
+            false,
+            Task::Step(integrator),
+        );
         add(size, fixed, 1.0, &[], dts, true, Task::Step(integrator));
-        add(size, fixed, 100.0, &[Pattern::StiffBall], dts, true, Task::Step(integrator));
+        add(
+            size,
+            fixed,
+            100.0,
+            &[Pattern::StiffBall],
+            dts,
+            true,
+            Task::Step(integrator),
+        );
     }
     if all {
         for size in [(24, 32), (32, 32)] {
