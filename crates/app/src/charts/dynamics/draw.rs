@@ -81,6 +81,7 @@ impl Chart {
             x_title: "processor time of a step, ms".into(),
             y_title: "‖A(x − x*)‖/‖Ax*‖, worst of three loads".into(),
             depth: DEPTH,
+            is_joined: true,
             series,
         }
     }
@@ -116,6 +117,7 @@ impl Chart {
             x_title: "processor time of a step, ms".into(),
             y_title: "error of the increment, ‖A(x − x*)‖/‖Ax*‖".into(),
             depth: DEPTH,
+            is_joined: true,
             series,
         }
     }
@@ -153,6 +155,7 @@ impl Chart {
             x_title: "contrast of stiffness".into(),
             y_title: "error of the increment, ‖A(x − x*)‖/‖Ax*‖".into(),
             depth: DEPTH,
+            is_joined: true,
             series,
         }
     }
@@ -183,6 +186,7 @@ impl Chart {
             x_title: "step over the explicit limit".into(),
             y_title: "error of the increment, ‖A(x − x*)‖/‖Ax*‖".into(),
             depth: DEPTH,
+            is_joined: true,
             series,
         }
     }
@@ -211,6 +215,7 @@ impl Chart {
             x_title: "samples per standard deviation of the force".into(),
             y_title,
             depth: 1e-6,
+            is_joined: true,
             series,
         };
         [
@@ -250,6 +255,7 @@ impl Chart {
             x_title: "samples".into(),
             y_title: "processor time per sample, ns".into(),
             depth: 1e-5,
+            is_joined: true,
             series,
         }
     }
