@@ -209,7 +209,7 @@ fn frames_show_the_motion() {
         mesh.positions.iter().map(|p| p.z).fold(0.0, f64::max)
     };
     assert!((height(0) - 1.0).abs() < 1e-3);
-    assert!(height(10) > height(0) + 1e-3 && height(20) > height(10));
+    assert!(height(10) > height(0) + 0.02 && height(20) > height(0) + 0.02);
     assert_eq!(std::fs::read_dir(ball.0.path("frames")).unwrap().count(), 3);
 }
 

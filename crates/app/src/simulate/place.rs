@@ -175,15 +175,48 @@ fn cells<T: Real>(
             let first = (b.min * scale + 1e-6).floor().max(DVec3::ZERO);
             let end = (b.max * scale - 1e-6).ceil().min(limit * scale);
             let whole = |v: DVec3| v.to_array().map(|c| c as u32);
-            Ok(Cells {
+            let mut cells = Cells {
                 level,
                 first: whole(first),
                 count: whole(end - first),
-            })
+            };
+            if table.samples_per_cell.is_none() {
+                thirds(&mut cells, whole(limit * scale));
+            }
+            Ok(cells)
         }
         _ => Err(wrong(
             "[region]",
             "give either min and max (in the world) or first and count (cells of a level)",
         )),
+    }
+}
+
+/// Takes in up to two cells more on an axis, at the end first, so that their number is a multiple of three and samples,
+/// 4/3 a cell, lie as far apart on every axis.
+fn thirds(cells: &mut Cells, limit: [u32; 3]) {
+    for (axis, limit) in limit.into_iter().enumerate() {
+        let (first, count) = (&mut cells.first[axis], &mut cells.count[axis]);
+        let missing = (3 - *count % 3) % 3;
+        let behind = missing.min(limit.saturating_sub(*first + *count));
+        let before = (missing - behind).min(*first);
+        *first -= before;
+        *count += behind + before;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn boxes_grow_to_thirds_within_the_field() {
+        let mut cells = Cells {
+            level: 0,
+            first: [4, 4, 0],
+            count: [7, 9, 8],
+        };
+        thirds(&mut cells, [12, 13, 8]);
+        assert_eq!((cells.first, cells.count), ([3, 4, 0], [9, 9, 8]));
     }
 }
