@@ -55,7 +55,7 @@ impl SolverOptions {
 /// wrong by about as much, far less than the 0.3 % asked of a step; halving it costs one iteration.
 pub const ITERATED: f64 = 1e-3;
 
-/// Residual, in units of rounding, at which solves by a factor stop.
+/// Residual, in units of rounding of single precision, at which solves by a factor stop.
 const EXACT: f64 = 64.0;
 
 /// The same of fast diagonalization. On coefficients the residual is mostly that of combinations that hardly move a
@@ -316,6 +316,8 @@ impl<T: Real> StepSolver<T> {
         let tolerance = self.options.tolerance.unwrap_or(match self.method {
             Method::VCycle | Method::SampleMultigrid => ITERATED,
             Method::Direct if matches!(self.painted, Painted::Background(_)) => ITERATED,
+            // Double precision is for references: there coefficients that hardly move a sample count too.
+            _ if T::UNIT_ROUND_OFF < 1e-10 => 16.0 * T::UNIT_ROUND_OFF,
             Method::FastDiagonalization => DIAGONALIZED * T::UNIT_ROUND_OFF,
             _ => EXACT * T::UNIT_ROUND_OFF,
         });
