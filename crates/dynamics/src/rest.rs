@@ -7,10 +7,13 @@ use crate::springs::Weights;
 
 impl<T: Real> Patch<T> {
     /// Makes the present densities the ones the patch was cut at: rest := current with rest scale 1, also of the ground
-    /// springs, velocity := 0, force := 0, `p` := 0.
+    /// springs, velocity := 0, force := 0, `p` := 0. Constraints are let go: they were made for the field as it was.
     ///
     /// No force is left, exactly, so later steps change no bit.
     pub fn rest_here(&mut self) {
+        if !self.constraints().is_empty() {
+            self.set_constraints(&[]).expect("no constraint contradicts none");
+        }
         self.network.rest_mut().scale = Weights::Constant(T::one());
         self.network.rest_at(&self.state.d);
         self.base.copy_from_slice(&self.state.d);

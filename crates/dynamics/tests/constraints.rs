@@ -479,3 +479,20 @@ fn nonsense_is_refused_with_its_name() {
         assert!(matches!(refused, ConstraintError::Curve { .. }), "{refused}");
     }
 }
+
+#[test]
+fn clay_at_rest_is_held_no_longer() {
+    for hold in [Hold::Hard, Hold::Spring(50.0)] {
+        let mut p = linear(false);
+        p.set_constraints(&[point("pin", [4.0, 4.0, 4.0], 0.7, hold)])
+            .unwrap();
+        for _ in 0..5 {
+            p.step(Integrator::TrBdf2, 0.1).unwrap();
+        }
+        p.rest_here();
+        let d = p.state().d.to_vec();
+        assert!(p.constraints().is_empty());
+        p.step(Integrator::TrBdf2, 0.1).unwrap();
+        assert_eq!(p.state().d, d);
+    }
+}

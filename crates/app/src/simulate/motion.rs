@@ -319,17 +319,6 @@ impl<'a, T: Real> Simulation<'a, T> {
         }
     }
 
-    fn drop_constraints(&mut self) -> Result<(), SimulateError> {
-        if self.region.patch().constraints().is_empty() {
-            return Ok(());
-        }
-        let dropped = self.region.patch_mut().set_constraints(&[]);
-        dropped.map_err(|source| SimulateError::Step {
-            time: self.time,
-            source,
-        })
-    }
-
     fn let_go(&mut self) -> Result<(), SimulateError> {
         let Some(release) = self.scene.release.filter(|_| self.released.is_none()) else {
             return Ok(());
@@ -340,7 +329,6 @@ impl<'a, T: Real> Simulation<'a, T> {
         self.released = Some(release.kind);
         match release.kind {
             ReleaseKind::Clay => {
-                self.drop_constraints()?;
                 self.field = self
                     .region
                     .release_clay(&self.field)

@@ -313,8 +313,8 @@ impl<T: Real> Region<T> {
         Ok(onto.edited(&edits)?)
     }
 
-    /// Lets clay go: bakes it, and makes the present shape the rest. Rest := current, velocity := 0, force := 0; the
-    /// region sleeps. From then on it is a region of the field returned, to which it adds nothing until it is moved again:
+    /// Lets clay go: bakes it, and makes the present shape the rest. Rest := current, velocity := 0, force := 0, no
+    /// constraints; the region sleeps. From then on it is a region of the field returned, to which it adds nothing until it is moved again:
     /// the shape stays, to the bit.
     ///
     /// # Errors
