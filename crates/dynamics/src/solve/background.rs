@@ -63,6 +63,10 @@ impl<T: Real> Background<T> {
     /// # Errors
     /// [`NotPositive`] if the V-cycle cannot be prepared.
     pub fn prepare(&mut self, s: &StepMatrix<T>) -> Result<(), NotPositive> {
+        // A solve that left too much asks for a fresh start: of the same matrix the factor is what helps.
+        if self.matrix == *s && self.work != Work::Prepared {
+            return Ok(());
+        }
         copy(&mut self.matrix.mass, &s.mass);
         for (to, from) in self.matrix.springs.iter_mut().zip(&s.springs) {
             copy(&mut to.weights, &from.weights);

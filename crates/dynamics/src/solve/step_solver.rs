@@ -239,7 +239,11 @@ impl<T: Real> StepSolver<T> {
             }
             Painted::Background(background) => {
                 background.prepare(s)?;
-                Method::VCycle
+                if background.is_done() {
+                    Method::Direct
+                } else {
+                    Method::VCycle
+                }
             }
             Painted::VCycle(cycle) => {
                 cycle.prepare(s)?;
