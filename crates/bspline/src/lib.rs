@@ -30,6 +30,7 @@ pub mod primitives;
 mod real;
 pub mod restrict;
 pub mod tensor;
+mod vectorized;
 
 pub use banded::BandedRows;
 pub use basis::Basis;
@@ -42,3 +43,4 @@ pub use knots::{KnotError, KnotVector};
 pub use primitives::{Primitive, PrimitiveError};
 pub use real::Real;
 pub use tensor::{TensorError, TensorSpline};
+pub use vectorized::vectorized;

@@ -7,6 +7,7 @@
 //! function by a share that falls with the square of the box, and is exact for linear functions.
 
 use crate::Real;
+use crate::vectorized::vectorized;
 
 /// Cells that one call covers.
 pub const CELLS: usize = 8;
@@ -144,7 +145,7 @@ pub fn restricted_range<T: Real>(
     coefficients: &[T; COEFFICIENTS * COEFFICIENTS * COEFFICIENTS],
     axes: &[RestrictedAxis<T>; 3],
 ) -> (T, T) {
-    pulp::Arch::new().dispatch(
+    vectorized(
         #[inline(always)]
         || range_of_rows(coefficients, axes),
     )

@@ -47,4 +47,3 @@ mod rest;
 pub mod solve;
 pub mod springs;
 pub mod study;
-mod vectorized;

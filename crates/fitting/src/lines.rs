@@ -5,7 +5,7 @@
 //! No result depends on how lines are grouped.
 
 use bspline::Real;
-use pulp::Arch;
+use bspline::vectorized;
 use rayon::prelude::*;
 
 /// Lines transposed together when the line runs along x.
@@ -39,10 +39,13 @@ pub(crate) fn rows_mut<T, R: AsMut<[T]>, const N: usize>(rows: &mut [R], at: [us
 pub(crate) fn solve_all_axes<T: Real>(axes: [&impl LineSolve<T>; 3], data: &mut [T], size: [usize; 3]) {
     assert_eq!(data.len(), size.iter().product::<usize>(), "array of {size:?}");
     data.par_chunks_mut(size[0] * size[1]).for_each(|plane| {
-        Arch::new().dispatch(|| {
-            solve_along_x(axes[0], plane, size[0]);
-            solve_along_y(axes[1], plane, size[0]);
-        });
+        vectorized(
+            #[inline(always)]
+            || {
+                solve_along_x(axes[0], plane, size[0]);
+                solve_along_y(axes[1], plane, size[0]);
+            },
+        );
     });
     solve_along_z(axes[2], data, size[0] * size[1]);
 }
@@ -103,7 +106,10 @@ pub(crate) fn solve_along_z<T: Real>(op: &impl LineSolve<T>, data: &mut [T], pla
             tile.push(piece);
         }
     }
-    tiles
-        .par_iter_mut()
-        .for_each(|rows| Arch::new().dispatch(|| op.solve(rows)));
+    tiles.par_iter_mut().for_each(|rows| {
+        vectorized(
+            #[inline(always)]
+            || op.solve(rows),
+        )
+    });
 }

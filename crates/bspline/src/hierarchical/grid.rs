@@ -1,5 +1,6 @@
 //! Values at the nodes of a grid that lies along the lattice: tensor products, brick by brick.
 
+use crate::vectorized::vectorized;
 use std::ops::Range;
 
 use glam::DVec3;
@@ -157,7 +158,7 @@ impl<T: Real> Block<'_, T> {
         );
         let (out, scratch) = (&mut *self.out, &mut self.scratch);
         let totals: &[T; HALO_LEN] = &brick.totals;
-        pulp::Arch::new().dispatch(
+        vectorized(
             #[inline(always)]
             || tensor(totals, scratch, counts, offsets, out),
         );

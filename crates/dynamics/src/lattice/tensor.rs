@@ -1,5 +1,5 @@
-use crate::vectorized::vectorized;
 use bspline::Real;
+use bspline::vectorized;
 
 use super::banded::{Banded, BandedLanes};
 

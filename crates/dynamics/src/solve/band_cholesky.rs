@@ -1,7 +1,7 @@
 //! Cholesky factorization inside the band of a matrix.
 
-use crate::vectorized::vectorized;
 use bspline::Real;
+use bspline::vectorized;
 
 use super::pcg::Preconditioner;
 use crate::springs::StepMatrix;

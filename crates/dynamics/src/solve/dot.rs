@@ -1,5 +1,5 @@
-use crate::vectorized::vectorized;
 use bspline::Real;
+use bspline::vectorized;
 
 const LANES: usize = 16;
 const CHUNK: usize = 1024;

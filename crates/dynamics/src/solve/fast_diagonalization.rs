@@ -1,8 +1,8 @@
 //! Fast diagonalization: the exact inverse of a constant material on a tensor-product lattice [R. E. Lynch,
 //! J. R. Rice and D. H. Thomas, *Direct solution of partial difference equations by tensor product methods*, 1964].
 
-use crate::vectorized::vectorized;
 use bspline::Real;
+use bspline::vectorized;
 use nalgebra::{Cholesky, DMatrix, SymmetricEigen};
 
 use super::pcg::Preconditioner;

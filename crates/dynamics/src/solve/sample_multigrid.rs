@@ -1,8 +1,8 @@
 //! Multigrid on the samples, for lattices with as many free coefficients as samples: there `H⁻¹ = A⁻¹S⁻¹A⁻ᵀ`, and `S`
 //! is a Laplacian with painted weights, while `H` itself is too badly conditioned for anything.
 
-use crate::vectorized::vectorized;
 use bspline::Real;
+use bspline::vectorized;
 
 use super::band_cholesky::{BandCholesky, NotPositive};
 use super::pcg::Preconditioner;

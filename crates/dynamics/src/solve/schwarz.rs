@@ -1,7 +1,7 @@
 //! Overlapping blocks of coefficients, each solved exactly: the additive Schwarz method, where material is painted.
 
-use crate::vectorized::vectorized;
 use bspline::Real;
+use bspline::vectorized;
 
 use super::galerkin::Galerkin;
 

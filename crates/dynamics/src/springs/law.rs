@@ -2,8 +2,8 @@
 //!
 //! A spring joins two samples at the distance `h` whose densities differ by `Δ = σ(d_i - d_j)`, a length.
 
-use crate::vectorized::vectorized;
 use bspline::Real;
+use bspline::vectorized;
 
 use super::stencil::{SpringWeights, Weights};
 

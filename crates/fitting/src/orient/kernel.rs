@@ -7,6 +7,7 @@
 //! - `(1/4π) Σ s (x − y)/ρ³`, gathered at `x`, is the adjoint of the first.
 
 use super::tree::Tree;
+use bspline::vectorized;
 
 /// Targets that are summed at once.
 pub(crate) const LANES: usize = 8;
@@ -57,7 +58,7 @@ fn lanes<S: Copy, const N: usize>(
     targets: &[Target],
     term: impl Fn([f32; 3], f32, S) -> [f32; N],
 ) -> [[f32; LANES]; N] {
-    pulp::Arch::new().dispatch(
+    vectorized(
         #[inline(always)]
         || {
             let (mut at, mut square) = ([[0.0f32; LANES]; 3], [0.0f32; LANES]);

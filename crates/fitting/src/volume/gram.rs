@@ -6,7 +6,7 @@
 //! its rows are in the cache: what is read and written is the packed vectors and the small coarse levels.
 
 use bspline::Real;
-use pulp::Arch;
+use bspline::vectorized;
 use rayon::prelude::*;
 
 use super::active::{ActiveSet, Packed};
@@ -56,7 +56,10 @@ fn apply_finest<T: Real>(
         .enumerate()
         .map(|(i, q)| {
             let (z0, z1) = (i * SLAB, ((i + 1) * SLAB).min(planes));
-            Arch::new().dispatch(|| slab(domain, coarse, active, p, q, z0, z1))
+            vectorized(
+                #[inline(always)]
+                || slab(domain, coarse, active, p, q, z0, z1),
+            )
         })
         .collect();
     Restriction::merge(slabs, collected);

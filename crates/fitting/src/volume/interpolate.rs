@@ -1,7 +1,7 @@
 //! The interpolating fit: one coefficient per voxel, exact at every voxel.
 
 use bspline::Real;
-use pulp::Arch;
+use bspline::vectorized;
 use rayon::prelude::*;
 
 use super::domain::{Domain, Samples};
@@ -27,14 +27,17 @@ pub(crate) fn interpolating_coefficients<T: Real>(domain: &Domain<T>, samples: &
         .take(nz)
         .enumerate()
         .for_each(|(z, plane)| {
-            Arch::new().dispatch(|| {
-                let rows = &mut plane[fx..(ny + 1) * fx];
-                for (y, row) in rows.chunks_mut(fx).enumerate() {
-                    samples.row(y, z, &mut row[1..nx + 1]);
-                }
-                solve_along_x(&filters[0], rows, fx);
-                solve_along_y(&filters[1], plane, fx);
-            });
+            vectorized(
+                #[inline(always)]
+                || {
+                    let rows = &mut plane[fx..(ny + 1) * fx];
+                    for (y, row) in rows.chunks_mut(fx).enumerate() {
+                        samples.row(y, z, &mut row[1..nx + 1]);
+                    }
+                    solve_along_x(&filters[0], rows, fx);
+                    solve_along_y(&filters[1], plane, fx);
+                },
+            );
         });
     solve_along_z(&filters[2], &mut dense, fx * fy);
     dense

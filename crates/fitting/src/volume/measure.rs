@@ -1,7 +1,7 @@
 //! Residuals of the finished field, measured in double precision from the stored coefficients.
 
 use bspline::Real;
-use pulp::Arch;
+use bspline::vectorized;
 use rayon::prelude::*;
 
 use super::active::{ActiveSet, Packed};
@@ -58,31 +58,34 @@ pub(crate) fn measure<T: Real>(
         .par_chunks_mut(nx * ny * SLAB)
         .enumerate()
         .map(|(i, slab)| {
-            Arch::new().dispatch(|| {
-                let planes = i * SLAB..i * SLAB + slab.len() / (nx * ny);
-                let rows = TotalRows::new(
-                    &domain,
-                    finest,
-                    &totals[finest - 1],
-                    &active[finest],
-                    &exact[finest],
-                );
-                let mut sums = LeafSums::new(grid, &planes);
-                let mut targets = slab.chunks_mut(nx);
-                let mut max = 0.0_f64;
-                residual_slab(&domain, &samples, rows, planes, |y, z, row| {
-                    if y < ny {
-                        let row = &row[..nx];
-                        sums.add_row(y, z, row);
-                        for (t, &v) in targets.next().expect("one target per row").iter_mut().zip(row) {
-                            let a = v.abs();
-                            max = if a > max { a } else { max };
-                            *t = a as f32;
+            vectorized(
+                #[inline(always)]
+                || {
+                    let planes = i * SLAB..i * SLAB + slab.len() / (nx * ny);
+                    let rows = TotalRows::new(
+                        &domain,
+                        finest,
+                        &totals[finest - 1],
+                        &active[finest],
+                        &exact[finest],
+                    );
+                    let mut sums = LeafSums::new(grid, &planes);
+                    let mut targets = slab.chunks_mut(nx);
+                    let mut max = 0.0_f64;
+                    residual_slab(&domain, &samples, rows, planes, |y, z, row| {
+                        if y < ny {
+                            let row = &row[..nx];
+                            sums.add_row(y, z, row);
+                            for (t, &v) in targets.next().expect("one target per row").iter_mut().zip(row) {
+                                let a = v.abs();
+                                max = if a > max { a } else { max };
+                                *t = a as f32;
+                            }
                         }
-                    }
-                });
-                (sums, max)
-            })
+                    });
+                    (sums, max)
+                },
+            )
         })
         .collect();
     let max = parts.iter().fold(0.0, |m: f64, p| m.max(p.1));

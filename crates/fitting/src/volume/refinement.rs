@@ -1,7 +1,7 @@
 //! Totals of a level row by row, and the transpose: the coarse share of fine rows.
 
 use bspline::Real;
-use pulp::Arch;
+use bspline::vectorized;
 use rayon::prelude::*;
 
 use super::active::ActiveSet;
@@ -154,17 +154,20 @@ pub(crate) fn prolong<T: Real>(
     fine.par_chunks_mut(nx * ny * SLAB)
         .enumerate()
         .for_each(|(i, slab)| {
-            Arch::new().dispatch(|| {
-                let mut rows = TotalRows::new(domain, level, coarse, active, packed);
-                let mut buffer = vec![T::zero(); phases.len()];
-                for (z, plane) in slab.chunks_mut(nx * ny).enumerate() {
-                    rows.start_plane(i * SLAB + z);
-                    for (y, row) in plane.chunks_mut(nx).enumerate() {
-                        rows.row(y, &mut buffer);
-                        phases.join_functions(&buffer, row);
+            vectorized(
+                #[inline(always)]
+                || {
+                    let mut rows = TotalRows::new(domain, level, coarse, active, packed);
+                    let mut buffer = vec![T::zero(); phases.len()];
+                    for (z, plane) in slab.chunks_mut(nx * ny).enumerate() {
+                        rows.start_plane(i * SLAB + z);
+                        for (y, row) in plane.chunks_mut(nx).enumerate() {
+                            rows.row(y, &mut buffer);
+                            phases.join_functions(&buffer, row);
+                        }
                     }
-                }
-            });
+                },
+            );
         });
     fine
 }
@@ -177,19 +180,22 @@ pub(crate) fn restrict<T: Real>(domain: &Domain<T>, level: usize, fine: &[T]) ->
         .par_chunks(nx * ny * SLAB)
         .enumerate()
         .map(|(i, slab)| {
-            Arch::new().dispatch(|| {
-                let z0 = i * SLAB;
-                let mut sum = Restriction::new(domain, level, z0, z0 + slab.len() / (nx * ny));
-                let mut buffer = vec![T::zero(); phases.len()];
-                for (z, plane) in slab.chunks(nx * ny).enumerate() {
-                    for (y, row) in plane.chunks(nx).enumerate() {
-                        phases.split_functions(row, &mut buffer);
-                        sum.add_row(y, &buffer);
+            vectorized(
+                #[inline(always)]
+                || {
+                    let z0 = i * SLAB;
+                    let mut sum = Restriction::new(domain, level, z0, z0 + slab.len() / (nx * ny));
+                    let mut buffer = vec![T::zero(); phases.len()];
+                    for (z, plane) in slab.chunks(nx * ny).enumerate() {
+                        for (y, row) in plane.chunks(nx).enumerate() {
+                            phases.split_functions(row, &mut buffer);
+                            sum.add_row(y, &buffer);
+                        }
+                        sum.end_plane(z0 + z);
                     }
-                    sum.end_plane(z0 + z);
-                }
-                sum
-            })
+                    sum
+                },
+            )
         })
         .collect();
     let mut coarse = vec![T::zero(); domain.function_count(level - 1)];

@@ -1,9 +1,9 @@
 //! Residuals at the samples, and their correlation with the functions of every level.
 
+use bspline::vectorized;
 use std::ops::Range;
 
 use bspline::Real;
-use pulp::Arch;
 use rayon::prelude::*;
 
 use super::active::{ActiveSet, Packed};
@@ -26,17 +26,20 @@ pub(crate) fn residual<T: Real>(
     out.par_chunks_mut(nx * ny * SLAB)
         .enumerate()
         .for_each(|(i, slab)| {
-            Arch::new().dispatch(|| {
-                let rows = TotalRows::new(domain, finest, coarse, &active[finest], &packed[finest]);
-                let planes = i * SLAB..i * SLAB + slab.len() / (nx * ny);
-                let mut targets = slab.chunks_mut(nx);
-                residual_slab(domain, samples, rows, planes, |_, _, row| {
-                    targets
-                        .next()
-                        .expect("as many rows as asked for")
-                        .copy_from_slice(row);
-                });
-            });
+            vectorized(
+                #[inline(always)]
+                || {
+                    let rows = TotalRows::new(domain, finest, coarse, &active[finest], &packed[finest]);
+                    let planes = i * SLAB..i * SLAB + slab.len() / (nx * ny);
+                    let mut targets = slab.chunks_mut(nx);
+                    residual_slab(domain, samples, rows, planes, |_, _, row| {
+                        targets
+                            .next()
+                            .expect("as many rows as asked for")
+                            .copy_from_slice(row);
+                    });
+                },
+            );
         });
 }
 
@@ -108,7 +111,10 @@ pub(crate) fn correlations<T: Real>(
         .enumerate()
         .map(|(i, out)| {
             let (z0, z1) = (i * SLAB, ((i + 1) * SLAB).min(planes));
-            Arch::new().dispatch(|| correlation_slab(domain, residual, finest_active, out, z0, z1))
+            vectorized(
+                #[inline(always)]
+                || correlation_slab(domain, residual, finest_active, out, z0, z1),
+            )
         })
         .collect();
     let mut dense = vec![T::zero(); domain.function_count(finest - 1)];

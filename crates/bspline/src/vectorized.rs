@@ -17,6 +17,6 @@ impl<R, F: FnMut() -> R> WithSimd for Kernel<F> {
 /// [`Arch::dispatch`] on the closure itself calls it through the shim that makes a `FnOnce` of it. The shim is compiled
 /// for the baseline, and is too long to be inlined: its loops stay at 128 bits.
 #[inline(always)]
-pub(crate) fn vectorized<R>(kernel: impl FnMut() -> R) -> R {
+pub fn vectorized<R>(kernel: impl FnMut() -> R) -> R {
     Arch::new().dispatch(Kernel(kernel))
 }
