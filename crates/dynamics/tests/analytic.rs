@@ -1,5 +1,7 @@
 //! Motion and rest against theory: one mode, a static solve, the closed form of a pull, its limit under refinement.
 
+mod common;
+
 use bspline::Basis;
 use dynamics::integrators::Integrator;
 use dynamics::lattice::{Lattice, Rim, TensorWorkspace};
@@ -85,22 +87,9 @@ fn frequency_and_decay_of_a_free_mode() {
 
 /// `K̃` element by element.
 fn stiffness(p: &Patch<f64>) -> DMatrix<f64> {
-    let lattice = p.lattice();
-    let lumped = p.matter().lumped(lattice, Neighbours::Six).unwrap();
-    let s = StepMatrix::new(lattice.sample_dims(), lumped.ground, lumped.springs);
-    let (n, m) = (lattice.coefficient_count(), lattice.sample_count());
-    let mut w = TensorWorkspace::new();
-    let (mut d, mut q, mut column) = (vec![0.0; m], vec![0.0; m], vec![0.0; n]);
-    let mut k = DMatrix::zeros(n, n);
-    for j in 0..n {
-        let mut e = vec![0.0; n];
-        e[j] = 1.0;
-        lattice.sample(&e, &mut d, &mut w);
-        s.apply(&d, &mut q);
-        lattice.gather(&q, &mut column, &mut w);
-        k.set_column(j, &DVector::from_column_slice(&column));
-    }
-    k
+    let lumped = p.matter().lumped(p.lattice(), Neighbours::Six).unwrap();
+    let s = StepMatrix::new(p.lattice().sample_dims(), lumped.ground, lumped.springs);
+    common::dense(p.lattice(), &s)
 }
 
 #[test]

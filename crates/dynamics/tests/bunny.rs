@@ -1,5 +1,7 @@
 //! A part of a scanned animal: rest lengths, stiffness and mass as a sculptor paints them, and what holds it.
 
+mod common;
+
 use std::io::Read;
 use std::path::Path;
 use std::sync::LazyLock;
@@ -243,20 +245,7 @@ fn rest_lengths_inflate_and_deflate_four_d_springs() {
 /// `Aᵀ(diag(m) + Bᵀdiag(k)B)A` element by element.
 fn dense(region: &Region<f64>, mass: Weights<f64>, springs: Vec<SpringWeights<f64>>) -> DMatrix<f64> {
     let lattice = region.patch().lattice();
-    let s = StepMatrix::new(lattice.sample_dims(), mass, springs);
-    let (n, m) = (lattice.coefficient_count(), lattice.sample_count());
-    let mut w = TensorWorkspace::new();
-    let (mut d, mut q, mut column) = (vec![0.0; m], vec![0.0; m], vec![0.0; n]);
-    let mut k = DMatrix::zeros(n, n);
-    for j in 0..n {
-        let mut e = vec![0.0; n];
-        e[j] = 1.0;
-        lattice.sample(&e, &mut d, &mut w);
-        s.apply(&d, &mut q);
-        lattice.gather(&q, &mut column, &mut w);
-        k.set_column(j, &DVector::from_column_slice(&column));
-    }
-    k
+    common::dense(lattice, &StepMatrix::new(lattice.sample_dims(), mass, springs))
 }
 
 /// Mass, damping and stiffness matrices of a region under the linear law.

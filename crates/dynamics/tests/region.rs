@@ -380,19 +380,22 @@ fn a_swinging_solid_does_not_fall_asleep() {
     }
 }
 
+/// A pushed region of 7³ cells from the cell `x` on.
+fn pushed_at(field: &HierarchicalSpline<f32>, x: u32) -> Region<f32> {
+    let cells = Cells {
+        level: 1,
+        first: [x, 2, 3],
+        count: [7, 7, 7],
+    };
+    let mut region = Region::new(field, cells, damped(), &options(field)).unwrap();
+    region.set_force(&push(&region, 0.3)).unwrap();
+    region
+}
+
 #[test]
 fn a_budget_gives_every_region_its_turn() {
     let old = field::<f32>(2);
-    let new = |x: u32| {
-        let cells = Cells {
-            level: 1,
-            first: [x, 2, 3],
-            count: [7, 7, 7],
-        };
-        let mut region = Region::new(&old, cells, damped(), &options(&old)).unwrap();
-        region.set_force(&push(&region, 0.3)).unwrap();
-        region
-    };
+    let new = |x| pushed_at(&old, x);
     let mut all = vec![new(0), new(8), new(16)];
     let mut some = all.clone();
     let work = some[0].step_work(Integrator::TrBdf2);
@@ -513,16 +516,7 @@ fn parts_sleep_that_a_push_does_not_reach() {
 #[test]
 fn a_frame_ends_when_its_time_is_spent() {
     let old = field::<f32>(2);
-    let new = |x: u32| {
-        let cells = Cells {
-            level: 1,
-            first: [x, 2, 3],
-            count: [7, 7, 7],
-        };
-        let mut region = Region::new(&old, cells, damped(), &options(&old)).unwrap();
-        region.set_force(&push(&region, 0.3)).unwrap();
-        region
-    };
+    let new = |x| pushed_at(&old, x);
     let mut regions = vec![new(0), new(8), new(16)];
     let mut schedule = Schedule::default();
     // A clock that a step advances by 4 ms, and frames of 6 ms.

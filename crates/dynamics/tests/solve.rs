@@ -1,30 +1,14 @@
 //! Solvers of a step against dense double precision.
 
+mod common;
+
 use dynamics::lattice::{Lattice, Rim, TensorWorkspace};
 use dynamics::solve::{BandCholesky, Galerkin, Method, SolverOptions, StepSolver};
 use dynamics::springs::{Neighbours, SpringWeights, StepMatrix, Weights};
 use dynamics::study::{Pattern, spring_weights};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
-fn dense(lattice: &Lattice<f64>, s: &StepMatrix<f64>) -> DMatrix<f64> {
-    let n = lattice.coefficient_count();
-    let mut w = TensorWorkspace::new();
-    let (mut d, mut q) = (
-        vec![0.0; lattice.sample_count()],
-        vec![0.0; lattice.sample_count()],
-    );
-    let mut h = DMatrix::zeros(n, n);
-    let mut column = vec![0.0; n];
-    for j in 0..n {
-        let mut e = vec![0.0; n];
-        e[j] = 1.0;
-        lattice.sample(&e, &mut d, &mut w);
-        s.apply(&d, &mut q);
-        lattice.gather(&q, &mut column, &mut w);
-        h.set_column(j, &DVector::from_column_slice(&column));
-    }
-    h
-}
+use common::dense;
 
 fn matrix(
     pattern: Pattern,

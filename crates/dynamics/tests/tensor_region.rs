@@ -1,5 +1,7 @@
 //! Tensor-product patches with nonuniform, clamped knots as dynamic patches.
 
+mod common;
+
 use bspline::tensor::TensorSpline;
 use bspline::{Field, KnotVector};
 use dynamics::integrators::Integrator;
@@ -9,7 +11,7 @@ use dynamics::region::{RegionError, TensorOptions, TensorRegion};
 use dynamics::solve::SolverOptions;
 use dynamics::springs::{Law, Neighbours, StepMatrix};
 use glam::{DAffine3, DMat3, DVec3};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 /// Nine, nine and ten coefficients, knots closer together near one end, cubic but for one quadratic axis.
 fn field() -> TensorSpline<f64> {
@@ -75,19 +77,9 @@ fn a_pushed_patch_rests_where_a_dense_solve_says() {
         assert_eq!(lattice.spacing(), [0.5, 0.5, 0.75]);
         let lumped = region.patch().matter().lumped(lattice, Neighbours::Six).unwrap();
         let s = StepMatrix::new([17; 3], lumped.ground, lumped.springs);
-        let (n, m) = (lattice.coefficient_count(), lattice.sample_count());
-        let mut w = TensorWorkspace::new();
-        let (mut d, mut q, mut column) = (vec![0.0; m], vec![0.0; m], vec![0.0; n]);
-        let mut k = DMatrix::zeros(n, n);
-        for j in 0..n {
-            let mut e = vec![0.0; n];
-            e[j] = 0.25;
-            lattice.sample(&e, &mut d, &mut w);
-            s.apply(&d, &mut q);
-            lattice.gather(&q, &mut column, &mut w);
-            k.set_column(j, &DVector::from_column_slice(&column));
-        }
-        lattice.gather(&force, &mut column, &mut w);
+        let k = common::dense(lattice, &s);
+        let mut column = vec![0.0; lattice.coefficient_count()];
+        lattice.gather(&force, &mut column, &mut TensorWorkspace::new());
         let exact = k.cholesky().unwrap().solve(&DVector::from_vec(column));
         let error = (DVector::from_column_slice(&region.patch().state().p) - &exact).norm() / exact.norm();
         assert!(error < 1e-8, "{rim:?}: {error:.1e}");

@@ -4,9 +4,10 @@ mod common;
 
 use bspline::{Field, Frame};
 use common::{cloud, fit, to_depth};
+use fitting::orient::{OrientOptions, orient_points};
 use fitting::phantoms::{CloudOptions, SampledCloud, Solid, SplitMix64};
-use fitting::points::{NormalForm, PointOptions, newton_distance};
-use fitting::{FitReport, StopReason, unsupported_components};
+use fitting::points::{NormalForm, OrientedPoints, PointOptions, fit_points, newton_distance};
+use fitting::{Control, FitReport, StopReason, unsupported_components};
 use glam::DVec3;
 
 const ROBUST: PointOptions = PointOptions {
@@ -314,4 +315,34 @@ fn hard_clouds_give_the_same_bits_at_any_number_of_threads() {
     };
     let one = results(1);
     assert!(one == results(3));
+}
+
+#[test]
+fn certainty_of_estimated_normals_serves_sparse_scans() {
+    let options = CloudOptions {
+        count: 2000,
+        density_ratio: 30.0,
+        ..CloudOptions::default()
+    };
+    let sparse = cloud(Solid::Tetrahedron, &options);
+    let even = cloud(Solid::Tetrahedron, &CloudOptions::default());
+    let mut control = Control::default();
+    let found = orient_points(&sparse.positions, &OrientOptions::default(), &mut control).unwrap();
+    let p95 = |certainty| {
+        let points = OrientedPoints {
+            positions: &sparse.positions,
+            normals: &found.normals,
+            certainty,
+        };
+        let (field, _) = fit_points::<f64>(&points, &to_depth(7), &mut Control::default()).unwrap();
+        let mut errors: Vec<f64> = even
+            .positions
+            .iter()
+            .map(|p| newton_distance(&field, *p).0)
+            .collect();
+        errors.sort_by(f64::total_cmp);
+        errors[errors.len() * 95 / 100]
+    };
+    let (blind, certain) = (p95(None), p95(Some(&found.certainty)));
+    assert!(certain < 0.8 * blind, "{certain} against {blind}");
 }

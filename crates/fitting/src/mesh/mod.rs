@@ -9,6 +9,7 @@ mod moments;
 mod nearest;
 mod pieces;
 mod probes;
+mod sides;
 mod surface;
 mod topology;
 mod tree;

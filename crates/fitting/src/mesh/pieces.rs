@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::surface::Sides;
+use super::sides::Sides;
 use super::topology::area_vector;
 use super::winding::WindingTree;
 

@@ -9,13 +9,12 @@ use rayon::prelude::*;
 use super::MeshDefects;
 use super::crossings::crossings;
 use super::pieces::boundary_pieces;
+use super::sides::Sides;
 use super::topology::{Faces, area_vector};
 use super::tree::TriangleTree;
 use super::winding::WindingTree;
 use crate::FitError;
 
-/// How far from a triangle its two sides are looked at, unit box.
-const ASIDE: f64 = 1e-7;
 /// Triangles of a sheet or patch whose sides are looked at.
 const LOOKS: usize = 32;
 /// Rounds of turning sheets over; each sees the sheets as the one before left them.
@@ -42,28 +41,6 @@ pub(crate) struct Rim {
     pub edges: TriangleTree,
     /// Length of all, each as often as it is passed more one way than the other.
     pub length: f64,
-}
-
-/// Sides of a triangle at one of its points.
-pub(crate) struct Sides {
-    /// Winding number in front of and behind it.
-    front: f64,
-    back: f64,
-}
-
-impl Sides {
-    pub fn at(winding: &WindingTree, p: DVec3, normal: DVec3) -> Self {
-        Self {
-            front: winding.at(p + normal * ASIDE),
-            back: winding.at(p - normal * ASIDE),
-        }
-    }
-    fn middle(&self) -> f64 {
-        0.5 * (self.front + self.back)
-    }
-    pub fn is_boundary(&self) -> bool {
-        self.back > 0.5 && self.front <= 0.5
-    }
 }
 
 /// Turns whole sheets the right way out, leaves out what bounds nothing, and finds the boundary of the solid.
