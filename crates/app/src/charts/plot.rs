@@ -42,13 +42,15 @@ const ROW: i32 = 24;
 pub const DEPTH: f64 = 1e-5;
 
 /// Colours that the colour-blind tell apart (Okabe & Ito 2008).
-const COLORS: [RGBColor; 6] = [
+const COLORS: [RGBColor; 8] = [
     RGBColor(0, 114, 178),
     RGBColor(230, 120, 0),
     RGBColor(0, 158, 115),
     RGBColor(204, 121, 167),
     RGBColor(86, 160, 233),
     RGBColor(90, 90, 90),
+    RGBColor(146, 73, 0),
+    RGBColor(73, 0, 146),
 ];
 
 impl Chart {

@@ -5,7 +5,7 @@ use dynamics::integrators::{Integrator, StepReport};
 use dynamics::lattice::{Lattice, LatticeError};
 use dynamics::matter::Matter;
 use dynamics::patch::{Patch, PatchError};
-use dynamics::solve::SolverOptions;
+use dynamics::solve::{Method, SolverOptions};
 use dynamics::springs::{Law, Weights};
 use dynamics::study::{Configuration, loads, spring_weights};
 
@@ -77,6 +77,9 @@ pub struct Stepped {
 const LINEAR: f64 = 1.0;
 const FOUR_D: f64 = 0.1;
 
+/// Steps in which any factor is made.
+const SETTLED: usize = 400;
+
 impl Increments {
     /// Solves directly in double precision.
     pub fn new(c: &Configuration, integrator: Integrator) -> Result<Self, DynamicsError> {
@@ -128,9 +131,24 @@ impl Increments {
         Ok((x.into_iter().map(|x| x.as_f64()).collect(), report))
     }
 
+    /// Steps until the factor is there that is made beside the steps, if one is.
+    fn settle<T: Real>(&self, patch: &mut Patch<T>) -> Result<(), PatchError> {
+        let options = SolverOptions::default();
+        if !(options.direct_limit..=options.background_limit).contains(&patch.lattice().coefficient_count()) {
+            return Ok(());
+        }
+        for _ in 0..SETTLED {
+            if patch.step(self.integrator, self.dt)?.solve.method != Method::VCycle {
+                break;
+            }
+        }
+        Ok(())
+    }
+
     /// What the default solver makes of them in precision `T`.
     pub fn judge<T: Real>(&self, c: &Configuration, clock: fn() -> f64) -> Result<Stepped, DynamicsError> {
         let mut patch = patch::<T>(c, SolverOptions::default())?;
+        self.settle(&mut patch)?;
         let mut out = Stepped {
             error: 0.0,
             iterations: 0,
