@@ -24,7 +24,7 @@ use super::{interrupt, set_threads};
 pub struct Args {
     /// Field (.iclay)
     field: PathBuf,
-    /// Mesh to write: .ply, .stl or .obj
+    /// Mesh to write: .ply, .stl, .obj, .glb, .gltf, .3mf or .wrl
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
     /// Cells along the longest side of the box [default: two cells per knot interval of the finest level that a

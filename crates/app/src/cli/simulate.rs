@@ -30,7 +30,7 @@ pub struct Args {
     /// Field to move in place of the one that the scene names
     #[arg(long, value_name = "FIELD")]
     field: Option<PathBuf>,
-    /// Also write the surface at the end: .ply, .stl or .obj
+    /// Also write the surface at the end: .ply, .stl, .obj, .glb, .gltf, .3mf or .wrl
     #[arg(long, value_name = "OUT")]
     mesh: Option<PathBuf>,
     /// Also write the surface along the way, as frame-00000.ply and so on; the directory is made if missing
