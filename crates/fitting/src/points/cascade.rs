@@ -16,7 +16,7 @@ use super::samples::{BASE_DEPTH, Samples};
 use super::stencil::Spot;
 use crate::{Control, FitError, StopReason};
 
-/// Samples of a cell beyond this many are thinned on levels that will be refined again.
+/// Samples of a cell beyond this many are thinned.
 const SAMPLES_PER_CELL: u32 = 8;
 /// A whole cascade.
 pub(crate) struct Cascade<T> {
@@ -155,8 +155,9 @@ fn band_samples<T: Real>(
     depth: usize,
 ) -> (Vec<BandSample<T>>, Vec<BrickSamples>, Vec<u32>) {
     let n = (1u64 << depth) as f64;
-    let thin = plan.thin && depth < plan.max_depth;
-    let (between, starts) = neighbours.map_or_else(Default::default, |n| n.by_brick(band, cells));
+    let (between, starts) = neighbours.map_or_else(Default::default, |n| {
+        n.by_brick(band, cells, plan.between_weight(depth))
+    });
     let mut list = Vec::with_capacity(samples.positions.len() + between.len());
     let mut owners = Vec::with_capacity(list.capacity());
     let mut bricks: Vec<BrickSamples> = Vec::new();
@@ -185,7 +186,7 @@ fn band_samples<T: Real>(
         let local = cell.at.map(|c| c as usize % BRICK);
         let start = (local[0] * HALO + local[1]) * HALO + local[2];
         let count = cell.end - cell.start;
-        let stride = if thin {
+        let stride = if plan.thin {
             (count / SAMPLES_PER_CELL).max(1)
         } else {
             1

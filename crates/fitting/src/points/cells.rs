@@ -106,7 +106,13 @@ pub(crate) fn children(samples: &Samples, above: &[(Cell, bool)], depth: usize) 
 }
 
 /// Whether a cell is split, or why not. `spacing` is the distance of its first sample to its neighbours, unit box.
-pub(crate) fn judge(cell: &Cell, q: &Quality, spacing: f32, plan: &Plan, depth: usize) -> Result<(), StopReason> {
+pub(crate) fn judge(
+    cell: &Cell,
+    q: &Quality,
+    spacing: f32,
+    plan: &Plan,
+    depth: usize,
+) -> Result<(), StopReason> {
     if !cell.is_live {
         return Err(StopReason::NoData);
     }

@@ -61,9 +61,12 @@ const FINEST_SPACING: f64 = 0.3;
 const SPARSE: f64 = 1.5;
 /// `β` of the samples themselves on such levels, in units of that on the others.
 const SPARSE_BETA: f64 = 1.0 / 6.0;
-/// `μ` of the finest level where its cells are as wide as the samples are apart. Narrower ones need more: what ripples
-/// between the samples costs `μ (h/s)²` a sample. Wider ones have their data.
+/// `μ` of the finest level where its cells are wide: the samples are close enough there.
 const FINEST_MU: f64 = 1e-4;
+/// The same times `(h/s)³` where they are narrow.
+const NARROW_MU: f64 = 6e-5;
+/// Weight of a condition between samples times `√(h/s)`.
+const BETWEEN: f64 = 2.0;
 
 /// Tolerance of a noisy cloud in standard deviations, when the caller gives none.
 const NOISE_FACTOR: f64 = 1.25;
@@ -93,7 +96,7 @@ impl Plan {
         let spacing = samples.mean_spacing(0.0);
         let asked = options.max_depth.map(|d| d.clamp(BASE_DEPTH + 1, MAX_DEPTH));
         let max_depth = asked.unwrap_or(depth_of(FINEST_SPACING * spacing).min(DEFAULT_DEPTH));
-        let finest_mu = FINEST_MU * (spacing * (1u64 << max_depth) as f64).powi(2).max(1.0);
+        let finest_mu = (NARROW_MU * (spacing * (1u64 << max_depth) as f64).powi(3)).max(FINEST_MU);
         let clean = Self {
             tolerance,
             max_depth,
@@ -150,6 +153,11 @@ impl Plan {
         self.form == NormalForm::Gradient && self.spacing.is_some_and(|s| h < SPARSE * s)
     }
 
+    /// Weight of the gradient between the samples, where that at a sample has 1.
+    pub fn between_weight(&self, depth: usize) -> f64 {
+        BETWEEN * (self.spacing.unwrap_or(0.0) * (1u64 << depth) as f64).sqrt()
+    }
+
     /// Weights of the energy on the level of `depth`. `β` is at least a quarter cell on levels that are refined
     /// again: it keeps the near far-field clean.
     pub fn weights(&self, depth: usize) -> Weights {
@@ -159,7 +167,11 @@ impl Plan {
         } else {
             self.beta
         };
-        let beta = if depth == self.max_depth { own } else { own.max(quarter) };
+        let beta = if depth == self.max_depth {
+            own
+        } else {
+            own.max(quarter)
+        };
         Weights {
             beta,
             mu: self.smoothing.at(depth, self.max_depth),
