@@ -11,8 +11,17 @@ use super::support::{self, Tree};
 
 /// Points at which a quadric is fitted.
 const QUERIES: usize = 256;
-/// Neighbourhoods tried, each twice the one before.
-const NEIGHBOURS: [usize; 5] = [30, 60, 120, 240, 480];
+/// The first neighbourhood; each further one is twice as large.
+const NEIGHBOURS: usize = 30;
+/// Largest neighbourhood of a surface. Beyond, the shape is seen, unless the points fill a volume: where the cloud is
+/// dense even the neighbourhoods that reach across the noise hold thousands.
+const OF_A_SURFACE: usize = 480;
+/// Points that a quadric is fitted to; of more they are taken at equal steps of their order by distance.
+const FITTED: usize = OF_A_SURFACE;
+/// Reach of a neighbourhood in standard deviations: noise has to be seen from so far ...
+const REACH: f64 = 3.0;
+/// ... and below this reach points fill a volume.
+const THICK: f64 = 4.0;
 /// Growth of the residual from one neighbourhood to the next that still counts as level. On clean scans the
 /// residual is the shape's own third order and grows by 1.4 to 2; with noise of 0.5 % it grows by 1.06 to 1.16
 /// once the neighbourhood spans the noise.
@@ -56,10 +65,9 @@ fn quadrics(
 ) -> Option<f64> {
     let stride = points.len().div_ceil(QUERIES);
     let mut previous: Option<f64> = None;
-    for k in NEIGHBOURS {
-        if 4 * k > points.len() {
-            return None;
-        }
+    let mut fills_volume = false;
+    let mut k = NEIGHBOURS;
+    while 4 * k <= points.len() && (k <= OF_A_SURFACE || fills_volume) {
         let count = NonZero::new(k).expect("not zero");
         let mut found: Vec<(f64, f64)> = (0..points.len())
             .step_by(stride)
@@ -72,6 +80,7 @@ fn quadrics(
                 let reach = f64::sqrt(near.last()?.distance);
                 let around: Vec<DVec3> = near
                     .iter()
+                    .step_by(k.div_ceil(FITTED))
                     .map(|n| n.item as usize)
                     .filter(|&j| same_wall.as_ref().is_none_or(|same| same(i, j)))
                     .map(|j| points[j])
@@ -97,9 +106,11 @@ fn quadrics(
         }
         match previous.map(|p| sigma / p) {
             Some(growth) if growth > SHAPE => return None,
-            Some(growth) if growth < LEVEL && reach >= 3.0 * sigma => return Some(sigma),
+            Some(growth) if growth < LEVEL && reach >= REACH * sigma => return Some(sigma),
             _ => previous = Some(sigma),
         }
+        fills_volume = reach < THICK * sigma;
+        k *= 2;
     }
     None
 }
