@@ -108,7 +108,10 @@ pub fn fit_points<T: Real>(
     }
     let turned = far_field::settle(&mut base, &samples);
     if turned > 0 {
-        samples.notes.push(format!("{turned} coefficients"));
+        samples.notes.push(format!(
+            "the sign of {turned} coefficients far from all points was turned over: the winding number of the points \
+             contradicts them"
+        ));
     }
     if let (Some(sigma), Some(beta)) = (noise, plan.second_beta) {
         let first = cascade::run::<T>(&samples, &base, &plan, 0.09..0.1, control)?;

@@ -155,3 +155,30 @@ fn quadric_residual(points: &[DVec3]) -> Option<(f64, f64)> {
 fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::phantoms::SplitMix64;
+
+    /// Points over a bent patch of 1 × 1, so many that 480 neighbours lie within two standard deviations.
+    fn patch(noise: f64) -> Vec<DVec3> {
+        let mut random = SplitMix64::new(7);
+        (0..60_000)
+            .map(|_| {
+                let p = random.uniform3();
+                DVec3::new(p.x, p.y, 0.2 * p.x * p.x) + noise * random.normal3()
+            })
+            .collect()
+    }
+
+    #[test]
+    fn noise_is_found_however_dense_the_cloud_and_none_where_there_is_none() {
+        let all = Some(|_: usize, _: usize| true);
+        for noise in [0.003, 0.01, 0.03] {
+            let found = of_positions(&patch(noise), all, 1e-4).expect("noise");
+            assert!((found / noise - 1.0).abs() < 0.2, "{found} for {noise}");
+        }
+        assert_eq!(of_positions(&patch(0.0), all, 1e-4), None);
+    }
+}
