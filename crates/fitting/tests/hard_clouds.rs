@@ -96,8 +96,9 @@ fn leaning_normals_grow_no_horn() {
     }
     let (field, report) = fit::<f32>(&samples, &PointOptions::default()).expect("a ball");
     assert!(says(&report, "turned over"), "{:?}", report.notes);
-    for i in 0..20 {
-        let at = middle * (1.4 + 0.03 * f64::from(i));
+    // Half a radius of the patch and a cell or two are left of it; it went on to 1.98.
+    for i in 0..10 {
+        let at = middle * (1.7 + 0.03 * f64::from(i));
         assert!(field.value(at) < 0.0, "solid at {at}");
     }
 }
