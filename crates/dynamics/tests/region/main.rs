@@ -1,5 +1,7 @@
 //! Regions of a hierarchical field: what baking keeps, how a solid is let go, and when it sleeps.
 
+mod sleep;
+
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
