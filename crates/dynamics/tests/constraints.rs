@@ -251,7 +251,7 @@ fn inconsistent_hard_constraints_are_refused_by_name_and_change_nothing() {
         .set_constraints(&[point("rim", [0.0, 4.0, 4.0], 0.0, Hold::Hard)])
         .unwrap_err();
     assert!(
-        refused.to_string().contains("hard constraints rim contradict"),
+        refused.to_string().contains("hard constraint rim asks for"),
         "{refused}"
     );
     // What is there already may be asked for.

@@ -105,7 +105,7 @@ impl<T: Real> Patch<T> {
             let balanced = gained <= options.energy_gain * scale + change.rounding;
             let fast = options.acceleration.is_some_and(|a| self.acceleration(dt) > a);
             // Of a method of second order the error of a step falls with its cube.
-            let factor = 0.9 * (options.tolerance / error).cbrt();
+            let factor = 0.9 * libm::cbrt(options.tolerance / error);
             let accepted = error <= options.tolerance && balanced;
             if accepted || dt <= shortest {
                 self.flow(dt);

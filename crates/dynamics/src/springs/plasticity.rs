@@ -57,7 +57,7 @@ impl<T: Real> Patch<T> {
     pub(crate) fn flow(&mut self, dt: f64) {
         match &self.plasticity {
             Plasticity::Elastic => (),
-            Plasticity::Clay { rate } => self.network.relax(&self.state.d, -(-rate * dt).exp_m1()),
+            Plasticity::Clay { rate } => self.network.relax(&self.state.d, -libm::expm1(-rate * dt)),
             Plasticity::Kernel { rate, weights } => {
                 self.network.relax_under(&self.state.d, weights, rate * dt);
             }
@@ -89,7 +89,7 @@ impl<T: Real> SpringNetwork<T> {
         assert_eq!(weights.len(), d.len(), "weights");
         self.relax_by(d, |i, j| {
             let w = 0.5 * (weights[i] + weights[j]).as_f64();
-            T::from_f64(-(-a * w).exp_m1())
+            T::from_f64(-libm::expm1(-a * w))
         });
     }
 

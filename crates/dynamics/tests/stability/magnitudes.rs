@@ -123,3 +123,266 @@ fn rounding_is_not_taken_for_energy() {
         }
     }
 }
+
+/// Units in which a scene is told.
+#[derive(Clone, Copy, Debug)]
+struct Units {
+    density: f64,
+    length: f64,
+    energy: f64,
+    time: f64,
+}
+
+const ONE: Units = Units {
+    density: 1.0,
+    length: 1.0,
+    energy: 1.0,
+    time: 1.0,
+};
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Held {
+    Free,
+    Spring,
+    Hard,
+}
+
+/// Where a scene told in other units goes, and the lengths of its steps, in the units of the first.
+fn told<T: Real>(u: Units, four_d: bool, held: Held, integrator: Option<Integrator>) -> Vec<f64> {
+    let scale = u.length / u.density;
+    let law = if four_d {
+        Law::FourD { scale }
+    } else {
+        Law::Linear { scale }
+    };
+    let volume = u.length.powi(3);
+    let times = |q: Quantity, by: f64| match q {
+        Quantity::Constant(v) => Quantity::Constant(v * by),
+        Quantity::PerSample(v) => Quantity::PerSample(v.iter().map(|v| v * by).collect()),
+    };
+    let of_mass = u.energy * (u.time / u.density).powi(2) / volume;
+    let matter = painted(12, 30.0, ball(12));
+    let matter = Matter {
+        stiffness: times(matter.stiffness, u.energy / volume),
+        mass: times(matter.mass, of_mass),
+        damping: times(matter.damping, of_mass / u.time),
+        ground: Quantity::Constant(0.01 * u.energy / (volume * u.length * u.length)),
+        spring_factors: None,
+    };
+    let mut p = patch::<T>(matter, law, u.length, u.density);
+    p.set_force(&list(&pull(12), u.energy / u.density)).unwrap();
+    if held != Held::Free {
+        let hold = match held {
+            Held::Hard => Hold::Hard,
+            _ => Hold::Spring(5.0 * u.energy / (u.length * u.length)),
+        };
+        let place = (5 * 12 + 6) * 12 + 5;
+        let constraint = Constraint {
+            label: "here".into(),
+            on: On::Samples(vec![(place, 1.0)]),
+            density: p.state().d[place].as_f64() + 0.25 * u.density,
+            hold,
+        };
+        p.set_constraints(&[constraint]).unwrap();
+    }
+    let options = AdaptiveOptions {
+        tolerance: 1e-3 * u.density,
+        shortest: 1e-4 * u.time,
+        longest: u.time,
+        energy_gain: 0.01,
+        acceleration: None,
+    };
+    let mut next = 0.3 * u.time;
+    let mut steps = Vec::new();
+    for _ in 0..5 {
+        let dt = match integrator {
+            Some(integrator) => p.step(integrator, 0.07 * u.time).unwrap().dt,
+            None => {
+                let report = p.adaptive_step(next, &options).unwrap();
+                next = report.next_dt;
+                report.step.dt
+            }
+        };
+        steps.push(dt / u.time);
+    }
+    let energy = p.energy().total() / u.energy;
+    let p = p.state().p.iter().map(|p| p.as_f64() / u.density);
+    p.chain(steps).chain([energy]).collect()
+}
+
+fn told_alike<T: Real>(tolerance: f64, schemes: &[Option<Integrator>], units: &[Units]) {
+    for four_d in [false, true] {
+        for held in [Held::Free, Held::Spring, Held::Hard] {
+            for &scheme in schemes {
+                let expected = told::<T>(ONE, four_d, held, scheme);
+                let largest = expected.iter().fold(0.0_f64, |m, p| m.max(p.abs()));
+                for &u in units {
+                    let found = told::<T>(u, four_d, held, scheme);
+                    for (i, (a, b)) in found.iter().zip(&expected).enumerate() {
+                        assert!(
+                            (a - b).abs() <= tolerance * largest,
+                            "{} 4-d {four_d} {held:?} {scheme:?} {u:?}: {a} {b} at {i} of {}",
+                            T::NAME,
+                            found.len()
+                        );
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_scene_told_in_other_units_is_the_same_scene() {
+    // Masses, stiffness, forces and volumes go through 10⁻⁷⁵ … 10⁷⁵ here.
+    let mut units = Vec::new();
+    for size in [1e-24, 1e25] {
+        units.push(Units { density: size, ..ONE });
+        units.push(Units { length: size, ..ONE });
+        units.push(Units { energy: size, ..ONE });
+        units.push(Units { time: size, ..ONE });
+        units.push(Units {
+            density: size,
+            length: size,
+            energy: size,
+            ..ONE
+        });
+    }
+    let schemes = [
+        None,
+        Some(Integrator::Paper),
+        Some(Integrator::TrBdf2),
+        Some(Integrator::Symplectic),
+        Some(Integrator::Auto),
+    ];
+    told_alike::<f32>(1e-3, &schemes, &units);
+    told_alike::<f64>(1e-9, &[Some(Integrator::TrBdf2)], &units);
+}
+
+#[test]
+fn units_of_powers_of_two_change_no_bit() {
+    let units = [
+        (2f64.powi(-80), 1.0),
+        (2f64.powi(83), 1.0),
+        (1.0, 2f64.powi(-80)),
+        (1.0, 2f64.powi(83)),
+    ];
+    for four_d in [false, true] {
+        let expected = told::<f32>(ONE, four_d, Held::Free, Some(Integrator::TrBdf2));
+        for (density, length) in units {
+            let u = Units {
+                density,
+                length,
+                ..ONE
+            };
+            let found = told::<f32>(u, four_d, Held::Free, Some(Integrator::TrBdf2));
+            assert_eq!(found, expected, "4-d {four_d} {u:?}");
+        }
+    }
+}
+
+#[test]
+fn springs_set_by_hand_move_the_tangent_and_the_bound() {
+    // Forces knew them, the matrix of the step and the bound of explicit steps did not.
+    let soft = Matter::default();
+    let stiff = Matter {
+        stiffness: Quantity::Constant(400.0),
+        ..Matter::default()
+    };
+    let linear = Law::Linear { scale: 1.0 };
+    let mut expected = patch::<f64>(stiff.clone(), linear, 1.0, 1.0);
+    let mut found = patch::<f64>(soft, linear, 1.0, 1.0);
+    found.explicit_limit().unwrap();
+    found.step(Integrator::TrBdf2, 0.5).unwrap();
+    let springs = stiff.lumped(expected.lattice(), Neighbours::Six).unwrap().springs;
+    found.set_springs(&springs).unwrap();
+    assert_eq!(
+        found.explicit_limit().unwrap(),
+        expected.explicit_limit().unwrap()
+    );
+    for p in [&mut found, &mut expected] {
+        p.set_force(&pull(12)).unwrap();
+        for _ in 0..5 {
+            p.step(Integrator::TrBdf2, 0.5).unwrap();
+        }
+    }
+    assert_eq!(found.state(), expected.state());
+    // What cannot be is refused, and changes nothing.
+    assert!(matches!(
+        found.set_springs(&springs[..2]),
+        Err(PatchError::Directions { .. })
+    ));
+    let mut bad = springs;
+    for weight in [-1.0, f64::NAN, f64::INFINITY] {
+        bad[1].weights = Weights::Constant(weight);
+        assert!(matches!(found.set_springs(&bad), Err(PatchError::Matter(_))));
+    }
+    bad[1].weights = Weights::Each(vec![1.0; 5]);
+    assert!(matches!(found.set_springs(&bad), Err(PatchError::Matter(_))));
+    assert_eq!(
+        found.explicit_limit().unwrap(),
+        expected.explicit_limit().unwrap()
+    );
+}
+
+#[test]
+fn a_report_carries_the_worst_of_its_stages() {
+    // One iteration of the V-cycle: from rest the first stage of TR-BDF2 solves (M + c²K)δ = 2c²F.
+    let matter = painted(12, 1e3, |[x, y, z]| (x + 2.0 * y + 3.0 * z) as usize % 5 < 2);
+    let options = SolverOptions {
+        iterations: 1,
+        tolerance: Some(1e-12),
+        direct_limit: 20,
+        background_limit: 20,
+        ..SolverOptions::default()
+    };
+    let matter = Matter {
+        damping: Quantity::Constant(0.0),
+        ..matter
+    };
+    let lattice = Lattice::<f64>::cube(11, 12, Rim::Fixed, 1.0).unwrap();
+    let law = Law::Linear { scale: 1.0 };
+    let new = || {
+        Patch::new(
+            lattice.clone(),
+            matter.clone(),
+            law,
+            Neighbours::Six,
+            &slope(12),
+            options,
+        )
+        .unwrap()
+    };
+    let lumped = matter.lumped(&lattice, Neighbours::Six).unwrap();
+    let mut first_is_worse = 0;
+    for dt in [0.05, 0.2, 1.0, 5.0] {
+        let mut p = new();
+        p.set_force(&pull(12)).unwrap();
+        let report = p.step(Integrator::TrBdf2, dt).unwrap();
+        let c = (1.0 - 0.5 * std::f64::consts::SQRT_2) * dt;
+        let springs = lumped.springs.iter().map(|s| {
+            let weights = match &s.weights {
+                Weights::Each(k) => Weights::Each(k.iter().map(|k| c * c * k).collect()),
+                Weights::Constant(k) => Weights::Constant(c * c * k),
+            };
+            SpringWeights {
+                direction: s.direction,
+                weights,
+            }
+        });
+        let matrix = StepMatrix::new([12; 3], lumped.mass.clone(), springs.collect());
+        let steps = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
+        let mut solver = StepSolver::new(lattice.clone(), &steps, options);
+        solver.prepare(&matrix).unwrap();
+        let (mut x, mut dx) = (vec![0.0; lattice.coefficient_count()], vec![0.0; 12 * 12 * 12]);
+        let first = solver.solve(&matrix, &pull(12), &mut x, &mut dx).iteration;
+        let found = report.solve.iteration;
+        println!(
+            "dt {dt}: {:.3e}, first stage {:.3e}",
+            found.residual, first.residual
+        );
+        assert!(found.residual >= first.residual * (1.0 - 1e-6));
+        first_is_worse += usize::from(found.residual < first.residual * (1.0 + 1e-6));
+    }
+    assert!(first_is_worse > 0, "no scene here shows the difference");
+}

@@ -2,6 +2,7 @@
 //! factor of two of the one in steps sixteen times as fine.
 
 mod magnitudes;
+mod random_scenes;
 
 use dynamics::constraints::{Constraint, Hold, On};
 use dynamics::integrators::{AdaptiveOptions, Integrator};
