@@ -464,7 +464,7 @@ fn nonsense_is_refused_with_its_name() {
         (nan, "constraint nan: density is NaN"),
         (slack, "constraint slack: the stiffness is 0"),
         (nowhere, "constraint nowhere: density of the field is NaN"),
-        (sample, "constraint sample: sample 1000 of 1000"),
+        (sample, "constraint sample names sample 1000"),
     ] {
         let refused = p.set_constraints(&[c]).unwrap_err().to_string();
         assert!(refused.contains(expected), "{refused}");

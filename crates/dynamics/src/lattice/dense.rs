@@ -13,8 +13,8 @@ const ROWS: usize = 6;
 /// `aᵀb`, summed in order: nalgebra's own product fuses multiplications and additions on machines that can.
 pub(crate) fn transposed_product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(a.ncols(), b.ncols(), |i, j| {
-        let terms = a.column(i).iter().zip(b.column(j).iter());
-        terms.map(|(a, b)| a * b).sum()
+        let terms = (0..a.nrows()).map(|k| a[(k, i)] * b[(k, j)]);
+        terms.sum()
     })
 }
 

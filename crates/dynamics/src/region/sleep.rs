@@ -27,7 +27,7 @@ impl<T: Real> Region<T> {
         self.asleep
     }
 
-    /// Wakes the region, all of it until it is looked at which parts may sleep.
+    /// Wakes the region; before the next step it is looked at which parts of it may sleep on.
     pub fn wake(&mut self) {
         self.asleep = false;
         self.parts.steps_to_look = 0;

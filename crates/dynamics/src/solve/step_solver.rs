@@ -276,8 +276,7 @@ impl<T: Real> StepSolver<T> {
             Painted::None => unreachable!("made above"),
             Painted::Direct(direct) => {
                 let (galerkin, factor) = &mut **direct;
-                galerkin.assemble(s, factor);
-                factor.factorize()?;
+                galerkin.factorize(s, factor)?;
                 Method::Direct
             }
             Painted::Background(background) => {

@@ -200,8 +200,7 @@ impl<T: Real> VCycle<T> {
     /// # Errors
     /// [`NotPositive`] if the coarsest level cannot be factorized.
     pub fn prepare(&mut self, s: &StepMatrix<T>) -> Result<(), NotPositive> {
-        self.assembly.assemble(s, &mut self.factor);
-        self.factor.factorize()?;
+        self.assembly.factorize(s, &mut self.factor)?;
         let mass = geometric_mean(&s.mass, 1e-9);
         let mut along = [0.0; 3];
         for spring in &s.springs {
