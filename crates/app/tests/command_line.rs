@@ -1,6 +1,8 @@
 //! The grammar of the command line, its exit codes, and what goes to stdout.
 
 mod common;
+#[path = "common/wrong_values.rs"]
+mod wrong_values;
 
 use std::io::{Read, Write};
 use std::process::Stdio;
@@ -289,4 +291,52 @@ fn trim_leaves_holes_open_and_says_how_much_was_invented() {
     assert!((0.75..0.97).contains(&share), "three holes of 6 %: {share}");
     let far = bench.json("mesh field.iclay -o far.ply --trim 100%");
     assert_eq!(far["triangles"], whole["triangles"]);
+}
+
+/// Every option of every command answers a wrong value with exit code 2 or 3 and a message that names the option and the
+/// value and says what would be right. `cli::tests` sees to it that no option is missing in the table.
+#[test]
+fn a_wrong_value_is_named_with_its_option_and_its_remedy() {
+    let bench = Bench::new();
+    bench.json("phantom sphere -o cloud.ply --count 500");
+    bench.json("phantom head -o head.nii --size 16");
+    bench.json("fit cloud.ply -o field.iclay --max-depth 6");
+    bench.write("notes.docx", "some words");
+    bench.write("scene.toml", "field = \"field.iclay\"\n");
+    let before = bench.files();
+    let mut wrong = Vec::new();
+    for (commands, options, arguments, word) in wrong_values::ROWS {
+        for (k, command) in commands.split(' ').enumerate() {
+            let names: Vec<&str> = options.split(' ').collect();
+            let option = names[k.min(names.len() - 1)];
+            let mut typed = command.replace('_', " ");
+            let mut value = "";
+            for part in arguments.split(' ') {
+                value = part.split_once('*').map_or(value, |(_, v)| v);
+                typed += " ";
+                typed += &match part {
+                    "@cloud" | "@volume" => wrong_values::besides(command, part),
+                    "@out" => wrong_values::out(command).to_string(),
+                    part => part.replace('*', ""),
+                };
+            }
+            let run = bench.run(&typed);
+            let short = match option {
+                "--output" => "-o",
+                long if long.starts_with("--") => long,
+                _ => "",
+            };
+            let said = &run.stderr;
+            let is_right = matches!(run.code, 2 | 3)
+                && said.contains(value)
+                && said.contains(short)
+                && said.contains(word)
+                && !said.contains("panicked");
+            if std::env::var_os("ISOCLAY_SHOW_MESSAGES").is_some() || !is_right {
+                wrong.push(format!("{typed}\n  {} {said}", run.code));
+            }
+            assert_eq!(bench.files(), before, "{typed}: something was left behind");
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }

@@ -15,9 +15,11 @@ use formats::volumes::Volume;
 use super::cost::Cost;
 use super::failure::{Failure, Outcome, explain};
 use super::field::{self, either};
-use super::input::{self, Input, Shape, bounding_box, check_output, remaining};
+use super::input::{self, Input, Shape, bounding_box, remaining};
+use super::output::Output;
 use super::progress::Bar;
-use super::quantity::{Memory, Tolerance, positive};
+use super::quantity::{Memory, Tolerance, count, positive, threads};
+use super::source::{SAMPLES, Source, input_formats};
 use super::summary::Summary;
 use super::unoriented::{Oriented, Unoriented};
 use super::volume_choice::VolumeChoice;
@@ -26,26 +28,30 @@ use super::{interrupt, set_threads};
 /// Arguments of `isoclay fit`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Point cloud with normals or faces (.ply, .obj, .xyz), mesh (.stl and others, see --as) or volume (.nii), each also gzipped (.gz)
+    /// Point cloud (.ply .obj .pcd .las .laz .e57 .xyz), mesh (.stl .gltf .glb .3mf .wrl, see --as) or volume (.nii .nrrd
+    /// .mha .tif), also gzipped; a directory of DICOM or TIFF slices; - reads standard input
     input: PathBuf,
-    /// Field to write (.iclay)
+    /// Field to write (.iclay); - writes to standard output
     #[arg(short, long, value_name = "FIELD")]
-    output: PathBuf,
+    pub output: PathBuf,
     /// What to fit of a file with faces. Meshes become the solid that their triangles bound [default: cloud for PLY
     /// and OBJ, mesh for files that hold nothing else]
     #[arg(long = "as", value_enum, value_name = "KIND")]
     shape: Option<Shape>,
+    /// Format of the input where neither its content nor its name tells it
+    #[arg(long, value_name = "FORMAT", value_parser = input_formats())]
+    format: Option<String>,
     #[command(flatten)]
     choice: Choice,
     /// Memory that the process may hold, such as 2GiB
     #[arg(long, value_name = "SIZE")]
     memory: Option<Memory>,
     /// Threads to work with [default: all cores]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = threads)]
     threads: Option<NonZeroUsize>,
     /// Print one JSON object instead of a table
     #[arg(long)]
-    json: bool,
+    pub json: bool,
     #[command(flatten)]
     volume: VolumeChoice,
 }
@@ -63,7 +69,7 @@ pub struct Choice {
     #[arg(long, value_name = "L[mm|%]")]
     pub band: Option<Tolerance>,
     /// Coefficients to spend
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = count)]
     pub coefficients: Option<NonZeroUsize>,
     /// Finest level allowed. Clouds: 2^N cells along the box, 6 to 16. Volumes: 0 is a knot every four voxels, 2 one
     /// at every voxel
@@ -139,14 +145,15 @@ pub struct Fitted {
 /// Fits a file and writes the field.
 pub fn run(args: &Args) -> Outcome {
     let cost = Cost::start();
-    check_output(&args.output, &["iclay"])?;
-    set_threads(args.threads)?;
     let cancel = Cancel::new();
     interrupt::cancel_on_interrupt(&cancel)?;
+    let source = Source::open(&args.input, args.format.as_deref(), SAMPLES, &cancel)?;
+    let output = Output::check("-o", &args.output, &["iclay"], None, &[&source])?;
+    set_threads(args.threads)?;
     let bar = Bar::new();
     bar.show("reading", 0.0);
     let input = input::read(
-        &args.input,
+        &source,
         args.shape,
         &args.volume.options(args.choice.unit)?,
         args.memory,
@@ -158,13 +165,8 @@ pub fn run(args: &Args) -> Outcome {
         cancel,
         memory_limit: args.memory.map(remaining),
     };
-    let fitted = fit(&input, &args.choice, &mut control).map_err(|f| {
-        if f.code() == 3 {
-            f.about(args.input.display())
-        } else {
-            f
-        }
-    })?;
+    let fitted = fit(&input, &args.choice, &mut control)
+        .map_err(|f| if f.code() == 3 { f.about(source.name()) } else { f })?;
     interrupt::check(&control.cancel)?;
     bar.show("writing", 0.99);
     let meta = FieldMeta {
@@ -174,15 +176,14 @@ pub fn run(args: &Args) -> Outcome {
         provenance: provenance(args),
         ..Default::default()
     };
-    let sha256 = field::save(&args.output, &fitted.field, &fitted.report, meta)?;
+    let sha256 = field::save(&output, &fitted.field, &fitted.report, meta)?;
     bar.clear();
     Summary {
         field_sha256: Some(sha256),
-        output: Some(args.output.display().to_string()),
         ..fitted.summary(&input)
     }
     .with_cost(&cost)
-    .print(args.json)
+    .print_after(&output, args.json)
 }
 
 /// Where the field comes from, for the file: enough to make it again.

@@ -9,7 +9,7 @@ use glam::{DAffine3, DMat3, DVec3};
 
 use super::cost::Cost;
 use super::failure::{Failure, Outcome};
-use super::input::{check_output, writing};
+use super::output::Output;
 use super::quantity::Tolerance;
 use super::summary::Summary;
 
@@ -19,9 +19,9 @@ pub struct Args {
     /// What to make
     #[arg(value_enum)]
     name: Name,
-    /// Cloud to write (.ply); for the head, volume (.nii, .nii.gz)
+    /// Cloud to write (.ply); for the head, volume (.nii, .nii.gz); - writes to standard output
     #[arg(short, long, value_name = "FILE")]
-    output: PathBuf,
+    pub output: PathBuf,
     /// Points, before holes are cut
     #[arg(long, value_name = "N", default_value_t = 20_000, value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
     count: u64,
@@ -39,11 +39,11 @@ pub struct Args {
     #[arg(long, value_name = "R", default_value_t = 1.0, value_parser = ratio)]
     density_ratio: f64,
     /// Seed of all randomness
-    #[arg(long, value_name = "K", default_value_t = 1)]
+    #[arg(long, value_name = "K", default_value_t = 1, value_parser = seed)]
     seed: u64,
     /// Print one JSON object instead of a table
     #[arg(long)]
-    json: bool,
+    pub json: bool,
 }
 
 /// A phantom's name.
@@ -73,6 +73,11 @@ impl ValueEnum for Name {
     }
 }
 
+fn seed(s: &str) -> Result<u64, String> {
+    s.parse()
+        .map_err(|_| "write a whole number in digits, 0 or more".into())
+}
+
 fn ratio(s: &str) -> Result<f64, String> {
     match s.parse::<f64>() {
         Ok(r) if (1.0..=1000.0).contains(&r) => Ok(r),
@@ -83,16 +88,17 @@ fn ratio(s: &str) -> Result<f64, String> {
 /// Writes a phantom.
 pub fn run(args: &Args) -> Outcome {
     let cost = Cost::start();
-    let summary = match args.name {
-        Name::Solid(solid) => write_cloud(args, solid)?,
-        Name::Head => write_head(args)?,
+    let formats: &[&str] = match args.name {
+        Name::Solid(_) => &["ply"],
+        Name::Head => &["nii", "nii.gz"],
     };
-    Summary {
-        output: Some(args.output.display().to_string()),
-        ..summary
+    let output = Output::check("-o", &args.output, formats, None, &[])?;
+    match args.name {
+        Name::Solid(solid) => write_cloud(args, solid, &output)?,
+        Name::Head => write_head(args, &output)?,
     }
     .with_cost(&cost)
-    .print(args.json)
+    .print_after(&output, args.json)
 }
 
 fn noise_of(args: &Args, whole: f64) -> Outcome<f64> {
@@ -102,8 +108,7 @@ fn noise_of(args: &Args, whole: f64) -> Outcome<f64> {
     Ok(noise.unwrap_or(0.0))
 }
 
-fn write_cloud(args: &Args, solid: Solid) -> Outcome<Summary> {
-    check_output(&args.output, &["ply"])?;
+fn write_cloud(args: &Args, solid: Solid, output: &Output) -> Outcome<Summary> {
     let (field, within) = (solid.field(), solid.within());
     let options = CloudOptions {
         count: args.count as usize,
@@ -115,8 +120,8 @@ fn write_cloud(args: &Args, solid: Solid) -> Outcome<Summary> {
     };
     let cloud = sample_cloud(&*field, &within, &options)
         .ok_or_else(|| Failure::limit(format!("{}: no surface was found", solid.name())))?;
-    formats::meshes::save_points(&args.output, &cloud.positions, Some(&cloud.normals), None)
-        .map_err(writing)?;
+    formats::meshes::save_points(output.path(), &cloud.positions, Some(&cloud.normals), None)
+        .map_err(|e| output.writing(e))?;
     Ok(Summary {
         input_count: Some(cloud.positions.len()),
         notes: cloud
@@ -128,8 +133,7 @@ fn write_cloud(args: &Args, solid: Solid) -> Outcome<Summary> {
     })
 }
 
-fn write_head(args: &Args) -> Outcome<Summary> {
-    check_output(&args.output, &["nii", "nii.gz"])?;
+fn write_head(args: &Args, output: &Output) -> Outcome<Summary> {
     if args.holes > 0 || args.density_ratio != 1.0 {
         return Err(Failure::usage(
             "--holes and --density-ratio are for clouds; the head is a volume",
@@ -145,14 +149,14 @@ fn write_head(args: &Args) -> Outcome<Summary> {
         translation: corner,
     };
     formats::volumes::save(
-        &args.output,
+        output.path(),
         [n; 3],
         &values,
         &map,
         Unit::Millimetre,
         StoreAs::Float32,
     )
-    .map_err(writing)?;
+    .map_err(|e| output.writing(e))?;
     Ok(Summary {
         input_count: Some(values.len()),
         ..Default::default()

@@ -1,3 +1,4 @@
+use std::num::NonZeroUsize;
 use std::str::FromStr;
 
 use formats::Unit;
@@ -75,6 +76,26 @@ pub fn positive(s: &str) -> Result<f64, String> {
         Ok(x) => Err(format!("{x} is not a finite number above zero")),
         Err(_) => Err(format!("{s:?} is not a number")),
     }
+}
+
+/// A number of threads.
+///
+/// # Errors
+/// A sentence, if it is none or too many.
+pub fn threads(s: &str) -> Result<NonZeroUsize, String> {
+    match s.parse::<NonZeroUsize>() {
+        Ok(n) if n.get() <= 1024 => Ok(n),
+        _ => Err("write a whole number from 1 to 1024".into()),
+    }
+}
+
+/// A whole number above zero.
+///
+/// # Errors
+/// A sentence, if it is something else.
+pub fn count(s: &str) -> Result<NonZeroUsize, String> {
+    s.parse()
+        .map_err(|_| "write a whole number above zero, in digits".into())
 }
 
 /// A finite number.

@@ -5,6 +5,7 @@ use formats::Unit;
 use formats::volumes::{DicomOptions, RawLayout, Tilt, Uneven, VolumeOptions, VoxelType};
 
 use super::failure::{Failure, Outcome};
+use super::quantity::{count, positive};
 
 /// Which part of a volume to read, and what its file does not tell.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -15,10 +16,10 @@ pub struct VolumeChoice {
     region: Option<Triple<Range>>,
     /// Read every so many voxels along each axis: one number, or three
     #[arg(long, value_name = "N|X,Y,Z")]
-    stride: Option<OneOrThree<usize>>,
+    stride: Option<OneOrThree<Step>>,
     /// Distances between neighbouring voxels in mm, in place of those in the file: one number, or three
     #[arg(long, value_name = "N|X,Y,Z")]
-    spacing: Option<OneOrThree<f64>>,
+    spacing: Option<OneOrThree<Spacing>>,
     /// The file has no header: voxels along x (fastest), y and z
     #[arg(long, value_name = "X,Y,Z", requires = "voxel")]
     shape: Option<Triple<usize>>,
@@ -29,7 +30,7 @@ pub struct VolumeChoice {
     #[arg(long, requires = "shape")]
     big_endian: bool,
     /// The file has no header: bytes before the first voxel
-    #[arg(long, value_name = "BYTES", requires = "shape", default_value_t = 0)]
+    #[arg(long, value_name = "BYTES", requires = "shape", default_value_t = 0, value_parser = whole)]
     offset: u64,
     /// DICOM: the series to read, by its number or its identifier, where there are several
     #[arg(long, value_name = "NUMBER|UID")]
@@ -63,11 +64,23 @@ enum TiltChoice {
 }
 
 impl VolumeChoice {
+    /// Takes away `--spacing` where it is not that of a file without a header.
+    pub fn take_spacing_of_other(&mut self) -> Option<[f64; 3]> {
+        if self.shape.is_some() {
+            return None;
+        }
+        self.spacing.take().map(|s| s.0.map(|Spacing(s)| s))
+    }
+
+    fn spacing(&self) -> Option<[f64; 3]> {
+        self.spacing.as_ref().map(|s| s.0.map(|Spacing(s)| s))
+    }
+
     /// The options of the reader; `unit` is what the user says of the file.
     pub fn options(&self, unit: Option<Unit>) -> Outcome<VolumeOptions> {
         let raw = match (&self.shape, self.voxel) {
             (Some(Triple(dims)), Some(voxel)) => {
-                let spacing = self.spacing.as_ref().map(|s| s.0);
+                let spacing = self.spacing();
                 if spacing.is_none() && unit.is_some() {
                     return Err(Failure::usage(
                         "--unit of a file without a header needs --spacing, in mm; give it and leave --unit out",
@@ -95,12 +108,8 @@ impl VolumeChoice {
                 .region
                 .as_ref()
                 .map(|r| r.0.map(|Range(from, to)| [from, to])),
-            stride: self.stride.as_ref().map_or([1; 3], |s| s.0),
-            spacing_mm: if raw.is_some() {
-                None
-            } else {
-                self.spacing.as_ref().map(|s| s.0)
-            },
+            stride: self.stride.as_ref().map_or([1; 3], |s| s.0.map(|Step(n)| n)),
+            spacing_mm: if raw.is_some() { None } else { self.spacing() },
             raw,
             dicom: DicomOptions {
                 series: self.series.clone(),
@@ -117,6 +126,11 @@ impl VolumeChoice {
     }
 }
 
+fn whole(s: &str) -> Result<u64, String> {
+    s.parse()
+        .map_err(|_| "write a whole number in digits, 0 or more".into())
+}
+
 /// Three values with commas between.
 #[derive(Clone, Debug, PartialEq)]
 struct Triple<T>([T; 3]);
@@ -125,17 +139,43 @@ struct Triple<T>([T; 3]);
 #[derive(Clone, Debug, PartialEq)]
 struct OneOrThree<T>([T; 3]);
 
+/// A length above zero.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Spacing(f64);
+
+impl FromStr for Spacing {
+    type Err = String;
+    fn from_str(s: &str) -> Result<Self, String> {
+        positive(s).map(Self)
+    }
+}
+
+/// A whole number above zero.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Step(usize);
+
+impl FromStr for Step {
+    type Err = String;
+    fn from_str(s: &str) -> Result<Self, String> {
+        count(s).map(|n| Self(n.get()))
+    }
+}
+
 /// `from:to`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Range(usize, usize);
 
-fn parts<T: FromStr>(s: &str) -> Result<Vec<T>, String> {
+fn parts<T: FromStr<Err: ToString>>(s: &str) -> Result<Vec<T>, String> {
     s.split(',')
-        .map(|p| p.trim().parse().map_err(|_| format!("{p:?} cannot be read")))
+        .map(|p| {
+            p.trim()
+                .parse()
+                .map_err(|e: T::Err| format!("{p:?}: {}", e.to_string()))
+        })
         .collect()
 }
 
-impl<T: FromStr> FromStr for Triple<T> {
+impl<T: FromStr<Err: ToString>> FromStr for Triple<T> {
     type Err = String;
     fn from_str(s: &str) -> Result<Self, String> {
         let all = parts(s)?;
@@ -146,7 +186,7 @@ impl<T: FromStr> FromStr for Triple<T> {
     }
 }
 
-impl<T: FromStr + Copy> FromStr for OneOrThree<T> {
+impl<T: FromStr<Err: ToString> + Copy> FromStr for OneOrThree<T> {
     type Err = String;
     fn from_str(s: &str) -> Result<Self, String> {
         match parts(s)?.as_slice() {
@@ -183,14 +223,20 @@ mod tests {
             "1:5, 2:6,0:9".parse(),
             Ok(Triple([Range(1, 5), Range(2, 6), Range(0, 9)]))
         );
-        assert_eq!("2".parse(), Ok(OneOrThree([2usize; 3])));
-        assert_eq!("0.5,1,2".parse(), Ok(OneOrThree([0.5, 1.0, 2.0])));
+        assert_eq!("2".parse(), Ok(OneOrThree([Step(2); 3])));
+        assert_eq!("0.5,1,2".parse(), Ok(OneOrThree([0.5, 1.0, 2.0].map(Spacing))));
+        assert!(
+            "1,0,1"
+                .parse::<OneOrThree<Spacing>>()
+                .unwrap_err()
+                .contains("above zero")
+        );
         for bad in ["", "1:2", "1:2,3:4", "1-2,3:4,5:6", "a:b,1:2,3:4", "-1:2,3:4,5:6"] {
             assert!(bad.parse::<Triple<Range>>().is_err(), "{bad:?}");
         }
         assert!(
             "1,2"
-                .parse::<OneOrThree<usize>>()
+                .parse::<OneOrThree<Step>>()
                 .unwrap_err()
                 .contains("one, or three")
         );
