@@ -20,10 +20,10 @@ fn wrong_usage_ends_with_code_2_and_a_remedy() {
         ("fit", "--output"),
         ("fit cloud.ply", "--output"),
         ("fit cloud.ply -o out.iclay --tolerance 1cm", "0.2mm"),
-        ("fit cloud.ply -o out.iclay --tolerance -1", "unexpected"),
+        ("fit cloud.ply -o out.iclay --tolerance -1", "above zero"),
         ("fit cloud.ply -o out.iclay --tolerance 1mm", "--unit"),
         ("fit cloud.ply -o out.iclay --memory 2Gib", "2GiB"),
-        ("fit cloud.ply -o out.iclay --threads 0", "threads"),
+        ("fit cloud.ply -o out.iclay --threads 0", "1 to 1024"),
         ("fit cloud.ply -o out.iclay --method exact", "interpolate"),
         ("fit cloud.ply -o out.iclay --method interpolate", "volumes"),
         ("fit cloud.ply -o out.iclay --unit inch", "mm, cm or m"),
@@ -302,7 +302,8 @@ fn a_wrong_value_is_named_with_its_option_and_its_remedy() {
     bench.json("phantom head -o head.nii --size 16");
     bench.json("fit cloud.ply -o field.iclay --max-depth 6");
     bench.write("notes.docx", "some words");
-    bench.write("scene.toml", "field = \"field.iclay\"\n");
+    let region = "[region]\nmin = [-0.5, -0.5, 0.6]\nmax = [0.5, 0.5, 1.3]\n[time]\nduration = 0.01\nstep = 0.01\n";
+    bench.write("scene.toml", format!("field = \"field.iclay\"\n{region}"));
     let before = bench.files();
     let mut wrong = Vec::new();
     for (commands, options, arguments, word) in wrong_values::ROWS {
@@ -335,7 +336,9 @@ fn a_wrong_value_is_named_with_its_option_and_its_remedy() {
             if std::env::var_os("ISOCLAY_SHOW_MESSAGES").is_some() || !is_right {
                 wrong.push(format!("{typed}\n  {} {said}", run.code));
             }
-            assert_eq!(bench.files(), before, "{typed}: something was left behind");
+            if bench.files() != before {
+                wrong.push(format!("{typed}\n  something was left behind"));
+            }
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));

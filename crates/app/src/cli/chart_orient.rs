@@ -42,8 +42,8 @@ pub fn run(args: &Args, cancel: &Cancel) -> Outcome {
         }
     }
     for path in &args.measured {
-        let bad = |e: String| Failure::input(format!("{}: {e}", path.display()));
-        let text = std::fs::read_to_string(path).map_err(|e| bad(e.to_string()))?;
+        let bad = |e: String| Failure::input(format!("--measured {}: {e}", path.display()));
+        let text = std::fs::read_to_string(path).map_err(|e| bad(format!("{e}; check the path")))?;
         runs.extend(Oriented::read_csv(&text).map_err(bad)?);
     }
     let svg = Chart::of_orientation(&runs).svg().map_err(Failure::limit)?;

@@ -3,6 +3,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use clap::ValueEnum;
 use fitting::Cancel;
 use formats::Kind;
 use serde_json::{Map, Value};
@@ -11,6 +12,7 @@ use super::failure::{Failure, OrFail, Outcome};
 use super::interrupt;
 use super::phantom::Name;
 use super::progress::Bar;
+use super::quantity::between;
 use super::source::{SAMPLES, Source};
 use super::staged::StagedFiles;
 use super::{chart_dynamics, chart_orient};
@@ -55,7 +57,7 @@ struct FitArgs {
     #[arg(short, long, value_name = "DIR", default_value = "docs/charts")]
     output: PathBuf,
     /// Runs of each configuration, of which the median time is shown
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u8).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = between::<u8>(1, 255))]
     runs: u8,
     /// Print one JSON object a configuration
     #[arg(long)]
@@ -178,6 +180,17 @@ impl Prepared {
             .split_once(':')
             .map_or((phantom, None), |(name, noise)| (name, Some(noise)));
         let (fitted, measured) = (scratch.join("fitted.ply"), scratch.join("measured.ply"));
+        if Name::from_str(name, false).is_err() {
+            let names: Vec<String> = Name::value_variants()
+                .iter()
+                .filter_map(|n| Some(n.to_possible_value()?.get_name().to_string()))
+                .filter(|n| n != "head")
+                .collect();
+            return Err(Failure::usage(format!(
+                "phantom:{phantom}: is no phantom; write phantom:NAME or phantom:NAME:NOISE, NAME one of {}",
+                names.join(", ")
+            )));
+        }
         let make = |path: &Path, options: &[&str]| {
             let fixed = [name, "--count", "50000", "-o"].map(OsString::from).into_iter();
             ask(

@@ -83,7 +83,7 @@ pub fn run(args: &Args) -> Outcome {
     let open = OpenField::load(&field)?;
     let leaves = &open.report().leaves;
     let index = LeafIndex::new(open.lattice(), leaves);
-    let measured = match input::read(&source, args.shape, &args.volume.options(None)?, None)? {
+    let measured = match input::read(&source, args.shape, &args.volume, None, None)? {
         Input::Cloud(cloud) => measure_cloud(&open, &index, &cloud),
         Input::Mesh(mesh) => measure_mesh(&open, &index, &mesh)?,
         Input::Volume(volume) => measure_volume(&open, &index, &volume),

@@ -79,7 +79,7 @@ pub fn run(args: &Args) -> Outcome {
     let cost = Cost::start();
     let part = args.volume.options(args.unit)?;
     let source = &Source::open(&args.input, args.input_format.as_deref(), SAMPLES, &Cancel::new())?;
-    let kind = input::kind(source, &part)?;
+    let kind = input::kind(source, &args.volume, &part)?;
     let bar = Bar::new();
     bar.show("reading", 0.0);
     let (summary, output) = match kind {

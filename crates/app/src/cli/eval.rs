@@ -42,7 +42,7 @@ pub fn run(args: &Args) -> Outcome {
     // Lines of numbers are what people type.
     let lines = (args.points == Path::new("-")).then_some("xyz");
     let format = args.format.as_deref().or(lines);
-    let cloud = read_points(&Source::open(&args.points, format, POINTS, &cancel)?)?;
+    let cloud = read_points(&Source::open(&args.points, format, POINTS, &cancel)?.under("--points"))?;
     let mut out = io::stdout().lock();
     out.write_all(b"x,y,z,value,gx,gy,gz\n").or_limit()?;
     for batch in cloud.positions.chunks(BATCH) {

@@ -5,7 +5,7 @@ use bspline::{Field, Frame, HierarchicalSpline, Real};
 use fitting::orient::Route;
 use fitting::{FitReport, Leaf, SignReport, StopReason};
 use formats::field::{AnyField, FieldMeta, LeafRecord, LoadedField, SourceKind};
-use formats::{FormatError, Kind, Unit};
+use formats::{Fault, FormatError, Kind, Unit};
 use serde::{Deserialize, Serialize};
 
 use super::failure::{Failure, Outcome};
@@ -250,6 +250,13 @@ fn not_loaded(source: &Source, e: FormatError) -> Failure {
     match formats::detect(source.path()) {
         Ok(kind @ (Kind::Cloud(_) | Kind::Mesh(_) | Kind::Volume(_))) => Failure::input(format!(
             "{0}: is a {kind}, where a fitted field is needed; fit it first: isoclay fit {0} -o FIELD.iclay",
+            source.name()
+        )),
+        Err(FormatError {
+            fault: Fault::UnknownKind { .. },
+            ..
+        }) => Failure::input(format!(
+            "{}: is no fitted field; give a file .iclay, as isoclay fit writes it",
             source.name()
         )),
         _ => source.reading(e),

@@ -18,7 +18,7 @@ use super::field::{self, either};
 use super::input::{self, Input, Shape, bounding_box, remaining};
 use super::output::Output;
 use super::progress::Bar;
-use super::quantity::{Memory, Tolerance, count, positive, threads};
+use super::quantity::{Memory, Tolerance, between, count, positive, threads};
 use super::source::{SAMPLES, Source, input_formats};
 use super::summary::Summary;
 use super::unoriented::{Oriented, Unoriented};
@@ -62,25 +62,25 @@ pub struct Choice {
     /// Rms residual that each leaf stays below, or says why not. Clouds: a distance in the file's unit, in mm,
     /// or in per cent of the diagonal. Volumes: a density, or per cent of the range between the 1st and the 99th
     /// percentile [default: what the noise justifies; for clean data 0.01% of the diagonal, 0.5% of the range]
-    #[arg(long, value_name = "T[mm|%]")]
+    #[arg(long, value_name = "T[mm|%]", allow_hyphen_values = true)]
     pub tolerance: Option<Tolerance>,
     /// Meshes: half the width of the band round the surface in which no error is above the tolerance, a length like
     /// it [default: eight tolerances]
-    #[arg(long, value_name = "L[mm|%]")]
+    #[arg(long, value_name = "L[mm|%]", allow_hyphen_values = true)]
     pub band: Option<Tolerance>,
     /// Coefficients to spend
     #[arg(long, value_name = "N", value_parser = count)]
     pub coefficients: Option<NonZeroUsize>,
     /// Finest level allowed. Clouds: 2^N cells along the box, 6 to 16. Volumes: 0 is a knot every four voxels, 2 one
     /// at every voxel
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=16))]
+    #[arg(long, value_name = "N", value_parser = between::<u8>(0, 16))]
     pub max_depth: Option<u8>,
     /// How to fit: a volume adaptively or by interpolation, a cloud by gradients or by offset pairs [default:
     /// adaptive; gradient]
     #[arg(long, value_enum)]
     pub method: Option<Method>,
     /// Weight of the bending energy [default: chosen from the data]
-    #[arg(long, value_name = "μ", value_parser = positive)]
+    #[arg(long, value_name = "μ", value_parser = positive, allow_hyphen_values = true)]
     pub smoothing: Option<f64>,
     /// Estimate the normals of a cloud that has none (or not those of its file), and how to tell inside from outside
     #[arg(long, value_enum, value_name = "ROUTE", num_args = 0..=1, require_equals = true,
@@ -152,12 +152,7 @@ pub fn run(args: &Args) -> Outcome {
     set_threads(args.threads)?;
     let bar = Bar::new();
     bar.show("reading", 0.0);
-    let input = input::read(
-        &source,
-        args.shape,
-        &args.volume.options(args.choice.unit)?,
-        args.memory,
-    )?;
+    let input = input::read(&source, args.shape, &args.volume, args.choice.unit, args.memory)?;
     interrupt::check(&cancel)?;
     let shown = bar.clone();
     let mut control = Control {
@@ -215,7 +210,7 @@ fn fit_cloud<T: Stored>(cloud: &PointCloud, choice: &Choice, control: &mut Contr
         Some(Method::OffsetPairs) => NormalForm::OffsetPairs,
         Some(Method::Adaptive | Method::Interpolate) => {
             return Err(Failure::usage(
-                "--method adaptive and interpolate are for volumes; a point cloud takes gradient or offset-pairs",
+                "--method adaptive and --method interpolate are for volumes; a point cloud takes gradient or offset-pairs",
             ));
         }
     };
@@ -303,7 +298,7 @@ fn fit_voxels<T: Stored>(volume: &Volume, choice: &Choice, control: &mut Control
         Some(Method::Interpolate) => VolumeMethod::Interpolate,
         Some(Method::Gradient | Method::OffsetPairs) => {
             return Err(Failure::usage(
-                "--method gradient and offset-pairs are for point clouds; a volume takes adaptive or interpolate",
+                "--method gradient and --method offset-pairs are for point clouds; a volume takes adaptive or interpolate",
             ));
         }
     };

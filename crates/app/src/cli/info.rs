@@ -61,7 +61,7 @@ fn count(key: &'static str, label: &'static str, n: usize) -> Entry {
 pub fn run(args: &Args) -> Outcome {
     let part = args.volume.options(None)?;
     let source = Source::open(&args.file, args.format.as_deref(), ANYTHING, &Cancel::new())?;
-    let kind = input::kind(&source, &part)?;
+    let kind = input::kind(&source, &args.volume, &part)?;
     let (entries, notes) = match kind {
         Kind::Cloud(_) | Kind::Mesh(_) => {
             let cloud =

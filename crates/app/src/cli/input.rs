@@ -3,13 +3,14 @@ use clap::ValueEnum;
 use formats::meshes::TriangleMesh;
 use formats::points::PointCloud;
 use formats::volumes::{Volume, VolumeFormat, VolumeOptions};
-use formats::{Fault, FormatError, Kind, ReadLimits};
+use formats::{Fault, FormatError, Kind, ReadLimits, Unit};
 use glam::DVec3;
 
 use super::cost;
 use super::failure::{Failure, Outcome};
 use super::quantity::Memory;
 use super::source::Source;
+use super::volume_choice::VolumeChoice;
 
 /// Something that can be fitted.
 pub enum Input {
@@ -30,16 +31,27 @@ pub enum Shape {
     Mesh,
 }
 
-/// Reads something that can be fitted, of a volume what `part` asks for, holding no more than `memory` in the whole
+impl Shape {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Cloud => "cloud",
+            Self::Mesh => "mesh",
+        }
+    }
+}
+
+/// Reads something that can be fitted, of a volume what `choice` asks for, holding no more than `memory` in the whole
 /// process. `shape` is the user's word for files with faces; by itself a file that can hold points alone is a cloud.
 pub fn read(
     source: &Source,
     shape: Option<Shape>,
-    part: &VolumeOptions,
+    choice: &VolumeChoice,
+    unit: Option<Unit>,
     memory: Option<Memory>,
 ) -> Outcome<Input> {
     let limits = limits(memory);
-    let kind = kind(source, part)?;
+    let part = &choice.options(unit)?;
+    let kind = kind(source, choice, part)?;
     let path = source.path();
     let reading = |e| source.reading(e);
     let shape = match (kind, shape) {
@@ -47,9 +59,10 @@ pub fn read(
             let volume = formats::volumes::read(path, part, &limits).map_err(reading)?;
             return Ok(Input::Volume(volume));
         }
-        (Kind::Volume(_), Some(_)) => {
+        (Kind::Volume(_), Some(shape)) => {
             return Err(Failure::usage(format!(
-                "--as: {} is a {kind}, and only files with faces can be taken for something else; leave it out",
+                "--as {}: {} is a {kind}, and only files with faces can be taken for one or the other; leave it out",
+                shape.name(),
                 source.name()
             )));
         }
@@ -70,7 +83,7 @@ pub fn read(
 }
 
 /// What a file is: without a header that is the user's word.
-pub fn kind(source: &Source, part: &VolumeOptions) -> Outcome<Kind> {
+pub fn kind(source: &Source, choice: &VolumeChoice, part: &VolumeOptions) -> Outcome<Kind> {
     if part.raw.is_some() {
         return Ok(Kind::Volume(VolumeFormat::Raw));
     }
@@ -81,6 +94,7 @@ pub fn kind(source: &Source, part: &VolumeOptions) -> Outcome<Kind> {
             source.name()
         )));
     }
+    choice.suits(kind)?;
     Ok(kind)
 }
 

@@ -114,8 +114,7 @@ impl Keep {
         };
         if largest < least {
             return Err(Failure::usage(format!(
-                "--keep {self}: the largest of the {} pieces encloses {}; give a smaller volume",
-                human_count(order.len()),
+                "--keep {self}: the largest piece encloses only {}; give a smaller volume",
                 volume_text(largest, unit)
             )));
         }

@@ -15,7 +15,7 @@ use super::field::OpenField;
 use super::mesh_output::{MESHES, MeshOutput};
 use super::output::Output;
 use super::progress::Bar;
-use super::quantity::{Tolerance, finite, human_number, threads};
+use super::quantity::{Tolerance, between, finite, human_number, threads};
 use super::source::{FIELDS, Source};
 use super::summary::Summary;
 use super::trim::{self, Sampled};
@@ -31,11 +31,11 @@ pub struct Args {
     pub output: PathBuf,
     /// Cells along the longest side of the box [default: two cells per knot interval of the finest level that a
     /// tenth of the surface lies on]
-    #[arg(long, value_name = "N", conflicts_with = "tolerance", value_parser = clap::value_parser!(u32).range(1..=65535))]
+    #[arg(long, value_name = "N", conflicts_with = "tolerance", value_parser = between::<u32>(1, 65535))]
     resolution: Option<u32>,
     /// Distance from the surface that 99 % of the triangles keep at their centres: in the field's unit, in mm,
     /// or in per cent of the solid's diagonal
-    #[arg(long, value_name = "T[mm|%]")]
+    #[arg(long, value_name = "T[mm|%]", allow_hyphen_values = true)]
     tolerance: Option<Tolerance>,
     /// Density of the surface [default: 0 for clouds, for volumes what the file suggests]
     #[arg(long, value_name = "V", value_parser = finite, allow_negative_numbers = true)]
@@ -45,7 +45,7 @@ pub struct Args {
     open: bool,
     /// Leave out what is invented: triangles farther than this from every cell with points, in the field's unit, in mm,
     /// or in per cent of the solid's diagonal [default of the distance: 4 times the mean spacing of the points]
-    #[arg(long, value_name = "DISTANCE[mm|%]", num_args = 0..=1)]
+    #[arg(long, value_name = "DISTANCE[mm|%]", num_args = 0..=1, allow_negative_numbers = true)]
     trim: Option<Option<Tolerance>>,
     /// Threads to work with [default: all cores]
     #[arg(long, value_name = "N", value_parser = threads)]

@@ -122,8 +122,8 @@ pub fn main() -> ExitCode {
             eprintln!("isoclay: {f}");
             let (json, data_on_stdout) = cli.command.stdout();
             match (json, data_on_stdout) {
-                (true, false) => println_quietly(io::stdout(), &f.json()),
-                (true, true) => println_quietly(io::stderr(), &f.json()),
+                (true, false) => print_quietly(io::stdout(), &f.json()),
+                (true, true) => print_quietly(io::stderr(), &f.json()),
                 (false, _) => {}
             }
             ExitCode::from(f.code())
@@ -152,12 +152,12 @@ fn refuse(e: &clap::Error) -> ExitCode {
             .lines()
             .map(str::trim)
             .find(|l| l.starts_with("tip:") || l.starts_with("Usage:"));
-        println_quietly(io::stdout(), &error_object(code, &message, remedy));
+        print_quietly(io::stdout(), &error_object(code, &message, remedy));
     }
     ExitCode::from(code)
 }
 
-fn println_quietly(mut out: impl Write, line: &str) {
+fn print_quietly(mut out: impl Write, line: &str) {
     let _ = writeln!(out, "{line}").and_then(|()| out.flush());
 }
 
@@ -228,6 +228,10 @@ mod tests {
         assert!(commands.len() > 10);
         let mut missing = Vec::new();
         for (name, command) in &commands {
+            // What clap itself looks for in debug builds alone: two arguments of one name, of which one is deaf.
+            let mut ids: Vec<_> = command.get_arguments().map(|a| a.get_id().as_str()).collect();
+            ids.sort_unstable();
+            assert!(ids.windows(2).all(|w| w[0] != w[1]), "{name}: {ids:?}");
             for argument in command.get_arguments() {
                 let option = match argument.get_long() {
                     Some("help" | "version") => continue,

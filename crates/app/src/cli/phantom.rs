@@ -10,7 +10,7 @@ use glam::{DAffine3, DMat3, DVec3};
 use super::cost::Cost;
 use super::failure::{Failure, Outcome};
 use super::output::Output;
-use super::quantity::Tolerance;
+use super::quantity::{Tolerance, between};
 use super::summary::Summary;
 
 /// Arguments of `isoclay phantom`.
@@ -22,24 +22,24 @@ pub struct Args {
     /// Cloud to write (.ply); for the head, volume (.nii, .nii.gz); - writes to standard output
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
-    /// Points, before holes are cut
-    #[arg(long, value_name = "N", default_value_t = 20_000, value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
-    count: u64,
-    /// Voxels along each side of the head
-    #[arg(long, value_name = "N", default_value_t = 96, value_parser = clap::value_parser!(u16).range(4..=1024))]
-    size: u16,
+    /// Points of a cloud, before holes are cut [default: 20000]
+    #[arg(long, value_name = "N", value_parser = between::<u64>(1, 100_000_000))]
+    count: Option<u64>,
+    /// Voxels along each side of the head [default: 96]
+    #[arg(long, value_name = "N", value_parser = between::<u16>(4, 1024))]
+    size: Option<u16>,
     /// Standard deviation of the noise: on each coordinate, a length or per cent of the solid's diagonal; of the
     /// head, a density or per cent of the skull's
-    #[arg(long, value_name = "S[%]")]
+    #[arg(long, value_name = "S[%]", allow_hyphen_values = true)]
     noise: Option<Tolerance>,
     /// Holes to cut, each with 6 % of the points
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=12))]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = between::<u8>(0, 12))]
     holes: u8,
     /// Ratio of the largest to the smallest density, along the longest side
     #[arg(long, value_name = "R", default_value_t = 1.0, value_parser = ratio)]
     density_ratio: f64,
     /// Seed of all randomness
-    #[arg(long, value_name = "K", default_value_t = 1, value_parser = seed)]
+    #[arg(long, value_name = "K", default_value_t = 1, value_parser = seed, allow_negative_numbers = true)]
     seed: u64,
     /// Print one JSON object instead of a table
     #[arg(long)]
@@ -102,16 +102,24 @@ pub fn run(args: &Args) -> Outcome {
 }
 
 fn noise_of(args: &Args, whole: f64) -> Outcome<f64> {
-    let noise = args.noise.map(|n| n.length(whole, Unit::Unknown)).transpose();
-    let noise =
-        noise.map_err(|_| Failure::usage("--noise: phantoms have no unit; give a number or per cent"))?;
-    Ok(noise.unwrap_or(0.0))
+    match args.noise {
+        None => Ok(0.0),
+        Some(Tolerance::Mm(n)) => Err(Failure::usage(format!(
+            "--noise {n}mm: phantoms have no unit; give a number ({n}) or per cent of the size (0.5%)"
+        ))),
+        Some(noise) => noise.length(whole, Unit::Unknown).map_err(Failure::usage),
+    }
 }
 
 fn write_cloud(args: &Args, solid: Solid, output: &Output) -> Outcome<Summary> {
+    if let Some(size) = args.size {
+        return Err(Failure::usage(format!(
+            "--size {size}: is the number of voxels of the head; a cloud takes --count"
+        )));
+    }
     let (field, within) = (solid.field(), solid.within());
     let options = CloudOptions {
-        count: args.count as usize,
+        count: args.count.unwrap_or(20_000) as usize,
         noise: noise_of(args, within.size().length())?,
         hole_count: usize::from(args.holes),
         density_ratio: args.density_ratio,
@@ -134,12 +142,22 @@ fn write_cloud(args: &Args, solid: Solid, output: &Output) -> Outcome<Summary> {
 }
 
 fn write_head(args: &Args, output: &Output) -> Outcome<Summary> {
-    if args.holes > 0 || args.density_ratio != 1.0 {
-        return Err(Failure::usage(
-            "--holes and --density-ratio are for clouds; the head is a volume",
-        ));
+    let is_for_clouds = [
+        ("--count", args.count.map(|n| n.to_string())),
+        ("--holes", (args.holes > 0).then(|| args.holes.to_string())),
+        (
+            "--density-ratio",
+            (args.density_ratio != 1.0).then(|| args.density_ratio.to_string()),
+        ),
+    ];
+    for (option, given) in is_for_clouds {
+        if let Some(given) = given {
+            return Err(Failure::usage(format!(
+                "{option} {given}: is for clouds, and the head is a volume; leave it out"
+            )));
+        }
     }
-    let n = usize::from(args.size);
+    let n = usize::from(args.size.unwrap_or(96));
     let values = head([n; 3], noise_of(args, 1.0)?, args.seed);
     // The middle of the volume is the origin, its sides are 200 mm long.
     let step = 200.0 / n as f64;

@@ -12,7 +12,7 @@ use super::field::OpenField;
 use super::mesh::Mesher;
 use super::output::Output;
 use super::progress::Bar;
-use super::quantity::{finite, positive, threads};
+use super::quantity::{between, finite, human_number, positive, threads};
 use super::source::{FIELDS, Source};
 use super::summary::Summary;
 use super::{interrupt, set_threads};
@@ -30,7 +30,7 @@ pub struct Args {
     #[arg(long, value_name = "V", value_parser = finite, allow_negative_numbers = true)]
     iso: Option<f64>,
     /// Cells along the longest side of the box [default: as many as the picture shows, at most two in a knot interval]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65535))]
+    #[arg(long, value_name = "N", value_parser = between::<u32>(1, 65535))]
     resolution: Option<u32>,
     /// Width and height in pixels
     #[arg(long, value_name = "WxH", default_value = "1200x900", value_parser = size)]
@@ -45,7 +45,7 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t = Axis::Y)]
     up: Axis,
     /// How many times larger than a picture of the whole solid
-    #[arg(long, value_name = "Z", default_value_t = 1.0, value_parser = zoom)]
+    #[arg(long, value_name = "Z", default_value_t = 1.0, value_parser = zoom, allow_negative_numbers = true)]
     zoom: f64,
     /// Point in the middle of the picture, in the field's coordinates [default: the middle of the solid]
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
@@ -184,14 +184,15 @@ impl Args {
     }
 
     fn nothing_there(&self, whole: &Mesh) -> Failure {
-        let corners = whole.bounding_box().map(|b| (b.min, b.max)).unwrap_or_default();
+        let corners = whole.bounding_box().map(|b| [b.min, b.max]).unwrap_or_default();
+        let [low, high] = corners.map(|p| p.to_array().map(human_number).join(", "));
         let at = self
             .at
             .map_or(String::new(), |p| format!("--at {},{},{} ", p.x, p.y, p.z));
         Failure::usage(format!(
-            "{at}--zoom {}: no part of the solid is in the picture; it lies between {} and {}: choose another point or a \
+            "{at}--zoom {}: no part of the solid is in the picture; it lies between ({low}) and ({high}); choose another point or a \
              smaller zoom",
-            self.zoom, corners.0, corners.1
+            self.zoom
         ))
     }
 }

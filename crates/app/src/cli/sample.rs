@@ -13,7 +13,7 @@ use super::convert::VOLUMES;
 use super::cost::Cost;
 use super::failure::Outcome;
 use super::field::OpenField;
-use super::input::{limits, remaining};
+use super::input::{self, limits, remaining};
 use super::output::Output;
 use super::progress::Bar;
 use super::quantity::{Memory, human_bytes, human_number, threads};
@@ -63,7 +63,7 @@ pub fn run(args: &Args) -> Outcome {
     let cost = Cost::start();
     let cancel = Cancel::new();
     interrupt::cancel_on_interrupt(&cancel)?;
-    let like = Source::open(&args.like, None, source::VOLUMES, &cancel)?;
+    let like = Source::open(&args.like, None, source::VOLUMES, &cancel)?.under("--like");
     let field = Source::open(&args.field, None, FIELDS, &cancel)?;
     let output = Output::check(
         "-o",
@@ -76,10 +76,13 @@ pub fn run(args: &Args) -> Outcome {
     set_threads(args.threads)?;
     let mut choice = args.volume.clone();
     let spacing = choice.take_spacing_of_other();
+    let part = choice.options(None)?;
+    input::kind(&like, &choice, &part)?;
     let Preview {
-        mut header, notes, ..
-    } = formats::volumes::peek(like.path(), &choice.options(None)?).map_err(|e| like.reading(e))?;
-    let mut notes = notes;
+        mut header,
+        mut notes,
+        ..
+    } = formats::volumes::peek(like.path(), &part).map_err(|e| like.reading(e))?;
     if let Some(spacing) = spacing {
         notes.extend(resample(&mut header, spacing)?);
     }

@@ -14,6 +14,7 @@ use super::field::{self, OpenField, either};
 use super::mesh::Mesher;
 use super::mesh_output::MESHES;
 use super::output::Output;
+use super::overwrite::refuse_own_input;
 use super::progress::Bar;
 use super::quantity::{count, human_count, human_number, threads};
 use super::source::{FIELDS, Source};
@@ -73,14 +74,9 @@ pub fn run(args: &Args) -> Outcome {
     let cancel = Cancel::new();
     interrupt::cancel_on_interrupt(&cancel)?;
     let script = Source::open(&args.scene, Some("toml"), "scenes .toml", &cancel)?;
-    let scene = read(&script)?;
-    let directory = args.scene.parent().unwrap_or(Path::new(""));
-    let named = directory.join(&scene.field);
-    let field = Source::open(args.field.as_ref().unwrap_or(&named), None, FIELDS, &cancel)?;
-    let inputs = [&script, &field];
-    let output = Output::check("-o", &args.output, &["iclay"], None, &inputs)?;
+    let output = Output::check("-o", &args.output, &["iclay"], None, &[&script])?;
     let mesh = (args.mesh.as_ref())
-        .map(|mesh| Output::check("--mesh", mesh, &MESHES, None, &inputs))
+        .map(|mesh| Output::check("--mesh", mesh, &MESHES, None, &[&script]))
         .transpose()?;
     if output.is_stdout() && mesh.as_ref().is_some_and(Output::is_stdout) {
         return Err(Failure::usage(
@@ -90,6 +86,15 @@ pub fn run(args: &Args) -> Outcome {
     let frames = (args.frames.as_ref())
         .map(|frames| StagedFiles::new("--frames", frames))
         .transpose()?;
+    let scene = read(&script)?;
+    let field = match &args.field {
+        Some(field) => Source::open(field, None, FIELDS, &cancel)?.under("--field"),
+        None => {
+            let directory = args.scene.parent().unwrap_or(Path::new(""));
+            Source::open(&directory.join(&scene.field), None, FIELDS, &cancel)?
+        }
+    };
+    refuse_own_input("-o", &field, &args.output)?;
     set_threads(args.threads)?;
     let open = OpenField::load(&field)?;
     let mut stage = Stage {
@@ -130,9 +135,13 @@ fn read(script: &Source) -> Outcome<Scene> {
     const LARGEST: u64 = 16 << 20;
     let path = script.path();
     let about = |why: String| Failure::input(format!("{}: {why}", script.name()));
-    let size = std::fs::metadata(path).map_err(|e| about(e.to_string()))?.len();
+    let size = std::fs::metadata(path)
+        .map_err(|e| about(format!("{e}; check the path")))?
+        .len();
     if size > LARGEST {
-        return Err(about(format!("has {size} bytes; a scene has at most {LARGEST}")));
+        return Err(about(format!(
+            "has {size} bytes, and a scene at most {LARGEST}; is this the right file?"
+        )));
     }
     let text = std::fs::read_to_string(path).map_err(|e| about(e.to_string()))?;
     toml::from_str(&text).map_err(|e| about(e.to_string().trim_end().into()))

@@ -88,6 +88,12 @@ impl Source {
         })
     }
 
+    /// Names the option that it was given by, for messages.
+    pub fn under(mut self, option: &str) -> Self {
+        self.name = format!("{option} {}", self.name);
+        self
+    }
+
     /// Where it is read from.
     pub fn path(&self) -> &Path {
         &self.path
@@ -111,12 +117,12 @@ impl Source {
                  trusted",
                 human_bytes(needed)
             )),
-            Fault::UnknownKind { .. } if self.name == "standard input" => Failure::input(format!(
+            Fault::UnknownKind { .. } if self.name.ends_with("standard input") => Failure::input(format!(
                 "{name}: its first bytes do not tell its format; name it by --format, or give {}",
                 self.accepted
             )),
             Fault::UnknownKind { found, .. } => Failure::input(format!(
-                "{name}: {found} is not what is read here; give {}",
+                "{name}: {found} is not read here; give {}",
                 self.accepted
             )),
             fault => Failure::input(format!("{name}: {fault}")),

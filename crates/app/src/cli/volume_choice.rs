@@ -1,8 +1,8 @@
 use std::str::FromStr;
 
 use clap::ValueEnum;
-use formats::Unit;
-use formats::volumes::{DicomOptions, RawLayout, Tilt, Uneven, VolumeOptions, VoxelType};
+use formats::volumes::{DicomOptions, RawLayout, Tilt, Uneven, VolumeFormat, VolumeOptions, VoxelType};
+use formats::{Kind, Unit};
 
 use super::failure::{Failure, Outcome};
 use super::quantity::{count, positive};
@@ -15,22 +15,22 @@ pub struct VolumeChoice {
     #[arg(long, value_name = "X0:X1,Y0:Y1,Z0:Z1")]
     region: Option<Triple<Range>>,
     /// Read every so many voxels along each axis: one number, or three
-    #[arg(long, value_name = "N|X,Y,Z")]
+    #[arg(long, value_name = "N|X,Y,Z", allow_hyphen_values = true)]
     stride: Option<OneOrThree<Step>>,
     /// Distances between neighbouring voxels in mm, in place of those in the file: one number, or three
-    #[arg(long, value_name = "N|X,Y,Z")]
+    #[arg(long, value_name = "N|X,Y,Z", allow_hyphen_values = true)]
     spacing: Option<OneOrThree<Spacing>>,
     /// The file has no header: voxels along x (fastest), y and z
-    #[arg(long, value_name = "X,Y,Z", requires = "voxel")]
-    shape: Option<Triple<usize>>,
+    #[arg(long = "shape", value_name = "X,Y,Z", requires = "voxel")]
+    dims: Option<Triple<usize>>,
     /// The file has no header: type of its voxels, such as uint16 or float32
-    #[arg(long, value_name = "TYPE", requires = "shape")]
+    #[arg(long, value_name = "TYPE", requires = "dims")]
     voxel: Option<VoxelType>,
     /// The file has no header: its voxels have their high byte first
-    #[arg(long, requires = "shape")]
+    #[arg(long, requires = "dims")]
     big_endian: bool,
     /// The file has no header: bytes before the first voxel
-    #[arg(long, value_name = "BYTES", requires = "shape", default_value_t = 0, value_parser = whole)]
+    #[arg(long, value_name = "BYTES", requires = "dims", default_value_t = 0, value_parser = whole, allow_negative_numbers = true)]
     offset: u64,
     /// DICOM: the series to read, by its number or its identifier, where there are several
     #[arg(long, value_name = "NUMBER|UID")]
@@ -64,9 +64,28 @@ enum TiltChoice {
 }
 
 impl VolumeChoice {
+    /// Refuses choices for DICOM series where the volume is none.
+    pub fn suits(&self, kind: Kind) -> Outcome {
+        let (option, value) = if let Some(series) = &self.series {
+            ("--series", series.clone())
+        } else if self.uneven != UnevenChoice::Refuse {
+            ("--uneven", "resample".into())
+        } else if self.tilt != TiltChoice::Keep {
+            ("--tilt", "resample".into())
+        } else {
+            return Ok(());
+        };
+        match kind {
+            Kind::Volume(VolumeFormat::Dicom) => Ok(()),
+            kind => Err(Failure::usage(format!(
+                "{option} {value}: is for DICOM series, and this is a {kind}; leave it out"
+            ))),
+        }
+    }
+
     /// Takes away `--spacing` where it is not that of a file without a header.
     pub fn take_spacing_of_other(&mut self) -> Option<[f64; 3]> {
-        if self.shape.is_some() {
+        if self.dims.is_some() {
             return None;
         }
         self.spacing.take().map(|s| s.0.map(|Spacing(s)| s))
@@ -78,7 +97,7 @@ impl VolumeChoice {
 
     /// The options of the reader; `unit` is what the user says of the file.
     pub fn options(&self, unit: Option<Unit>) -> Outcome<VolumeOptions> {
-        let raw = match (&self.shape, self.voxel) {
+        let raw = match (&self.dims, self.voxel) {
             (Some(Triple(dims)), Some(voxel)) => {
                 let spacing = self.spacing();
                 if spacing.is_none() && unit.is_some() {
@@ -182,7 +201,7 @@ impl<T: FromStr<Err: ToString>> FromStr for Triple<T> {
         let n = all.len();
         all.try_into()
             .map(Self)
-            .map_err(|_| format!("{n} given; write three with commas between"))
+            .map_err(|_| format!("{n} of three values given; write all three with commas between"))
     }
 }
 
@@ -193,7 +212,7 @@ impl<T: FromStr<Err: ToString> + Copy> FromStr for OneOrThree<T> {
             &[one] => Ok(Self([one; 3])),
             &[x, y, z] => Ok(Self([x, y, z])),
             other => Err(format!(
-                "{} given; write one, or three with commas between",
+                "{} values given; write one, or three with commas between",
                 other.len()
             )),
         }

@@ -114,11 +114,8 @@ mod tests {
             cells: [200; 3],
         };
         let within = part.within(&frame).unwrap();
-        assert!(
-            within.cells.iter().all(|n| (20..150).contains(n)),
-            "{:?}",
-            within.cells
-        );
+        let count: u32 = within.cells.iter().product();
+        assert!(count < 8_000_000 / 3, "{:?}", within.cells);
         let away = View {
             center: DVec3::splat(50.0),
             ..view
