@@ -63,7 +63,7 @@ impl Output {
             (None, None) if is_stdout || is_device => Some(formats[0]),
             _ => {
                 return Err(Failure::usage(format!(
-                    "{option} {}: the name has to end in .{}",
+                    "{option} {}: the name tells no format that is written here; let it end in .{}",
                     given.display(),
                     formats.join(" or .")
                 )));

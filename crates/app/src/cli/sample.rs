@@ -170,7 +170,7 @@ fn resample(header: &mut VolumeHeader, wanted: [f64; 3]) -> Outcome<Option<Strin
         header.world_from_voxel * DAffine3::from_translation(0.5 * step - 0.5) * DAffine3::from_scale(step);
     header.dims = counts.map(|n| n as usize);
     let found = header.spacing();
-    let is_off = (0..3).any(|a| (found[a] - wanted[a]).abs() > 1e-9 * wanted[a]);
+    let is_off = (0..3).any(|a| (found[a] - wanted[a]).abs() > 1e-4 * wanted[a]);
     Ok(is_off.then(|| {
         format!(
             "voxels of {} {}, so that the box holds a whole number of them",

@@ -111,10 +111,6 @@ pub fn run(args: &Args) -> Outcome {
     };
     let total = either!(&open.loaded().field, f => stage.play(f.clone()))?;
     stage.bar.clear();
-    // All is computed; what is written whole takes its name.
-    if let Some(frames) = stage.frames {
-        frames.publish()?;
-    }
     if let Some(mesh) = &mesh {
         mesh.finish()?;
     }
@@ -188,6 +184,9 @@ impl Stage<'_> {
         }
         let baked = simulation.baked().map_err(failed)?;
         total.summary.notes = simulation.notes().to_vec();
+        if let Some(frames) = self.frames.take() {
+            frames.publish()?;
+        }
         if let Some(output) = self.mesh {
             let mesh = self.surface(&baked, simulation.region().cells().level)?;
             formats::meshes::save(output.path(), &written(&mesh, self.open.unit()))

@@ -118,7 +118,7 @@ impl Source {
                 human_bytes(needed)
             )),
             Fault::UnknownKind { .. } if self.name.ends_with("standard input") => Failure::input(format!(
-                "{name}: its first bytes do not tell its format; name it by --format, or give {}",
+                "{name}: its first bytes do not tell its format; name it by --format (convert: --input-format), or give {}",
                 self.accepted
             )),
             Fault::UnknownKind { found, .. } => Failure::input(format!(
