@@ -84,7 +84,7 @@ fn is_named(input: &Path, target: &Path) -> bool {
             .iter()
             .any(|e| is_same(Path::new(&format!("{stem}.{e}")), target));
     }
-    if ![".nhdr", ".nhdr.gz", ".mhd", ".gltf"].iter().any(|e| ends_in(&e)) {
+    if ![".nhdr", ".nhdr.gz", ".mhd", ".gltf"].iter().any(ends_in) {
         return false;
     }
     let mut header = Vec::new();

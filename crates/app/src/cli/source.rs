@@ -13,6 +13,7 @@ use formats::{Fault, FormatError};
 use tempfile::TempDir;
 
 use super::failure::{Failure, Outcome};
+use super::flags;
 use super::interrupt;
 use super::quantity::human_bytes;
 
@@ -125,7 +126,10 @@ impl Source {
                 "{name}: {found} is not read here; give {}",
                 self.accepted
             )),
-            fault => Failure::input(format!("{name}: {fault}")),
+            fault => Failure::input(match fault.choice() {
+                Some(choice) => format!("{name}: {fault} ({})", flags::of(choice)),
+                None => format!("{name}: {fault}"),
+            }),
         }
     }
 }

@@ -20,6 +20,9 @@ pub struct VolumeChoice {
     /// Distances between neighbouring voxels in mm, in place of those in the file: one number, or three
     #[arg(long, value_name = "N|X,Y,Z", allow_hyphen_values = true)]
     spacing: Option<OneOrThree<Spacing>>,
+    /// Which volume of a time series, of echoes or channels to read, counted from 0
+    #[arg(long, value_name = "N", value_parser = whole::<usize>, allow_negative_numbers = true)]
+    volume: Option<usize>,
     /// The file has no header: voxels along x (fastest), y and z
     #[arg(long = "shape", value_name = "X,Y,Z", requires = "voxel")]
     dims: Option<Triple<usize>>,
@@ -30,7 +33,7 @@ pub struct VolumeChoice {
     #[arg(long, requires = "dims")]
     big_endian: bool,
     /// The file has no header: bytes before the first voxel
-    #[arg(long, value_name = "BYTES", requires = "dims", default_value_t = 0, value_parser = whole, allow_negative_numbers = true)]
+    #[arg(long, value_name = "BYTES", requires = "dims", default_value_t = 0, value_parser = whole::<u64>, allow_negative_numbers = true)]
     offset: u64,
     /// DICOM: the series to read, by its number or its identifier, where there are several
     #[arg(long, value_name = "NUMBER|UID")]
@@ -129,6 +132,7 @@ impl VolumeChoice {
                 .map(|r| r.0.map(|Range(from, to)| [from, to])),
             stride: self.stride.as_ref().map_or([1; 3], |s| s.0.map(|Step(n)| n)),
             spacing_mm: if raw.is_some() { None } else { self.spacing() },
+            volume: self.volume,
             raw,
             dicom: DicomOptions {
                 series: self.series.clone(),
@@ -145,7 +149,7 @@ impl VolumeChoice {
     }
 }
 
-fn whole(s: &str) -> Result<u64, String> {
+fn whole<T: FromStr>(s: &str) -> Result<T, String> {
     s.parse()
         .map_err(|_| "write a whole number in digits, 0 or more".into())
 }

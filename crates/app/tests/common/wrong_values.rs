@@ -87,6 +87,8 @@ pub const ROWS: &[Row] = &[
     ("fit check info convert sample", "--shape", "@volume --voxel int16 --shape *16,16", "three"),
     ("fit check info convert sample", "--voxel", "@volume --shape 16,16,16 --voxel *int12", "int16"),
     ("fit check info convert sample", "--offset", "@volume --shape 1,1,1 --voxel uint8 --offset *-1", "whole number"),
+    ("fit check info convert sample", "--volume", "@volume --volume *-1", "0 or more"),
+    ("fit check info convert sample", "--volume", "@volume --volume *3", "--volume"),
     ("fit check info convert sample", "--series", "@volume --series *9", "DICOM"),
     ("fit", "--uneven", "@volume --uneven *resample", "DICOM"),
     ("fit check info convert sample", "--uneven", "@volume --uneven *guess", "resample"),
