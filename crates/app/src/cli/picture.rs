@@ -198,7 +198,7 @@ impl Args {
 }
 
 /// Cells along the longest side of the box of the mesh that casts shadows.
-const SHADING_CELLS: u32 = 192;
+const SHADING_CELLS: u32 = 128;
 /// Side of a cell in pixels: an arc of a radius of ten of them is left by a twelfth of a pixel.
 const CELL_PIXELS: f64 = 2.5;
 

@@ -72,8 +72,11 @@ impl DepthMap {
             return;
         }
         let (lo, hi) = (a.min(b).min(c), a.max(b).max(c));
+        // Whole numbers from `lo` to `hi`; casts cut off and saturate, and cost less than `ceil`.
         let range = |lo: f64, hi: f64, n: usize| {
-            lo.ceil().max(0.0) as usize..(hi.floor() + 1.0).clamp(0.0, n as f64) as usize
+            let first = lo.max(0.0) as usize;
+            let end = if hi < 0.0 { 0 } else { n.min(hi as usize + 1) };
+            first + usize::from((first as f64) < lo)..end
         };
         let columns = range(lo.x, hi.x, self.size[0]);
         for y in range(lo.y, hi.y, self.size[1]) {
@@ -93,10 +96,23 @@ impl DepthMap {
         }
     }
 
+    /// Whether nothing lies before `p`, whose normal is `normal`.
+    pub fn is_visible(&self, p: DVec3, normal: DVec3) -> bool {
+        let q = self.off_surface(p, normal) + 0.5;
+        // Casts cut off towards 0: what is left of the map or above it counts as its first column or row.
+        let (x, y) = (q.x as usize, q.y as usize);
+        let is_outside = x >= self.size[0] || y >= self.size[1];
+        is_outside || (q.z - 0.5) as f32 >= self.depth[y * self.size[0] + x]
+    }
+
+    /// Pixel of a point a step off the surface, so that it does not shade itself.
+    fn off_surface(&self, p: DVec3, normal: DVec3) -> DVec3 {
+        self.pixel(p + normal * (2.5 / self.pixels_per_length))
+    }
+
     /// Share of the pixels round `p`'s own, `reach` on each side, in which nothing lies before it.
     pub fn visible(&self, p: DVec3, normal: DVec3, reach: i64) -> f64 {
-        // A step off the surface, so that it does not shade itself.
-        let q = self.pixel(p + normal * (2.5 / self.pixels_per_length));
+        let q = self.off_surface(p, normal);
         let (x, y) = (q.x.round() as i64, q.y.round() as i64);
         let mut seen = 0;
         for (i, j) in (-reach..=reach).flat_map(|i| (-reach..=reach).map(move |j| (x + i, y + j))) {

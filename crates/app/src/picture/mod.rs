@@ -50,7 +50,7 @@ pub struct View {
 /// Samples of a pixel along one side.
 const SAMPLES: usize = 2;
 /// Directions of the sky.
-const SKY: usize = 96;
+const SKY: usize = 64;
 /// Cosine between the triangles of a pixel's samples above which one colour will do for them all.
 const SMOOTH: f64 = 0.95;
 /// The same for their depths: the most that they differ, in sides of a sample.
@@ -92,11 +92,11 @@ pub fn draw(scene: &Scene, view: &View) -> Vec<u8> {
             let angle = PI * (3.0 - 5f64.sqrt()) * i as f64;
             let r = (1.0 - z * z).sqrt();
             let d = view.axes.transpose() * DVec3::new(r * angle.cos(), z, r * angle.sin());
-            DepthMap::filled(&scene.shading, axes(d, up), [384, 384])
+            DepthMap::filled(&scene.shading, axes(d, up), [288, 288])
         })
         .collect();
     let sun_direction = view.axes.transpose() * DVec3::new(-0.45, 0.65, 0.62);
-    let sun = DepthMap::filled(&scene.shading, axes(sun_direction, up), [1536, 1536]);
+    let sun = DepthMap::filled(&scene.shading, axes(sun_direction, up), [1024, 1024]);
     let lights = Lights {
         sky: &sky,
         sun: &sun,
@@ -194,7 +194,9 @@ impl Lights<'_> {
             let weight = n.dot(toward);
             if weight > 0.0 {
                 all += weight;
-                light += weight * (0.55 + 0.45 * toward.dot(self.up)) * d.visible(p, n, 0);
+                if d.is_visible(p, n) {
+                    light += weight * (0.55 + 0.45 * toward.dot(self.up));
+                }
             }
         }
         let facing = n.dot(self.sun.axes.row(2));
