@@ -139,7 +139,7 @@ fn missing_empty_and_unknown_files() {
     bench.write("empty.ply", "");
     refused(&bench, "empty.ply", 3, &["empty"]);
     bench.write("text.docx", "hello");
-    refused(&bench, "text.docx", 3, &["supported"]);
+    refused(&bench, "text.docx", 3, &["not read here", ".nrrd"]);
     std::fs::create_dir(bench.path("folder.ply")).unwrap();
     refused(&bench, "folder.ply", 3, &["directory"]);
 }

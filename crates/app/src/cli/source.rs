@@ -126,10 +126,7 @@ impl Source {
                 "{name}: {found} is not read here; give {}",
                 self.accepted
             )),
-            fault => Failure::input(match fault.choice() {
-                Some(choice) => format!("{name}: {fault} ({})", flags::of(choice)),
-                None => format!("{name}: {fault}"),
-            }),
+            fault => Failure::input(format!("{name}: {}", flags::fault(&fault))),
         }
     }
 }
