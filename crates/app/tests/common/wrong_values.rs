@@ -89,7 +89,7 @@ pub const ROWS: &[Row] = &[
     ("fit check info convert sample", "--offset", "@volume --shape 1,1,1 --voxel uint8 --offset *-1", "whole number"),
     ("fit check info convert sample", "--volume", "@volume --volume *-1", "0 or more"),
     ("fit check info convert sample", "--volume", "@volume --volume *3", "counted from 0"),
-    ("fit info", "--region", "@volume --region *0:99,0:9,0:9", "16"),
+    ("fit info", "--region", "@volume --region 0:9,0:9,0:*99", "16"),
     ("fit check info convert sample", "--series", "@volume --series *9", "DICOM"),
     ("fit", "--uneven", "@volume --uneven *resample", "DICOM"),
     ("fit check info convert sample", "--uneven", "@volume --uneven *guess", "resample"),
