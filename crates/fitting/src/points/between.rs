@@ -101,13 +101,8 @@ impl Neighbours {
     }
 
     /// The conditions of a level, those whose samples are farther apart than its cells are wide and one of which lies in
-    /// a cell that was refined, sorted by brick; those of brick `b` are at `starts[b]..starts[b + 1]`.
-    pub fn by_brick<T: Real>(
-        &self,
-        band: &Band<T>,
-        cells: &[Cell],
-        weight: f64,
-    ) -> (Vec<BandSample<T>>, Vec<u32>) {
+    /// a cell that was refined, sorted by brick, and where those of each brick start (with one start past the last).
+    pub fn by_brick<T: Real>(&self, band: &Band<T>, cells: &[Cell]) -> (Vec<u32>, Vec<u32>) {
         let mut is_refined = vec![false; self.spacing.len()];
         for cell in cells.iter().filter(|c| c.refined) {
             is_refined[cell.start as usize..cell.end as usize].fill(true);
@@ -143,17 +138,13 @@ impl Neighbours {
             *to += 1;
         }
         starts.pop();
-        let list = order
-            .iter()
-            .map(|&i| self.between[i as usize].on_level(n, weight))
-            .collect();
-        (list, starts)
+        (order, starts)
     }
-}
 
-impl Between {
-    fn on_level<T: Real>(&self, n: f64, weight: f64) -> BandSample<T> {
-        let q = self.position.as_dvec3() * n;
+    /// Condition `index` on the level with `n` cells along the box, `weight` times as heavy as a gradient at a sample.
+    pub fn condition<T: Real>(&self, index: u32, n: f64, weight: f64) -> BandSample<T> {
+        let b = &self.between[index as usize];
+        let q = b.position.as_dvec3() * n;
         let local = q.to_array().map(|x| x as usize % BRICK);
         BandSample {
             spot: Spot {
@@ -161,10 +152,10 @@ impl Between {
                 t: (q - q.floor()).to_array().map(T::from_f64),
             },
             weight: T::zero(),
-            gradient_weight: T::from_f64(f64::from(self.weight) * weight),
-            tangential: T::from_f64(f64::from(self.certainty)),
+            gradient_weight: T::from_f64(f64::from(b.weight) * weight),
+            tangential: T::from_f64(f64::from(b.certainty)),
             target: T::zero(),
-            normal: self.normal.as_dvec3().to_array().map(T::from_f64),
+            normal: b.normal.as_dvec3().to_array().map(T::from_f64),
         }
     }
 }

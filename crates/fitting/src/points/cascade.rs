@@ -130,8 +130,10 @@ fn no_room<T: Real>(
     // The bricks are counted only where someone asks.
     control.memory_limit?;
     let (keys, _) = bricks_near(depth, refined, REACH);
+    // About three conditions between the samples for each of them, half as large as a sample.
+    let held = samples.positions.len() * if plan.is_sparse(depth) { 3 } else { 1 };
     control
-        .reserve(level_bytes::<T>(keys.len(), samples.positions.len()))
+        .reserve(level_bytes::<T>(keys.len(), held))
         .is_err()
         .then_some(StopReason::Memory)
 }
@@ -155,10 +157,10 @@ fn band_samples<T: Real>(
     depth: usize,
 ) -> (Vec<BandSample<T>>, Vec<BrickSamples>, Vec<u32>) {
     let n = (1u64 << depth) as f64;
-    let (between, starts) = neighbours.map_or_else(Default::default, |n| {
-        n.by_brick(band, cells, plan.between_weight(depth))
-    });
-    let mut list = Vec::with_capacity(samples.positions.len() + between.len());
+    let between_weight = plan.between_weight(depth);
+    let between = neighbours.map(|n| (n, n.by_brick(band, cells)));
+    let between_count = between.as_ref().map_or(0, |(_, (order, _))| order.len());
+    let mut list = Vec::with_capacity(samples.positions.len() + between_count);
     let mut owners = Vec::with_capacity(list.capacity());
     let mut bricks: Vec<BrickSamples> = Vec::new();
     let mut current = (BrickKey([u32::MAX; 3]), None);
@@ -168,8 +170,9 @@ fn band_samples<T: Real>(
             current = (key, band.find(key));
             if let Some(brick) = current.1 {
                 let start = list.len() as u32;
-                if let Some(&[from, to]) = starts.get(brick..brick + 2) {
-                    list.extend_from_slice(&between[from as usize..to as usize]);
+                if let Some((all, (order, starts))) = &between {
+                    let own = &order[starts[brick] as usize..starts[brick + 1] as usize];
+                    list.extend(own.iter().map(|&i| all.condition(i, n, between_weight)));
                     // Without weight, they count for no cell.
                     owners.resize(list.len(), index as u32);
                 }
