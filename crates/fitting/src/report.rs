@@ -19,6 +19,8 @@ pub enum StopReason {
     /// The residual was below the tolerance when the cell was looked at, and has been moved above it by the
     /// refinement of cells beside it.
     Neighbours = 6,
+    /// The smoothing that was asked for leaves more than the tolerance.
+    Smoothing = 8,
 }
 
 /// A dyadic cell that was not split, with its own error.

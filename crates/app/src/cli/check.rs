@@ -2,7 +2,7 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use fitting::mesh::MeshDistance;
-use fitting::{Cancel, StopReason, UnsupportedComponent, unsupported_components};
+use fitting::{StopReason, UnsupportedComponent, unsupported_components};
 use formats::field::SourceKind;
 use formats::meshes::TriangleMesh;
 use formats::points::PointCloud;
@@ -67,8 +67,7 @@ struct Measured {
 pub fn run(args: &Args) -> Outcome {
     let cost = Cost::start();
     set_threads(args.threads)?;
-    let cancel = Cancel::new();
-    interrupt::cancel_on_interrupt(&cancel)?;
+    let cancel = interrupt::cancel();
     if let Some(d) = args.output.as_ref().filter(|d| d.exists() && !d.is_dir()) {
         return Err(Failure::usage(format!(
             "-o {}: is no directory; name another",

@@ -61,8 +61,7 @@ pub fn run(args: &Args) -> Outcome {
     let cost = Cost::start();
     check_output(&args.output, &["ply", "stl", "obj"])?;
     set_threads(args.threads)?;
-    let cancel = Cancel::new();
-    interrupt::cancel_on_interrupt(&cancel)?;
+    let cancel = interrupt::cancel();
     let open = OpenField::load(&args.field)?;
     let options = PolygonizeOptions {
         iso: open.iso_or(args.iso, &args.field)?,

@@ -3,7 +3,6 @@ use std::path::PathBuf;
 
 use bspline::polygonize::PolygonizeOptions;
 use clap::ValueEnum;
-use fitting::Cancel;
 use glam::DVec3;
 
 use super::cost::Cost;
@@ -76,8 +75,7 @@ pub fn run(args: &Args) -> Outcome {
     let cost = Cost::start();
     check_output(&args.output, &["png"])?;
     set_threads(args.threads)?;
-    let cancel = Cancel::new();
-    interrupt::cancel_on_interrupt(&cancel)?;
+    let cancel = interrupt::cancel();
     let open = OpenField::load(&args.field)?;
     let bar = Bar::new();
     let options = PolygonizeOptions {

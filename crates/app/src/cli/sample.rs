@@ -2,7 +2,6 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use bspline::{Field, Frame};
-use fitting::Cancel;
 use formats::FormatError;
 use formats::volumes::{Grid, Preview, StoreAs, save_slices};
 
@@ -49,8 +48,7 @@ pub fn run(args: &Args) -> Outcome {
     let cost = Cost::start();
     check_output(&args.output, &VOLUMES)?;
     set_threads(args.threads)?;
-    let cancel = Cancel::new();
-    interrupt::cancel_on_interrupt(&cancel)?;
+    let cancel = interrupt::cancel();
     let Preview { header, notes, .. } =
         formats::volumes::peek(&args.like, &args.volume.options(None)?).map_err(reading)?;
     let open = OpenField::load(&args.field)?;

@@ -77,8 +77,7 @@ pub fn run(args: &Args) -> Outcome {
             .or_limit()?;
     }
     set_threads(args.threads)?;
-    let cancel = Cancel::new();
-    interrupt::cancel_on_interrupt(&cancel)?;
+    let cancel = interrupt::cancel();
     let scene = read(&args.scene)?;
     let directory = args.scene.parent().unwrap_or(Path::new(""));
     let named = directory.join(&scene.field);

@@ -67,6 +67,14 @@ impl<'a> Oriented<'a> {
         })
     }
 
+    /// Bytes held beside the cloud.
+    pub fn bytes(&self) -> u64 {
+        let per_point = 2 * size_of::<DVec3>() + size_of::<f32>();
+        let estimated = size_of::<DVec3>() + 2 * size_of::<f32>() + 1;
+        let kept = |k: &Kept| k.positions.len() * per_point + k.orientation.normals.len() * estimated;
+        self.kept.as_ref().map_or(0, kept) as u64
+    }
+
     /// Positions of the points to fit.
     pub fn positions(&self) -> &[DVec3] {
         self.kept.as_ref().map_or(&self.cloud.positions, |k| &k.positions)

@@ -178,6 +178,7 @@ fn adapt<T: Real>(
             _ if rms <= goal.tolerance && by_noise && rms > clean => StopReason::Noise,
             _ if rms <= goal.tolerance => StopReason::Tolerance,
             Outcome::BudgetSpent => budget_reason,
+            Outcome::Smoothed => StopReason::Smoothing,
             _ => StopReason::Depth,
         }
     });
