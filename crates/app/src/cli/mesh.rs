@@ -17,7 +17,7 @@ use super::progress::Bar;
 use super::quantity::{Tolerance, finite, human_number};
 use super::summary::Summary;
 use super::trim::{self, Sampled};
-use super::{interrupt, set_threads};
+use super::{ceiling, interrupt, set_threads};
 
 /// Arguments of `isoclay mesh`.
 #[derive(clap::Args)]
@@ -214,9 +214,11 @@ impl Mesher<'_> {
     /// Meshes the cells of `frame`.
     pub fn on(&mut self, frame: Frame) -> Outcome<(Mesh, MeshReport, Frame)> {
         let (cancel, bar) = (self.cancel, self.bar);
+        let mut is_over = false;
         let mut progress = |fraction| {
             bar.show("meshing", fraction);
-            if cancel.is_cancelled() {
+            is_over = ceiling::is_exceeded();
+            if cancel.is_cancelled() || is_over {
                 ControlFlow::Break(())
             } else {
                 ControlFlow::Continue(())
@@ -224,6 +226,9 @@ impl Mesher<'_> {
         };
         let (mesh, report) =
             polygonize_with(self.field, &frame, &self.options, &mut progress).map_err(|e| match e {
+                PolygonizeError::Cancelled if is_over => {
+                    Failure::limit("the mesh takes more than --memory allows; raise it, or lower --resolution")
+                }
                 PolygonizeError::Cancelled => fitting::FitError::Cancelled.into(),
                 PolygonizeError::TooManyBlocks { .. } | PolygonizeError::TooManyVertices { .. } => {
                     Failure::limit(format!("{e}: lower --resolution or raise --tolerance"))
