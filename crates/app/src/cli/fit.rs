@@ -21,7 +21,7 @@ use super::quantity::{Memory, Tolerance, human_number, positive};
 use super::summary::Summary;
 use super::unoriented::{Oriented, Unoriented};
 use super::volume_choice::VolumeChoice;
-use super::{ceiling, interrupt, set_threads};
+use super::{belongs, ceiling, interrupt, set_threads};
 
 /// Arguments of `isoclay fit`.
 #[derive(clap::Args)]
@@ -173,7 +173,10 @@ pub fn run(args: &Args) -> Outcome {
         source: fitted.source,
         unit: fitted.unit,
         iso: fitted.iso,
-        provenance: provenance(args),
+        provenance: belongs::provenance(
+            &input,
+            args.input.file_name().map(|n| n.to_string_lossy().into_owned()),
+        ),
         ..Default::default()
     };
     let sha256 = field::save(&args.output, &fitted.field, &fitted.report, meta)?;
@@ -185,17 +188,6 @@ pub fn run(args: &Args) -> Outcome {
     }
     .with_cost(&cost)
     .print(args.json)
-}
-
-/// Where the field comes from, for the file: enough to make it again.
-fn provenance(args: &Args) -> String {
-    let options: Vec<String> = std::env::args().skip(1).collect();
-    serde_json::json!({
-        "program": concat!("isoclay ", env!("CARGO_PKG_VERSION")),
-        "input": args.input.file_name().map(|n| n.to_string_lossy()),
-        "arguments": options,
-    })
-    .to_string()
 }
 
 /// Fits an input as chosen.
@@ -414,7 +406,7 @@ impl Fitted {
     /// The fit's part of a summary.
     pub fn summary(&self, input: &Input) -> Summary {
         let r = &self.report;
-        let over = |l: &&fitting::Leaf| f64::from(l.rms) > r.tolerance;
+        let over = |l: &&fitting::Leaf| l.is_above(r.tolerance);
         // An interpolating fit aims at none.
         let has_tolerance = r.tolerance > 0.0;
         Summary {

@@ -226,9 +226,9 @@ impl Mesher<'_> {
         };
         let (mesh, report) =
             polygonize_with(self.field, &frame, &self.options, &mut progress).map_err(|e| match e {
-                PolygonizeError::Cancelled if is_over => {
-                    Failure::limit("the mesh takes more than --memory allows; raise it, or lower --resolution")
-                }
+                PolygonizeError::Cancelled if is_over => Failure::limit(
+                    "the mesh takes more than --memory allows; raise it, or lower --resolution",
+                ),
                 PolygonizeError::Cancelled => fitting::FitError::Cancelled.into(),
                 PolygonizeError::TooManyBlocks { .. } | PolygonizeError::TooManyVertices { .. } => {
                     Failure::limit(format!("{e}: lower --resolution or raise --tolerance"))

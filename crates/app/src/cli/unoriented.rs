@@ -102,6 +102,16 @@ impl<'a> Oriented<'a> {
             return;
         };
         report.input_count = self.cloud.positions.len();
+        // Counted among all points of the cloud.
+        let on_surface: Vec<u32> = (0..)
+            .zip(&orientation.outlier)
+            .filter(|p| !p.1)
+            .map(|p| p.0)
+            .collect();
+        let outliers = (0..).zip(&orientation.outlier).filter(|p| *p.1).map(|p| p.0);
+        let unused = report.left_out.iter().map(|&i| on_surface[i as usize]);
+        report.left_out = unused.chain(outliers).collect();
+        report.left_out.sort_unstable();
         let confidence = orientation.on_surface(&orientation.confidence);
         report.signs = Some(SignReport {
             route: orientation.route,

@@ -15,10 +15,12 @@ pub(crate) mod full_grid;
 mod invented;
 #[cfg(test)]
 mod iteration_growth;
+mod measure;
 pub(crate) mod noise;
 mod pairs;
 mod plan;
 mod residual;
+pub use measure::{LeafError, PointError, PointErrors, crossing, measure_points, point_error};
 pub use residual::newton_distance;
 mod robust;
 pub(crate) mod samples;
@@ -172,6 +174,6 @@ pub fn fit_points<T: Real>(
         ));
     };
     control.step("measuring", 0.95)?;
-    let report = residual::report(&field, &samples, &cascade, cloud.positions.len(), &plan, noise);
+    let report = residual::report(&field, &samples, &cascade, cloud.positions, &plan, noise);
     Ok((field, report))
 }
