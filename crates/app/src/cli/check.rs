@@ -5,7 +5,7 @@ use fitting::mesh::MeshDistance;
 use fitting::points::measure_points;
 use fitting::volume::VolumeView;
 use fitting::{LeafIndex, StopReason, UnsupportedComponent, unsupported_components};
-use formats::field::SourceKind;
+use formats::field::{AnyField, SourceKind};
 use formats::meshes::TriangleMesh;
 use formats::volumes::Volume;
 use glam::DVec3;

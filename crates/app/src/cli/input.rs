@@ -9,6 +9,7 @@ use formats::{Fault, FormatError, Kind, ReadLimits};
 use glam::DVec3;
 
 use super::failure::{Failure, Outcome};
+use super::flags;
 use super::quantity::{Memory, human_bytes};
 use super::{ceiling, cost};
 
@@ -121,7 +122,10 @@ pub fn reading(e: FormatError) -> Failure {
             e.path.display(),
             human_bytes(*needed)
         )),
-        _ => Failure::input(e),
+        fault => match fault.choice() {
+            Some(choice) => Failure::input(format!("{e} ({})", flags::of(choice))),
+            None => Failure::input(e),
+        },
     }
 }
 
