@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex};
 
 use bspline::Field;
 use common::{cloud, fit, oriented, to_depth};
-use fitting::phantoms::{CloudOptions, SampledCloud, Solid};
+use fitting::phantoms::{CloudOptions, SampledCloud, Solid, SplitMix64};
 use fitting::points::{LEAST_COEFFICIENTS, PointOptions, fit_points};
 use fitting::{Cancel, Control, FitError, StopReason};
 use glam::DVec3;
@@ -304,5 +304,42 @@ fn a_cancel_is_heard_in_every_stage() {
             }
             assert_eq!(*after.lock().unwrap(), 1, "{stage}: the work went on");
         }
+    }
+}
+
+/// A robust fit of points that no neighbour speaks for ends with all of them, and says so.
+#[test]
+fn a_robust_fit_survives_points_that_all_contradict_each_other() {
+    let golden = (1.0 + 5f64.sqrt()) / 2.0;
+    let corner = |i: usize| {
+        let (a, b) = ([1.0, -1.0][i & 1], golden * [1.0, -1.0][i >> 1 & 1]);
+        [
+            DVec3::new(0.0, a, b),
+            DVec3::new(a, b, 0.0),
+            DVec3::new(b, 0.0, a),
+        ][i / 4]
+    };
+    let icosahedron: Vec<DVec3> = (0..12).map(corner).collect();
+    let mut random = SplitMix64::new(3);
+    let dust: Vec<DVec3> = (0..3000).map(|_| random.uniform3()).collect();
+    let mut anyhow = |n: usize| (0..n).map(|_| random.normal3()).collect::<Vec<_>>();
+    let clouds = [
+        (icosahedron.clone(), icosahedron.clone()),
+        (icosahedron, anyhow(12)),
+        (dust, anyhow(3000)),
+    ];
+    for (positions, normals) in clouds {
+        let samples = SampledCloud {
+            positions,
+            normals,
+            holes: Vec::new(),
+        };
+        let options = PointOptions {
+            robust: true,
+            ..to_depth(6)
+        };
+        let (field, report) = fit::<f32>(&samples, &options).expect("weights that stay");
+        assert!(field.value(DVec3::splat(0.4)).is_finite() && report.rms.is_finite());
+        assert!(report.used_count >= 10, "{}", report.used_count);
     }
 }

@@ -1,5 +1,5 @@
 use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use fitting::mesh::MeshDistance;
 use fitting::points::measure_points;
@@ -12,10 +12,13 @@ use glam::DVec3;
 use serde_json::json;
 
 use super::cost::Cost;
-use super::failure::{Failure, OrFail, Outcome};
+use super::failure::{Failure, Outcome};
 use super::field::{OpenField, either};
-use super::input::{self, Input, Shape, writing};
+use super::input::{self, Input, Shape};
+use super::quantity::threads;
 use super::sample::voxel_frame;
+use super::source::{FIELDS, SAMPLES, Source, input_formats};
+use super::staged::StagedFiles;
 use super::summary::Summary;
 use super::volume_choice::VolumeChoice;
 use super::{belongs, interrupt, set_threads};
@@ -27,9 +30,9 @@ use crate::check::{
 /// Arguments of `isoclay check`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Field (.iclay)
+    /// Field (.iclay); - reads standard input
     field: PathBuf,
-    /// What it was fitted to
+    /// What it was fitted to; - reads standard input
     input: PathBuf,
     /// What to take a file with faces for [default: cloud for PLY and OBJ, mesh for files that hold nothing else]
     #[arg(long = "as", value_enum, value_name = "KIND")]
@@ -37,15 +40,18 @@ pub struct Args {
     /// Measure also what the field was not fitted to
     #[arg(long)]
     anyway: bool,
+    /// Format of the input where neither its content nor its name tells it
+    #[arg(long, value_name = "FORMAT", value_parser = input_formats())]
+    format: Option<String>,
     /// Directory for error.ply, octree.ply and report.json; made if missing
     #[arg(short, long, value_name = "REPORT_DIR")]
     output: Option<PathBuf>,
     /// Threads to work with [default: all cores]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = threads)]
     threads: Option<NonZeroUsize>,
     /// Print one JSON object instead of a table
     #[arg(long)]
-    json: bool,
+    pub json: bool,
     #[command(flatten)]
     volume: VolumeChoice,
 }
@@ -77,17 +83,15 @@ pub fn run(args: &Args) -> Outcome {
     let cost = Cost::start();
     set_threads(args.threads)?;
     let cancel = interrupt::cancel();
-    if let Some(d) = args.output.as_ref().filter(|d| d.exists() && !d.is_dir()) {
-        return Err(Failure::usage(format!(
-            "-o {}: is no directory; name another",
-            d.display()
-        )));
-    }
-    let open = OpenField::load(&args.field)?;
+    let report = (args.output.as_ref())
+        .map(|directory| StagedFiles::new("-o", directory))
+        .transpose()?;
+    let field = Source::open(&args.field, None, FIELDS, &cancel)?;
+    let source = Source::open(&args.input, args.format.as_deref(), SAMPLES, &cancel)?;
+    let open = OpenField::load(&field)?;
     let leaves = &open.report().leaves;
-    let input = input::read(&args.input, args.shape, &args.volume.options(None)?, None)?;
-    let names = [&args.field, &args.input].map(|p| p.display().to_string());
-    let own = belongs::check(&open, &names[0], &input, &names[1]);
+    let input = input::read(&source, args.shape, &args.volume, None, None)?;
+    let own = belongs::check(&open, field.name(), &input, source.name());
     let is_own = own.is_ok();
     if !args.anyway {
         own?;
@@ -104,11 +108,11 @@ pub fn run(args: &Args) -> Outcome {
     if measured.count == 0 {
         return Err(Failure::input(format!(
             "{}: there is no sample to measure at",
-            args.input.display()
+            source.name()
         )));
     }
-    if let Some(directory) = &args.output {
-        write_report(directory, args, &open, &measured)?;
+    if let Some(staged) = report {
+        write_report(staged, [field.name(), source.name()], &open, &measured)?;
     }
     let (s, audit) = (&measured.statistics, &measured.audit);
     // An interpolating fit aims at none.
@@ -322,19 +326,17 @@ fn measure_voxels(open: &OpenField, volume: &Volume) -> Measured {
 }
 
 /// Writes the two pictures and the figures.
-fn write_report(directory: &Path, args: &Args, open: &OpenField, measured: &Measured) -> Outcome {
-    std::fs::create_dir_all(directory)
-        .map_err(|e| anyhow::anyhow!("-o {}: cannot be made ({e})", directory.display()))
-        .or_limit()?;
+fn write_report(
+    mut staged: StagedFiles,
+    [field, input]: [&str; 2],
+    open: &OpenField,
+    measured: &Measured,
+) -> Outcome {
     let full_scale = measured.statistics.p99.max(f64::MIN_POSITIVE);
     let colors: Vec<[u8; 3]> = measured.errors.iter().map(|e| viridis(e / full_scale)).collect();
-    formats::meshes::save_points(
-        &directory.join("error.ply"),
-        &measured.positions,
-        None,
-        Some(&colors),
-    )
-    .map_err(writing)?;
+    staged.write("error.ply", |path| {
+        formats::meshes::save_points(path, &measured.positions, None, Some(&colors))
+    })?;
 
     let (report, audit) = (open.report(), &measured.audit);
     let finest = report.leaves.iter().map(|l| l.level).max().unwrap_or(0).max(1);
@@ -347,12 +349,12 @@ fn write_report(directory: &Path, args: &Args, open: &OpenField, measured: &Meas
         };
         (leaf.sample_count > 0 || refused).then(|| (corners(open.lattice(), leaf), color))
     });
-    write_boxes(&directory.join("octree.ply"), boxes).map_err(writing)?;
+    staged.write("octree.ply", |path| write_boxes(path, boxes))?;
 
     let text = json!({
-        "field": args.field.display().to_string(),
+        "field": field,
         "field_sha256": open.sha256(),
-        "input": args.input.display().to_string(),
+        "input": input,
         "samples": measured.count,
         "unit": measured.unit,
         "tolerance": report.tolerance,
@@ -368,9 +370,7 @@ fn write_report(directory: &Path, args: &Args, open: &OpenField, measured: &Meas
         "octree_ply": { "boxes": "edges of the leaves with samples, violet coarse to yellow fine; red: above the \
                                   tolerance and not split for lack of data" },
     });
-    formats::atomic::replace(&directory.join("report.json"), |out| {
-        serde_json::to_writer_pretty(&mut *out, &text)?;
-        out.write_all(b"\n")
-    })
-    .map_err(writing)
+    staged.write_text("report.json", &format!("{text:#}\n"))?;
+    staged.publish()?;
+    Ok(())
 }
