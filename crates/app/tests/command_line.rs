@@ -378,6 +378,8 @@ fn check_refuses_what_does_not_belong_together() {
     // The same samples in another file are the same input.
     bench.json("convert ball.ply ball.xyz");
     bench.json("check ball.iclay ball.xyz");
+}
+
 /// Every option of every command answers a wrong value with exit code 2 or 3 and a message that names the option and the
 /// value and says what would be right. `cli::tests` sees to it that no option is missing in the table.
 #[test]
