@@ -259,11 +259,9 @@ fn ascii_keeps_the_digits_of_a_float() {
 #[test]
 fn a_list_without_end_is_booked_before_it_is_held() {
     let corners = 300_000u32;
-    let mut file = format!(
-        "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+    let mut file = b"ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
          element face 1\nproperty list uint uchar vertex_indices\nend_header\n"
-    )
-    .into_bytes();
+    .to_vec();
     for v in [0f32, 0., 0., 1., 0., 0., 0., 1., 0.] {
         file.extend(v.to_le_bytes());
     }
