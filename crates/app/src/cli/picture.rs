@@ -106,8 +106,8 @@ pub fn run(args: &Args) -> Outcome {
     let bar = Bar::new();
     let options = PolygonizeOptions {
         iso: open.iso_or(args.iso, &source)?,
-        // Colours come from the normals of the field; what is left of the chord's error is below a pixel.
-        placement: Placement::Linear,
+        // Colours come from the normals of the field; a tenth of a cell is a quarter of a pixel.
+        placement: Placement::RootFinding { tolerance: 0.1 },
         ..Default::default()
     };
     let mut mesher = Mesher {
@@ -121,9 +121,9 @@ pub fn run(args: &Args) -> Outcome {
         return Err(open.no_surface(&source, options.iso));
     }
     let view = args.view(&whole);
-    let part = Part::new(&view, &whole);
     let cells = args.resolution.unwrap_or_else(|| cells_for(&open, &view));
     let frame = open.frame_of_resolution(cells);
+    let part = Part::new(&view, &whole, frame.world_from_grid.matrix3.x_axis.length());
     let (mesh, _, frame) = if args.zoom == 1.0 && args.at.is_none() {
         mesher.on(frame)?
     } else {
