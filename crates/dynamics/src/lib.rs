@@ -42,6 +42,7 @@ pub mod integrators;
 pub mod lattice;
 pub mod matter;
 pub mod patch;
+mod patch_error;
 pub mod region;
 mod rest;
 pub mod solve;
