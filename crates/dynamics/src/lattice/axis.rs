@@ -202,7 +202,7 @@ impl Axis {
         }
     }
 
-    /// The collocation matrix: sample `s` is `Σ_c row_s[c] p_c` over the free coefficients [DIS eq. 5, one axis].
+    /// The collocation matrix: sample `s` is `Σ_c row_s[c] p_c` over the free coefficients [Hua04 eq. 5, one axis].
     pub fn collocation(&self) -> Banded<f64> {
         let (first, n) = (self.first_free(), self.free_count());
         let rows = (0..self.samples).map(|s| {
