@@ -8,7 +8,6 @@ mod implicit;
 
 pub use adaptive::{AdaptiveOptions, AdaptiveReport};
 pub use auto::Choice;
-pub(crate) use auto::Operations;
 pub(crate) use explicit::largest_frequency;
 
 use bspline::Real;
