@@ -19,7 +19,7 @@ use super::quantity::{Tolerance, between, finite, human_number, threads};
 use super::source::{FIELDS, Source};
 use super::summary::Summary;
 use super::trim::{self, Sampled};
-use super::{interrupt, set_threads};
+use super::{ceiling, interrupt, set_threads};
 
 /// Arguments of `isoclay mesh`.
 #[derive(clap::Args)]
@@ -63,8 +63,7 @@ const MANY: usize = 4_000_000;
 /// Meshes a field file.
 pub fn run(args: &Args) -> Outcome {
     let cost = Cost::start();
-    let cancel = Cancel::new();
-    interrupt::cancel_on_interrupt(&cancel)?;
+    let cancel = interrupt::cancel();
     let format = args.written.format.as_deref();
     let field = Source::open(&args.field, None, FIELDS, &cancel)?;
     let output = Output::check("-o", &args.output, &MESHES, format, &[&field])?;
@@ -217,9 +216,11 @@ impl Mesher<'_> {
     /// Meshes the cells of `frame`.
     pub fn on(&mut self, frame: Frame) -> Outcome<(Mesh, MeshReport, Frame)> {
         let (cancel, bar) = (self.cancel, self.bar);
+        let mut is_over = false;
         let mut progress = |fraction| {
             bar.show("meshing", fraction);
-            if cancel.is_cancelled() {
+            is_over = ceiling::is_exceeded();
+            if cancel.is_cancelled() || is_over {
                 ControlFlow::Break(())
             } else {
                 ControlFlow::Continue(())
@@ -227,6 +228,9 @@ impl Mesher<'_> {
         };
         let (mesh, report) =
             polygonize_with(self.field, &frame, &self.options, &mut progress).map_err(|e| match e {
+                PolygonizeError::Cancelled if is_over => Failure::limit(
+                    "the mesh takes more than --memory allows; raise it, or lower --resolution",
+                ),
                 PolygonizeError::Cancelled => fitting::FitError::Cancelled.into(),
                 PolygonizeError::TooManyBlocks { .. } | PolygonizeError::TooManyVertices { .. } => {
                     Failure::limit(format!("{e}: lower --resolution or raise --tolerance"))

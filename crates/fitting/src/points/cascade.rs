@@ -9,7 +9,7 @@ use super::NormalForm;
 use super::band::{Band, Coarser, REACH, bricks_near};
 use super::band_solve::{BandProblem, BandSample, BrickSamples, SolveReport};
 use super::between::Neighbours;
-use super::cells::{Cell, LeafCell, cell_quality, children, judge, root_cells};
+use super::cells::{Cell, LeafCell, cell_quality, children, judge, keep_within, root_cells};
 use super::full_grid::FullGrid;
 use super::plan::Plan;
 use super::samples::{BASE_DEPTH, Samples};
@@ -33,8 +33,8 @@ pub(crate) struct Level<T> {
     pub x: Vec<T>,
 }
 
-/// Runs the cascade from the full level `base` down. No level is begun that the memory ceiling or the budget of
-/// coefficients has no room for; the cells that would have been split say so. Progress is told from `span.start` to
+/// Runs the cascade from the full level `base` down. No level is begun that the memory ceiling has no room for, and no
+/// more cells are split than the budget of coefficients allows, the worst first; the others say so. Progress is told from `span.start` to
 /// `span.end`.
 ///
 /// # Errors
@@ -52,10 +52,16 @@ pub(crate) fn run<T: Real>(
         solves: Vec::new(),
     };
     let mut split = root_cells(samples);
+    let mut worth: Vec<f64> = split.iter().map(|(c, _)| f64::from(c.end - c.start)).collect();
     let mut coarser: Option<Band<T>> = None;
     let mut coefficients = base.values.len();
     let mut neighbours = None;
     for depth in BASE_DEPTH + 1..=plan.max_depth {
+        if let Some(limit) = plan.coefficients {
+            let room = limit.saturating_sub(coefficients);
+            let left_out = keep_within(room, samples, &mut split, &worth, depth);
+            out.leaves.extend(left_out);
+        }
         let cells = children(samples, &split, depth);
         let refined: Vec<[u32; 3]> = cells
             .iter()
@@ -65,7 +71,7 @@ pub(crate) fn run<T: Real>(
         if refined.is_empty() {
             break;
         }
-        if let Some(reason) = no_room::<T>(depth, &refined, samples, plan, coefficients, control) {
+        if let Some(reason) = no_room::<T>(depth, &refined, samples, control) {
             let kept = split
                 .iter()
                 .filter(|s| s.1)
@@ -95,12 +101,14 @@ pub(crate) fn run<T: Real>(
         out.solves.push(report);
         let quality = cell_quality(&band, &list, &bricks, &owners, cells.len());
         split.clear();
+        worth.clear();
         for (cell, q) in cells.iter().zip(&quality) {
             let spacing = neighbours
                 .as_ref()
                 .map_or(f32::INFINITY, |n| n.spacing[cell.start as usize]);
             let verdict = judge(cell, q, spacing, plan, depth);
             split.push((*cell, cell.refined && verdict.is_ok()));
+            worth.push(q.worth());
             if let (true, Err(reason)) = (cell.refined, verdict) {
                 out.leaves.push(cell.leaf(depth, reason));
             }
@@ -120,13 +128,8 @@ fn no_room<T: Real>(
     depth: usize,
     refined: &[[u32; 3]],
     samples: &Samples,
-    plan: &Plan,
-    coefficients: usize,
     control: &Control,
 ) -> Option<StopReason> {
-    if plan.coefficients.is_some_and(|limit| coefficients >= limit) {
-        return Some(StopReason::Budget);
-    }
     // The bricks are counted only where someone asks.
     control.memory_limit?;
     let (keys, _) = bricks_near(depth, refined, REACH);

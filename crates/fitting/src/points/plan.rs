@@ -14,7 +14,7 @@ pub(crate) struct Plan {
     pub max_depth: usize,
     /// Whether every occupied cell is split down to `max_depth`, whatever its residual.
     pub uniform: bool,
-    /// Active functions after which no further level is begun.
+    /// Largest number of active functions.
     pub coefficients: Option<usize>,
     /// `β` of the finest level, unit box.
     pub beta: f64,
@@ -94,7 +94,7 @@ impl Plan {
     /// `tolerance` and `noise` in the unit box.
     pub fn new(samples: &Samples, options: &PointOptions, tolerance: f64, noise: Option<f64>) -> Self {
         let spacing = samples.mean_spacing(0.0);
-        let asked = options.max_depth.map(|d| d.clamp(BASE_DEPTH + 1, MAX_DEPTH));
+        let asked = options.max_depth;
         let max_depth = asked.unwrap_or(depth_of(FINEST_SPACING * spacing).min(DEFAULT_DEPTH));
         let finest_mu = (NARROW_MU * (spacing * (1u64 << max_depth) as f64).powi(3)).max(FINEST_MU);
         let clean = Self {
