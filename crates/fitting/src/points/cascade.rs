@@ -71,7 +71,9 @@ pub(crate) fn run<T: Real>(
         if refined.is_empty() {
             break;
         }
-        if let Some(reason) = no_room::<T>(depth, &refined, samples, control) {
+        // About three conditions between the samples for each of them, half as large as a sample.
+        let held = samples.positions.len() * if plan.is_sparse(depth) { 3 } else { 1 };
+        if let Some(reason) = no_room::<T>(depth, &refined, held, control) {
             let kept = split
                 .iter()
                 .filter(|s| s.1)
@@ -127,16 +129,14 @@ pub(crate) fn run<T: Real>(
 fn no_room<T: Real>(
     depth: usize,
     refined: &[[u32; 3]],
-    samples: &Samples,
+    sample_count: usize,
     control: &Control,
 ) -> Option<StopReason> {
     // The bricks are counted only where someone asks.
     control.memory_limit?;
     let (keys, _) = bricks_near(depth, refined, REACH);
-    // About three conditions between the samples for each of them, half as large as a sample.
-    let held = samples.positions.len() * if plan.is_sparse(depth) { 3 } else { 1 };
     control
-        .reserve(level_bytes::<T>(keys.len(), held))
+        .reserve(level_bytes::<T>(keys.len(), sample_count))
         .is_err()
         .then_some(StopReason::Memory)
 }
