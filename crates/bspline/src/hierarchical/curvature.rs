@@ -1,11 +1,13 @@
 //! A sound bound of the Hessian over a box: second differences of control coefficients.
 
+use std::ops::Range;
+
 use glam::{DMat3, DVec3};
 
 use super::bounds::{local_box, onto_knots, shared};
 use super::brick::{BRICK, Brick, HALO, NONE};
 use super::spline::HierarchicalSpline;
-use crate::{Aabb, Real};
+use crate::{Aabb, Real, vectorized};
 
 /// Largest magnitudes of `xx, yy, zz, xy, xz, yz`, by lattice coordinates.
 type Second = [f64; 6];
@@ -90,70 +92,99 @@ fn add_part<T: Real>(brick: &Brick<T>, level: usize, part: &Aabb, most: &mut Sec
         let first = (a as usize).min(BRICK - 1);
         first..(b.ceil() as usize).max(first + 1) + 3
     });
-    let zero = T::zero();
-    let mut found = [zero; 6];
-    let mut largest = zero;
-    let raise = |m: &mut T, d: T| {
-        let d = d.abs();
-        *m = if d > *m { d } else { *m };
-    };
-    let two = T::from_f64(2.0);
-    for i in x.clone() {
-        let (ahead, between) = (i + 1 < x.end, i > x.start && i + 1 < x.end);
-        for j in y.clone() {
-            let (beside, amid) = (j + 1 < y.end, j > y.start && j + 1 < y.end);
-            let row = |di: usize, dj: usize| {
-                let at = ((i + di) * HALO + j + dj) * HALO;
-                &brick.totals[at + z.start..at + z.end]
-            };
-            let back = |di: usize, dj: usize| {
-                let at = ((i - di) * HALO + j - dj) * HALO;
-                &brick.totals[at + z.start..at + z.end]
-            };
-            let own = row(0, 0);
-            let n = own.len();
-            for c in own {
-                raise(&mut largest, *c);
-            }
-            for k in 1..n - 1 {
-                raise(&mut found[2], own[k + 1] - two * own[k] + own[k - 1]);
-            }
-            if between {
-                let (a, b) = (back(1, 0), row(1, 0));
-                for k in 0..n {
-                    raise(&mut found[0], a[k] - two * own[k] + b[k]);
-                }
-            }
-            if amid {
-                let (a, b) = (back(0, 1), row(0, 1));
-                for k in 0..n {
-                    raise(&mut found[1], a[k] - two * own[k] + b[k]);
-                }
-            }
-            if ahead && beside {
-                let (a, b, c) = (row(1, 0), row(0, 1), row(1, 1));
-                for k in 0..n {
-                    raise(&mut found[3], (c[k] - a[k]) - (b[k] - own[k]));
-                }
-            }
-            if ahead {
-                let a = row(1, 0);
-                for k in 0..n - 1 {
-                    raise(&mut found[4], (a[k + 1] - a[k]) - (own[k + 1] - own[k]));
-                }
-            }
-            if beside {
-                let a = row(0, 1);
-                for k in 0..n - 1 {
-                    raise(&mut found[5], (a[k + 1] - a[k]) - (own[k + 1] - own[k]));
-                }
-            }
-        }
-    }
+    let (found, largest) = vectorized(
+        #[inline(always)]
+        || second_differences(brick, &x, &y, &z),
+    );
     // Rounding of the differences here and of the evaluation, whose weights sum to 4 in magnitude.
     let rounding = 128.0 * T::UNIT_ROUND_OFF * largest.as_f64();
     let scale = ((1u64 << level) as f64).powi(2);
     for (m, d) in most.iter_mut().zip(found) {
         *m = m.max((d.as_f64() + rounding) * scale);
     }
+}
+
+/// Lanes of a row: its 11 coefficients, and what follows them, which nobody looks at.
+const LANES: usize = 16;
+
+fn row<T: Real>(totals: &[T; HALO_LEN], i: usize, j: usize) -> [T; LANES] {
+    let start = (i * HALO + j) * HALO;
+    match totals.get(start..start + LANES) {
+        Some(row) => row.try_into().expect("sixteen"),
+        None => {
+            let mut row = [T::zero(); LANES];
+            row[..HALO].copy_from_slice(&totals[start..start + HALO]);
+            row
+        }
+    }
+}
+
+#[inline(always)]
+fn raise<T: Real>(most: &mut [T; LANES], of: impl Fn(usize) -> T) {
+    for k in 0..LANES {
+        let d = of(k).abs();
+        most[k] = if d > most[k] { d } else { most[k] };
+    }
+}
+
+/// Largest second differences, and the largest coefficient, among those of the ranges.
+#[inline(always)]
+fn second_differences<T: Real>(
+    brick: &Brick<T>,
+    x: &Range<usize>,
+    y: &Range<usize>,
+    z: &Range<usize>,
+) -> ([T; 6], T) {
+    let zero = [T::zero(); LANES];
+    let two = T::from_f64(2.0);
+    // Of each lane; differences along z stand at their first coefficient.
+    let (mut found, mut largest) = ([zero; 6], zero);
+    let step = |r: &[T; LANES]| {
+        let mut d = [T::zero(); LANES];
+        for k in 0..LANES - 1 {
+            d[k] = r[k + 1] - r[k];
+        }
+        d
+    };
+    for j in y.clone() {
+        let beside = j + 1 < y.end;
+        let mut before = [zero; 2];
+        for i in x.clone() {
+            let own = row(&brick.totals, i, j);
+            let along = step(&own);
+            raise(&mut largest, |k| own[k]);
+            raise(&mut found[2], |k| if k + 1 < LANES { along[k + 1] - along[k] } else { T::zero() });
+            if beside {
+                let next = row(&brick.totals, i, j + 1);
+                let rise = step(&next);
+                raise(&mut found[5], |k| rise[k] - along[k]);
+                if j > y.start {
+                    let last = row(&brick.totals, i, j - 1);
+                    raise(&mut found[1], |k| (next[k] - own[k]) - (own[k] - last[k]));
+                }
+                if i + 1 < x.end {
+                    let (ahead, across) = (row(&brick.totals, i + 1, j), row(&brick.totals, i + 1, j + 1));
+                    raise(&mut found[3], |k| (across[k] - ahead[k]) - (next[k] - own[k]));
+                }
+            }
+            if i > x.start {
+                let [last, last_along] = &before;
+                raise(&mut found[4], |k| along[k] - last_along[k]);
+                if i + 1 < x.end {
+                    let ahead = row(&brick.totals, i + 1, j);
+                    raise(&mut found[0], |k| (ahead[k] - own[k]) - (own[k] - last[k]));
+                }
+            }
+            before = [own, along];
+        }
+    }
+    let most = |lanes: &[T; LANES], short: usize| {
+        let lanes = &lanes[z.start..z.end - short];
+        lanes.iter().fold(T::zero(), |m, d| if *d > m { *d } else { m })
+    };
+    let [xx, yy, zz, xy, xz, yz] = &found;
+    (
+        [most(xx, 0), most(yy, 0), most(zz, 2), most(xy, 0), most(xz, 1), most(yz, 1)],
+        most(&largest, 0),
+    )
 }

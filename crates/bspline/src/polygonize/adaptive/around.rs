@@ -87,6 +87,18 @@ impl<'a> Around<'a> {
         }
     }
 
+    /// Which of the 27 cells about an own one are split: bit `9(x + 1) + 3(y + 1) + z + 1` for the offset `x, y, z`.
+    pub fn split_about(&self, c: [usize; 3]) -> u32 {
+        let mut found = 0;
+        for x in 0..3 {
+            for y in 0..3 {
+                let row = self.split[(c[0] + x) * ROWS + c[1] + y] >> c[2] & 7;
+                found |= u32::from(row) << (9 * x + 3 * y);
+            }
+        }
+        found
+    }
+
     /// Own cells that share a face or an edge with a split cell.
     pub fn beside_split(&self) -> Cells {
         std::array::from_fn(|x| {

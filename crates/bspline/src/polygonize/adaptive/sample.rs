@@ -12,9 +12,9 @@ pub(super) struct Sample {
     /// Inside nodes: bit `k` of row `9i + j`. Nodes beyond the frame are outside.
     pub rows: [u16; NODES * NODES],
     /// `f - iso` at the nodes, 0 beyond the frame.
-    pub values: Box<[f32; NODE_COUNT]>,
+    pub values: [f32; NODE_COUNT],
     /// Chord error of each cell that was judged, world length; 0 without surface.
-    pub error: Box<[f32; CELL_COUNT]>,
+    pub error: [f32; CELL_COUNT],
     /// Cells judged.
     pub judged: Cells,
     /// Judged cells of which only an upper bound of the error is known.
@@ -60,8 +60,8 @@ impl Sample {
             .frame_values(&grids.frames[level], lo, count, &mut scratch.values);
         let mut sample = Self {
             rows: [0; NODES * NODES],
-            values: Box::new([0.0; NODE_COUNT]),
-            error: Box::new([0.0; CELL_COUNT]),
+            values: [0.0; NODE_COUNT],
+            error: [0.0; CELL_COUNT],
             judged: [0; CELLS],
             bounded: [0; CELLS],
             creased: [0; CELLS],
@@ -157,7 +157,7 @@ impl Sample {
         };
         let border = grids.meets_border(level, key);
         let size = grids.size(level);
-        let (h, diagonal) = (size.max_element(), size.length());
+        let h = size.max_element();
         let world_from_grid = grids.frames[level].world_from_grid;
         scratch.points.clear();
         scratch.owners.clear();
@@ -171,6 +171,10 @@ impl Sample {
             if (0..3).any(|a| lo[a] + 4 <= 0 || lo[a] >= grids.cells(level, a)) {
                 continue;
             }
+            let is_crossed = (0..CELLS).any(|x| part[x] & crossed[x] != 0);
+            if !is_crossed && judge.excludes(level, lo, 4) {
+                continue;
+            }
             let bend = judge.field.hessian_bound(&grids.world_box(level, lo, 4));
             for c in each(part) {
                 if border && !inside_frame(c) {
@@ -179,10 +183,8 @@ impl Sample {
                 let cell: [i32; 3] = std::array::from_fn(|a| origin[a] + c[a] as i32);
                 let v = self.corners(c);
                 let error = if !holds_any(&crossed, c) {
-                    let least = v.iter().fold(f32::INFINITY, |m, v| m.min(v.abs()));
-                    // A largest or least value within the cell lies no farther than half a diagonal from a corner.
-                    let hidden = !(f64::from(least) > 0.125 * bend * diagonal * diagonal)
-                        && level < judge.detection
+                    let hidden = level < judge.detection
+                        && may_peak(&v, bend, size)
                         && may_hide(judge, level, cell);
                     if hidden { f32::INFINITY } else { 0.0 }
                 } else {
@@ -309,19 +311,51 @@ fn octant_of_set(set: &Cells, at: [usize; 3]) -> Cells {
     std::array::from_fn(|x| if x / 4 * 4 == at[0] { set[x] & mask } else { 0 })
 }
 
-/// Whether a piece of the surface may lie in a cell without touching its corners.
-fn may_hide(judge: &Judge, level: usize, cell: [i32; 3]) -> bool {
-    let (lo, hi) = judge.grids.clipped(level, cell, 1);
-    let bounds = judge
-        .field
-        .frame_bounds_about(&judge.grids.frames[level], lo, hi, judge.iso);
-    if bounds.hi <= judge.iso || bounds.lo > judge.iso {
+impl Judge<'_> {
+    /// Whether the bounds say that all of `count` cells from `lo` lie on one side.
+    fn excludes(&self, level: usize, lo: [i32; 3], count: i32) -> bool {
+        let (lo, hi) = self.grids.clipped(level, lo, count);
+        let frame = &self.grids.frames[level];
+        let bounds = self.field.frame_bounds_about(frame, lo, hi, self.iso);
+        bounds.hi <= self.iso || bounds.lo > self.iso
+    }
+}
+
+/// Whether a cell whose corners `v` lie on one side may hold a largest or least value on the other, if `‖∇²f‖ <= bend`.
+///
+/// Such a value lies no farther than half a diagonal `d` from a corner, so it differs by `bend d²/8` at most; and
+/// the gradient, which vanishes there, is at most `bend d` along each edge.
+fn may_peak(v: &[f32; 8], bend: f64, size: DVec3) -> bool {
+    let square = size.length_squared();
+    let least = v.iter().fold(f32::INFINITY, |m, v| m.min(v.abs()));
+    if f64::from(least) > 0.125 * bend * square {
         return false;
     }
-    // A closed piece has a largest or a least value within, where the gradient vanishes.
-    let slopes = judge
-        .field
-        .gradient_bounds(&judge.grids.world_box(level, cell, 1));
+    let rise = |bit: usize| {
+        let sum: f32 = (0..8).map(|c| if c & bit != 0 { v[c] } else { -v[c] }).sum();
+        f64::from(sum.abs()) * 0.25
+    };
+    let steepest = (rise(4) / size.x).max(rise(2) / size.y).max(rise(1) / size.z);
+    // Also where one of them is not a number.
+    !(steepest > bend * square.sqrt())
+}
+
+/// Whether a piece of the surface may lie in a cell without touching its corners.
+///
+/// A closed piece has a largest or a least value within, where the gradient vanishes.
+fn may_hide(judge: &Judge, level: usize, cell: [i32; 3]) -> bool {
+    let around = judge.grids.world_box(level, cell, 1);
+    let reach = 0.5 * around.size().length();
+    let (value, slope) = judge.field.value_gradient(around.center());
+    let bend = judge.field.hessian_bound(&around);
+    let steepness = slope.length();
+    if steepness > bend * reach || (value - judge.iso).abs() > (steepness + 0.5 * bend * reach) * reach {
+        return false;
+    }
+    if judge.excludes(level, cell, 1) {
+        return false;
+    }
+    let slopes = judge.field.gradient_bounds(&around);
     slopes.iter().all(|g| !(g.lo > 0.0 || g.hi < 0.0))
 }
 

@@ -18,7 +18,6 @@ pub(super) const MAX_LOOPS: usize = 16;
 /// Name of a crossing.
 pub(super) type Crossing = u8;
 
-const NO_CROSSING: Crossing = u8::MAX;
 const NAMES: usize = 125;
 
 /// A segment of a loop.
@@ -37,6 +36,13 @@ pub(super) struct LeafSurface {
     /// Segments, loop after loop, each in its order.
     pub segments: Vec<Segment>,
     pub loops: usize,
+}
+
+/// The segment that starts at each crossing: where it ends, and on which face.
+struct Next {
+    to: [(Crossing, u8); NAMES],
+    /// Crossings whose segments belong to no loop yet.
+    open: u128,
 }
 
 /// Nodes of a leaf's surface with their signs and values.
@@ -81,32 +87,27 @@ impl Nodes {
             nodes.values[slot] = sample.values[super::grid::node_index(n)];
         }
         let cell = c.map(|c| c as i32);
-        let take = |nodes: &mut Self, n: [usize; 3], beside: [i32; 3]| {
+        let split = around.split_about(c);
+        let take = |nodes: &mut Self, n: [usize; 3], out: [usize; 3]| {
+            let beside = std::array::from_fn(|a| cell[a] + out[a] as i32 - 1);
             let fine = std::array::from_fn(|a| 2 * cell[a] + n[a] as i32);
             let (inside, value) = around.fine_node(beside, fine);
             nodes.inside[node(n)] = inside;
             nodes.values[node(n)] = value;
         };
-        let out = |side: usize| side as i32 - 1;
+        // The cell beside the side 0 or 2 of an axis stands at 0 or 2 of the 27 as well.
         for axis in 0..3 {
-            for side in [0, 2] {
-                let mut beside = cell;
-                beside[axis] += out(side);
-                if around.state(beside) == State::Split {
-                    nodes.split_faces |= 1 << (2 * axis + side / 2);
-                    take(&mut nodes, placed(axis, side, 1, 1), beside);
+            for u in [0, 2] {
+                let face = placed(axis, u, 1, 1);
+                if split >> node(face) & 1 == 1 {
+                    nodes.split_faces |= 1 << (2 * axis + u / 2);
+                    take(&mut nodes, face, face);
                 }
-                for other in [0, 2] {
-                    let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-                    let around_edge = [[1, 0], [0, 1], [1, 1]].map(|[du, dv]| {
-                        let mut beside = cell;
-                        beside[u] += du * out(side);
-                        beside[v] += dv * out(other);
-                        beside
-                    });
-                    if let Some(beside) = around_edge.into_iter().find(|b| around.state(*b) == State::Split) {
-                        nodes.split_edges |= edge_bit(axis, side, other);
-                        take(&mut nodes, placed(axis, 1, side, other), beside);
+                for v in [0, 2] {
+                    let about = [placed(axis, 1, u, 1), placed(axis, 1, 1, v), placed(axis, 1, u, v)];
+                    if let Some(out) = about.into_iter().find(|n| split >> node(*n) & 1 == 1) {
+                        nodes.split_edges |= edge_bit(axis, u, v);
+                        take(&mut nodes, placed(axis, 1, u, v), out);
                     }
                 }
             }
@@ -124,7 +125,10 @@ impl LeafSurface {
     /// Finds the loops of the leaf `c` of the block.
     pub fn find(&mut self, around: &Around, c: [usize; 3]) {
         let nodes = Nodes::new(around, c);
-        let mut next = [(NO_CROSSING, 0u8); NAMES];
+        let mut next = Next {
+            to: [(0, 0); NAMES],
+            open: 0,
+        };
         for axis in 0..3 {
             for side in 0..2 {
                 cut_face(&nodes, axis, side, &mut next);
@@ -132,29 +136,27 @@ impl LeafSurface {
         }
         self.segments.clear();
         self.loops = 0;
-        for start in 0..NAMES {
-            let mut from = start;
-            let mut found = false;
-            while next[from].0 != NO_CROSSING {
-                let (to, face) = next[from];
-                next[from].0 = NO_CROSSING;
+        while next.open != 0 {
+            let mut from = next.open.trailing_zeros() as usize;
+            while next.open >> from & 1 == 1 {
+                next.open &= !(1 << from);
+                let (to, face) = next.to[from];
                 self.segments.push(Segment {
                     face,
                     from: from as Crossing,
                     to,
                     of_loop: self.loops.min(MAX_LOOPS - 1) as u8,
                 });
-                from = to as usize;
-                found = true;
+                from = usize::from(to);
             }
-            self.loops += usize::from(found);
+            self.loops += 1;
         }
         self.loops = self.loops.min(MAX_LOOPS);
     }
 }
 
 /// Cuts one face, whole or in quarters.
-fn cut_face(nodes: &Nodes, axis: usize, side: usize, next: &mut [(Crossing, u8); NAMES]) {
+fn cut_face(nodes: &Nodes, axis: usize, side: usize, next: &mut Next) {
     let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
     let at = |i: usize, j: usize| placed(axis, 2 * side, i, j);
     let face = 5 * (2 * axis + side) as u8;
@@ -195,8 +197,12 @@ fn cut_face(nodes: &Nodes, axis: usize, side: usize, next: &mut [(Crossing, u8);
 }
 
 /// Cuts each run of inside nodes round a minimal face off from the rest.
-fn cut(nodes: &Nodes, ring: &[[usize; 3]], face: u8, next: &mut [(Crossing, u8); NAMES]) {
+fn cut(nodes: &Nodes, ring: &[[usize; 3]], face: u8, next: &mut Next) {
     let n = ring.len();
+    let count = ring.iter().filter(|p| nodes.inside[node(**p)]).count();
+    if count == 0 || count == n {
+        return;
+    }
     let inside = |k: usize| nodes.inside[node(ring[k % n])];
     let crossing = |k: usize| {
         let (a, b) = (ring[k % n], ring[(k + 1) % n]);
@@ -208,7 +214,9 @@ fn cut(nodes: &Nodes, ring: &[[usize; 3]], face: u8, next: &mut [(Crossing, u8);
             while inside(last + 1) {
                 last += 1;
             }
-            next[crossing(start + n - 1)] = (crossing(last) as Crossing, face);
+            let from = crossing(start + n - 1);
+            next.to[from] = (crossing(last) as Crossing, face);
+            next.open |= 1 << from;
         }
     }
 }
