@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::{DMat3, DVec3};
 
 use super::bounds::{local_box, onto_knots, shared};
-use super::brick::{BRICK, Brick, HALO, NONE};
+use super::brick::{BRICK, Brick, HALO, HALO_LEN, NONE};
 use super::spline::HierarchicalSpline;
 use crate::{Aabb, Real, vectorized};
 
@@ -34,18 +34,18 @@ pub(super) fn over_world_box<T: Real>(spline: &HierarchicalSpline<T>, b: &Aabb) 
         let brick = |q: f64| (q as u32 / BRICK as u32).min(counts[a] - 1);
         brick(snapped.min[a])..=brick(snapped.max[a])
     };
-    let mut most = [0.0; 6];
+    let mut most = 0f64;
     for x in range(0) {
         for y in range(1) {
             for z in range(2) {
                 let root = ((x * counts[1] + y) * counts[2] + z) as usize;
-                visit(spline, 0, root, &snapped, &mut most);
+                most = most.max(over_brick(spline, 0, root, &snapped));
             }
         }
     }
     // Second derivatives are continuous and, cell by cell, linear along each axis: a move of `d` cells changes them by
     // at most `4d` of the largest second difference in reach; over a million times what `moved` can be.
-    in_world(spline.lattice_from_world().matrix3, most) * (1.0 + 1e-6 + 4.0 * moved)
+    most * (1.0 + 1e-6 + 4.0 * moved)
 }
 
 /// Frobenius norm of `Mᵀ H M` for the largest that `H` can be.
@@ -60,34 +60,52 @@ fn in_world(m: DMat3, [xx, yy, zz, xy, xz, yz]: Second) -> f64 {
     world.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// Adds the second derivatives of brick `index` of `level` over the part of `b` in it.
-fn visit<T: Real>(spline: &HierarchicalSpline<T>, level: usize, index: usize, b: &Aabb, most: &mut Second) {
+/// Bound over the part of `b` in brick `index` of `level`.
+fn over_brick<T: Real>(spline: &HierarchicalSpline<T>, level: usize, index: usize, b: &Aabb) -> f64 {
     let brick = &spline.levels[level][index];
     let width = BRICK as f64 / (1u64 << level) as f64;
     let corner = DVec3::from_array(brick.key.0.map(|k| k as f64 * width));
     let end = (corner + width).min(spline.lattice().extent());
     let Some(part) = shared(b, corner, end) else {
-        return;
+        return 0.0;
     };
-    if !brick.has_children() {
-        return add_part(brick, level, &part, most);
+    if part.min == corner && part.max == end {
+        return *brick.bend.get_or_init(|| over_parts(spline, level, brick, &part, width));
     }
+    over_parts(spline, level, brick, &part, width)
+}
+
+fn over_parts<T: Real>(
+    spline: &HierarchicalSpline<T>,
+    level: usize,
+    brick: &Brick<T>,
+    part: &Aabb,
+    width: f64,
+) -> f64 {
+    let own = |part: &Aabb| in_world(spline.lattice_from_world().matrix3, of_part(brick, level, part));
+    if !brick.has_children() {
+        return own(part);
+    }
+    let corner = DVec3::from_array(brick.key.0.map(|k| k as f64 * width));
+    let end = (corner + width).min(spline.lattice().extent());
+    let mut most = 0f64;
     for octant in 0..8usize {
-        match brick.children[octant] {
-            NONE => {
-                let half = |a: usize| (octant >> (2 - a) & 1) as f64 * width / 2.0;
-                let low = corner + DVec3::from_array(std::array::from_fn(half));
-                if let Some(part) = shared(b, low, (low + width / 2.0).min(end)) {
-                    add_part(brick, level, &part, most);
-                }
-            }
-            child => visit(spline, level + 1, child as usize, b, most),
+        let child = brick.children[octant];
+        if child != NONE {
+            most = most.max(over_brick(spline, level + 1, child as usize, part));
+            continue;
+        }
+        let half = |a: usize| (octant >> (2 - a) & 1) as f64 * width / 2.0;
+        let low = corner + DVec3::from_array(std::array::from_fn(half));
+        if let Some(part) = shared(part, low, (low + width / 2.0).min(end)) {
+            most = most.max(own(&part));
         }
     }
+    most
 }
 
 /// Second derivatives are convex combinations of the second differences of the coefficients that the box reads.
-fn add_part<T: Real>(brick: &Brick<T>, level: usize, part: &Aabb, most: &mut Second) {
+fn of_part<T: Real>(brick: &Brick<T>, level: usize, part: &Aabb) -> Second {
     let [x, y, z] = local_box(brick, level, part).map(|[a, b]| {
         let first = (a as usize).min(BRICK - 1);
         first..(b.ceil() as usize).max(first + 1) + 3
@@ -99,9 +117,7 @@ fn add_part<T: Real>(brick: &Brick<T>, level: usize, part: &Aabb, most: &mut Sec
     // Rounding of the differences here and of the evaluation, whose weights sum to 4 in magnitude.
     let rounding = 128.0 * T::UNIT_ROUND_OFF * largest.as_f64();
     let scale = ((1u64 << level) as f64).powi(2);
-    for (m, d) in most.iter_mut().zip(found) {
-        *m = m.max((d.as_f64() + rounding) * scale);
-    }
+    found.map(|d| (d.as_f64() + rounding) * scale)
 }
 
 /// Lanes of a row: its 11 coefficients, and what follows them, which nobody looks at.

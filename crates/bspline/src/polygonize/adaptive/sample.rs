@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::grid::{CELL_COUNT, Cells, Grids, NODE_COUNT, cell_index, each, node_index};
 use crate::polygonize::blocks::{BlockKey, CELLS, NODES};
-use crate::{Field, Jet};
+use crate::{Field, Interval, Jet};
 
 /// A pure function of field, frames, level and block, but for how many cells have been judged.
 #[derive(Clone)]
@@ -172,8 +172,11 @@ impl Sample {
                 continue;
             }
             let is_crossed = (0..CELLS).any(|x| part[x] & crossed[x] != 0);
-            if !is_crossed && judge.excludes(level, lo, 4) {
-                continue;
+            if !is_crossed {
+                let bounds = judge.bounds(level, lo, 4);
+                if bounds.hi <= judge.iso || bounds.lo > judge.iso {
+                    continue;
+                }
             }
             let bend = judge.field.hessian_bound(&grids.world_box(level, lo, 4));
             for c in each(part) {
@@ -185,7 +188,7 @@ impl Sample {
                 let error = if !holds_any(&crossed, c) {
                     let hidden = level < judge.detection
                         && may_peak(&v, bend, size)
-                        && may_hide(judge, level, cell);
+                        && may_hide(judge, level, cell, v[0] > 0.0, bend, SEARCH);
                     if hidden { f32::INFINITY } else { 0.0 }
                 } else {
                     self.judge_crossed(judge, level, c, cell, &v, bend, h, &world_from_grid, scratch)
@@ -312,12 +315,11 @@ fn octant_of_set(set: &Cells, at: [usize; 3]) -> Cells {
 }
 
 impl Judge<'_> {
-    /// Whether the bounds say that all of `count` cells from `lo` lie on one side.
-    fn excludes(&self, level: usize, lo: [i32; 3], count: i32) -> bool {
+    /// Bounds over `count` cells from `lo`, as tight as it takes to tell on which side they lie.
+    fn bounds(&self, level: usize, lo: [i32; 3], count: i32) -> Interval {
         let (lo, hi) = self.grids.clipped(level, lo, count);
         let frame = &self.grids.frames[level];
-        let bounds = self.field.frame_bounds_about(frame, lo, hi, self.iso);
-        bounds.hi <= self.iso || bounds.lo > self.iso
+        self.field.frame_bounds_about(frame, lo, hi, self.iso)
     }
 }
 
@@ -340,20 +342,39 @@ fn may_peak(v: &[f32; 8], bend: f64, size: DVec3) -> bool {
     !(steepest > bend * square.sqrt())
 }
 
-/// Whether a piece of the surface may lie in a cell without touching its corners.
+/// How often a cell is halved to see whether a piece of the surface hides in it.
+const SEARCH: usize = 3;
+
+/// Whether a piece of the surface may lie in a cell without touching its corners, which are on one side.
 ///
-/// A closed piece has a largest or a least value within, where the gradient vanishes.
-fn may_hide(judge: &Judge, level: usize, cell: [i32; 3]) -> bool {
+/// A closed piece has a largest or a least value within, where the gradient vanishes. `bend` bounds the Hessian in the
+/// cell.
+fn may_hide(judge: &Judge, level: usize, cell: [i32; 3], inside: bool, bend: f64, search: usize) -> bool {
     let around = judge.grids.world_box(level, cell, 1);
     let reach = 0.5 * around.size().length();
     let (value, slope) = judge.field.value_gradient(around.center());
-    let bend = judge.field.hessian_bound(&around);
-    let steepness = slope.length();
-    if steepness > bend * reach || (value - judge.iso).abs() > (steepness + 0.5 * bend * reach) * reach {
+    if (value > judge.iso) != inside {
+        return true;
+    }
+    let (steepness, height) = (slope.length(), (value - judge.iso).abs());
+    // Neither a vanishing gradient nor the surface is within reach.
+    let is_safe = |bend: f64| steepness > bend * reach || height > (steepness + 0.5 * bend * reach) * reach;
+    if is_safe(bend) {
         return false;
     }
-    if judge.excludes(level, cell, 1) {
+    let bend = judge.field.hessian_bound(&around);
+    if is_safe(bend) {
         return false;
+    }
+    let bounds = judge.bounds(level, cell, 1);
+    if bounds.hi <= judge.iso || bounds.lo > judge.iso {
+        return (bounds.lo > judge.iso) != inside;
+    }
+    if search > 0 && level < judge.grids.depth() {
+        return (0..8).any(|o| {
+            let child = std::array::from_fn(|a| 2 * cell[a] + (o >> a & 1));
+            may_hide(judge, level + 1, child, inside, bend, search - 1)
+        });
     }
     let slopes = judge.field.gradient_bounds(&around);
     slopes.iter().all(|g| !(g.lo > 0.0 || g.hi < 0.0))
