@@ -70,7 +70,9 @@ fn over_brick<T: Real>(spline: &HierarchicalSpline<T>, level: usize, index: usiz
         return 0.0;
     };
     if part.min == corner && part.max == end {
-        return *brick.bend.get_or_init(|| over_parts(spline, level, brick, &part, width));
+        return *brick
+            .bend
+            .get_or_init(|| over_parts(spline, level, brick, &part, width));
     }
     over_parts(spline, level, brick, &part, width)
 }
@@ -152,7 +154,6 @@ fn second_differences<T: Real>(
     z: &Range<usize>,
 ) -> ([T; 6], T) {
     let zero = [T::zero(); LANES];
-    let two = T::from_f64(2.0);
     // Of each lane; differences along z stand at their first coefficient.
     let (mut found, mut largest) = ([zero; 6], zero);
     let step = |r: &[T; LANES]| {
@@ -169,7 +170,13 @@ fn second_differences<T: Real>(
             let own = row(&brick.totals, i, j);
             let along = step(&own);
             raise(&mut largest, |k| own[k]);
-            raise(&mut found[2], |k| if k + 1 < LANES { along[k + 1] - along[k] } else { T::zero() });
+            raise(&mut found[2], |k| {
+                if k + 1 < LANES {
+                    along[k + 1] - along[k]
+                } else {
+                    T::zero()
+                }
+            });
             if beside {
                 let next = row(&brick.totals, i, j + 1);
                 let rise = step(&next);
@@ -200,7 +207,14 @@ fn second_differences<T: Real>(
     };
     let [xx, yy, zz, xy, xz, yz] = &found;
     (
-        [most(xx, 0), most(yy, 0), most(zz, 2), most(xy, 0), most(xz, 1), most(yz, 1)],
+        [
+            most(xx, 0),
+            most(yy, 0),
+            most(zz, 2),
+            most(xy, 0),
+            most(xz, 1),
+            most(yz, 1),
+        ],
         most(&largest, 0),
     )
 }

@@ -27,6 +27,7 @@ use self::sample::{Judge, Sample};
 use self::tree::{Limits, Samples, Tree, Watch};
 use self::vertices::{BlockVertices, PLACE_BITS, Placer};
 use super::blocks::{BlockGrid, BlockKey, find_blocks};
+use super::settle::{SettleOptions, settle};
 use super::{Mesh, PolygonizeError, PolygonizeOptions};
 use crate::{Field, Frame};
 
@@ -37,14 +38,35 @@ pub struct AdaptiveOptions {
     pub iso: f64,
     /// Leaves the surface open where it meets the frame's box, instead of closing it with a cap.
     pub open: bool,
-    /// Chord error up to which a cell is left whole, world length, above 0: `κ h²/8`.
-    pub error: f64,
     /// Halvings of the frame's cells, at most.
     pub depth: usize,
     /// Halvings down to which pieces of the surface are looked for that touch no corner of a cell.
     pub detection: usize,
     /// Most blocks of 8³ cells before the work is refused.
     pub max_blocks: usize,
+}
+
+impl Default for AdaptiveOptions {
+    /// The closed surface `f = 0`, eight halvings.
+    fn default() -> Self {
+        Self {
+            iso: 0.0,
+            open: false,
+            depth: 8,
+            detection: 8,
+            max_blocks: 1 << 22,
+        }
+    }
+}
+
+impl AdaptiveOptions {
+    /// Most halvings of a frame that has `cells` cells along its longest side: keys of vertices have room for no more.
+    pub fn most_depth(cells: u32) -> usize {
+        (0..PLACE_BITS as usize)
+            .rev()
+            .find(|depth| (u64::from(cells) + 2) << depth <= 1 << PLACE_BITS)
+            .unwrap_or(0)
+    }
 }
 
 /// What the mesher met.
@@ -101,15 +123,13 @@ impl<'a> AdaptiveMesher<'a> {
             ..Default::default()
         };
         super::validate(frame, &plain)?;
-        let max = (1u64 << PLACE_BITS >> options.depth).saturating_sub(2);
-        if frame.cells.iter().any(|&n| u64::from(n) > max) {
-            let max = max.min(u64::from(u32::MAX)) as u32;
+        let max = (1u32 << PLACE_BITS)
+            .checked_shr(options.depth as u32)
+            .unwrap_or(0)
+            .saturating_sub(2);
+        if frame.cells.iter().any(|&n| n > max) {
             let cells = frame.cells;
             return Err(PolygonizeError::Cells { cells, max });
-        }
-        if !(options.error > 0.0) {
-            let tolerance = options.error;
-            return Err(PolygonizeError::Tolerance { tolerance });
         }
         let grid = BlockGrid { frame, open: false };
         let (roots, _) = find_blocks(field, &grid, &plain, None, &mut *progress)?;
@@ -132,8 +152,11 @@ impl<'a> AdaptiveMesher<'a> {
         }
     }
 
-    /// The octree for a chord error.
+    /// The octree whose cells keep a chord error `κ h²/8`.
     fn grow(&mut self, error: f64, watch: &mut Watch) -> Result<Tree, PolygonizeError> {
+        if !(error.is_finite() && error > 0.0) {
+            return Err(PolygonizeError::Error { error });
+        }
         let limits = Limits {
             error,
             depth: self.options.depth,
@@ -145,13 +168,29 @@ impl<'a> AdaptiveMesher<'a> {
         tree
     }
 
-    /// The mesh for a chord error.
+    /// About how many triangles [`Self::mesh`] makes.
+    ///
+    /// # Errors
+    /// Any [`PolygonizeError`].
+    pub fn estimate(
+        &mut self,
+        error: f64,
+        progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
+    ) -> Result<u64, PolygonizeError> {
+        let tree = self.grow(error, &mut |_| progress(0.0))?;
+        Ok(2 * tree::crossed_leaves(&tree))
+    }
+
+    /// The mesh of cells that keep the chord error `κ h²/8 <= error`, a world length above 0, `κ` the largest curvature
+    /// in the cell and `h` its edge; with `settled`, its vertices spread and its edges turned so that the triangles
+    /// are as good as they may be, at about a fifth of that error.
     ///
     /// # Errors
     /// Any [`PolygonizeError`].
     pub fn mesh(
         &mut self,
         error: f64,
+        settled: bool,
         progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
     ) -> Result<(AdaptiveMesh, AdaptiveReport), PolygonizeError> {
         let tree = self.grow(error, &mut |_| progress(0.0))?;
@@ -162,7 +201,29 @@ impl<'a> AdaptiveMesher<'a> {
             iso: self.options.iso,
             steps: 2,
         };
-        contour(&placer, &tree, self.options.open, report)
+        let (mut made, report) = contour(&placer, &tree, self.options.open, report)?;
+        drop(tree);
+        if progress(0.5).is_break() {
+            return Err(PolygonizeError::Cancelled);
+        }
+        if settled {
+            let Mesh {
+                positions, triangles, ..
+            } = &mut made.mesh;
+            let options = SettleOptions::new(error);
+            settle(
+                self.field,
+                self.options.iso,
+                positions,
+                triangles,
+                &made.fixed,
+                &options,
+            );
+        }
+        if progress(1.0).is_break() {
+            return Err(PolygonizeError::Cancelled);
+        }
+        Ok((made, report))
     }
 
     fn report(&self, tree: &Tree, error: f64) -> AdaptiveReport {
@@ -355,18 +416,4 @@ fn drop_unused(made: &mut AdaptiveMesh) {
     for corner in made.mesh.triangles.iter_mut().flatten() {
         *corner = number[*corner as usize];
     }
-}
-
-/// Makes the surface `{ f = iso }` over the cells of `frame` into triangles no smaller than its curvature asks.
-///
-/// # Errors
-/// Any [`PolygonizeError`].
-pub fn polygonize_adaptively(
-    field: &dyn Field,
-    frame: &Frame,
-    options: &AdaptiveOptions,
-    progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
-) -> Result<(AdaptiveMesh, AdaptiveReport), PolygonizeError> {
-    let mut mesher = AdaptiveMesher::new(field, frame, options, progress)?;
-    mesher.mesh(options.error, progress)
 }

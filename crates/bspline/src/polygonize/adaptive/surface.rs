@@ -104,7 +104,11 @@ impl Nodes {
                     take(&mut nodes, face, face);
                 }
                 for v in [0, 2] {
-                    let about = [placed(axis, 1, u, 1), placed(axis, 1, 1, v), placed(axis, 1, u, v)];
+                    let about = [
+                        placed(axis, 1, u, 1),
+                        placed(axis, 1, 1, v),
+                        placed(axis, 1, u, v),
+                    ];
                     if let Some(out) = about.into_iter().find(|n| split >> node(*n) & 1 == 1) {
                         nodes.split_edges |= edge_bit(axis, u, v);
                         take(&mut nodes, placed(axis, 1, u, v), out);
