@@ -115,6 +115,11 @@ impl OpenField {
         either!(&self.loaded.field, f => f.lattice())
     }
 
+    /// Median slope of the field, density per world length.
+    pub fn slope(&self) -> f64 {
+        either!(&self.loaded.field, f => f.slope())
+    }
+
     /// Number of levels.
     pub fn level_count(&self) -> usize {
         either!(&self.loaded.field, f => f.level_count())

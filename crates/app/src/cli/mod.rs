@@ -11,6 +11,7 @@ mod cost;
 mod eval;
 mod failure;
 mod field;
+mod fineness;
 mod fit;
 mod info;
 mod input;
