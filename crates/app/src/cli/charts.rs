@@ -12,7 +12,7 @@ use super::input::{reading, writing};
 use super::interrupt;
 use super::phantom::Name;
 use super::progress::Bar;
-use super::{chart_dynamics, chart_orient};
+use super::{chart_dynamics, chart_mesh, chart_orient};
 use crate::charts::{Chart, Configuration, Input, Measurement, Scene, noise, outliers, sweeps};
 
 /// Arguments of `isoclay charts`.
@@ -30,6 +30,8 @@ enum Subject {
     Orient(chart_orient::Args),
     /// Error of a step's increment against its time, over solvers, laws, schemes and steps; sampling; cost by size
     Dynamics(chart_dynamics::Args),
+    /// Distance of meshes from the surface of their field against triangles and time
+    Mesh(chart_mesh::Args),
     /// Noise against the resolution chosen and the error, and outliers against the error with and without --robust
     Hard(HardArgs),
 }
@@ -69,11 +71,12 @@ pub fn run(args: &Args) -> Outcome {
         Subject::Fit(args) => fits(args, &cancel),
         Subject::Orient(args) => chart_orient::run(args, &cancel),
         Subject::Dynamics(args) => chart_dynamics::run(args, &cancel),
+        Subject::Mesh(args) => chart_mesh::run(args, &cancel),
         Subject::Hard(args) => hard(args, &cancel),
     }
 }
 
-fn make(directory: &Path) -> Outcome {
+pub(super) fn make(directory: &Path) -> Outcome {
     std::fs::create_dir_all(directory)
         .map_err(|e| anyhow::anyhow!("-o {}: cannot be made ({e})", directory.display()))
         .or_limit()

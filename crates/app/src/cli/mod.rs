@@ -3,6 +3,7 @@
 //! Exit codes: 0 done, 2 wrong usage, 3 bad input, 4 a limit was reached or the work was cancelled.
 
 mod chart_dynamics;
+mod chart_mesh;
 mod chart_orient;
 mod charts;
 mod check;
