@@ -197,7 +197,7 @@ fn frames_show_the_motion() {
     ball.0.write("scene.toml", SCENE);
     let run = ball
         .0
-        .run("simulate scene.toml -o moved.iclay --frames frames --every 10");
+        .run("simulate scene.toml -o moved.iclay --frames frames --every 10 --mesh moved.glb");
     assert_eq!(run.code, 0, "{}", run.stderr);
     assert!(
         run.stdout.contains("steps") && run.stdout.contains("awake"),
@@ -211,6 +211,7 @@ fn frames_show_the_motion() {
     assert!((height(0) - 1.0).abs() < 1e-3);
     assert!(height(10) > height(0) + 0.02 && height(20) > height(0) + 0.02);
     assert_eq!(std::fs::read_dir(ball.0.path("frames")).unwrap().count(), 3);
+    assert!(number(&ball.0.json("info moved.glb"), "faces") > 1000.0);
 }
 
 #[test]
@@ -242,7 +243,7 @@ fn what_cannot_be_is_refused_by_line_or_table_with_a_remedy_and_writes_nothing()
         (
             "damping = 1.0",
             "damping = \"w\"",
-            ["line 9", "nothing is called w"],
+            ["line 9", "no variable or function called w"],
         ),
         (
             "max = [0.5, 0.5, 1.14]",
@@ -284,7 +285,7 @@ fn what_cannot_be_is_refused_by_line_or_table_with_a_remedy_and_writes_nothing()
         (
             "step = 0.05",
             "step = 0.5\nintegrator = \"symplectic\"",
-            ["unstable beyond", "sub-steps"],
+            ["unstable beyond", "shorter steps"],
         ),
         (
             "step = 0.05",
@@ -295,6 +296,11 @@ fn what_cannot_be_is_refused_by_line_or_table_with_a_remedy_and_writes_nothing()
             "step = 0.05",
             "step = 0.5\ntolerance = 1",
             ["[time] tolerance", "adaptive"],
+        ),
+        (
+            "step = 0.05",
+            "step = 0.5\nintegrator = \"adaptive\"\nshortest = 2\nlongest = 1",
+            ["[time] shortest", "longer than the longest step"],
         ),
         (
             "step = 0.05",

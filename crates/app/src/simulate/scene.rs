@@ -180,7 +180,7 @@ pub struct Time {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Scheme {
-    /// DIS eq. 12.
+    /// The paper's own [Hua04 eq. 12].
     Paper,
     /// Explicit, first order.
     Symplectic,
@@ -294,7 +294,10 @@ impl Paint {
             return Err("along has no points; give the centre of a ball, or the points of a stroke".into());
         }
         if let Some(fade) = self.fade.filter(|f| f.0 > 1.0) {
-            return Err(format!("a fade of {} of the radius; it is at most 1", fade.0));
+            return Err(format!(
+                "fade is {}; it can be at most 1, the whole radius",
+                fade.0
+            ));
         }
         if self.substance == Substance::Mass && self.value.0 == 0.0 {
             return Err("a mass of 0 moves infinitely fast; write a value above 0".into());

@@ -18,7 +18,7 @@ use crate::solve::SolveReport;
 /// How a step is made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Integrator {
-    /// Implicit Euler in displacements with the damping in the middle [DIS eq. 12], first order.
+    /// Implicit Euler in displacements with the damping in the middle [Hua04 eq. 12], first order.
     Paper,
     /// The velocity from the present forces, then the position from the new velocity; only the damping is implicit.
     /// First order, symplectic where nothing damps, stable up to a bound.
@@ -26,8 +26,7 @@ pub enum Integrator {
     /// Velocity Verlet: half a kick by the forces, the drift, half a kick; the damping is that of the mean velocity of
     /// each kick. Second order, symplectic where nothing damps, two solves, stable up to the bound of `Symplectic`.
     Verlet,
-    /// Trapezoidal rule to `2 - √2` of the step, then backward differences: second order, L-stable [R. E. Bank et
-    /// al., *Transient simulation of silicon devices and circuits*, 1985].
+    /// Trapezoidal rule to `2 - √2` of the step, then backward differences: second order, L-stable \[Bank85\].
     TrBdf2,
     /// `Verlet` in sub-steps within its bound where these cost less than a step of `TrBdf2`, which is no more accurate;
     /// else `TrBdf2`. See [`Patch::choose`].
@@ -56,11 +55,12 @@ pub struct StepReport {
     pub integrator: Integrator,
     /// Equal parts that the step was made of.
     pub substeps: usize,
-    /// The last solve of the step.
+    /// The worst of the solves that the step was made of: most iterations, largest residual, any negative curvature; the
+    /// method is that of the last.
     pub solve: SolveReport,
-    /// Springs whose negative tangent was taken as 0.
+    /// Springs whose negative tangent was taken as 0, in the stage that had most.
     pub clamped: usize,
-    /// Work of the external forces over the step.
+    /// Work of the external forces over the step, from the increments themselves.
     pub work: f64,
     /// Estimate of the step's error in the densities, root mean square; of TR-BDF2 only.
     pub error: Option<f64>,
@@ -70,8 +70,8 @@ impl<T: Real> Patch<T> {
     /// Moves the patch by `dt` seconds; then rest lengths follow as the [plasticity](crate::springs::Plasticity) says.
     ///
     /// # Errors
-    /// [`PatchError::TimeStep`], [`PatchError::Unstable`] of an explicit step beyond its bound, [`PatchError::Solve`].
-    /// The state is then the one before.
+    /// [`PatchError::TimeStep`], [`PatchError::Unstable`] of an explicit step beyond its bound, [`PatchError::Solve`],
+    /// [`PatchError::Overflow`] if a number of the new state would not be finite. The state is then the one before.
     pub fn step(&mut self, integrator: Integrator, dt: f64) -> Result<StepReport, PatchError> {
         let report = self.try_step(integrator, dt)?;
         self.flow(dt);
@@ -84,6 +84,7 @@ impl<T: Real> Patch<T> {
             return Err(PatchError::TimeStep { dt });
         }
         self.work.before.copy_from(&self.state);
+        self.work.work = 0.0;
         let (integrator, substeps) = match integrator {
             Integrator::Auto => {
                 let choice = self.choose(dt)?;
@@ -101,18 +102,14 @@ impl<T: Real> Patch<T> {
             self.restore();
         }
         let (solve, clamped, error) = moved?;
-        let before = &self.work.before;
-        let path = self.state.d.iter().zip(&before.d).zip(&self.external);
-        let work = path
-            .map(|((now, then), f)| (*now - *then).as_f64() * f.as_f64())
-            .sum();
+        self.keep_if_finite()?;
         Ok(StepReport {
             dt,
             integrator,
             substeps,
             solve,
             clamped,
-            work,
+            work: self.work.work,
             error,
         })
     }

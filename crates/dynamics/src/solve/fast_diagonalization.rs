@@ -1,12 +1,11 @@
-//! Fast diagonalization: the exact inverse of a constant material on a tensor-product lattice [R. E. Lynch,
-//! J. R. Rice and D. H. Thomas, *Direct solution of partial difference equations by tensor product methods*, 1964].
+//! Fast diagonalization: the exact inverse of a constant material on a tensor-product lattice \[Lynch64\].
 
 use bspline::Real;
 use bspline::vectorized;
 use nalgebra::{Cholesky, DMatrix, SymmetricEigen};
 
 use super::pcg::Preconditioner;
-use crate::lattice::{Banded, DenseAxis, Lattice, PAD, multiply, multiply_last};
+use crate::lattice::{Banded, DenseAxis, Lattice, PAD, multiply, multiply_last, transposed_product};
 use crate::springs::StepMatrix;
 
 /// `z = s∘(V⊗V⊗V) [ (V⊗V⊗V)ᵀ(s∘r) / (a + b_x λ_i + b_y λ_j + b_z λ_k) ]` with, on each axis, `AᵀK₁A V = AᵀA V Λ`,
@@ -27,8 +26,8 @@ pub struct FastDiagonalization<T> {
 fn pencil(a: &Banded<f64>) -> (DMatrix<f64>, Vec<f64>) {
     let d = a.differences().to_dense();
     let a = a.to_dense();
-    let stiffness = d.transpose() * d;
-    let gram = a.transpose() * a;
+    let stiffness = transposed_product(&d, &d);
+    let gram = transposed_product(&a, &a);
     let l = Cholesky::new(gram)
         .expect("axes are refused when their samples do not determine the coefficients")
         .unpack();

@@ -1,59 +1,20 @@
-//! Which method solves a step, and the methods behind one interface.
+//! The methods that solve a step, behind one interface.
 
 use bspline::Real;
 
 use super::background::Background;
-use super::band_cholesky::{BandCholesky, NotPositive};
+use super::band_cholesky::BandCholesky;
 use super::border::Border;
 use super::dot::dot;
 use super::fast_diagonalization::FastDiagonalization;
 use super::galerkin::Galerkin;
 use super::pcg::{CoefficientSystem, ConjugateGradients, PcgReport, Preconditioner, System, add_scaled};
+use super::report::{ITERATED, Method, SolveError, SolveReport, SolverOptions};
 use super::sample_multigrid::SampleMultigrid;
-use super::v_cycle::{VCycle, VCycleOptions};
+use super::v_cycle::VCycle;
 use crate::lattice::{Lattice, TensorProduct, TensorWorkspace};
 use crate::springs::StepMatrix;
-
-/// Limits of a solve.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SolverOptions {
-    /// Most iterations of conjugate gradients.
-    pub iterations: usize,
-    /// Residual, relative to the impulse, that ends them earlier. `None`: what the precision can reach where a solve is
-    /// exact but for rounding, [`ITERATED`] where it is iterated.
-    pub tolerance: Option<f64>,
-    /// Free coefficients up to which the matrix is factorized; four times as many on lattices with as many samples, whose
-    /// band is a quarter as wide.
-    pub direct_limit: usize,
-    /// Free coefficients up to which a factor is made beside the steps, a V-cycle solving them until it is done: 5832
-    /// take 33 MB in single precision, which is read twice a step.
-    pub background_limit: usize,
-    /// Of the V-cycle for more.
-    pub v_cycle: VCycleOptions,
-}
-
-impl Default for SolverOptions {
-    fn default() -> Self {
-        Self {
-            iterations: 8,
-            tolerance: None,
-            direct_limit: 1000,
-            background_limit: 6000,
-            v_cycle: VCycleOptions::default(),
-        }
-    }
-}
-
-impl SolverOptions {
-    /// Free coefficients up to which the matrix of a lattice with as many samples is factorized.
-    pub fn sample_direct_limit(&self) -> usize {
-        4 * self.direct_limit
-    }
-}
-
-/// Residual, relative to the impulse, at which the V-cycle and the multigrid stop by default. The increment is then
-/// wrong by about as much, far less than the 0.3 % asked of a step; halving it costs one iteration.
-pub const ITERATED: f64 = 1e-3;
+use crate::units::{binary_unit, largest};
 
 /// Residual, in units of rounding of single precision, at which solves by a factor stop.
 const EXACT: f64 = 64.0;
@@ -63,50 +24,8 @@ const EXACT: f64 = 64.0;
 /// by a few units.
 const DIAGONALIZED: f64 = 4096.0;
 
-/// How a step was solved.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Method {
-    /// Fast diagonalization: constant material.
-    FastDiagonalization,
-    /// Banded Cholesky factor: few coefficients.
-    Direct,
-    /// V-cycle on every other knot: many coefficients.
-    VCycle,
-    /// Banded Cholesky factor on the samples: few, and as many coefficients as samples.
-    SampleDirect,
-    /// Multigrid on the samples: as many coefficients as samples.
-    SampleMultigrid,
-}
-
-impl Method {
-    /// Name in reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::FastDiagonalization => "fast-diagonalization",
-            Self::Direct => "direct",
-            Self::VCycle => "v-cycle",
-            Self::SampleDirect => "sample-direct",
-            Self::SampleMultigrid => "sample-multigrid",
-        }
-    }
-}
-
-/// What a solve did.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SolveReport {
-    /// The method.
-    pub method: Method,
-    /// Iterations, residual and curvature.
-    pub iteration: PcgReport,
-}
-
-/// Why a matrix cannot be solved.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum SolveError {
-    /// Not positive definite.
-    #[error(transparent)]
-    NotPositive(#[from] NotPositive),
-}
+/// Impulses whose squares, and those of their residuals, are far from the ends of the range of single precision.
+const ORDINARY: std::ops::Range<f64> = 1e-6..1e12;
 
 /// Solves `AᵀSA x = Aᵀg` on one lattice, by the method that its size, its sampling and the material ask for:
 ///
@@ -233,8 +152,7 @@ impl<T: Real> StepSolver<T> {
             Painted::None => unreachable!("made above"),
             Painted::Direct(direct) => {
                 let (galerkin, factor) = &mut **direct;
-                galerkin.assemble(s, factor);
-                factor.factorize()?;
+                galerkin.factorize(s, factor)?;
                 Method::Direct
             }
             Painted::Background(background) => {
@@ -326,6 +244,22 @@ impl<T: Real> StepSolver<T> {
             _ => EXACT * T::UNIT_ROUND_OFF,
         });
         let cap = self.options.iterations;
+        if self.inverse.is_some() {
+            self.b.copy_from_slice(g);
+        } else {
+            self.lattice.gather(g, &mut self.b, &mut self.workspace);
+        }
+        // Solved for an impulse of about one, whose squares no precision loses.
+        let unit = self.impulse_unit();
+        if unit != 1.0 {
+            for b in &mut self.b {
+                *b = T::from_f64(b.as_f64() / unit);
+            }
+            if let Some(border) = &mut self.border {
+                border.scale(1.0 / unit);
+            }
+        }
+        let solved_by = self.method;
         let iteration = if let Some(inverse) = &mut self.inverse {
             let preconditioner = active(self.method, &mut self.painted, &mut self.diagonalization);
             let mut system = SampleSystem {
@@ -333,8 +267,8 @@ impl<T: Real> StepSolver<T> {
                 preconditioner: &mut Dynamic(preconditioner),
             };
             let report = match &mut self.border {
-                Some(border) => border.solve(&mut system, g, dx, cap, tolerance),
-                None => self.iteration.solve(&mut system, g, dx, cap, tolerance),
+                Some(border) => border.solve(&mut system, &self.b, dx, cap, tolerance),
+                None => self.iteration.solve(&mut system, &self.b, dx, cap, tolerance),
             };
             for (d, dx) in inverse.d.iter_mut().zip(dx.iter()) {
                 *d = dx.as_f64();
@@ -347,23 +281,37 @@ impl<T: Real> StepSolver<T> {
             }
             report
         } else {
-            self.lattice.gather(g, &mut self.b, &mut self.workspace);
             let report = self.iterate(s, x, Some(dx), cap, tolerance);
-            let solved_by = self.method;
             if let (Painted::Background(background), None) = (&mut self.painted, &self.border)
                 && solved_by != Method::FastDiagonalization
             {
                 background.advance(s, report);
                 self.settle_method();
             }
-            return SolveReport {
-                method: solved_by,
-                iteration: report,
-            };
+            report
         };
+        if unit != 1.0 {
+            if let Some(border) = &mut self.border {
+                border.scale(unit);
+            }
+            for x in x.iter_mut().chain(dx) {
+                *x = T::from_f64(x.as_f64() * unit);
+            }
+        }
         SolveReport {
-            method: self.method,
+            method: solved_by,
             iteration,
+        }
+    }
+
+    /// The power of two that the impulses are divided by; 1 where they are of ordinary size, which saves two passes and
+    /// changes no bit.
+    fn impulse_unit(&self) -> f64 {
+        let size = largest(&self.b).max(self.border.as_ref().map_or(0.0, |b| b.size()));
+        if size == 0.0 || ORDINARY.contains(&size) {
+            1.0
+        } else {
+            binary_unit(size)
         }
     }
 
