@@ -8,7 +8,7 @@ use bspline::polygonize::{
 use bspline::{Field, Frame};
 use fitting::Cancel;
 use formats::field::SourceKind;
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 
 use super::failure::{Failure, Outcome};
@@ -68,17 +68,24 @@ impl<'a> Adaptive<'a> {
         bar: &'a Bar,
     ) -> Outcome<Self> {
         let lattice = open.lattice();
+        // Larger cells than the lattice's own, where they are whole: the fewest triangles are few.
+        let (mut cells, mut above) = (lattice.cells, 0);
+        while cells.iter().all(|n| n % 2 == 0 && *n >= 8) {
+            cells = cells.map(|n| n / 2);
+            above += 1;
+        }
         let frame = Frame {
-            world_from_grid: lattice.world_from_lattice,
-            cells: lattice.cells,
+            world_from_grid: lattice.world_from_lattice
+                * DAffine3::from_scale(DVec3::splat((1u64 << above) as f64)),
+            cells,
         };
-        let finest = open.level_count() - 1;
+        let finest = open.level_count() - 1 + above;
         // Voxels lie no closer than the finest knots; a cloud's surface bends within their intervals.
         let beyond = match (open.source(), fineness) {
             (SourceKind::Volume, Fineness::OfTheFit) => 0,
             _ => 2,
         };
-        let longest = lattice.cells.into_iter().max().unwrap_or(1);
+        let longest = cells.into_iter().max().unwrap_or(1);
         let options = AdaptiveOptions {
             iso,
             open: !capped,
