@@ -1,5 +1,7 @@
 //! The triangles: one polygon for each minimal edge that the surface crosses, through the leaves about it.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
 use super::around::{Around, State};
@@ -14,7 +16,7 @@ pub(super) const EXTRA: u32 = 1 << 31;
 
 /// All vertices, by level and block, and the number of the first one of each block.
 pub(super) struct Numbered<'a> {
-    pub vertices: &'a [Vec<BlockVertices>],
+    pub vertices: &'a [Vec<Arc<BlockVertices>>],
     pub first: &'a [Vec<u32>],
     /// Coarsest cells of the frame.
     pub cells: [i32; 3],
