@@ -13,6 +13,7 @@ mod failure;
 mod field;
 mod fineness;
 mod fit;
+mod flags;
 mod info;
 mod input;
 mod interrupt;

@@ -131,7 +131,7 @@ fn step(field: &dyn Field, iso: f64, edges: &Edges, state: &mut State, targets: 
                     return false;
                 }
                 let [a, b, c] = **t;
-                let was = normal(&state.positions, a, b, c);
+                let was = normal(state.positions, a, b, c);
                 let is = (at(b) - at(a)).cross(at(c) - at(a));
                 let dot = was.dot(is);
                 dot < 0.0 || dot * dot < TURN * TURN * was.length_squared() * is.length_squared()
