@@ -220,7 +220,7 @@ fn mesh_tolerance_chooses_the_triangles() {
     }
 }
 
-/// 95th percentile over the triangles of the largest distance from the unit sphere at centre and sides.
+/// 95th percentile over the triangles of the distances of centres and sides from the unit sphere.
 fn chord_error_on_unit_sphere(bench: &Bench) -> f64 {
     let mesh = common::read_mesh(&bench.path("mesh.ply"));
     assert!(bspline::polygonize::check_mesh(&mesh).is_closed_manifold());

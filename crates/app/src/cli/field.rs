@@ -221,7 +221,8 @@ impl OpenField {
         self.frame((sides / cell).to_array().map(|c| (c.round() as u32).max(1)))
     }
 
-    fn frame(&self, cells: [u32; 3]) -> Frame {
+    /// The grid of so many cells over the lattice's box.
+    pub fn frame(&self, cells: [u32; 3]) -> Frame {
         let lattice = self.lattice();
         let step = lattice.extent() / glam::DVec3::from_array(cells.map(f64::from));
         Frame {

@@ -30,8 +30,8 @@ pub struct Args {
     /// Cells of one size, so many along the longest side of the box [default: cells as large as the surface allows]
     #[arg(long, value_name = "N", conflicts_with_all = ["tolerance", "triangles"], value_parser = clap::value_parser!(u32).range(1..=65535))]
     resolution: Option<u32>,
-    /// Distance from the surface that 95 % of the triangles keep at their centres and sides: in the field's unit, in mm,
-    /// or in per cent of the solid's diagonal [default: half the tolerance of the fit]
+    /// Distance from the surface that 95 % of the centres and sides of the triangles keep: in the field's unit, in mm, or
+    /// in per cent of the solid's diagonal [default: half the tolerance of the fit]
     #[arg(long, value_name = "T[mm|%]", conflicts_with = "triangles")]
     tolerance: Option<Tolerance>,
     /// Most triangles of the mesh
@@ -99,7 +99,7 @@ pub fn run(args: &Args) -> Outcome {
                 _ => Fineness::OfTheFit,
             };
             let mut adaptive = Adaptive::new(&open, options.iso, !args.open, fineness, &cancel, &bar)?;
-            let made = adaptive.mesh(&open, fineness, &mut notes)?;
+            let made = adaptive.mesh(fineness, &mut notes)?;
             notes.extend(doubts(0, made.report.nan_nodes));
             (made.mesh, None)
         }

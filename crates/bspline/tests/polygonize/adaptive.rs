@@ -4,8 +4,8 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use bspline::polygonize::{
-    AdaptiveMesh, AdaptiveMesher, AdaptiveOptions, AdaptiveReport, Mesh, PolygonizeError, PolygonizeOptions,
-    check_mesh, polygonize,
+    AdaptiveBlockMesh, AdaptiveMesh, AdaptiveMesher, AdaptiveOptions, AdaptiveReport, Mesh, PolygonizeError,
+    PolygonizeOptions, check_mesh, polygonize,
 };
 use bspline::primitives::{Cuboid, Gyroid, Sphere, Torus};
 use bspline::{Aabb, Csg, Field, Frame};
@@ -276,7 +276,7 @@ fn a_full_box_is_itself_and_open_surfaces_end_on_it() {
         let (made, _) = meshed(&field, &cube(1.0, 6), &open, 0.01, seed % 2 == 0);
         let check = check_mesh(&made.mesh);
         assert!(
-            check.is_manifold() && !check.is_closed(),
+            check.non_manifold_edges == 0 && !check.is_closed(),
             "seed {seed}: {check:?}"
         );
         let mut sides: Vec<[u32; 2]> = made
@@ -286,19 +286,24 @@ fn a_full_box_is_itself_and_open_surfaces_end_on_it() {
             .flat_map(|t| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]])
             .collect();
         sides.sort_unstable();
-        for &[a, b] in sides
-            .iter()
-            .filter(|[a, b]| sides.binary_search(&[*b, *a]).is_err())
-        {
-            for v in [a, b] {
-                let p = made.mesh.positions[v as usize];
+        let mut off = Vec::new();
+        for &[a, b] in &sides {
+            if sides.binary_search(&[b, a]).is_err() {
+                let p = made.mesh.positions[a as usize];
                 assert!(
                     (p.abs().max_element() - 1.0).abs() < 1e-9,
                     "seed {seed}: a border vertex at {p}"
                 );
-                assert!(field.value(p).abs() < 0.02, "seed {seed}: {}", field.value(p));
+                off.push(field.value(p).abs());
             }
         }
+        // Where the surface touches the face it has no foot along it.
+        off.sort_by(f64::total_cmp);
+        assert!(
+            off[off.len() * 95 / 100] < 0.005,
+            "seed {seed}: {}",
+            off[off.len() * 95 / 100]
+        );
     }
 }
 
@@ -321,7 +326,7 @@ fn chord_errors(field: &dyn Field, mesh: &Mesh) -> Vec<f64> {
 
 #[test]
 fn a_quarter_of_the_triangles_of_cells_of_one_size_will_do() {
-    // A blend of a large and small balls: curvatures from 1 to 25.
+    // A blend of a large and small balls, curvatures from 1 to 25: all of it as fine as its finest parts need.
     let small = |x: f64, y: f64| ball(DVec3::new(x, y, 0.72), 0.06);
     let balls = vec![
         ball(DVec3::ZERO, 0.7),
@@ -331,13 +336,19 @@ fn a_quarter_of_the_triangles_of_cells_of_one_size_will_do() {
     ];
     let rounding = bspline::csg::Rounding::Bounded { range: 0.05 };
     let field = Csg::smooth_union(balls, rounding, 0.0).expect("balls");
-    let rank = |errors: &[f64]| errors[errors.len() * 95 / 100];
+    let rank = |errors: &[f64]| errors[errors.len() * 999 / 1000];
     let frame = cube(1.0, 96);
     let (uniform, _) = polygonize(field.as_ref(), &frame, &PolygonizeOptions::default()).expect("a mesh");
     let wanted = rank(&chord_errors(field.as_ref(), &uniform));
-    let (made, _) = meshed(field.as_ref(), &cube(1.0, 8), &options(8), 3.6 * wanted, true);
-    let error = rank(&chord_errors(field.as_ref(), &made.mesh));
-    assert!(error <= wanted, "{error} {wanted}");
+    let mut of_cells = 1.5 * wanted;
+    let mut found = None;
+    while found.is_none() && of_cells > 0.1 * wanted {
+        let (made, _) = meshed(field.as_ref(), &cube(1.0, 8), &options(8), of_cells, true);
+        let error = rank(&chord_errors(field.as_ref(), &made.mesh));
+        of_cells *= 0.95 * wanted / error;
+        found = (error <= wanted).then_some(made);
+    }
+    let made = found.expect("fine cells will do");
     assert!(
         4 * made.mesh.triangles.len() <= uniform.triangles.len(),
         "{} {}",
@@ -428,4 +439,71 @@ fn senseless_adaptive_requests_are_refused() {
         mesher.mesh(1e-4, true, go_on).err(),
         Some(PolygonizeError::TooManyBlocks { limit: 50 })
     );
+}
+
+#[test]
+fn a_mesh_that_followed_edits_is_the_one_made_anew() {
+    let mut random = Random(3);
+    let frame = cube(2.0, 6);
+    let region = Aabb::new(DVec3::splat(-2.0), DVec3::splat(2.0));
+    let iso = AdaptiveOptions {
+        iso: 0.05,
+        ..options(4)
+    };
+    // Dents and bumps of compact support on a ball: sums of cubic functions, on the finest level of a spline.
+    let lattice = bspline::hierarchical::Lattice {
+        world_from_lattice: DAffine3::from_translation(DVec3::splat(-2.0))
+            * DAffine3::from_scale(DVec3::splat(0.25)),
+        cells: [16; 3],
+    };
+    let mut field = ball_spline(lattice);
+    let mut mesh = AdaptiveBlockMesh::new(&field, &frame, &iso, 0.004).expect("a mesh");
+    let (mut placed, mut whole) = (0, 0);
+    let rounds = 200;
+    for round in 1..=rounds {
+        let n = field.lattice().cells_at(1)[0] as f64;
+        let out =
+            DVec3::new(random.unit() - 0.5, random.unit() - 0.5, random.unit() - 0.5).normalize_or(DVec3::X);
+        let near = (DVec3::splat(0.5 * n) + out * 0.3 * n).round();
+        let edit = bspline::hierarchical::LevelEdit {
+            level: 1,
+            function: near.to_array().map(|x| x as u32),
+            delta: (0.4 * (random.unit() - 0.5)) as f32,
+        };
+        let next = field.edited(&[edit]).expect("an edit");
+        let boxes = next.changed_boxes(&field, &region);
+        placed += mesh.update(&next, &boxes).expect("an update");
+        whole += mesh.block_count();
+        field = next;
+        if round % 40 == 0 {
+            let anew = AdaptiveBlockMesh::new(&field, &frame, &iso, 0.004)
+                .expect("a mesh")
+                .mesh(&field);
+            let once = meshed(&field, &frame, &iso, 0.004, false).0;
+            let kept = mesh.mesh(&field).expect("a mesh").0;
+            assert!(
+                kept == anew.expect("a mesh").0 && kept == once,
+                "after {round} edits"
+            );
+            assert!(check_mesh(&kept.mesh).is_closed_manifold());
+        }
+    }
+    assert!(placed * 2 < whole, "{placed} of {whole} blocks placed anew");
+}
+
+/// A ball of radius 1.2 on coefficients of two levels.
+fn ball_spline(lattice: bspline::hierarchical::Lattice) -> bspline::HierarchicalSpline<f32> {
+    use bspline::hierarchical::{BrickKey, Corrections, LevelCorrections};
+    let mut bricks = std::collections::BTreeMap::new();
+    for n in 0..19u32.pow(3) {
+        let s = [n / 361, n / 19 % 19, n % 19];
+        let knot = DVec3::from_array(s.map(|s| f64::from(s) - 1.0));
+        let value = 1.2 - lattice.world_from_lattice.transform_point3(knot).length();
+        let brick = bricks
+            .entry(BrickKey(s.map(|s| s / 8)))
+            .or_insert_with(Corrections::empty);
+        brick.set(s.map(|s| s as usize % 8), value as f32);
+    }
+    let coarse = bricks.into_iter().map(|(key, c)| (key, Arc::new(c))).collect();
+    bspline::HierarchicalSpline::from_corrections(lattice, 1.0, vec![coarse, LevelCorrections::new()])
 }

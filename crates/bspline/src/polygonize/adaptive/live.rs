@@ -83,6 +83,11 @@ impl AdaptiveBlockMesh {
         )
     }
 
+    /// Blocks of 8³ cells over all levels.
+    pub fn block_count(&self) -> usize {
+        self.tree.iter().map(Vec::len).sum()
+    }
+
     fn placer<'a>(&'a self, field: &'a dyn Field) -> Placer<'a> {
         Placer {
             field,

@@ -363,14 +363,11 @@ fn add_extras(
     parts: &[BlockTriangles],
     made: &mut AdaptiveMesh,
 ) -> Vec<Vec<u32>> {
-    let mut all: Vec<(ExtraKey, usize, DVec3)> = Vec::new();
+    let mut all: Vec<(ExtraKey, DVec3)> = Vec::new();
     for (part, &(_, level, _)) in parts.iter().zip(order) {
         let frame = &placer.grids.frames[level];
-        all.extend(
-            part.extras
-                .iter()
-                .map(|(key, p)| (*key, level, frame.world_from_grid.transform_point3(*p))),
-        );
+        let placed = part.extras.iter();
+        all.extend(placed.map(|(key, p)| (*key, frame.world_from_grid.transform_point3(*p))));
     }
     if all.is_empty() {
         return parts.iter().map(|_| Vec::new()).collect();
@@ -378,12 +375,8 @@ fn add_extras(
     all.sort_by_key(|e| e.0);
     all.dedup_by_key(|e| e.0);
     let first = made.mesh.positions.len() as u32;
-    let mut answers = Vec::new();
-    for (key, level, p) in &all {
-        let mut p = [*p];
-        let longest = 0.1 * placer.grids.size(*level).min_element();
-        vertices::project(placer, &mut p, &[false], longest, &mut answers);
-        made.mesh.positions.push(p[0]);
+    for (key, p) in &all {
+        made.mesh.positions.push(*p);
         made.keys
             .push(key.iter().fold(u64::MAX, |hash, k| mixed(hash ^ *k as u64)));
         // Kept where they are: a piece of surface that is thinner than the cells hangs on them.
