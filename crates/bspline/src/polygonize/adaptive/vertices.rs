@@ -248,15 +248,10 @@ fn mean_of_edges(values: &[f32; NODE_COUNT], c: [usize; 3], edges: u16) -> DVec3
         let mut high = low;
         high[axis] += 1;
         let (v, w) = (values[node_index(low)], values[node_index(high)]);
-        let t = v / (v - w);
         for a in 0..3 {
             sum[a] += low[a] as f64;
         }
-        sum[axis] += if t.is_finite() {
-            f64::from(t.clamp(0.0, 1.0))
-        } else {
-            0.5
-        };
+        sum[axis] += share(f64::from(v), f64::from(w));
         count += 1.0;
     }
     DVec3::from_array(sum) / count
