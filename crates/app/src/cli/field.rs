@@ -204,13 +204,6 @@ impl OpenField {
         self.frame(self.lattice().cells_at(finest).map(|c| c.saturating_mul(n)))
     }
 
-    /// The grid with two cells in every knot interval of the level that holds the surface `{ f = iso }`, and how many finer
-    /// levels there are.
-    pub fn frame_of_surface(&self, iso: f64) -> (Frame, usize) {
-        let level = self.level_of_surface(iso);
-        (self.frame_of_level(level), self.level_count() - 1 - level)
-    }
-
     /// The finest level on which, or on finer ones, at least a tenth of the surface's area lies.
     pub fn level_of_surface(&self, iso: f64) -> usize {
         either!(&self.loaded.field, f => f.level_of_surface(iso, 0.1))

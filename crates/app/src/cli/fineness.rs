@@ -2,13 +2,13 @@
 
 use std::ops::ControlFlow;
 
+use bspline::Frame;
 use bspline::polygonize::{
     AdaptiveMesh, AdaptiveMesher, AdaptiveOptions, AdaptiveReport, Mesh, PolygonizeError,
 };
-use bspline::{Field, Frame};
 use fitting::Cancel;
 use formats::field::SourceKind;
-use glam::{DAffine3, DVec3};
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::failure::{Failure, Outcome};

@@ -6,7 +6,6 @@ use bspline::polygonize::{Mesh, MeshReport, PolygonizeOptions, polygonize_with};
 use bspline::{Field, Frame};
 use fitting::Cancel;
 use formats::field::SourceKind;
-use glam::DVec3;
 
 use super::cost::Cost;
 use super::failure::{Failure, Outcome};
