@@ -4,7 +4,7 @@ mod common;
 
 use bspline::Field;
 use common::{cloud, fit, oriented, to_depth};
-use fitting::phantoms::{CloudOptions, SampledCloud, Solid};
+use fitting::phantoms::{CloudOptions, SampledCloud, Solid, SplitMix64};
 use fitting::points::{PointOptions, fit_points};
 use fitting::{Control, FitError, StopReason};
 use glam::DVec3;
@@ -195,4 +195,41 @@ fn a_budget_of_coefficients_stops_the_refinement() {
     };
     let (_, report) = fit::<f32>(&samples, &options).expect("a clean cloud");
     assert!(report.leaves.iter().any(|l| l.reason == StopReason::Budget));
+}
+
+/// A robust fit of points that no neighbour speaks for ends with all of them, and says so.
+#[test]
+fn a_robust_fit_survives_points_that_all_contradict_each_other() {
+    let golden = (1.0 + 5f64.sqrt()) / 2.0;
+    let corner = |i: usize| {
+        let (a, b) = ([1.0, -1.0][i & 1], golden * [1.0, -1.0][i >> 1 & 1]);
+        [
+            DVec3::new(0.0, a, b),
+            DVec3::new(a, b, 0.0),
+            DVec3::new(b, 0.0, a),
+        ][i / 4]
+    };
+    let icosahedron: Vec<DVec3> = (0..12).map(corner).collect();
+    let mut random = SplitMix64::new(3);
+    let dust: Vec<DVec3> = (0..3000).map(|_| random.uniform3()).collect();
+    let mut anyhow = |n: usize| (0..n).map(|_| random.normal3()).collect::<Vec<_>>();
+    let clouds = [
+        (icosahedron.clone(), icosahedron.clone()),
+        (icosahedron, anyhow(12)),
+        (dust, anyhow(3000)),
+    ];
+    for (positions, normals) in clouds {
+        let samples = SampledCloud {
+            positions,
+            normals,
+            holes: Vec::new(),
+        };
+        let options = PointOptions {
+            robust: true,
+            ..to_depth(6)
+        };
+        let (field, report) = fit::<f32>(&samples, &options).expect("weights that stay");
+        assert!(field.value(DVec3::splat(0.4)).is_finite() && report.rms.is_finite());
+        assert!(report.used_count >= 10, "{}", report.used_count);
+    }
 }

@@ -16,13 +16,13 @@ pub struct Args {
     /// Directory for the charts dynamics-NAME.svg; made if missing
     #[arg(short, long, value_name = "DIR", default_value = "docs/charts")]
     output: PathBuf,
-    /// Small patches alone, in seconds
+    /// Small patches only: takes seconds
     #[arg(long, conflicts_with = "all")]
     quick: bool,
     /// All sizes up to 32 coefficients an axis, all patterns, contrasts and steps: takes hours
     #[arg(long)]
     all: bool,
-    /// Print one JSON object a configuration
+    /// Print one JSON object for each configuration
     #[arg(long)]
     pub json: bool,
 }

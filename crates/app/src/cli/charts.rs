@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use clap::ValueEnum;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use fitting::Cancel;
+use fitting::phantoms::Solid;
 use formats::Kind;
 use serde_json::{Map, Value};
 
@@ -29,7 +31,7 @@ pub struct Args {
 enum Subject {
     /// Error of fits against their time and memory, over tolerance, depth, smoothing and precision
     Fit(FitArgs),
-    /// Wrong normals of clouds without any against the time of their estimation
+    /// How many normals are estimated wrongly, against the time that their estimation takes
     Orient(chart_orient::Args),
     /// Error of a step's increment against its time, over solvers, laws, schemes and steps; sampling; cost by size
     Dynamics(chart_dynamics::Args),
@@ -39,12 +41,22 @@ enum Subject {
 
 #[derive(clap::Args)]
 struct HardArgs {
-    /// Phantom to spoil
-    #[arg(value_enum, default_value = "gyroid")]
-    solid: Name,
+    /// Phantom to add noise and outliers to
+    #[arg(default_value = "gyroid", value_parser = solids())]
+    solid: Solid,
     /// Directory for the charts noise-NAME.svg and outliers-NAME.svg; made if missing
     #[arg(short, long, value_name = "DIR", default_value = "docs/charts")]
     output: PathBuf,
+}
+
+/// Names of solids, as clouds are made of them.
+fn solids() -> impl TypedValueParser<Value = Solid> {
+    PossibleValuesParser::new(Solid::ALL.map(Solid::name)).try_map(|name| {
+        Solid::ALL
+            .into_iter()
+            .find(|s| s.name() == name)
+            .ok_or("no solid")
+    })
 }
 
 #[derive(clap::Args)]
@@ -59,7 +71,7 @@ struct FitArgs {
     /// Runs of each configuration, of which the median time is shown
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = between::<u8>(1, 255))]
     runs: u8,
-    /// Print one JSON object a configuration
+    /// Print one JSON object for each configuration
     #[arg(long)]
     json: bool,
 }
@@ -100,9 +112,7 @@ pub fn publish(staged: StagedFiles, quiet: bool) -> Outcome {
 /// Draws what noise and outliers do to a phantom.
 fn hard(args: &HardArgs, cancel: &Cancel) -> Outcome {
     let mut staged = StagedFiles::new("-o", &args.output)?;
-    let Name::Solid(solid) = args.solid else {
-        return Err(Failure::usage("charts hard: the head is a volume; name a solid"));
-    };
+    let solid = args.solid;
     let scene = Scene::new(solid).ok_or_else(|| Failure::input("the phantom has no surface"))?;
     let bar = Bar::new();
     let show = |fraction| bar.show("fitting", fraction);

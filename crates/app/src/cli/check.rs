@@ -14,7 +14,7 @@ use super::cost::Cost;
 use super::failure::{Failure, Outcome};
 use super::field::OpenField;
 use super::input::{self, Input, Shape};
-use super::quantity::threads;
+use super::quantity::{human_number, threads};
 use super::sample::voxel_frame;
 use super::source::{FIELDS, SAMPLES, Source, input_formats};
 use super::staged::StagedFiles;
@@ -121,9 +121,9 @@ pub fn run(args: &Args) -> Outcome {
             "cavity"
         };
         format!(
-            "a {what} of {} cells of 1/{COMPONENT_CELLS} round {} holds no sample",
+            "a {what} of {} cells (of {COMPONENT_CELLS} along the box) around ({}) holds no sample",
             c.cells.len(),
-            c.at
+            c.at.to_array().map(human_number).join(", ")
         )
     }));
     Summary {

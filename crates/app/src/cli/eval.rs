@@ -11,18 +11,18 @@ use super::field::OpenField;
 use super::input::limits;
 use super::quantity::threads;
 use super::set_threads;
-use super::source::{FIELDS, POINTS, Source, input_formats};
+use super::source::{FIELDS, POINTS, Source, point_formats};
 
 /// Arguments of `isoclay eval`.
 #[derive(clap::Args)]
 pub struct Args {
     /// Field (.iclay); - reads standard input
     field: PathBuf,
-    /// Points, one a line or as a cloud; - reads standard input
+    /// Points: lines of x y z, or a point cloud; - reads standard input
     #[arg(long, value_name = "F")]
     points: PathBuf,
     /// Format of the points where neither their content nor their name tells it [default for -: xyz]
-    #[arg(long, value_name = "FORMAT", value_parser = input_formats())]
+    #[arg(long, value_name = "FORMAT", value_parser = point_formats())]
     format: Option<String>,
     /// Threads to work with [default: all cores]
     #[arg(long, value_name = "N", value_parser = threads)]

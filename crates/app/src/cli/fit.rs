@@ -59,13 +59,13 @@ pub struct Args {
 /// What the user may choose of a fit; the rest is chosen from the data.
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub struct Choice {
-    /// Rms residual that each leaf stays below, or says why not. Clouds: a distance in the file's unit, in mm,
+    /// Root mean square of the residuals that no leaf of the octree exceeds, unless its report says why. Clouds: a distance in the file's unit, in mm,
     /// or in per cent of the diagonal. Volumes: a density, or per cent of the range between the 1st and the 99th
     /// percentile [default: what the noise justifies; for clean data 0.01% of the diagonal, 0.5% of the range]
     #[arg(long, value_name = "T[mm|%]", allow_hyphen_values = true)]
     pub tolerance: Option<Tolerance>,
-    /// Meshes: half the width of the band round the surface in which no error is above the tolerance, a length like
-    /// it [default: eight tolerances]
+    /// Meshes: distance from the surface up to which no error is above the tolerance, written like it [default: eight
+    /// tolerances]
     #[arg(long, value_name = "L[mm|%]", allow_hyphen_values = true)]
     pub band: Option<Tolerance>,
     /// Coefficients to spend
@@ -86,7 +86,7 @@ pub struct Choice {
     #[arg(long, value_enum, value_name = "ROUTE", num_args = 0..=1, require_equals = true,
           default_missing_value = "winding")]
     pub unoriented: Option<Unoriented>,
-    /// Take away the weight of points that the others contradict: for clouds with outliers
+    /// Take no notice of points that contradict the others: for clouds with outliers
     #[arg(long)]
     pub robust: bool,
     /// Unit of the coordinates, where the file does not tell: mm, cm or m
@@ -214,6 +214,7 @@ fn fit_cloud<T: Stored>(cloud: &PointCloud, choice: &Choice, control: &mut Contr
             ));
         }
     };
+    refuse_band(choice)?;
     if cloud.positions.is_empty() {
         return Err(FitError::NotEnoughSamples { found: 0, needed: 10 }.into());
     }
@@ -251,10 +252,16 @@ fn fit_cloud<T: Stored>(cloud: &PointCloud, choice: &Choice, control: &mut Contr
 }
 
 fn fit_triangles<T: Stored>(mesh: &TriangleMesh, choice: &Choice, control: &mut Control) -> Outcome<Fitted> {
-    if choice.method.is_some() {
-        return Err(Failure::usage(
-            "--method is for point clouds and volumes; leave it out for a mesh",
-        ));
+    for (option, is_given) in [
+        ("--method", choice.method.is_some()),
+        ("--unoriented", choice.unoriented.is_some()),
+        ("--robust", choice.robust),
+    ] {
+        if is_given {
+            return Err(Failure::usage(format!(
+                "{option}: is for other inputs than meshes; leave it out"
+            )));
+        }
     }
     if choice.smoothing.is_some() {
         return Err(Failure::usage(
@@ -307,6 +314,7 @@ fn fit_voxels<T: Stored>(volume: &Volume, choice: &Choice, control: &mut Control
             "--robust is for point clouds; leave it out for a volume",
         ));
     }
+    refuse_band(choice)?;
     let header = &volume.header;
     let unit = stated_unit(header.unit, choice.unit)?;
     let view = VolumeView {
@@ -341,6 +349,17 @@ fn fit_voxels<T: Stored>(volume: &Volume, choice: &Choice, control: &mut Control
         iso,
         defects: None,
     })
+}
+
+/// Refuses a band where it would do nothing.
+fn refuse_band(choice: &Choice) -> Outcome {
+    match choice.band {
+        Some(_) => Err(Failure::usage(
+            "--band: is for meshes, whose distance is fitted round the surface; leave it out, or take the faces by --as \
+             mesh",
+        )),
+        None => Ok(()),
+    }
 }
 
 /// The unit of a file whose header says `known`, of which the user says `stated`.

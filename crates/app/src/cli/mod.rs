@@ -59,7 +59,7 @@ const EXIT_CODES: &str =
 
 #[derive(Subcommand)]
 enum Command {
-    /// Fit a field to a point cloud with normals or to a volume
+    /// Fit a field to a point cloud, a mesh or a volume
     Fit(fit::Args),
     /// Turn a field into a closed triangle mesh
     Mesh(mesh::Args),
@@ -67,7 +67,7 @@ enum Command {
     Sample(sample::Args),
     /// Print value and gradient of the field at given points
     Eval(eval::Args),
-    /// Describe a cloud, a volume or a field
+    /// Describe a cloud, a mesh, a volume or a field
     Info(info::Args),
     /// Measure the errors of a field against its input again, and draw them
     Check(check::Args),

@@ -29,7 +29,7 @@ pub struct Args {
     /// Density of the surface [default: as for mesh]
     #[arg(long, value_name = "V", value_parser = finite, allow_negative_numbers = true)]
     iso: Option<f64>,
-    /// Cells along the longest side of the box [default: as many as the picture shows, at most two in a knot interval]
+    /// Cells along the longest side of the box [default: as many as the picture shows, at most eight in a knot interval]
     #[arg(long, value_name = "N", value_parser = between::<u32>(1, 65535))]
     resolution: Option<u32>,
     /// Width and height in pixels
@@ -106,8 +106,8 @@ pub fn run(args: &Args) -> Outcome {
     let bar = Bar::new();
     let options = PolygonizeOptions {
         iso: open.iso_or(args.iso, &source)?,
-        // Colours come from the normals of the field; what is left of the chord's error is below a pixel.
-        placement: Placement::Linear,
+        // Colours come from the normals of the field; a tenth of a cell is a quarter of a pixel.
+        placement: Placement::RootFinding { tolerance: 0.1 },
         ..Default::default()
     };
     let mut mesher = Mesher {
@@ -121,9 +121,9 @@ pub fn run(args: &Args) -> Outcome {
         return Err(open.no_surface(&source, options.iso));
     }
     let view = args.view(&whole);
-    let part = Part::new(&view, &whole);
     let cells = args.resolution.unwrap_or_else(|| cells_for(&open, &view));
     let frame = open.frame_of_resolution(cells);
+    let part = Part::new(&view, &whole, frame.world_from_grid.matrix3.x_axis.length());
     let (mesh, _, frame) = if args.zoom == 1.0 && args.at.is_none() {
         mesher.on(frame)?
     } else {
@@ -206,7 +206,7 @@ const CELL_PIXELS: f64 = 2.5;
 fn cells_for(open: &OpenField, view: &View) -> u32 {
     let sides = open.lattice().spacing(0) * open.lattice().extent();
     let shown = (sides.max_element() * view.pixels_per_length / CELL_PIXELS).ceil();
-    let finest = open.frame_of_subdivision(2).cells.into_iter().max().unwrap_or(1);
+    let finest = open.frame_of_subdivision(8).cells.into_iter().max().unwrap_or(1);
     (shown as u32).clamp(16, finest.clamp(16, 65535))
 }
 

@@ -46,7 +46,7 @@ pub struct Args {
     /// Threads to work with [default: all cores]
     #[arg(long, value_name = "N", value_parser = threads)]
     threads: Option<NonZeroUsize>,
-    /// Print one JSON object a step, and one at the end
+    /// Print one JSON object for each step, and one at the end
     #[arg(long)]
     pub json: bool,
 }

@@ -31,7 +31,14 @@ pub struct Source {
 pub fn input_formats() -> PossibleValuesParser {
     PossibleValuesParser::new([
         "ply", "obj", "xyz", "pcd", "las", "laz", "e57", "stl", "gltf", "glb", "3mf", "wrl", "nii", "nrrd",
-        "mha", "tif", "iclay",
+        "mha", "tif",
+    ])
+}
+
+/// The same where points are needed; a mesh gives its vertices.
+pub fn point_formats() -> PossibleValuesParser {
+    PossibleValuesParser::new([
+        "ply", "obj", "xyz", "pcd", "las", "laz", "e57", "stl", "gltf", "glb", "3mf", "wrl",
     ])
 }
 

@@ -10,9 +10,9 @@ use super::failure::{Failure, Outcome, explain};
 /// How to tell inside from outside where a cloud has no normals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Unoriented {
-    /// Consistency of the winding number with the normals.
+    /// By the winding number of the points: takes noise, holes and outliers.
     Winding,
-    /// Exterior tagged from outside; needs closed surfaces.
+    /// By flooding the space outside; needs closed surfaces.
     Tagging,
 }
 

@@ -14,12 +14,12 @@ pub struct Part {
     sides: [(DVec3, DVec3); 4],
 }
 
-/// Pixels round the picture that belong to it, so that the cut is never seen.
-const RIM: f64 = 8.0;
+/// Cells round the picture that belong to it, and pixels, so that the ragged edge of the cut is never seen.
+const RIM: f64 = 4.0;
 
 impl Part {
-    /// What `view` shows of `whole`, which is not empty.
-    pub fn new(view: &View, whole: &Mesh) -> Self {
+    /// What `view` shows of `whole`, which is not empty, if it is meshed with cells of side `cell`.
+    pub fn new(view: &View, whole: &Mesh, cell: f64) -> Self {
         let center = view.axes * view.center;
         let toward = view.axes.row(2);
         let depths = whole.positions.iter().map(|p| toward.dot(*p));
@@ -28,7 +28,9 @@ impl Part {
         });
         // The whole is a coarse mesh: what sticks out of it is seen too.
         let slack = 0.1 * (far - near);
-        let [x, y] = view.size.map(|n| (0.5 * n as f64 + RIM) / view.pixels_per_length);
+        let [x, y] = view
+            .size
+            .map(|n| (0.5 * n as f64 + RIM) / view.pixels_per_length + RIM * cell);
         let world_from_view = view.axes.transpose();
         let corners = std::array::from_fn(|i| {
             let side = |bit: usize, half: f64| if i >> bit & 1 == 1 { half } else { -half };
@@ -94,13 +96,13 @@ mod tests {
             positions: vec![DVec3::splat(-1.0), DVec3::splat(1.0)],
             ..Default::default()
         };
-        let part = Part::new(&view, &whole);
+        let part = Part::new(&view, &whole, 0.0);
         let cut = part
             .cut(Arc::new(Sphere::new(DVec3::ZERO, 10.0).unwrap()), 3.0)
             .unwrap();
         let inside =
             |x: f64, y: f64| cut.value(view.center + view.axes.transpose() * DVec3::new(x, y, 0.3)) > 3.0;
-        let [x, y] = [58.0 / 400.0, 33.0 / 400.0];
+        let [x, y] = [54.0 / 400.0, 29.0 / 400.0];
         for s in [-0.999, 0.999] {
             assert!(
                 inside(s * x, s * y)
@@ -120,6 +122,6 @@ mod tests {
             center: DVec3::splat(50.0),
             ..view
         };
-        assert!(Part::new(&away, &whole).within(&frame).is_none());
+        assert!(Part::new(&away, &whole, 0.0).within(&frame).is_none());
     }
 }

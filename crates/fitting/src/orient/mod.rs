@@ -7,13 +7,13 @@
 mod band;
 mod cloud;
 mod confidence;
-mod kernel;
+pub(crate) mod kernel;
 mod local;
 mod outliers;
 mod sampling;
 mod surface;
 mod tagging;
-mod tree;
+pub(crate) mod tree;
 mod winding;
 
 use glam::DVec3;

@@ -17,6 +17,7 @@ mod invented;
 mod iteration_growth;
 pub(crate) mod noise;
 mod pairs;
+mod pieces;
 mod plan;
 mod residual;
 pub use residual::newton_distance;
@@ -60,6 +61,8 @@ pub enum NormalForm {
     OffsetPairs,
 }
 
+/// Points that a fit needs.
+const LEAST_POINTS: usize = 10;
 /// Rounds of conditions against pieces that no sample speaks for.
 const REPAIR_ROUNDS: i32 = 3;
 
@@ -95,7 +98,7 @@ pub fn fit_points<T: Real>(
         directions::refine::<T>(&mut samples, &plan, control)?;
     }
     control.step("fitting coarse levels", 0.05)?;
-    let base = if options.robust {
+    let mut base = if options.robust {
         robust::reweigh::<T>(&mut samples, &plan, control)?
     } else {
         coarse::solve(&samples, plan.beta, false)
@@ -103,10 +106,21 @@ pub fn fit_points<T: Real>(
     if options.robust {
         samples.notes.push(robust::account(&samples));
     }
+    let turned = far_field::settle(&mut base, &samples);
+    if turned > 0 {
+        samples.notes.push(format!(
+            "the sign of {turned} coefficients far from all points was turned over: the winding number of the points \
+             contradicts them"
+        ));
+    }
     if let (Some(sigma), Some(beta)) = (noise, plan.second_beta) {
         let first = cascade::run::<T>(&samples, &base, &plan, 0.09..0.1, control)?;
         let field = assemble::assemble(&samples, &base, &first.levels);
-        samples = feet::on_feet(&samples, &field, sigma);
+        let on_feet = feet::on_feet(&samples, &field, sigma);
+        if on_feet.live_points().count() >= LEAST_POINTS {
+            samples = on_feet;
+            plan.beta = beta;
+        }
         let without = samples.weights.iter().filter(|w| **w == 0.0).count();
         if without > 0 && !options.robust {
             samples.notes.push(format!(
@@ -114,7 +128,6 @@ pub fn fit_points<T: Real>(
                 samples.positions.len()
             ));
         }
-        plan.beta = beta;
     }
     if let Some(sigma) = noise {
         let start = plan.smoothing.at(plan.max_depth, plan.max_depth);
@@ -137,7 +150,7 @@ pub fn fit_points<T: Real>(
         let end = 0.9 - 0.3 * 0.5f64.powi(rounds);
         let cascade = cascade::run::<T>(&samples, &base, &plan, begin..end, control)?;
         let field = assemble::assemble(&samples, &base, &cascade.levels);
-        let conditions = far_field::conditions(&field, &samples);
+        let conditions = pieces::conditions(&field, &samples);
         if conditions.is_empty() || rounds == REPAIR_ROUNDS {
             break (cascade, field);
         }

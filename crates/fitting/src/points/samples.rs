@@ -3,6 +3,7 @@
 use bspline::hierarchical::Lattice;
 use glam::{DAffine3, DMat3, DVec3};
 
+use super::LEAST_POINTS;
 use crate::FitError;
 
 /// Points with normals, as given. Normals point outward and need no unit length.
@@ -122,10 +123,10 @@ impl Samples {
             with_normal - kept.len(),
             "farther than ten extents from the bulk of the points",
         );
-        if kept.len() < 10 {
+        if kept.len() < LEAST_POINTS {
             return Err(FitError::NotEnoughSamples {
                 found: kept.len(),
-                needed: 10,
+                needed: LEAST_POINTS,
             });
         }
         let (min, max) = extent(cloud.positions, &kept);
