@@ -42,7 +42,7 @@ fn project(field: &dyn Field, p: DVec3, spacing: f64) -> Projected {
             };
         }
     };
-    // Hartmann (1999): step in the tangent plane below `p`, then back to the surface.
+    // [Hartmann99]: step in the tangent plane below `p`, then back to the surface.
     let mut distance = p.distance(foot);
     for _ in 0..SLIDES {
         let offset = p - foot;

@@ -74,8 +74,7 @@ impl TriangleTree {
     }
 }
 
-/// Nearest point of a triangle, by the seven regions of its plane (Ericson, *Real-Time Collision Detection*, 2005,
-/// §5.1.5), and whether it is inside the triangle.
+/// Nearest point of a triangle, by the seven regions of its plane [Ericson05 §5.1.5], and whether it is inside the triangle.
 #[inline]
 pub(crate) fn closest_point(p: DVec3, &[a, b, c]: &[DVec3; 3]) -> (DVec3, bool) {
     let (ab, ac, ap) = (b - a, c - a, p - a);
