@@ -324,6 +324,93 @@ fn trim_leaves_holes_open_and_says_how_much_was_invented() {
     assert_eq!(far["triangles"], whole["triangles"]);
 }
 
+/// What the fit says of a field, what the field remembers, and what is measured again are the same figures, to the bit.
+#[test]
+fn fit_info_and_check_agree() {
+    let bench = Bench::new();
+    bench.json("phantom cup -o clean.ply --count 9000");
+    bench.json("phantom cup -o noisy.ply --count 9000 --noise 1%");
+    bench.json("phantom head -o head.nii --size 40 --noise 2%");
+    for (input, options) in [
+        ("clean.ply", ""),
+        ("clean.ply", "--tolerance 1e-5 --max-depth 7"),
+        ("clean.ply", "--coefficients 50000 --precision f64"),
+        ("clean.ply", "--unoriented"),
+        ("clean.ply", "--method offset-pairs"),
+        ("noisy.ply", ""),
+        ("noisy.ply", "--robust"),
+        ("noisy.ply", "--unoriented --robust"),
+        ("head.nii", ""),
+        ("head.nii", "--tolerance 2%"),
+        ("head.nii", "--coefficients 3000"),
+        ("head.nii", "--smoothing 0.5 --precision f64"),
+        ("head.nii", "--method interpolate"),
+    ] {
+        let fit = bench.json(&format!("fit {input} -o field.iclay {options}"));
+        let info = bench.json("info field.iclay");
+        let check = bench.json(&format!("check field.iclay {input}"));
+        for key in [
+            "input_count",
+            "used_count",
+            "coefficients",
+            "rms",
+            "p95",
+            "max",
+            "bound",
+            "leaves",
+        ] {
+            let value = number(&fit, key);
+            assert_eq!(value, number(&info, key), "{input} {options}: {key} of info");
+            assert_eq!(value, number(&check, key), "{input} {options}: {key} of check");
+        }
+        assert_eq!(
+            fit["leaves_over_tolerance"], check["leaves_over_tolerance"],
+            "{input} {options}"
+        );
+        assert_eq!(
+            fit["leaves_over_tolerance"], info["leaves_over_tolerance"],
+            "{input} {options}"
+        );
+        assert!(
+            number(&fit, "bound") >= number(&fit, "max"),
+            "{input} {options}: {fit}"
+        );
+    }
+}
+
+/// A field is not measured against what it was not fitted to, unless that is asked for.
+#[test]
+fn check_refuses_what_does_not_belong_together() {
+    let bench = Bench::new();
+    bench.json("phantom sphere -o ball.ply --count 3000");
+    bench.json("phantom sphere -o other.ply --count 3000 --seed 2");
+    bench.json("phantom head -o head.nii --size 24");
+    bench.json("phantom head -o noisy.nii --size 24 --noise 1%");
+    bench.json("fit ball.ply -o ball.iclay");
+    bench.json("fit head.nii -o head.iclay");
+    for (field, input, word) in [
+        ("ball.iclay", "other.ply", "other samples"),
+        ("ball.iclay", "head.nii", "fitted to a cloud"),
+        ("head.iclay", "noisy.nii", "other samples"),
+        ("head.iclay", "ball.ply", "fitted to a volume"),
+        ("head.iclay", "head.nii --stride 2", "other samples"),
+    ] {
+        let run = bench.run(&format!("check {field} {input} -o report"));
+        assert_eq!(run.code, 2, "{field} {input}: {}", run.stderr);
+        assert!(
+            run.stderr.contains(word) && run.stderr.contains("--anyway"),
+            "{}",
+            run.stderr
+        );
+        assert!(!bench.path("report").exists());
+        let anyway = bench.json(&format!("check {field} {input} --anyway"));
+        assert!(number(&anyway, "max") > 0.0, "{anyway}");
+    }
+    // The same samples in another file are the same input.
+    bench.json("convert ball.ply ball.xyz");
+    bench.json("check ball.iclay ball.xyz");
+}
+
 /// Every option of every command answers a wrong value with exit code 2 or 3 and a message that names the option and the
 /// value and says what would be right. `cli::tests` sees to it that no option is missing in the table.
 #[test]

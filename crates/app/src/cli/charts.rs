@@ -89,8 +89,7 @@ impl Args {
 
 /// Runs the sweeps and draws the charts.
 pub fn run(args: &Args) -> Outcome {
-    let cancel = Cancel::new();
-    interrupt::cancel_on_interrupt(&cancel)?;
+    let cancel = interrupt::cancel();
     match &args.subject {
         Subject::Fit(args) => fits(args, &cancel),
         Subject::Orient(args) => chart_orient::run(args, &cancel),

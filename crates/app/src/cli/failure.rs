@@ -127,6 +127,15 @@ impl<T, E: Into<anyhow::Error>> OrFail<T> for Result<T, E> {
 
 impl From<FitError> for Failure {
     fn from(e: FitError) -> Self {
+        if let FitError::Option {
+            option,
+            value,
+            requirement,
+        } = e
+        {
+            let option = option.trim_start_matches("--").replace('_', "-");
+            return Self::usage(format!("--{option} {value}: {requirement}"));
+        }
         let cause = match e {
             FitError::Cancelled | FitError::MemoryLimit { .. } => Cause::Limit,
             FitError::NotEnoughSamples { .. } | FitError::Degenerate(_) => Cause::Input,

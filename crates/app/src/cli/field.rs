@@ -33,6 +33,9 @@ struct StoredReport {
     noise: Option<f64>,
     tolerance: f64,
     smoothing: f64,
+    /// [`FitReport::left_out`], each less the one before.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    left_out: Vec<u32>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     signs: Option<StoredSigns>,
 }
@@ -90,6 +93,14 @@ impl OpenField {
             noise: stored.noise,
             tolerance: stored.tolerance,
             smoothing: stored.smoothing,
+            left_out: stored
+                .left_out
+                .iter()
+                .scan(0u32, |at, step| {
+                    *at = at.saturating_add(*step);
+                    Some(*at)
+                })
+                .collect(),
             signs: stored.signs.map(|s| signs(s, &loaded.meta.sign_confidence)),
             leaves,
             notes: loaded.meta.notes.clone(),
@@ -275,6 +286,10 @@ pub fn save(output: &Output, field: &AnyField, report: &FitReport, meta: FieldMe
         noise: report.noise,
         tolerance: report.tolerance,
         smoothing: report.smoothing,
+        left_out: {
+            let before = [0].iter().chain(&report.left_out);
+            report.left_out.iter().zip(before).map(|(i, b)| i - b).collect()
+        },
         signs: report.signs.as_ref().map(|s| StoredSigns {
             route: s.route.name().into(),
             outlier_count: s.outlier_count,
@@ -329,9 +344,11 @@ fn signs(stored: StoredSigns, leaf_confidence: &[f32]) -> SignReport {
 
 fn leaf(r: &LeafRecord) -> Option<Leaf> {
     use StopReason::*;
-    let reason = [Tolerance, Depth, NoData, Noise, Budget, Memory, Neighbours]
-        .into_iter()
-        .find(|s| *s as u8 == r.reason)?;
+    let reason = [
+        Tolerance, Depth, NoData, Noise, Budget, Memory, Neighbours, Smoothing,
+    ]
+    .into_iter()
+    .find(|s| *s as u8 == r.reason)?;
     Some(Leaf {
         level: r.level,
         cell: r.cell,

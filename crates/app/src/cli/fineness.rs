@@ -318,7 +318,7 @@ impl<'a> Adaptive<'a> {
 }
 
 /// Shows progress between two shares of the whole and listens for the user's wish to stop.
-fn watch<'a>(
+pub fn watch<'a>(
     cancel: &'a Cancel,
     bar: &'a Bar,
     from: f64,
@@ -326,7 +326,7 @@ fn watch<'a>(
 ) -> impl FnMut(f64) -> ControlFlow<()> + 'a {
     move |fraction| {
         bar.show("meshing", from + (to - from) * fraction);
-        if cancel.is_cancelled() {
+        if cancel.is_cancelled() || ceiling::is_exceeded() {
             ControlFlow::Break(())
         } else {
             ControlFlow::Continue(())
@@ -337,6 +337,9 @@ fn watch<'a>(
 /// What a failure of the mesher means to the user.
 pub fn failed(e: PolygonizeError) -> Failure {
     match e {
+        PolygonizeError::Cancelled if ceiling::is_exceeded() => Failure::limit(
+            "the mesh takes more than --memory allows; raise it, or lower --resolution or --triangles",
+        ),
         PolygonizeError::Cancelled => fitting::FitError::Cancelled.into(),
         PolygonizeError::TooManyBlocks { .. } | PolygonizeError::TooManyVertices { .. } => Failure::limit(
             format!("{e}: lower --resolution or --triangles, or raise --tolerance"),

@@ -5,7 +5,7 @@ use clap::ValueEnum;
 use fitting::mesh::{MeshDefects, MeshOptions, fit_mesh};
 use fitting::points::{NormalForm, OrientedPoints, PointOptions, fit_points};
 use fitting::volume::{VolumeMethod, VolumeOptions, VolumeView, fit_volume, otsu_threshold};
-use fitting::{Cancel, Control, FitError, FitReport, StopReason};
+use fitting::{Control, FitError, FitReport, StopReason};
 use formats::Unit;
 use formats::field::{AnyField, FieldMeta, SourceKind, Stored};
 use formats::meshes::TriangleMesh;
@@ -15,15 +15,15 @@ use formats::volumes::Volume;
 use super::cost::Cost;
 use super::failure::{Failure, Outcome, explain};
 use super::field::{self, either};
-use super::input::{self, Input, Shape, bounding_box, remaining};
+use super::input::{self, Input, Shape, bounding_box};
 use super::output::Output;
 use super::progress::Bar;
-use super::quantity::{Memory, Tolerance, between, count, positive, threads};
+use super::quantity::{Memory, Tolerance, between, count, human_number, positive, threads};
 use super::source::{SAMPLES, Source, input_formats};
 use super::summary::Summary;
 use super::unoriented::{Oriented, Unoriented};
 use super::volume_choice::VolumeChoice;
-use super::{flags, interrupt, set_threads};
+use super::{belongs, ceiling, flags, interrupt, set_threads};
 
 /// Arguments of `isoclay fit`.
 #[derive(clap::Args)]
@@ -145,8 +145,7 @@ pub struct Fitted {
 /// Fits a file and writes the field.
 pub fn run(args: &Args) -> Outcome {
     let cost = Cost::start();
-    let cancel = Cancel::new();
-    interrupt::cancel_on_interrupt(&cancel)?;
+    let cancel = interrupt::cancel();
     let source = Source::open(&args.input, args.format.as_deref(), SAMPLES, &cancel)?;
     let output = Output::check("-o", &args.output, &["iclay"], None, &[&source])?;
     set_threads(args.threads)?;
@@ -158,7 +157,10 @@ pub fn run(args: &Args) -> Outcome {
     let mut control = Control {
         on_progress: Box::new(move |p| shown.show(p.stage, p.fraction)),
         cancel,
-        memory_limit: args.memory.map(remaining),
+        memory_limit: args
+            .memory
+            .or_else(ceiling::limit)
+            .map(|m| m.0.saturating_sub(ceiling::PROGRAM + input.bytes())),
     };
     let fitted = fit(&input, &args.choice, &mut control)
         .map_err(|f| if f.code() == 3 { f.about(source.name()) } else { f })?;
@@ -168,7 +170,10 @@ pub fn run(args: &Args) -> Outcome {
         source: fitted.source,
         unit: fitted.unit,
         iso: fitted.iso,
-        provenance: provenance(args),
+        provenance: belongs::provenance(
+            &input,
+            args.input.file_name().map(|n| n.to_string_lossy().into_owned()),
+        ),
         ..Default::default()
     };
     let sha256 = field::save(&output, &fitted.field, &fitted.report, meta)?;
@@ -181,19 +186,51 @@ pub fn run(args: &Args) -> Outcome {
     .print_after(&output, args.json)
 }
 
-/// Where the field comes from, for the file: enough to make it again.
-fn provenance(args: &Args) -> String {
-    let options: Vec<String> = std::env::args().skip(1).collect();
-    serde_json::json!({
-        "program": concat!("isoclay ", env!("CARGO_PKG_VERSION")),
-        "input": args.input.file_name().map(|n| n.to_string_lossy()),
-        "arguments": options,
-    })
-    .to_string()
-}
-
 /// Fits an input as chosen.
 pub fn fit(input: &Input, choice: &Choice, control: &mut Control) -> Outcome<Fitted> {
+    let mut fitted = fit_as(input, choice, control)?;
+    let notes = limits_met(&fitted.report);
+    fitted.report.notes.extend(notes);
+    Ok(fitted)
+}
+
+/// What the user's limits left undone.
+fn limits_met(report: &FitReport) -> impl Iterator<Item = String> + use<> {
+    let limits = [
+        ("--memory", StopReason::Memory),
+        ("--coefficients", StopReason::Budget),
+    ];
+    let total = report.leaves.len();
+    let counts = limits.map(|(option, reason)| {
+        let stopped = report.leaves.iter().filter(|l| l.reason == reason).count();
+        (option, stopped)
+    });
+    counts.into_iter().filter(|c| c.1 > 0).map(move |(option, stopped)| {
+        format!("{stopped} of {total} leaves are coarser than the tolerance asks for: {option} leaves no room for more")
+    })
+}
+
+/// A doubt about a tolerance that the user gave, on an object of this `size` whose numbers are as large as `magnitude`.
+fn tolerance_doubt(choice: &Choice, tolerance: f64, size: f64, magnitude: f64) -> Option<String> {
+    choice.tolerance?;
+    let finest = magnitude * f64::from(f32::EPSILON) / 2.0;
+    if tolerance >= size {
+        let (t, s) = (human_number(tolerance), human_number(size));
+        Some(format!(
+            "--tolerance {t} is larger than the object itself ({s}): the field may miss it altogether"
+        ))
+    } else if tolerance < finest && choice.precision == Precision::F32 {
+        Some(format!(
+            "--tolerance {} is finer than 32-bit coefficients can be ({}): use --precision f64",
+            human_number(tolerance),
+            human_number(finest)
+        ))
+    } else {
+        None
+    }
+}
+
+fn fit_as(input: &Input, choice: &Choice, control: &mut Control) -> Outcome<Fitted> {
     match (input, choice.precision) {
         (Input::Cloud(cloud), Precision::F32) => fit_cloud::<f32>(cloud, choice, control),
         (Input::Cloud(cloud), Precision::F64) => fit_cloud::<f64>(cloud, choice, control),
@@ -219,6 +256,9 @@ fn fit_cloud<T: Stored>(cloud: &PointCloud, choice: &Choice, control: &mut Contr
         return Err(FitError::NotEnoughSamples { found: 0, needed: 10 }.into());
     }
     let oriented = Oriented::new(cloud, choice.unoriented, control)?;
+    if let Some(limit) = &mut control.memory_limit {
+        *limit = limit.saturating_sub(oriented.bytes());
+    }
     let unit = stated_unit(cloud.unit, choice.unit)?;
     let points = OrientedPoints {
         positions: oriented.positions(),
@@ -241,6 +281,9 @@ fn fit_cloud<T: Stored>(cloud: &PointCloud, choice: &Choice, control: &mut Contr
     let (field, mut report) = fit_points::<T>(&points, &options, control).map_err(|e| explain(e, control))?;
     oriented.complete(&mut report, field.lattice());
     report.notes.splice(0..0, cloud.notes.iter().cloned());
+    report
+        .notes
+        .extend(tolerance_doubt(choice, report.tolerance, diagonal, diagonal));
     Ok(Fitted {
         field: T::any(field),
         report,
@@ -378,7 +421,7 @@ impl Fitted {
     /// The fit's part of a summary.
     pub fn summary(&self, input: &Input) -> Summary {
         let r = &self.report;
-        let over = |l: &&fitting::Leaf| f64::from(l.rms) > r.tolerance;
+        let over = |l: &&fitting::Leaf| l.is_above(r.tolerance);
         // An interpolating fit aims at none.
         let has_tolerance = r.tolerance > 0.0;
         Summary {

@@ -271,8 +271,19 @@ fn of_field(open: &OpenField) -> Vec<Entry> {
         entry("rms", "error rms", human_number(report.rms), report.rms),
         entry("p95", "error p95", human_number(report.p95), report.p95),
         entry("max", "error max", human_number(report.max), report.max),
+        entry(
+            "bound",
+            "bound on |residual|",
+            human_number(report.bound),
+            report.bound,
+        ),
         count("leaves", "leaves", report.leaves.len()),
     ];
+    // An interpolating fit aims at none.
+    if report.tolerance > 0.0 {
+        let above = report.leaves.iter().filter(|l| l.is_above(report.tolerance));
+        entries.push(count("leaves_over_tolerance", "  over tolerance", above.count()));
+    }
     entries.push(entry(
         "field_sha256",
         "field sha256",

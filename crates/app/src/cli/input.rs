@@ -6,11 +6,11 @@ use formats::volumes::{Volume, VolumeFormat, VolumeOptions};
 use formats::{Fault, FormatError, Kind, ReadLimits, Unit};
 use glam::DVec3;
 
-use super::cost;
 use super::failure::{Failure, Outcome};
 use super::quantity::Memory;
 use super::source::Source;
 use super::volume_choice::VolumeChoice;
+use super::{ceiling, cost};
 
 /// Something that can be fitted.
 pub enum Input {
@@ -20,6 +20,22 @@ pub enum Input {
     Mesh(TriangleMesh),
     /// Voxels.
     Volume(Volume),
+}
+
+impl Input {
+    /// Bytes that it holds.
+    pub fn bytes(&self) -> u64 {
+        let bytes = match self {
+            Self::Cloud(c) => (1 + usize::from(c.normals.is_some())) * size_of_val(&c.positions[..]),
+            Self::Mesh(m) => {
+                size_of_val(&m.vertices[..])
+                    + size_of_val(&m.triangles[..])
+                    + m.colors.as_deref().map_or(0, size_of_val)
+            }
+            Self::Volume(v) => size_of_val(&v.values[..]),
+        };
+        bytes as u64
+    }
 }
 
 /// What to take a file with vertices and faces for.
@@ -100,9 +116,11 @@ pub fn kind(source: &Source, choice: &VolumeChoice, part: &VolumeOptions) -> Out
 
 /// What reading may hold: the ceiling of the user less what the process holds already.
 pub fn limits(memory: Option<Memory>) -> ReadLimits {
-    memory.map_or_else(ReadLimits::default, |m| ReadLimits {
-        max_bytes: remaining(m),
-    })
+    memory
+        .or_else(ceiling::limit)
+        .map_or_else(ReadLimits::default, |m| ReadLimits {
+            max_bytes: remaining(m),
+        })
 }
 
 /// Bytes of the user's ceiling that are still free.

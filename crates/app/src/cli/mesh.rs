@@ -1,5 +1,4 @@
 use std::num::NonZeroUsize;
-use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use bspline::polygonize::{Mesh, MeshReport, PolygonizeOptions, polygonize_with};
@@ -10,7 +9,7 @@ use formats::field::SourceKind;
 use super::cost::Cost;
 use super::failure::{Failure, Outcome};
 use super::field::OpenField;
-use super::fineness::{Adaptive, Fineness, failed};
+use super::fineness::{Adaptive, Fineness, failed, watch};
 use super::mesh_output::{MESHES, MeshOutput};
 use super::output::Output;
 use super::progress::Bar;
@@ -18,7 +17,7 @@ use super::quantity::{Tolerance, between, finite, human_number, threads};
 use super::source::{FIELDS, Source};
 use super::summary::Summary;
 use super::trim::{self, Sampled};
-use super::{interrupt, set_threads};
+use super::{ceiling, interrupt, set_threads};
 
 /// Arguments of `isoclay mesh`.
 #[derive(clap::Args)]
@@ -76,8 +75,7 @@ const MANY: usize = 4_000_000;
 /// Meshes a field file.
 pub fn run(args: &Args) -> Outcome {
     let cost = Cost::start();
-    let cancel = Cancel::new();
-    interrupt::cancel_on_interrupt(&cancel)?;
+    let cancel = interrupt::cancel();
     let format = args.written.format.as_deref();
     let field = Source::open(&args.field, None, FIELDS, &cancel)?;
     let output = Output::check("-o", &args.output, &MESHES, format, &[&field])?;
@@ -229,14 +227,7 @@ impl Mesher<'_> {
     /// Meshes the cells of `frame`.
     pub fn on(&mut self, frame: Frame) -> Outcome<(Mesh, MeshReport, Frame)> {
         let (cancel, bar) = (self.cancel, self.bar);
-        let mut progress = |fraction| {
-            bar.show("meshing", fraction);
-            if cancel.is_cancelled() {
-                ControlFlow::Break(())
-            } else {
-                ControlFlow::Continue(())
-            }
-        };
+        let mut progress = watch(cancel, bar, 0.0, 1.0);
         let (mesh, report) =
             polygonize_with(self.field, &frame, &self.options, &mut progress).map_err(failed)?;
         Ok((mesh, report, frame))

@@ -2,6 +2,8 @@
 //!
 //! Exit codes: 0 done, 2 wrong usage, 3 bad input, 4 a limit was reached or the work was cancelled.
 
+mod belongs;
+mod ceiling;
 mod chart_dynamics;
 mod chart_orient;
 mod charts;
@@ -44,6 +46,7 @@ use std::process::ExitCode;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use failure::{Failure, OrFail, Outcome, error_object};
+use quantity::Memory;
 
 /// Turns scans into elastic clay: point clouds and volumes become implicit B-spline solids and watertight
 /// meshes.
@@ -52,6 +55,9 @@ use failure::{Failure, OrFail, Outcome, error_object};
 struct Cli {
     #[command(subcommand)]
     command: Command,
+    /// Memory that the process may hold, such as 2GiB
+    #[arg(long, global = true, value_name = "SIZE")]
+    memory: Option<Memory>,
 }
 
 const EXIT_CODES: &str =
@@ -104,7 +110,8 @@ pub fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(e) => return refuse(&e),
     };
-    let outcome = match &cli.command {
+    let ready = interrupt::listen().and_then(|()| cli.memory.map_or(Ok(()), ceiling::hold));
+    let outcome = ready.and_then(|()| match &cli.command {
         Command::Fit(a) => fit::run(a),
         Command::Mesh(a) => mesh::run(a),
         Command::Sample(a) => sample::run(a),
@@ -116,7 +123,7 @@ pub fn main() -> ExitCode {
         Command::Picture(a) => picture::run(a),
         Command::Simulate(a) => simulate::run(a),
         Command::Charts(a) => charts::run(a),
-    };
+    });
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(f) if f.is_broken_pipe() => ExitCode::SUCCESS,

@@ -3,7 +3,6 @@ use std::path::PathBuf;
 
 use bspline::polygonize::{Mesh, Placement, PolygonizeOptions};
 use clap::ValueEnum;
-use fitting::Cancel;
 use glam::DVec3;
 
 use super::cost::Cost;
@@ -97,8 +96,7 @@ fn point(s: &str) -> Result<DVec3, String> {
 /// Draws a field file.
 pub fn run(args: &Args) -> Outcome {
     let cost = Cost::start();
-    let cancel = Cancel::new();
-    interrupt::cancel_on_interrupt(&cancel)?;
+    let cancel = interrupt::cancel();
     let source = Source::open(&args.field, None, FIELDS, &cancel)?;
     let output = Output::check("-o", &args.output, &["png"], None, &[&source])?;
     set_threads(args.threads)?;

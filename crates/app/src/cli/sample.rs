@@ -61,8 +61,7 @@ const SLAB: usize = 16;
 /// Writes the field at the voxel centres of another volume and holds no more than a few slices of it.
 pub fn run(args: &Args) -> Outcome {
     let cost = Cost::start();
-    let cancel = Cancel::new();
-    interrupt::cancel_on_interrupt(&cancel)?;
+    let cancel = interrupt::cancel();
     let like = Source::open(&args.like, None, source::VOLUMES, &cancel)?.under("--like");
     let field = Source::open(&args.field, None, FIELDS, &cancel)?;
     let output = Output::check(

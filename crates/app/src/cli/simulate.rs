@@ -71,8 +71,7 @@ struct Total {
 /// Runs a scene and writes the field that it leaves.
 pub fn run(args: &Args) -> Outcome {
     let cost = Cost::start();
-    let cancel = Cancel::new();
-    interrupt::cancel_on_interrupt(&cancel)?;
+    let cancel = interrupt::cancel();
     let script = Source::open(&args.scene, Some("toml"), "scenes .toml", &cancel)?;
     let output = Output::check("-o", &args.output, &["iclay"], None, &[&script])?;
     let mesh = (args.mesh.as_ref())

@@ -481,6 +481,7 @@ impl Octree<'_> {
             tolerance,
             smoothing: BENDING,
             leaves: leaves.collect(),
+            left_out: Vec::new(),
             signs: None,
             notes: Vec::new(),
         }

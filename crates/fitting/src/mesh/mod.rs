@@ -21,7 +21,7 @@ use glam::DVec3;
 pub use defects::MeshDefects;
 pub use distance::MeshDistance;
 
-use crate::points::{BASE_DEPTH, MAX_DEPTH};
+use crate::points::check_limits;
 use crate::{Control, FitError, FitReport};
 
 /// What the caller may choose; `None` is chosen from the data.
@@ -29,9 +29,10 @@ use crate::{Control, FitError, FitReport};
 pub struct MeshOptions {
     /// Largest error of the signed distance in the band, world units; 1e-4 of the diagonal if not given.
     pub tolerance: Option<f64>,
-    /// No level is begun once so many coefficients are spent.
+    /// Largest number of coefficients, at least [`LEAST_COEFFICIENTS`](crate::points::LEAST_COEFFICIENTS): no level is
+    /// begun that would exceed it.
     pub coefficients: Option<usize>,
-    /// Deepest level: `2^max_depth` cells along the box; 10 if not given.
+    /// Deepest level: `2^max_depth` cells along the box, from 6 to 16; 10 if not given.
     pub max_depth: Option<usize>,
     /// Half the width of the band round the surface in which the tolerance holds, world units; 8 tolerances if not
     /// given. Beyond it the error may grow by a quarter of the way out.
@@ -85,6 +86,7 @@ pub fn fit_mesh<T: Real>(
             });
         }
     }
+    check_limits(options.coefficients, options.max_depth)?;
     control.step("sorting triangles", 0.0)?;
     control.reserve(levels::bytes::<T>(0, 0, triangles.len(), vertices.len()))?;
     let (mesh, defects) = MeshDistance::new(vertices, triangles)?;
@@ -92,10 +94,7 @@ pub fn fit_mesh<T: Real>(
     let plan = Plan {
         tolerance,
         band: options.band.map_or(DEFAULT_BAND * tolerance, |b| b / mesh.scale),
-        max_depth: options
-            .max_depth
-            .unwrap_or(DEFAULT_DEPTH)
-            .clamp(BASE_DEPTH + 1, MAX_DEPTH),
+        max_depth: options.max_depth.unwrap_or(DEFAULT_DEPTH),
         coefficients: options.coefficients,
     };
     let (field, mut report) = levels::fit(&mesh, &plan, triangles.len(), vertices.len(), control)?;

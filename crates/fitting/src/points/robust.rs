@@ -72,7 +72,7 @@ pub(crate) fn reweigh<T: Real>(
             max_depth: depth,
             ..plan.clone()
         };
-        let quiet = &mut Control::default();
+        let quiet = &mut control.quiet();
         let fit = cascade::run::<T>(samples, &base, &shallow, 0.0..1.0, quiet)?;
         let field = assemble::assemble(samples, &base, &fit.levels);
         weigh(samples, &field, 0.5f64.powi(depth as i32));

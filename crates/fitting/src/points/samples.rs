@@ -59,7 +59,12 @@ pub(crate) struct Entry {
     pub weight: f32,
     /// Share of the part of the gradient across the normal.
     pub certainty: f32,
+    /// Which of the points given it is; [`ADDED`] for a condition.
+    pub source: u32,
 }
+
+/// Source of a condition that is no point of the cloud.
+pub(crate) const ADDED: u32 = u32::MAX;
 
 /// The usable samples in Morton order of their position.
 #[derive(Debug)]
@@ -74,6 +79,8 @@ pub(crate) struct Samples {
     pub weights: Vec<f32>,
     /// Of that, the share of the part of the gradient across the normal, `0..=1`.
     pub certainty: Vec<f32>,
+    /// Which of the points given each is; [`ADDED`] for a condition.
+    pub source: Vec<u32>,
     /// Where the points were measured, unit box, if they were moved from there.
     measured: Option<Vec<DVec3>>,
     /// Edge of the (cubic) box in world units.
@@ -167,6 +174,7 @@ impl Samples {
             targets,
             weights: vec![1.0; keyed.len()],
             certainty,
+            source: keyed.iter().map(|k| k.1).collect(),
             measured: None,
             scale,
             origin,
@@ -212,6 +220,7 @@ impl Samples {
             target: self.targets[index],
             weight: self.weights[index],
             certainty: self.certainty[index],
+            source: self.source[index],
         }
     }
 
@@ -227,6 +236,7 @@ impl Samples {
             targets: sorted().map(|e| e.target).collect(),
             weights: sorted().map(|e| e.weight).collect(),
             certainty: sorted().map(|e| e.certainty).collect(),
+            source: sorted().map(|e| e.source).collect(),
             measured: is_moved.then(|| sorted().map(|e| e.measured).collect()),
             notes: self.notes.clone(),
             ..*self
@@ -243,6 +253,7 @@ impl Samples {
             target,
             weight: 1.0,
             certainty: 1.0,
+            source: ADDED,
         }));
         self.with_entries(entries)
     }

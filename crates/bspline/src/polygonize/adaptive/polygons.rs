@@ -297,7 +297,13 @@ impl Numbered<'_> {
         if t < s {
             (s, t) = (t, s);
         }
-        extras.push(([s[0], s[1], s[2], t[0], t[1], t[2]], (p + q) * (0.5 * scale)));
+        // Off the straight line, on which the vertex of a leaf may lie that has these two crossings only.
+        let mut center = DVec3::from_array(std::array::from_fn(|a| {
+            f64::from(CELLS as i32 * block.key[a] + small.local[a] as i32) + 0.5
+        }));
+        center[axis] += if way > 0 { 0.5 } else { -0.5 };
+        let at = 0.75 * (0.5 * (p + q)) + 0.25 * center;
+        extras.push(([s[0], s[1], s[2], t[0], t[1], t[2]], at * scale));
         Some(EXTRA + extras.len() as u32 - 1)
     }
 }
