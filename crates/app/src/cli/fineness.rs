@@ -2,10 +2,10 @@
 
 use std::ops::ControlFlow;
 
+use bspline::Frame;
 use bspline::polygonize::{
     AdaptiveMesh, AdaptiveMesher, AdaptiveOptions, AdaptiveReport, Mesh, PolygonizeError,
 };
-use bspline::{Field, Frame};
 use fitting::Cancel;
 use formats::field::SourceKind;
 use glam::DVec3;
@@ -27,11 +27,10 @@ pub enum Fineness {
     Triangles(usize),
 }
 
-/// Chord error that a cell is divided at over the one that 95 % of the settled triangles keep: 3.4 to 5 on scans and
-/// phantoms.
-const SPARE: f64 = 3.6;
+/// Chord error that a cell is divided at over the one that 95 % of the centres and sides of settled triangles keep.
+const SPARE: f64 = 3.2;
 /// Share of the triangles asked for that is aimed at.
-const AIM: f64 = 0.93;
+const AIM: f64 = 0.96;
 /// Least share of the triangles asked for.
 const LEAST: f64 = 0.8;
 /// Trials until the best found is taken.
@@ -42,8 +41,8 @@ const MEASURED: usize = 1 << 14;
 /// A field being meshed as finely as it needs.
 pub struct Adaptive<'a> {
     mesher: AdaptiveMesher<'a>,
-    field: &'a dyn Field,
-    iso: f64,
+    open: &'a OpenField,
+    options: AdaptiveOptions,
     frame: Frame,
     cancel: &'a Cancel,
     bar: &'a Bar,
@@ -53,7 +52,7 @@ pub struct Adaptive<'a> {
 pub struct Meshed {
     pub mesh: Mesh,
     pub report: AdaptiveReport,
-    /// Chord error that 95 % of the triangles keep.
+    /// Chord error that 95 % of the centres and sides of the triangles keep.
     pub error: f64,
 }
 
@@ -67,38 +66,57 @@ impl<'a> Adaptive<'a> {
         cancel: &'a Cancel,
         bar: &'a Bar,
     ) -> Outcome<Self> {
-        let lattice = open.lattice();
-        let frame = Frame {
-            world_from_grid: lattice.world_from_lattice,
-            cells: lattice.cells,
-        };
-        let finest = open.level_count() - 1;
+        let mut cells = open.lattice().cells;
+        // Larger cells than the lattice's own, where they are whole: the fewest triangles are few.
+        let mut above = 0;
+        while cells.iter().all(|n| n % 2 == 0 && *n >= 8) {
+            cells = cells.map(|n| n / 2);
+            above += 1;
+        }
         // Voxels lie no closer than the finest knots; a cloud's surface bends within their intervals.
         let beyond = match (open.source(), fineness) {
             (SourceKind::Volume, Fineness::OfTheFit) => 0,
             _ => 2,
         };
-        let longest = lattice.cells.into_iter().max().unwrap_or(1);
+        let finest = open.level_count() - 1 + above;
+        let longest = cells.into_iter().max().unwrap_or(1);
         let options = AdaptiveOptions {
             iso,
             open: !capped,
-            depth: (finest + beyond).min(AdaptiveOptions::most_depth(longest)),
+            // Room for cells of half the size.
+            depth: (finest + beyond).min(AdaptiveOptions::most_depth(2 * longest)),
             detection: finest + 1,
             ..AdaptiveOptions::default()
         };
+        let frame = open.frame(cells);
         let mesher = AdaptiveMesher::new(open.field(), &frame, &options, &mut watch(cancel, bar, 0.0, 0.1));
         Ok(Self {
             mesher: mesher.map_err(failed)?,
-            field: open.field(),
-            iso,
+            open,
+            options,
             frame,
             cancel,
             bar,
         })
     }
 
+    /// Starts again with the coarsest cells `finer` times as fine: what bends evenly all over needs cells of one size,
+    /// and halving alone would leave a factor of four between the numbers of triangles.
+    fn rescale(&mut self, finer: f64) -> Outcome {
+        let cells = self
+            .frame
+            .cells
+            .map(|n| ((f64::from(n) * finer).round() as u32).clamp(1, 2 * n));
+        self.frame = self.open.frame(cells);
+        let progress = &mut watch(self.cancel, self.bar, 0.1, 0.2);
+        self.mesher =
+            AdaptiveMesher::new(self.open.field(), &self.frame, &self.options, progress).map_err(failed)?;
+        Ok(())
+    }
+
     /// Makes the mesh.
-    pub fn mesh(&mut self, open: &OpenField, fineness: Fineness, notes: &mut Vec<String>) -> Outcome<Meshed> {
+    pub fn mesh(&mut self, fineness: Fineness, notes: &mut Vec<String>) -> Outcome<Meshed> {
+        let open = self.open;
         let diagonal = self
             .frame
             .world_box([0; 3], self.frame.cells.map(i64::from))
@@ -116,14 +134,14 @@ impl<'a> Adaptive<'a> {
                 } else {
                     1e-4 * diagonal
                 };
-                self.within(wanted, notes)
+                self.within(wanted, true, notes)
             }
             Fineness::Error(tolerance) => {
                 // Per cent are of the solid's own diagonal, which a coarse mesh tells well enough.
                 let around = self.at(1e-3 * diagonal, false)?.mesh.bounding_box();
                 let size = around.map_or(diagonal, |b| b.size().length());
                 let wanted = tolerance.length(size, open.unit()).map_err(Failure::usage)?;
-                self.within(wanted, notes)
+                self.within(wanted, false, notes)
             }
             Fineness::Triangles(most) => self.with_triangles(most, 1e-4 * diagonal, notes),
         }
@@ -140,42 +158,52 @@ impl<'a> Adaptive<'a> {
         Ok(Meshed { mesh, report, error })
     }
 
-    /// The coarsest mesh found of which 95 % keep the error `wanted`.
-    fn within(&mut self, wanted: f64, notes: &mut Vec<String>) -> Outcome<Meshed> {
+    /// The coarsest mesh found of which 95 % keep the error `wanted`; with `any`, the first.
+    fn within(&mut self, wanted: f64, any: bool, notes: &mut Vec<String>) -> Outcome<Meshed> {
         let mut of_cells = SPARE * wanted;
         let mut best: Option<Meshed> = None;
+        // Errors of cells that kept what is wanted and that did not.
+        let (mut met, mut missed) = (0.0, f64::INFINITY);
+        let mut is_rescaled = false;
         for _ in 0..TRIALS {
             let trial = self.at(of_cells, true)?;
-            if trial.mesh.triangles.is_empty() {
+            let (error, count) = (trial.error, trial.mesh.triangles.len());
+            if count == 0 {
                 return Ok(trial);
             }
-            let error = trial.error;
-            let at_limit = trial.report.leaves_at_limit > 0 && error > wanted;
-            let met = error <= wanted;
-            let coarser = met
-                && best
-                    .as_ref()
-                    .is_none_or(|b| trial.mesh.triangles.len() < b.mesh.triangles.len());
-            let had = best.is_some();
-            if coarser || (at_limit && best.is_none()) {
+            let exhausted = trial.report.leaves_at_limit > 0 && of_cells < 1e-2 * wanted;
+            let is_met = error <= wanted;
+            let coarser = best.as_ref().is_none_or(|b| count < b.mesh.triangles.len());
+            if (is_met && coarser) || (exhausted && best.is_none()) {
                 best = Some(trial);
             }
-            // Within a third of what will do, or as fine as the cells may be, or finer than one that did.
-            if (met && error > 0.66 * wanted) || (!met && had) {
+            if (is_met && (any || error > 0.66 * wanted)) || exhausted {
                 break;
+            }
+            if is_met {
+                met = of_cells;
+            } else {
+                missed = of_cells;
             }
             // Errors of the cells and of the triangles rise together.
-            let factor = (0.85 * wanted / error).clamp(0.1, 4.0);
-            if at_limit && of_cells < 1e-3 * wanted {
-                break;
+            let next = of_cells * (0.85 * wanted / error).clamp(0.1, 4.0);
+            if met > 0.0 && met * 1.3 > missed {
+                let kept = best.as_ref().map_or(wanted, |b| b.error);
+                if is_rescaled || kept > 0.66 * wanted {
+                    break;
+                }
+                self.rescale((kept / (0.8 * wanted)).sqrt())?;
+                is_rescaled = true;
+                (met, missed, of_cells) = (0.0, f64::INFINITY, met);
+                continue;
             }
-            of_cells *= factor;
+            of_cells = next.clamp(met * 1.15, missed / 1.15);
         }
         let best = best.ok_or_else(|| {
             Failure::limit("the tolerance asked for needs more cells than can be meshed; raise --tolerance")
         })?;
         notes.push(format!(
-            "95 % of the triangles lie within {} of the surface, at their centres and sides",
+            "95 % of the centres and sides of the triangles lie within {} of the surface",
             human_number(best.error)
         ));
         if best.error > wanted {
@@ -192,24 +220,24 @@ impl<'a> Adaptive<'a> {
     fn with_triangles(&mut self, most: usize, start: f64, notes: &mut Vec<String>) -> Outcome<Meshed> {
         let (cancel, bar) = (self.cancel, self.bar);
         let target = AIM * most as f64;
-        // Errors with too many triangles and with few enough.
-        let (mut fine, mut coarse): (Option<f64>, Option<f64>) = (None, None);
+        // Errors with too many triangles, and with few enough and how many.
+        let (mut fine, mut coarse): (Option<f64>, Option<(f64, f64)>) = (None, None);
         let (mut error, mut last) = (start, None);
-        for _ in 0..3 * TRIALS {
+        let mut is_rescaled = false;
+        for _ in 0..4 * TRIALS {
             let count = self
                 .mesher
                 .estimate(error, &mut watch(cancel, bar, 0.1, 0.5))
                 .map_err(failed)? as f64;
-            if count == 0.0
-                || (LEAST.max(AIM - 0.05) * most as f64..=(AIM + 0.04) * most as f64).contains(&count)
-            {
-                coarse = Some(error);
+            let share = count / most as f64;
+            if count == 0.0 || (AIM - 0.05..=AIM + 0.03).contains(&share) {
+                coarse = Some((error, count));
                 break;
             }
             if count > target {
                 fine = Some(error);
             } else {
-                coarse = Some(error);
+                coarse = Some((error, count));
                 // Nothing is left to divide.
                 if last == Some(count) && fine.is_none() {
                     break;
@@ -217,13 +245,22 @@ impl<'a> Adaptive<'a> {
             }
             last = Some(count);
             error = match (fine, coarse) {
-                (Some(f), Some(c)) if c / f < 1.001 => break,
-                (Some(f), Some(c)) => {
+                (Some(f), Some((c, few))) if c / f < 1.001 => {
+                    if is_rescaled || few > LEAST * most as f64 {
+                        break;
+                    }
+                    self.rescale((target / few).sqrt())?;
+                    is_rescaled = true;
+                    (fine, coarse, last) = (None, None, None);
+                    c
+                }
+                (Some(f), Some((c, _))) => {
                     (error * (count / target)).clamp(f * (c / f).powf(0.1), f * (c / f).powf(0.9))
                 }
                 _ => error * (count / target).clamp(0.2, 8.0),
             };
         }
+        let coarse = coarse.map(|c| c.0);
         let mut error = coarse.or(fine).unwrap_or(start);
         for _ in 0..TRIALS {
             let made = self.at(error, true)?;
@@ -237,7 +274,7 @@ impl<'a> Adaptive<'a> {
                     ));
                 }
                 notes.push(format!(
-                    "95 % of the triangles lie within {} of the surface, at their centres and sides",
+                    "95 % of the centres and sides of the triangles lie within {} of the surface",
                     human_number(made.error)
                 ));
                 return Ok(made);
@@ -250,8 +287,8 @@ impl<'a> Adaptive<'a> {
         )))
     }
 
-    /// 95th percentile over the triangles of the largest distance to the surface, to first order, of their centres and
-    /// the middles of their sides. What lies on the frame's box belongs to the cut and does not count.
+    /// 95th percentile over the triangles of the distance to the surface, to first order, of their centres and the
+    /// middles of their sides. What lies on the frame's box belongs to the cut and does not count.
     fn chord_error(&self, mesh: &Mesh) -> f64 {
         let grid = self.frame.world_from_grid.inverse();
         let end = DVec3::from_array(self.frame.cells.map(f64::from));
@@ -267,10 +304,10 @@ impl<'a> Adaptive<'a> {
                     return None;
                 }
                 let mut answers = [(0.0, DVec3::ZERO); 4];
-                self.field.values_gradients(&points, &mut answers);
-                let off = answers.map(|(f, g)| (f - self.iso).abs() / g.length());
-                Some(off.into_iter().fold(0.0, f64::max))
+                self.open.field().values_gradients(&points, &mut answers);
+                Some(answers.map(|(f, g)| (f - self.options.iso).abs() / g.length()))
             })
+            .flatten_iter()
             .collect();
         if errors.is_empty() {
             return 0.0;
@@ -281,7 +318,7 @@ impl<'a> Adaptive<'a> {
 }
 
 /// Shows progress between two shares of the whole and listens for the user's wish to stop.
-fn watch<'a>(
+pub fn watch<'a>(
     cancel: &'a Cancel,
     bar: &'a Bar,
     from: f64,
@@ -289,7 +326,7 @@ fn watch<'a>(
 ) -> impl FnMut(f64) -> ControlFlow<()> + 'a {
     move |fraction| {
         bar.show("meshing", from + (to - from) * fraction);
-        if cancel.is_cancelled() {
+        if cancel.is_cancelled() || ceiling::is_exceeded() {
             ControlFlow::Break(())
         } else {
             ControlFlow::Continue(())
@@ -300,6 +337,9 @@ fn watch<'a>(
 /// What a failure of the mesher means to the user.
 pub fn failed(e: PolygonizeError) -> Failure {
     match e {
+        PolygonizeError::Cancelled if ceiling::is_exceeded() => Failure::limit(
+            "the mesh takes more than --memory allows; raise it, or lower --resolution or --triangles",
+        ),
         PolygonizeError::Cancelled => fitting::FitError::Cancelled.into(),
         PolygonizeError::TooManyBlocks { .. } | PolygonizeError::TooManyVertices { .. } => Failure::limit(
             format!("{e}: lower --resolution or --triangles, or raise --tolerance"),

@@ -67,7 +67,7 @@ impl Grids {
         };
         let bits = |axis: usize| (0..CELLS).fold(0u64, |m, i| m | u64::from(is_in(axis, i)) << i);
         let (y, z) = (bits(1), bits(2));
-        let plane = (0..CELLS).fold(0, |m, j| m | (y >> j & 1) * (z << (CELLS * j)));
+        let plane = (0..CELLS).fold(0, |m, j| m | ((y >> j & 1) * (z << (CELLS * j))));
         std::array::from_fn(|i| if is_in(0, i) { plane } else { 0 })
     }
 

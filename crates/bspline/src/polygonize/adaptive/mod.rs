@@ -9,6 +9,7 @@
 mod around;
 mod cases;
 mod grid;
+mod live;
 mod polygons;
 mod sample;
 mod surface;
@@ -16,9 +17,12 @@ mod tree;
 mod vertices;
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use glam::DVec3;
 use rayon::prelude::*;
+
+pub use self::live::AdaptiveBlockMesh;
 
 use self::around::Around;
 use self::grid::Grids;
@@ -117,20 +121,7 @@ impl<'a> AdaptiveMesher<'a> {
         options: &AdaptiveOptions,
         progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
     ) -> Result<Self, PolygonizeError> {
-        let plain = PolygonizeOptions {
-            iso: options.iso,
-            max_blocks: options.max_blocks,
-            ..Default::default()
-        };
-        super::validate(frame, &plain)?;
-        let max = (1u32 << PLACE_BITS)
-            .checked_shr(options.depth as u32)
-            .unwrap_or(0)
-            .saturating_sub(2);
-        if frame.cells.iter().any(|&n| n > max) {
-            let cells = frame.cells;
-            return Err(PolygonizeError::Cells { cells, max });
-        }
+        let plain = checked(frame, options, 1.0)?;
         let grid = BlockGrid { frame, open: false };
         let (roots, _) = find_blocks(field, &grid, &plain, None, &mut *progress)?;
         Ok(Self {
@@ -154,9 +145,7 @@ impl<'a> AdaptiveMesher<'a> {
 
     /// The octree whose cells keep a chord error `κ h²/8`.
     fn grow(&mut self, error: f64, watch: &mut Watch) -> Result<Tree, PolygonizeError> {
-        if !(error.is_finite() && error > 0.0) {
-            return Err(PolygonizeError::Error { error });
-        }
+        checked(&self.grids.frames[0], &self.options, error)?;
         let limits = Limits {
             error,
             depth: self.options.depth,
@@ -194,14 +183,30 @@ impl<'a> AdaptiveMesher<'a> {
         progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
     ) -> Result<(AdaptiveMesh, AdaptiveReport), PolygonizeError> {
         let tree = self.grow(error, &mut |_| progress(0.0))?;
-        let report = self.report(&tree, error);
+        let report = report_of(&self.samples, &tree, &self.options, error);
         let placer = Placer {
             field: self.field,
             grids: &self.grids,
             iso: self.options.iso,
-            steps: 2,
+            steps: STEPS,
         };
-        let (mut made, report) = contour(&placer, &tree, self.options.open, report)?;
+        let vertices = tree
+            .iter()
+            .enumerate()
+            .map(|(level, blocks)| {
+                let place = |scratch: &mut vertices::Scratch, block| {
+                    Arc::new(BlockVertices::new(
+                        &placer,
+                        &Around::new(&tree, level, block),
+                        scratch,
+                    ))
+                };
+                let blocks = blocks.par_iter().with_min_len(4);
+                blocks.map_init(vertices::Scratch::default, place).collect()
+            })
+            .collect::<Vec<_>>();
+        let (mut made, report) = contour(&placer, &tree, &vertices, self.options.open, report)?;
+        drop(vertices);
         drop(tree);
         if progress(0.5).is_break() {
             return Err(PolygonizeError::Cancelled);
@@ -225,50 +230,65 @@ impl<'a> AdaptiveMesher<'a> {
         }
         Ok((made, report))
     }
+}
 
-    fn report(&self, tree: &Tree, error: f64) -> AdaptiveReport {
-        let mut report = AdaptiveReport {
-            blocks: self.samples.len() as u64,
-            crossed_leaves: tree::crossed_leaves(tree),
-            nan_nodes: self.samples.nan_nodes(),
-            ..Default::default()
-        };
-        if let Some(last) = tree.get(self.options.depth) {
-            for block in last {
-                let sample: &Sample = &block.sample;
-                for c in grid::each(tree::leaves(block)) {
-                    if f64::from(sample.error[grid::cell_index(c)]) > error {
-                        report.leaves_at_limit += 1;
-                        report.creased_leaves += u64::from(grid::holds(&sample.creased, c));
-                    }
-                }
+/// Newton steps that take a vertex onto the surface: two, as the second is the size of the square of the first.
+const STEPS: usize = 2;
+
+/// What is common with other meshes, if all of it makes sense.
+fn checked(
+    frame: &Frame,
+    options: &AdaptiveOptions,
+    error: f64,
+) -> Result<PolygonizeOptions, PolygonizeError> {
+    let plain = PolygonizeOptions {
+        iso: options.iso,
+        max_blocks: options.max_blocks,
+        ..Default::default()
+    };
+    super::validate(frame, &plain)?;
+    let room = (1u32 << PLACE_BITS)
+        .checked_shr(options.depth as u32)
+        .unwrap_or(0);
+    let max = room.saturating_sub(2);
+    if frame.cells.iter().any(|&n| n > max) {
+        let cells = frame.cells;
+        return Err(PolygonizeError::Cells { cells, max });
+    }
+    if !(error.is_finite() && error > 0.0) {
+        return Err(PolygonizeError::Error { error });
+    }
+    Ok(plain)
+}
+
+fn report_of(samples: &Samples, tree: &Tree, options: &AdaptiveOptions, error: f64) -> AdaptiveReport {
+    let mut report = AdaptiveReport {
+        blocks: samples.len() as u64,
+        crossed_leaves: tree::crossed_leaves(tree),
+        nan_nodes: samples.nan_nodes(),
+        ..Default::default()
+    };
+    for block in tree.get(options.depth).into_iter().flatten() {
+        let sample: &Sample = &block.sample;
+        for c in grid::each(tree::leaves(block)) {
+            if f64::from(sample.error[grid::cell_index(c)]) > error {
+                report.leaves_at_limit += 1;
+                report.creased_leaves += u64::from(grid::holds(&sample.creased, c));
             }
         }
-        report
     }
+    report
 }
 
 /// Vertices and triangles of an octree.
 fn contour(
     placer: &Placer,
     tree: &Tree,
+    vertices: &[Vec<Arc<BlockVertices>>],
     open: bool,
     mut report: AdaptiveReport,
 ) -> Result<(AdaptiveMesh, AdaptiveReport), PolygonizeError> {
     let depth = placer.grids.depth();
-    let vertices: Vec<Vec<BlockVertices>> = tree
-        .iter()
-        .enumerate()
-        .map(|(level, blocks)| {
-            let found = blocks
-                .par_iter()
-                .with_min_len(4)
-                .map_init(vertices::Scratch::default, |scratch, block| {
-                    BlockVertices::new(placer, &Around::new(tree, level, block), scratch)
-                });
-            found.collect()
-        })
-        .collect();
     // Blocks in the order of space, so that what is close in it is close in the mesh.
     let mut order: Vec<(u64, usize, usize)> = tree
         .iter()
@@ -291,7 +311,7 @@ fn contour(
         return Err(PolygonizeError::TooManyVertices { vertices: total });
     }
     let numbered = Numbered {
-        vertices: &vertices,
+        vertices,
         first: &first,
         cells: placer.grids.frames[0].cells.map(|n| n as i32),
         mirrored: placer.grids.mirrored,
@@ -343,14 +363,11 @@ fn add_extras(
     parts: &[BlockTriangles],
     made: &mut AdaptiveMesh,
 ) -> Vec<Vec<u32>> {
-    let mut all: Vec<(ExtraKey, usize, DVec3)> = Vec::new();
+    let mut all: Vec<(ExtraKey, DVec3)> = Vec::new();
     for (part, &(_, level, _)) in parts.iter().zip(order) {
         let frame = &placer.grids.frames[level];
-        all.extend(
-            part.extras
-                .iter()
-                .map(|(key, p)| (*key, level, frame.world_from_grid.transform_point3(*p))),
-        );
+        let placed = part.extras.iter();
+        all.extend(placed.map(|(key, p)| (*key, frame.world_from_grid.transform_point3(*p))));
     }
     if all.is_empty() {
         return parts.iter().map(|_| Vec::new()).collect();
@@ -358,12 +375,8 @@ fn add_extras(
     all.sort_by_key(|e| e.0);
     all.dedup_by_key(|e| e.0);
     let first = made.mesh.positions.len() as u32;
-    let mut answers = Vec::new();
-    for (key, level, p) in &all {
-        let mut p = [*p];
-        let longest = 0.1 * placer.grids.size(*level).min_element();
-        vertices::project(placer, &mut p, &[false], longest, &mut answers);
-        made.mesh.positions.push(p[0]);
+    for (key, p) in &all {
+        made.mesh.positions.push(*p);
         made.keys
             .push(key.iter().fold(u64::MAX, |hash, k| mixed(hash ^ *k as u64)));
         // Kept where they are: a piece of surface that is thinner than the cells hangs on them.

@@ -1,5 +1,7 @@
 //! The triangles: one polygon for each minimal edge that the surface crosses, through the leaves about it.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
 use super::around::{Around, State};
@@ -14,7 +16,7 @@ pub(super) const EXTRA: u32 = 1 << 31;
 
 /// All vertices, by level and block, and the number of the first one of each block.
 pub(super) struct Numbered<'a> {
-    pub vertices: &'a [Vec<BlockVertices>],
+    pub vertices: &'a [Vec<Arc<BlockVertices>>],
     pub first: &'a [Vec<u32>],
     /// Coarsest cells of the frame.
     pub cells: [i32; 3],
@@ -295,7 +297,13 @@ impl Numbered<'_> {
         if t < s {
             (s, t) = (t, s);
         }
-        extras.push(([s[0], s[1], s[2], t[0], t[1], t[2]], (p + q) * (0.5 * scale)));
+        // Off the straight line, on which the vertex of a leaf may lie that has these two crossings only.
+        let mut center = DVec3::from_array(std::array::from_fn(|a| {
+            f64::from(CELLS as i32 * block.key[a] + small.local[a] as i32) + 0.5
+        }));
+        center[axis] += if way > 0 { 0.5 } else { -0.5 };
+        let at = 0.75 * (0.5 * (p + q)) + 0.25 * center;
+        extras.push(([s[0], s[1], s[2], t[0], t[1], t[2]], at * scale));
         Some(EXTRA + extras.len() as u32 - 1)
     }
 }

@@ -338,8 +338,9 @@ fn may_peak(v: &[f32; 8], bend: f64, size: DVec3) -> bool {
         f64::from(sum.abs()) * 0.25
     };
     let steepest = (rise(4) / size.x).max(rise(2) / size.y).max(rise(1) / size.z);
-    // Also where one of them is not a number.
-    !(steepest > bend * square.sqrt())
+    let is_steep = steepest > bend * square.sqrt();
+    // Not where one of them is not a number.
+    !is_steep
 }
 
 /// How often a cell is halved to see whether a piece of the surface hides in it.

@@ -258,8 +258,13 @@ pub(super) fn ends(crossing: Crossing) -> [[i32; 3]; 2] {
 }
 
 /// Where the straight line through the values at a crossing's ends crosses the surface, in grid coordinates of the
-/// level of `around`; `c` is the leaf. Beyond the frame a crossing stands at the last node within.
-pub(super) fn crossing_point(around: &Around, c: [usize; 3], crossing: Crossing, cells: [i32; 3]) -> DVec3 {
+/// level of `around`; `c` is the leaf. `None`, with the last node within, of an edge that leaves the frame.
+pub(super) fn crossing_on(
+    around: &Around,
+    c: [usize; 3],
+    crossing: Crossing,
+    cells: [i32; 3],
+) -> (Option<DVec3>, DVec3) {
     let own = around.block.key.map(|b| 8 * b);
     let base: [i32; 3] = std::array::from_fn(|a| own[a] + c[a] as i32);
     let [a, b] = ends(crossing);
@@ -269,13 +274,33 @@ pub(super) fn crossing_point(around: &Around, c: [usize; 3], crossing: Crossing,
     match (is_in(a), is_in(b)) {
         (true, true) => {
             let [v, w] = [a, b].map(|n| f64::from(value(around, c, n)));
-            let t = v / (v - w);
-            p + (q - p) * if t.is_finite() { t.clamp(0.0, 1.0) } else { 0.5 }
+            let point = p + (q - p) * share(v, w);
+            (Some(point), point)
         }
-        (true, false) => p,
-        _ => q,
+        (true, false) => (None, p),
+        _ => (None, q),
     }
 }
+
+/// The place of [`crossing_on`].
+pub(super) fn crossing_point(around: &Around, c: [usize; 3], crossing: Crossing, cells: [i32; 3]) -> DVec3 {
+    crossing_on(around, c, crossing, cells).1
+}
+
+/// Where along an edge with the values `v`, `w` at its ends the surface crosses: never at an end, which other edges
+/// have too.
+#[inline(always)]
+pub(super) fn share(v: f64, w: f64) -> f64 {
+    let t = v / (v - w);
+    if t.is_finite() {
+        t.clamp(MARGIN, 1.0 - MARGIN)
+    } else {
+        0.5
+    }
+}
+
+/// Share of an edge that crossings, and vertices of a leaf, keep from its ends: no two vertices are then one point.
+pub(super) const MARGIN: f64 = 1.0 / 256.0;
 
 /// Value at a node of a leaf's surface, in half cells from its first corner.
 fn value(around: &Around, c: [usize; 3], n: [i32; 3]) -> f32 {

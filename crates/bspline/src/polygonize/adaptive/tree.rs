@@ -75,6 +75,13 @@ impl Samples {
         Some(&level[at].1)
     }
 
+    /// Forgets the blocks that `is_stale` names.
+    pub fn forget(&mut self, is_stale: impl Fn(usize, BlockKey) -> bool) {
+        for (n, level) in self.0.iter_mut().enumerate() {
+            level.retain(|(key, _)| !is_stale(n, *key));
+        }
+    }
+
     /// Sees to it that the cells of `sets` are judged; blocks that are not there are sampled.
     pub fn add(
         &mut self,

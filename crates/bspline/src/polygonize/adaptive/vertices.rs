@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::around::Around;
 use super::cases;
 use super::grid::{CELL_COUNT, Cells, Grids, NODE_COUNT, cell_index, each, holds, node_index};
-use super::surface::{Crossing, LeafSurface, Segment, crossing_point};
+use super::surface::{Crossing, LeafSurface, MARGIN, Segment, crossing_on, share};
 use super::tree::leaves;
 use crate::Field;
 use crate::polygonize::blocks::CELLS;
@@ -31,6 +31,8 @@ pub(super) struct BlockVertices {
     pub keys: Vec<u64>,
     /// Vertices on the cap, which stay where they are.
     pub fixed: Vec<bool>,
+    /// Vertices of leaves with several loops, which stay amid their crossings: sheets that close may have the same foot.
+    amid: Vec<bool>,
 }
 
 /// What to place vertices by.
@@ -90,6 +92,7 @@ impl BlockVertices {
             positions: Vec::new(),
             keys: Vec::new(),
             fixed: Vec::new(),
+            amid: Vec::new(),
         };
         scratch.cells.clear();
         let candidates: Cells = std::array::from_fn(|x| leaves[x] & (crossed[x] | beside[x]));
@@ -105,7 +108,7 @@ impl BlockVertices {
                 made.push(
                     mean_of_edges(&block.sample.values, c, case.edges) + place(own),
                     key,
-                    false,
+                    [false; 2],
                 );
                 scratch.cells.push(cell);
                 continue;
@@ -123,14 +126,14 @@ impl BlockVertices {
                         .iter()
                         .filter(move |s| usize::from(s.of_loop) == n)
                 };
-                let points = own_segments().map(|s| crossing_point(around, c, s.from, cells));
+                let points = own_segments().map(|s| crossing_on(around, c, s.from, cells));
                 let at = if capped {
                     cap_vertex(placer, level, cell, cells, points)
                 } else {
                     let count = own_segments().count() as f64;
-                    points.sum::<DVec3>() / count
+                    points.map(|p| p.1).sum::<DVec3>() / count
                 };
-                made.push(at, key + n as u64, capped);
+                made.push(at, key + n as u64, [capped, surface.loops > 1]);
                 scratch.cells.push(cell);
             }
             if surface.loops > 1 {
@@ -151,10 +154,11 @@ impl BlockVertices {
         made
     }
 
-    fn push(&mut self, at: DVec3, key: u64, fixed: bool) {
+    fn push(&mut self, at: DVec3, key: u64, [fixed, amid]: [bool; 2]) {
         self.positions.push(at);
         self.keys.push(key);
         self.fixed.push(fixed);
+        self.amid.push(fixed || amid);
     }
 
     /// Moves the vertices, given in the grid's coordinates, onto the surface and into the world.
@@ -179,14 +183,14 @@ impl BlockVertices {
             }
             // Kept in its leaf, so that the triangles do not pass through each other.
             let q = grid_from_world.transform_point3(*p);
-            let low = DVec3::from_array(scratch.cells[n].map(f64::from));
-            let inside = q.clamp(low, low + 1.0);
-            if q != inside {
-                let start = starts[n];
+            let low = place(scratch.cells[n]) + MARGIN;
+            let high = place(scratch.cells[n]) + (1.0 - MARGIN);
+            if q != q.clamp(low, high) {
+                let start = starts[n].clamp(low, high);
                 let way = q - start;
                 let share = (0..3)
                     .map(|a| match way[a] {
-                        w if w > 0.0 => (low[a] + 1.0 - start[a]) / w,
+                        w if w > 0.0 => (high[a] - start[a]) / w,
                         w if w < 0.0 => (low[a] - start[a]) / w,
                         _ => 1.0,
                     })
@@ -199,7 +203,7 @@ impl BlockVertices {
 }
 
 /// Newton steps onto the surface, none longer than `longest`.
-pub(super) fn project(
+fn project(
     placer: &Placer,
     positions: &mut [DVec3],
     fixed: &[bool],
@@ -244,15 +248,10 @@ fn mean_of_edges(values: &[f32; NODE_COUNT], c: [usize; 3], edges: u16) -> DVec3
         let mut high = low;
         high[axis] += 1;
         let (v, w) = (values[node_index(low)], values[node_index(high)]);
-        let t = v / (v - w);
         for a in 0..3 {
             sum[a] += low[a] as f64;
         }
-        sum[axis] += if t.is_finite() {
-            f64::from(t.clamp(0.0, 1.0))
-        } else {
-            0.5
-        };
+        sum[axis] += share(f64::from(v), f64::from(w));
         count += 1.0;
     }
     DVec3::from_array(sum) / count
@@ -265,14 +264,13 @@ fn cap_vertex(
     level: usize,
     cell: [i32; 3],
     cells: [i32; 3],
-    points: impl Iterator<Item = DVec3>,
+    points: impl Iterator<Item = (Option<DVec3>, DVec3)>,
 ) -> DVec3 {
-    let is_node = |p: &DVec3| *p == p.round();
-    let points: Vec<DVec3> = points.collect();
-    let border: Vec<DVec3> = points.iter().copied().filter(|p| !is_node(p)).collect();
+    let (border, nodes): (Vec<Option<DVec3>>, Vec<DVec3>) = points.unzip();
+    let border: Vec<DVec3> = border.into_iter().flatten().collect();
     let mean = |points: &[DVec3]| points.iter().sum::<DVec3>() / points.len() as f64;
     if border.is_empty() {
-        return mean(&points);
+        return mean(&nodes);
     }
     let start = mean(&border);
     // Along the frame's face only.
@@ -292,7 +290,6 @@ fn cap_vertex(
             p += step.clamp_length_max(0.5);
         }
     }
-    let low = place(cell);
-    let kept = p.clamp(low, low + 1.0);
+    let kept = p.clamp(place(cell) + MARGIN, place(cell) + (1.0 - MARGIN));
     DVec3::select(free.cmpeq(DVec3::ONE), kept, start)
 }
