@@ -5,12 +5,13 @@ use std::path::PathBuf;
 use bspline::Frame;
 use fitting::Cancel;
 
+use super::charts::publish;
 use super::cost::cpu_seconds;
 use super::failure::{Failure, OrFail, Outcome};
 use super::field::OpenField;
 use super::fineness::failed;
-use super::input::writing;
 use super::progress::Bar;
+use super::staged::StagedFiles;
 use crate::charts::{Chart, MeshSubject, MeshTrial};
 
 /// Arguments of `isoclay charts mesh`.
@@ -26,8 +27,6 @@ pub struct Args {
 
 /// Meshes every field in every way, prints a line of CSV each, and draws them.
 pub fn run(args: &Args, cancel: &Cancel) -> Outcome {
-    super::charts::make(&args.output)?;
-    let mut out = io::stdout().lock();
     for path in &args.fields {
         let open = OpenField::load(path)?;
         let lattice = open.lattice();
@@ -53,19 +52,19 @@ pub fn run(args: &Args, cancel: &Cancel) -> Outcome {
         });
         bar.clear();
         let trials = trials.map_err(failed)?;
-        writeln!(out, "{}", MeshTrial::COLUMNS).or_limit()?;
+        writeln!(io::stdout().lock(), "{}", MeshTrial::COLUMNS).or_limit()?;
         for trial in &trials {
-            writeln!(out, "{}", trial.csv()).or_limit()?;
+            writeln!(io::stdout().lock(), "{}", trial.csv()).or_limit()?;
         }
         let name = path.file_stem().unwrap_or_default().to_string_lossy();
+        let mut staged = StagedFiles::new("-o", &args.output)?;
         for (suffix, against_time) in [("triangles", false), ("time", true)] {
             let svg = Chart::of_meshes(&name, against_time, &trials)
                 .svg()
                 .map_err(Failure::limit)?;
-            let target = args.output.join(format!("mesh-{name}-{suffix}.svg"));
-            formats::atomic::replace(&target, |out| out.write_all(svg.as_bytes())).map_err(writing)?;
-            writeln!(out, "written  {}", target.display()).or_limit()?;
+            staged.write_text(&format!("mesh-{name}-{suffix}.svg"), &svg)?;
         }
+        publish(staged, false)?;
     }
     Ok(())
 }

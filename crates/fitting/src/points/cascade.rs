@@ -8,6 +8,7 @@ use bspline::hierarchical::{BRICK, BrickKey, HALO};
 use super::NormalForm;
 use super::band::{Band, Coarser, REACH, bricks_near};
 use super::band_solve::{BandProblem, BandSample, BrickSamples, SolveReport};
+use super::between::Neighbours;
 use super::cells::{Cell, LeafCell, cell_quality, children, judge, keep_within, root_cells};
 use super::full_grid::FullGrid;
 use super::plan::Plan;
@@ -15,7 +16,7 @@ use super::samples::{BASE_DEPTH, Samples};
 use super::stencil::Spot;
 use crate::{Control, FitError, StopReason};
 
-/// Samples of a cell beyond this many are thinned on levels that will be refined again.
+/// Samples of a cell beyond this many are thinned.
 const SAMPLES_PER_CELL: u32 = 8;
 /// A whole cascade.
 pub(crate) struct Cascade<T> {
@@ -54,6 +55,7 @@ pub(crate) fn run<T: Real>(
     let mut worth: Vec<f64> = split.iter().map(|(c, _)| f64::from(c.end - c.start)).collect();
     let mut coarser: Option<Band<T>> = None;
     let mut coefficients = base.values.len();
+    let mut neighbours = None;
     for depth in BASE_DEPTH + 1..=plan.max_depth {
         if let Some(limit) = plan.coefficients {
             let room = limit.saturating_sub(coefficients);
@@ -87,7 +89,11 @@ pub(crate) fn run<T: Real>(
             None => Band::around(depth, &refined, &Coarser::Full(base)),
             Some(band) => Band::around(depth, &refined, &Coarser::Band(band)),
         };
-        let (list, bricks, owners) = band_samples(samples, &band, &cells, plan, depth);
+        if neighbours.is_none() && plan.is_sparse(depth) {
+            let ranges = cells.iter().filter(|c| c.refined).map(|c| c.start..c.end);
+            neighbours = Some(Neighbours::of(samples, ranges));
+        }
+        let (list, bricks, owners) = band_samples(samples, &band, &cells, neighbours.as_ref(), plan, depth);
         let problem = BandProblem::new(&band, &list, &bricks, plan.weights(depth));
         let (x, report) = problem.solve(plan.residual, plan.iterations);
         band.add_active(&x);
@@ -97,7 +103,10 @@ pub(crate) fn run<T: Real>(
         split.clear();
         worth.clear();
         for (cell, q) in cells.iter().zip(&quality) {
-            let verdict = judge(cell, q, plan, depth);
+            let spacing = neighbours
+                .as_ref()
+                .map_or(f32::INFINITY, |n| n.spacing[cell.start as usize]);
+            let verdict = judge(cell, q, spacing, plan, depth);
             split.push((*cell, cell.refined && verdict.is_ok()));
             worth.push(q.worth());
             if let (true, Err(reason)) = (cell.refined, verdict) {
@@ -138,18 +147,22 @@ pub(crate) fn level_bytes<T>(bricks: usize, sample_count: usize) -> u64 {
     (bricks * per_brick + sample_count * per_sample) as u64 + (8 << 20)
 }
 
-/// Samples of the cells whose brick is in the band, brick by brick; `owners[i]` is the cell of sample `i`.
+/// Samples of the cells whose brick is in the band, and the conditions between them, brick by brick; `owners[i]` is the
+/// cell of sample `i`.
 fn band_samples<T: Real>(
     samples: &Samples,
     band: &Band<T>,
     cells: &[Cell],
+    neighbours: Option<&Neighbours>,
     plan: &Plan,
     depth: usize,
 ) -> (Vec<BandSample<T>>, Vec<BrickSamples>, Vec<u32>) {
     let n = (1u64 << depth) as f64;
-    let thin = plan.thin && depth < plan.max_depth;
-    let mut list = Vec::with_capacity(samples.positions.len());
-    let mut owners = Vec::with_capacity(samples.positions.len());
+    let (between, starts) = neighbours.map_or_else(Default::default, |n| {
+        n.by_brick(band, cells, plan.between_weight(depth))
+    });
+    let mut list = Vec::with_capacity(samples.positions.len() + between.len());
+    let mut owners = Vec::with_capacity(list.capacity());
     let mut bricks: Vec<BrickSamples> = Vec::new();
     let mut current = (BrickKey([u32::MAX; 3]), None);
     for (index, cell) in cells.iter().enumerate() {
@@ -157,9 +170,15 @@ fn band_samples<T: Real>(
         if key != current.0 {
             current = (key, band.find(key));
             if let Some(brick) = current.1 {
+                let start = list.len() as u32;
+                if let Some(&[from, to]) = starts.get(brick..brick + 2) {
+                    list.extend_from_slice(&between[from as usize..to as usize]);
+                    // Without weight, they count for no cell.
+                    owners.resize(list.len(), index as u32);
+                }
                 bricks.push(BrickSamples {
                     brick: brick as u32,
-                    start: list.len() as u32,
+                    start,
                     end: list.len() as u32,
                 });
             }
@@ -170,7 +189,7 @@ fn band_samples<T: Real>(
         let local = cell.at.map(|c| c as usize % BRICK);
         let start = (local[0] * HALO + local[1]) * HALO + local[2];
         let count = cell.end - cell.start;
-        let stride = if thin {
+        let stride = if plan.thin {
             (count / SAMPLES_PER_CELL).max(1)
         } else {
             1

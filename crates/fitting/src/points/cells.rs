@@ -17,6 +17,9 @@ const GRADIENT_LIMIT: f64 = 0.3;
 /// Samples that the cell above must hold for its children to be split: below, the spacing of the coefficients
 /// would fall under half the spacing of the samples.
 const SAMPLES_TO_SPLIT: u32 = 2;
+/// Distance of a sample to its neighbours, in cells of the next level, up to which its cell is split all the same where
+/// conditions stand between the samples.
+const CELLS_BETWEEN: f64 = 8.0;
 
 /// A cell that holds samples: `start..end` in Morton order.
 #[derive(Clone, Copy, Debug)]
@@ -135,11 +138,18 @@ pub(crate) fn keep_within(
     left_out
 }
 
-/// Whether a cell is split, or why not.
-pub(crate) fn judge(cell: &Cell, q: &Quality, plan: &Plan, depth: usize) -> Result<(), StopReason> {
+/// Whether a cell is split, or why not. `spacing` is the distance of its first sample to its neighbours, unit box.
+pub(crate) fn judge(
+    cell: &Cell,
+    q: &Quality,
+    spacing: f32,
+    plan: &Plan,
+    depth: usize,
+) -> Result<(), StopReason> {
     if !cell.is_live {
         return Err(StopReason::NoData);
     }
+    let is_carried = f64::from(spacing) <= CELLS_BETWEEN * 0.5f64.powi(depth as i32 + 1);
     let fits = q.distance() <= plan.tolerance && q.turn() <= GRADIENT_LIMIT;
     if fits && !plan.uniform {
         Err(StopReason::Tolerance)
@@ -149,7 +159,7 @@ pub(crate) fn judge(cell: &Cell, q: &Quality, plan: &Plan, depth: usize) -> Resu
         } else {
             plan.limited_by
         })
-    } else if cell.above < SAMPLES_TO_SPLIT {
+    } else if cell.above < SAMPLES_TO_SPLIT && !is_carried {
         Err(StopReason::NoData)
     } else {
         Ok(())

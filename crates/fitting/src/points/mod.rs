@@ -3,6 +3,7 @@
 pub(crate) mod assemble;
 pub(crate) mod band;
 pub(crate) mod band_solve;
+mod between;
 pub(crate) mod cascade;
 mod cells;
 mod clusters;

@@ -18,6 +18,9 @@ pub(crate) struct Plan {
     pub coefficients: Option<usize>,
     /// `β` of the finest level, unit box.
     pub beta: f64,
+    /// Mean spacing of clean samples, unit box: levels with cells finer than 1.5 times as wide ask for the gradient
+    /// [between](super::between) the samples too.
+    pub spacing: Option<f64>,
     /// `β` of a second fit to the feet of the points, where noise needs one.
     pub second_beta: Option<f64>,
     /// `μ` of a level.
@@ -54,6 +57,17 @@ const DEFAULT_DEPTH: usize = 10;
 /// they left the leaves of a cloud of 1839 points 40 % less accurate.
 const FINEST_SPACING: f64 = 0.3;
 
+/// Cells, in spacings of the samples, below which conditions stand between the samples.
+const SPARSE: f64 = 1.5;
+/// `β` of the samples themselves on such levels, in units of that on the others.
+const SPARSE_BETA: f64 = 1.0 / 6.0;
+/// `μ` of the finest level where its cells are wide: the samples are close enough there.
+const FINEST_MU: f64 = 1e-4;
+/// The same times `(h/s)³` where they are narrow.
+const NARROW_MU: f64 = 6e-5;
+/// Weight of a condition between samples times `√(h/s)`.
+const BETWEEN: f64 = 2.0;
+
 /// Tolerance of a noisy cloud in standard deviations, when the caller gives none.
 const NOISE_FACTOR: f64 = 1.25;
 
@@ -81,16 +95,19 @@ impl Plan {
     pub fn new(samples: &Samples, options: &PointOptions, tolerance: f64, noise: Option<f64>) -> Self {
         let spacing = samples.mean_spacing(0.0);
         let asked = options.max_depth;
+        let max_depth = asked.unwrap_or(depth_of(FINEST_SPACING * spacing).min(DEFAULT_DEPTH));
+        let finest_mu = (NARROW_MU * (spacing * (1u64 << max_depth) as f64).powi(3)).max(FINEST_MU);
         let clean = Self {
             tolerance,
-            max_depth: asked.unwrap_or(depth_of(FINEST_SPACING * spacing).min(DEFAULT_DEPTH)),
+            max_depth,
             uniform: false,
             coefficients: options.coefficients,
             beta: 0.6 * spacing,
+            spacing: Some(spacing),
             second_beta: None,
             smoothing: Smoothing::Steps {
                 coarse: 1e-3,
-                finest: options.smoothing.unwrap_or(1e-4),
+                finest: options.smoothing.unwrap_or(finest_mu),
             },
             residual: 0.03,
             iterations: 8,
@@ -114,6 +131,7 @@ impl Plan {
             },
             max_depth,
             uniform: true,
+            spacing: None,
             beta: if is_thick { 0.5 * sigma } else { 0.3 * spacing },
             smoothing: Smoothing::Halving(0.05 * (h / spacing).powi(2)),
             second_beta: is_thick.then_some(0.3 * spacing),
@@ -129,14 +147,30 @@ impl Plan {
         }
     }
 
+    /// Whether the cells of `depth` are too fine for the samples to stand for the surface between them.
+    pub fn is_sparse(&self, depth: usize) -> bool {
+        let h = 0.5f64.powi(depth as i32);
+        self.form == NormalForm::Gradient && self.spacing.is_some_and(|s| h < SPARSE * s)
+    }
+
+    /// Weight of the gradient between the samples, where that at a sample has 1.
+    pub fn between_weight(&self, depth: usize) -> f64 {
+        BETWEEN * (self.spacing.unwrap_or(0.0) * (1u64 << depth) as f64).sqrt()
+    }
+
     /// Weights of the energy on the level of `depth`. `β` is at least a quarter cell on levels that are refined
     /// again: it keeps the near far-field clean.
     pub fn weights(&self, depth: usize) -> Weights {
         let quarter = 0.25 * 0.5f64.powi(depth as i32);
-        let beta = if depth == self.max_depth {
-            self.beta
+        let own = if self.is_sparse(depth) {
+            SPARSE_BETA * self.beta
         } else {
-            self.beta.max(quarter)
+            self.beta
+        };
+        let beta = if depth == self.max_depth {
+            own
+        } else {
+            own.max(quarter)
         };
         Weights {
             beta,

@@ -263,13 +263,22 @@ impl Samples {
     /// The area is that of the occupied cells, `cells·h²/1.5`, on the grid where a cell holds about six points, or
     /// where it is `band` wide: noise fills a band round the surface that smaller cells would count.
     pub fn mean_spacing(&self, band: f64) -> f64 {
-        let n = self.live_points().count().max(1);
-        let occupied = |depth: usize| {
-            let mut last = [u32::MAX; 3];
-            self.live_points()
-                .filter(|&i| std::mem::replace(&mut last, self.cell(i, depth)) != last)
-                .count()
-        };
+        // In Morton order, a sample opens new cells from the level on that parts it from the one before.
+        let mut opened = [0usize; MAX_DEPTH + 1];
+        let (mut n, mut last) = (0usize, None::<u64>);
+        for i in self.live_points() {
+            let key = morton(self.positions[i]);
+            let from = last.map_or(0, |last| {
+                let bits = 64 - (key ^ last).leading_zeros() as usize;
+                MAX_DEPTH + 1 - bits.div_ceil(3)
+            });
+            if from <= MAX_DEPTH {
+                opened[from] += 1;
+            }
+            (n, last) = (n + 1, Some(key));
+        }
+        let n = n.max(1);
+        let occupied = |depth: usize| opened[..=depth].iter().sum::<usize>();
         let mut depth = 2;
         while depth < MAX_DEPTH && n > 6 * occupied(depth) && 0.5f64.powi(depth as i32 + 1) >= band {
             depth += 1;
