@@ -79,6 +79,8 @@ pub struct LeafAudit {
     pub at_noise: usize,
     /// Of these, leaves that the coefficient or memory budget stopped.
     pub at_budget: usize,
+    /// Of these, leaves at edges of the surface, which a smooth field cannot have.
+    pub at_creases: usize,
     /// Moved above the tolerance when cells beside them were refined.
     pub moved: usize,
     /// Of these, leaves that the fit believed to be below the tolerance: a wrong statement of the fit.
@@ -123,6 +125,7 @@ pub fn audit_leaves(
             StopReason::Noise => &mut audit.at_noise,
             StopReason::Budget | StopReason::Memory => &mut audit.at_budget,
             StopReason::Neighbours => &mut audit.moved,
+            StopReason::Crease => &mut audit.at_creases,
             StopReason::Tolerance => &mut audit.claimed_below,
         } += 1;
     }
