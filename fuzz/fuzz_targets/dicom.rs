@@ -5,18 +5,11 @@ use formats::ReadLimits;
 use formats::volumes::{DicomOptions, Tilt, Uneven};
 use libfuzzer_sys::fuzz_target;
 
-fuzz_target!(
-    init: {
-        // Decoders of others may panic, which the reader takes for damage; the fuzzer's hook would end the run. Panics
-        // that the reader does not take still end it.
-        std::panic::set_hook(Box::new(|_| {}));
-    },
-    |bytes: &[u8]| {
-        let options = DicomOptions {
-            series: None,
-            uneven: if bytes.len() % 2 == 0 { Uneven::Resample } else { Uneven::Refuse },
-            tilt: if bytes.len() % 3 == 0 { Tilt::Resample } else { Tilt::Keep },
-        };
-        let _ = formats::volumes::parse_dicom(bytes, &options, &ReadLimits { max_bytes: 1 << 24 });
-    }
-);
+fuzz_target!(|bytes: &[u8]| {
+    let options = DicomOptions {
+        series: None,
+        uneven: if bytes.len() % 2 == 0 { Uneven::Resample } else { Uneven::Refuse },
+        tilt: if bytes.len() % 3 == 0 { Tilt::Resample } else { Tilt::Keep },
+    };
+    let _ = formats::volumes::parse_dicom(bytes, &options, &ReadLimits { max_bytes: 1 << 24 });
+});

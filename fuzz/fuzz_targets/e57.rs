@@ -7,7 +7,7 @@ use libfuzzer_sys::fuzz_target;
 
 const LIMITS: ReadLimits = ReadLimits { max_bytes: 1 << 24 };
 
-fuzz_target!(init: std::panic::set_hook(Box::new(|_| {})), |bytes: &[u8]| {
+fuzz_target!(|bytes: &[u8]| {
     let _ = formats::points::parse_e57(bytes, &LIMITS);
     let mut sealed = bytes.to_vec();
     for page in sealed.chunks_exact_mut(1024) {

@@ -39,6 +39,30 @@ fn odd_series_are_refused_until_an_option_says_what_to_do() {
     assert_eq!(kept["dims"], serde_json::json!([8, 8, 5]));
     assert_eq!(upright["dims"], serde_json::json!([8, 13, 5]));
 
+    // Every picture twice: a time series of two steps.
+    let twice = bench.directory.path().join("twice");
+    std::fs::create_dir(&twice).unwrap();
+    for k in 0..6 {
+        for step in ["a", "b"] {
+            std::fs::copy(
+                data(&format!("ct/IM000{k}.dcm")),
+                twice.join(format!("{step}{k}")),
+            )
+            .unwrap();
+        }
+    }
+    let run = bench.run("info twice");
+    assert_eq!(run.code, 3);
+    assert!(
+        run.stderr.contains("counted from 0 (--volume N)"),
+        "{}",
+        run.stderr
+    );
+    assert_eq!(
+        bench.json("info twice --volume 1")["dims"],
+        serde_json::json!([10, 8, 6])
+    );
+
     let several = data("syntax");
     let run = bench.run(&format!("info {several}"));
     assert_eq!(run.code, 3);

@@ -6,7 +6,7 @@ pub enum FitError {
     Cancelled,
     /// The work would hold more memory than allowed.
     #[error(
-        "the fit needs about {needed} bytes, the ceiling is {limit}; raise --memory or lower --max-depth"
+        "the fit needs about {needed} bytes, the ceiling is {limit}; raise the memory ceiling or lower the depth limit"
     )]
     MemoryLimit {
         /// Bytes the work would hold at once.

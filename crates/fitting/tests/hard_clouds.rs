@@ -94,7 +94,7 @@ fn outliers_over_the_whole_box_leave_no_trace_in_a_robust_fit() {
             without > 50,
             "noise {noise}: {without} wrong without re-weighting"
         );
-        assert!(says(&told, "--robust"), "{:?}", told.notes);
+        assert!(says(&told, "robust loss"), "{:?}", told.notes);
         let (with, report) = wrong(true);
         assert_eq!(with, 0, "noise {noise}");
         assert!(says(&report, "outliers"), "{:?}", report.notes);
@@ -119,7 +119,7 @@ fn a_robust_fit_of_a_clean_cloud_is_as_good_and_no_advice_is_given() {
         let samples = cloud(solid, &CloudOptions::default());
         let (_, plain) = fit::<f32>(&samples, &to_depth(7)).expect("a clean cloud");
         let (_, robust) = fit::<f32>(&samples, &ROBUST).expect("a clean cloud");
-        assert!(!says(&plain, "--robust"), "{:?}", plain.notes);
+        assert!(!says(&plain, "robust loss"), "{:?}", plain.notes);
         assert!(robust.p95 < 1.5 * plain.p95, "{} and {}", robust.p95, plain.p95);
         assert!(robust.used_count * 100 > 99 * plain.used_count);
     }

@@ -6,15 +6,17 @@ use std::path::Path;
 use crate::file_name::extension;
 use crate::input::{self, read_fault};
 use crate::kind::{Kind, MeshFileFormat, PointFormat, SUPPORTED, VolumeFormat};
-use crate::meshes::gltf::looks_like_gltf;
-use crate::meshes::threemf::looks_like_3mf;
-use crate::meshes::vrml::looks_like_vrml;
+#[cfg(feature = "cad")]
+use crate::meshes::{gltf::looks_like_gltf, threemf::looks_like_3mf, vrml::looks_like_vrml};
 use crate::points::pcd::looks_like_pcd;
-use crate::volumes::dicom::{holds_dicom, looks_like_dicom};
-use crate::volumes::metaimage::looks_like_metaimage;
-use crate::volumes::nifti::nifti_format;
-use crate::volumes::nrrd::looks_like_nrrd;
 use crate::volumes::tiff::{is_stack_folder, looks_like_tiff};
+#[cfg(feature = "medical")]
+use crate::volumes::{
+    dicom::{holds_dicom, looks_like_dicom},
+    metaimage::looks_like_metaimage,
+    nifti::nifti_format,
+    nrrd::looks_like_nrrd,
+};
 use crate::{Fault, FormatError, field};
 
 /// Bytes that are enough to know every content that can be known.
@@ -43,6 +45,7 @@ pub fn detect(path: &Path) -> Result<Kind, FormatError> {
 
 /// What a directory holds, seen by the files in it.
 fn kind_of_directory(path: &Path) -> Result<Kind, Fault> {
+    #[cfg(feature = "medical")]
     if holds_dicom(path)? {
         return Ok(Kind::Volume(VolumeFormat::Dicom));
     }
@@ -70,35 +73,26 @@ pub(crate) fn kind_of(head: &[u8], path: &Path) -> Result<Kind, Fault> {
     if head.starts_with(&field::MAGIC) {
         return Ok(Kind::Field);
     }
-    if let Some(format) = nifti_format(head) {
-        return Ok(Kind::Volume(format));
-    }
     if head.starts_with(b"LASF") {
         return Ok(Kind::Cloud(PointFormat::Las));
     }
     if head.starts_with(b"ASTM-E57") {
         return Ok(Kind::Cloud(PointFormat::E57));
     }
-    if looks_like_gltf(head) {
-        return Ok(Kind::Mesh(MeshFileFormat::Gltf));
+    #[cfg(feature = "medical")]
+    if let Some(format) = nifti_format(head) {
+        return Ok(Kind::Volume(format));
     }
-    if looks_like_3mf(head) {
-        return Ok(Kind::Mesh(MeshFileFormat::ThreeMf));
-    }
-    if looks_like_vrml(head) {
-        return Ok(Kind::Mesh(MeshFileFormat::Vrml));
+    #[cfg(feature = "cad")]
+    if let Some(format) = mesh_format(head) {
+        return Ok(Kind::Mesh(format));
     }
     if head.starts_with(b"solid") && memchr::memmem::find(head, b"facet").is_some() {
         return Ok(Kind::Mesh(MeshFileFormat::Stl));
     }
-    if looks_like_dicom(head) {
-        return Ok(Kind::Volume(VolumeFormat::Dicom));
-    }
-    if looks_like_nrrd(head) {
-        return Ok(Kind::Volume(VolumeFormat::Nrrd));
-    }
-    if looks_like_metaimage(head) {
-        return Ok(Kind::Volume(VolumeFormat::MetaImage));
+    #[cfg(feature = "medical")]
+    if let Some(format) = volume_format(head) {
+        return Ok(Kind::Volume(format));
     }
     if looks_like_tiff(head) {
         return Ok(Kind::Volume(VolumeFormat::Tiff));
@@ -131,6 +125,28 @@ pub(crate) fn kind_of(head: &[u8], path: &Path) -> Result<Kind, Fault> {
             purpose: "input",
             supported: SUPPORTED,
         }),
+    }
+}
+
+#[cfg(feature = "cad")]
+fn mesh_format(head: &[u8]) -> Option<MeshFileFormat> {
+    if looks_like_gltf(head) {
+        Some(MeshFileFormat::Gltf)
+    } else if looks_like_3mf(head) {
+        Some(MeshFileFormat::ThreeMf)
+    } else {
+        looks_like_vrml(head).then_some(MeshFileFormat::Vrml)
+    }
+}
+
+#[cfg(feature = "medical")]
+fn volume_format(head: &[u8]) -> Option<VolumeFormat> {
+    if looks_like_dicom(head) {
+        Some(VolumeFormat::Dicom)
+    } else if looks_like_nrrd(head) {
+        Some(VolumeFormat::Nrrd)
+    } else {
+        looks_like_metaimage(head).then_some(VolumeFormat::MetaImage)
     }
 }
 

@@ -78,6 +78,18 @@ pub enum Fault {
         /// What would help.
         remedy: &'static str,
     },
+    /// Something that the caller has to choose or to allow first.
+    #[error("{what} is {value}; {remedy}")]
+    Choose {
+        /// Name of the value.
+        what: &'static str,
+        /// The value.
+        value: String,
+        /// What would help.
+        remedy: &'static str,
+        /// What of the reader's options is meant.
+        choice: Choice,
+    },
     /// Reading would hold more bytes than allowed.
     #[error(
         "{what} would need {needed} bytes, the ceiling is {limit}; \
@@ -111,6 +123,17 @@ pub enum Fault {
     },
 }
 
+/// An option of the readers that a [`Fault::Choose`] asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Choice {
+    /// [`crate::volumes::DicomOptions::series`].
+    Series,
+    /// [`crate::volumes::DicomOptions::uneven`].
+    Uneven,
+    /// [`crate::volumes::VolumeOptions::volume`].
+    Volume,
+}
+
 /// A place in a file, for messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
@@ -138,6 +161,25 @@ impl Fault {
         FormatError {
             path: path.to_path_buf(),
             fault: self,
+        }
+    }
+
+    /// For a file of a family that this build leaves out.
+    #[allow(dead_code, reason = "a build with all families leaves none out")]
+    pub(crate) fn left_out(what: impl std::fmt::Display, family: &str) -> Self {
+        Self::UnknownKind {
+            found: format!("{what}, whose family «{family}» this program was built without,"),
+            purpose: "file",
+            supported: "the formats of the families that it was built with",
+        }
+    }
+
+    /// The choice that is asked for, if one would help.
+    pub fn choice(&self) -> Option<Choice> {
+        match self {
+            Self::Choose { choice, .. } => Some(*choice),
+            Self::Inside { fault, .. } => fault.choice(),
+            _ => None,
         }
     }
 
@@ -175,9 +217,14 @@ fn io_remedy(e: &io::Error) -> &'static str {
 
 /// At most 40 characters of foreign text, made printable, for an error message.
 pub(crate) fn excerpt(bytes: &[u8]) -> String {
-    let text = String::from_utf8_lossy(&bytes[..bytes.len().min(160)]);
-    let mut short: String = text.chars().take(40).flat_map(char::escape_default).collect();
-    if text.chars().count() > 40 || bytes.len() > 160 {
+    excerpt_of(bytes, 40)
+}
+
+/// At most `most` characters of it.
+pub(crate) fn excerpt_of(bytes: &[u8], most: usize) -> String {
+    let text = String::from_utf8_lossy(&bytes[..bytes.len().min(4 * most)]);
+    let mut short: String = text.chars().take(most).flat_map(char::escape_default).collect();
+    if text.chars().count() > most || bytes.len() > 4 * most {
         short.push('…');
     }
     format!("\"{short}\"")

@@ -16,6 +16,10 @@
 //! Every reader takes [`ReadLimits`] and holds no more bytes than those allow, whatever a header promises.
 //! Every writer goes through [`atomic`]: a target is either the old file or the whole new one.
 //!
+//! Formats come in families, each a feature of the crate, all on by default: `medical` (DICOM, NIfTI, NRRD, MetaImage),
+//! `lidar` (LAS, LAZ, E57) and `cad` (glTF, 3MF, VRML). PLY, OBJ, STL, PCD, XYZ, TIFF, VTK, raw voxels and fields are
+//! always there. A file of a family that was left out is refused by name.
+//!
 //! ```
 //! use formats::{ReadLimits, points};
 //! let ply = b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
@@ -25,19 +29,31 @@
 //! ```
 //!
 //! # What it cannot do
-//! No RGB or complex voxels, no time series, no textures or materials of meshes. Of a volume, [`volumes`]
+//! No RGB or complex voxels, one volume of a time series at a time, no textures or materials of meshes. Of a volume, [`volumes`]
 //! says more.
+
+// What several families share has fewer users in a build without some of them.
+#![cfg_attr(
+    not(all(feature = "medical", feature = "lidar", feature = "cad")),
+    allow(
+        dead_code,
+        unused_imports,
+        reason = "shared by families that this build leaves out"
+    )
+)]
 
 pub mod atomic;
 mod detect;
 mod error;
 pub mod field;
 mod file_name;
+#[cfg(any(feature = "medical", feature = "lidar"))]
 mod guard;
 mod input;
 mod kind;
 mod limits;
 pub mod meshes;
+mod neighbour;
 pub mod points;
 mod polygon;
 mod raw;
@@ -46,7 +62,7 @@ mod unit;
 pub mod volumes;
 
 pub use detect::detect;
-pub use error::{Fault, FormatError};
+pub use error::{Choice, Fault, FormatError};
 pub use kind::{Kind, MeshFileFormat, PointFormat};
 pub use limits::ReadLimits;
 pub use unit::Unit;

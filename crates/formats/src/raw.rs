@@ -28,6 +28,8 @@ pub(crate) struct RawShape {
     pub short_faces: usize,
     /// Unit of the positions, millimetres where the file names any.
     pub unit: Unit,
+    /// Step of the coordinates, where the file counts in steps.
+    pub resolution: Option<f64>,
     pub notes: Vec<String>,
 }
 

@@ -1,7 +1,10 @@
 //! Numbers out of text, with the line they stand on.
 
+use std::borrow::Cow;
+
 use crate::Fault;
 use crate::error::excerpt;
+use crate::limits::Budget;
 
 /// Whitespace-separated words of a text, counting lines.
 pub(crate) struct Words<'a> {
@@ -41,7 +44,7 @@ impl<'a> Words<'a> {
     }
 }
 
-/// Lines of a text without their ends (`\n`, `\r\n`).
+/// Lines of a text without their ends (`\n`, `\r\n`, or `\r` alone).
 pub(crate) struct Lines<'a> {
     rest: &'a [u8],
     /// Number of the last line, from 1.
@@ -67,13 +70,36 @@ impl<'a> Lines<'a> {
             return None;
         }
         self.line += 1;
-        let (line, rest) = match memchr::memchr(b'\n', self.rest) {
-            Some(n) => (&self.rest[..n], &self.rest[n + 1..]),
-            None => (self.rest, &self.rest[..0]),
+        let end = memchr::memchr2(b'\n', b'\r', self.rest).unwrap_or(self.rest.len());
+        let (line, rest) = self.rest.split_at(end);
+        self.rest = match rest {
+            [b'\r', b'\n', rest @ ..] | [_, rest @ ..] => rest,
+            [] => rest,
         };
-        self.rest = rest;
-        Some(line.strip_suffix(b"\r").unwrap_or(line))
+        Some(line)
     }
+}
+
+/// Text that says by its mark that it is UTF-16 (Windows calls it Unicode), as UTF-8; all else as it is.
+pub(crate) fn utf8<'a>(bytes: &'a [u8], budget: &mut Budget) -> Result<Cow<'a, [u8]>, Fault> {
+    let unit: fn([u8; 2]) -> u16 = match bytes {
+        [0xff, 0xfe, ..] => u16::from_le_bytes,
+        [0xfe, 0xff, ..] => u16::from_be_bytes,
+        _ => return Ok(Cow::Borrowed(bytes)),
+    };
+    let (units, []) = bytes[2..].as_chunks::<2>() else {
+        return Ok(Cow::Borrowed(bytes));
+    };
+    // A unit becomes three bytes at most, and the text is kept until it is read.
+    budget.reserve("the text as UTF-8", units.len() as u64, 3)?;
+    let mut text = String::with_capacity(3 * units.len());
+    for c in char::decode_utf16(units.iter().map(|u| unit(*u))) {
+        match c {
+            Ok(c) => text.push(c),
+            Err(_) => return Ok(Cow::Borrowed(bytes)),
+        }
+    }
+    Ok(Cow::Owned(text.into_bytes()))
 }
 
 /// A number; `nan` and `inf` in any case are numbers too.
@@ -126,6 +152,36 @@ mod tests {
         let all: Vec<_> = std::iter::from_fn(|| l.next()).collect();
         assert_eq!(all, [&b"a"[..], b"b", b"", b"c"]);
         assert_eq!(l.line, 4);
+    }
+
+    #[test]
+    fn lines_of_old_apples_end_in_a_carriage_return() {
+        let mut l = Lines::new(b"a\r\rb\r\nc\r");
+        let all: Vec<_> = std::iter::from_fn(|| l.next()).collect();
+        assert_eq!(all, [&b"a"[..], b"", b"b", b"c"]);
+        assert_eq!((l.line, l.left()), (4, 0));
+    }
+
+    #[test]
+    fn text_of_two_bytes_a_letter_becomes_utf8_and_nothing_else_is_touched() {
+        let mut budget = Budget::new(&crate::ReadLimits { max_bytes: 1 << 10 });
+        let text = "v 1 2 3 # größer 𝄞\n";
+        for big in [false, true] {
+            let mut bytes = if big { vec![0xfe, 0xff] } else { vec![0xff, 0xfe] };
+            for unit in text.encode_utf16() {
+                bytes.extend(if big {
+                    unit.to_be_bytes()
+                } else {
+                    unit.to_le_bytes()
+                });
+            }
+            assert_eq!(&*utf8(&bytes, &mut budget).unwrap(), text.as_bytes());
+        }
+        for bytes in [&b"v 1 2 3"[..], b"\xff\xfe\x00", b"\xff\xfe\x00\xd8a\x00", b""] {
+            assert_eq!(&*utf8(bytes, &mut budget).unwrap(), bytes);
+        }
+        let long = [&[0xff, 0xfe][..], &b"a\0".repeat(1000)].concat();
+        assert!(utf8(&long, &mut budget).is_err());
     }
 
     #[test]

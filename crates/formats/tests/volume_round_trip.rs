@@ -280,3 +280,143 @@ mod maps {
         assert_eq!(std::fs::read_dir(&directory).unwrap().count(), 5);
     }
 }
+
+/// Numbers of four volumes after each other: volume `t` holds `t·42 + i`.
+fn four() -> Vec<f32> {
+    (0..4 * 42).map(|i| i as f32).collect()
+}
+
+fn number(path: &std::path::Path, volume: Option<usize>) -> Result<volumes::Volume, formats::FormatError> {
+    let options = volumes::VolumeOptions {
+        volume,
+        ..Default::default()
+    };
+    volumes::read(path, &options, &ReadLimits::default())
+}
+
+/// Each of the four volumes of `path`, the refusal without a choice, and that of a fifth.
+fn holds_four(path: &std::path::Path) {
+    let name = path.display();
+    let e = number(path, None).unwrap_err();
+    assert_eq!(e.fault.choice(), Some(formats::Choice::Volume), "{name}: {e}");
+    assert!(e.to_string().contains("volumes in the file is 4"), "{name}: {e}");
+    for t in 0..4 {
+        let v = number(path, Some(t)).unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(v.header.dims, DIMS, "{name}");
+        assert_eq!(v.values, four()[42 * t..42 * (t + 1)], "{name}");
+        assert!(
+            v.notes
+                .iter()
+                .any(|n| *n == format!("volume {t} of 4, counted from 0")),
+            "{name}: {:?}",
+            v.notes
+        );
+        let options = volumes::VolumeOptions {
+            volume: Some(t),
+            region: Some([[1, 6], [0, 3], [1, 2]]),
+            stride: [2, 1, 1],
+            ..Default::default()
+        };
+        let part = volumes::read(path, &options, &ReadLimits::default()).unwrap();
+        assert_eq!(
+            part.values[..3],
+            [22.0, 24.0, 26.0].map(|i| i + 42.0 * t as f32),
+            "{name}"
+        );
+    }
+    let e = number(path, Some(4)).unwrap_err().to_string();
+    assert!(e.contains("4 of 4"), "{name}: {e}");
+}
+
+#[test]
+fn one_volume_of_several_is_chosen_by_its_number() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = |name: &str| directory.path().join(name);
+    let bytes = |values: &[f32]| values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
+
+    // NIfTI of four axes, and of two and two beyond the third.
+    let mut nifti = Vec::new();
+    let long = [7, 3, 8];
+    volumes::write_nifti(
+        &mut nifti,
+        long,
+        &four(),
+        &map(),
+        Unit::Millimetre,
+        StoreAs::Float32,
+    )
+    .unwrap();
+    for dim in [[4i16, 7, 3, 2, 4, 1, 1, 1], [5, 7, 3, 2, 2, 2, 1, 1]] {
+        for (i, n) in dim.into_iter().enumerate() {
+            nifti[40 + 2 * i..42 + 2 * i].copy_from_slice(&n.to_le_bytes());
+        }
+        std::fs::write(at("a.nii"), &nifti).unwrap();
+        holds_four(&at("a.nii"));
+    }
+    let mut gz = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+    std::io::Write::write_all(&mut gz, &nifti).unwrap();
+    std::fs::write(at("a.nii.gz"), gz.finish().unwrap()).unwrap();
+    holds_four(&at("a.nii.gz"));
+    // Counts whose product is beyond all bounds, and voxels that are not there.
+    for (dim, part) in [
+        ([32767i16; 4], "number of voxels"),
+        ([4, 1, 1, 2], "needs 1344 bytes, 672"),
+    ] {
+        let mut forged = nifti.clone();
+        forged[40..42].copy_from_slice(&7i16.to_le_bytes());
+        for (i, n) in dim.into_iter().enumerate() {
+            forged[48 + 2 * i..50 + 2 * i].copy_from_slice(&n.to_le_bytes());
+        }
+        std::fs::write(at("b.nii"), &forged).unwrap();
+        let e = number(&at("b.nii"), Some(0)).unwrap_err().to_string();
+        assert!(e.contains(part), "{e}");
+    }
+
+    // NRRD: the axis of time last, first, and without a word about any axis.
+    let interleaved: Vec<f32> = (0..4 * 42).map(|i| four()[42 * (i % 4) + i / 4]).collect();
+    let head = |sizes: &str, kinds: &str| {
+        format!("NRRD0004\ntype: float\ndimension: 4\nsizes: {sizes}\n{kinds}endian: little\nencoding: raw\n")
+    };
+    for (name, sizes, kinds, values) in [
+        ("t.nrrd", "7 3 2 4", "kinds: domain domain domain time\n", four()),
+        ("n.nrrd", "7 3 2 4", "", four()),
+        (
+            "l.nrrd",
+            "4 7 3 2",
+            "kinds: list domain domain domain\n",
+            interleaved.clone(),
+        ),
+        (
+            "d.nrrd",
+            "4 7 3 2",
+            "space: RAS\nspace directions: none (1,0,0) (0,1,0) (0,0,1)\nspace origin: (0,0,0)\n",
+            interleaved.clone(),
+        ),
+    ] {
+        let whole = [head(sizes, kinds).as_bytes(), b"\n", &bytes(&values)].concat();
+        std::fs::write(at(name), whole).unwrap();
+        holds_four(&at(name));
+    }
+    // In files of their own, a volume each.
+    for (t, part) in four().chunks_exact(42).enumerate() {
+        std::fs::write(at(&format!("p{t}.raw")), bytes(part)).unwrap();
+    }
+    let listed = format!("{}data file: p%d.raw 0 3 1\n", head("7 3 2 4", ""));
+    std::fs::write(at("p.nhdr"), listed).unwrap();
+    holds_four(&at("p.nhdr"));
+    let middle = [
+        head("7 3 4 2", "kinds: domain domain time domain\n").as_bytes(),
+        b"\n",
+        &bytes(&four()),
+    ]
+    .concat();
+    std::fs::write(at("m.nrrd"), middle).unwrap();
+    let e = number(&at("m.nrrd"), Some(0)).unwrap_err().to_string();
+    assert!(e.contains("before or after"), "{e}");
+
+    // The channels of MetaImage stand together.
+    let header = "NDims = 3\nDimSize = 7 3 2\nElementNumberOfChannels = 4\nElementType = MET_FLOAT\n\
+                  BinaryDataByteOrderMSB = False\nElementSpacing = 1 1 1\nElementDataFile = LOCAL\n";
+    std::fs::write(at("c.mha"), [header.as_bytes(), &bytes(&interleaved)].concat()).unwrap();
+    holds_four(&at("c.mha"));
+}

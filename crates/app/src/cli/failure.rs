@@ -4,6 +4,7 @@ use std::io;
 use fitting::{Control, FitError};
 
 use super::cost::rss_bytes;
+use super::flags;
 use super::quantity::human_bytes;
 
 /// What a subcommand gives back.
@@ -117,7 +118,7 @@ impl From<FitError> for Failure {
         };
         Self {
             cause,
-            error: e.into(),
+            error: anyhow::anyhow!(flags::named(&e.to_string())),
         }
     }
 }

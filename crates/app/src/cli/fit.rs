@@ -21,7 +21,7 @@ use super::quantity::{Memory, Tolerance, positive};
 use super::summary::Summary;
 use super::unoriented::{Oriented, Unoriented};
 use super::volume_choice::VolumeChoice;
-use super::{interrupt, set_threads};
+use super::{flags, interrupt, set_threads};
 
 /// Arguments of `isoclay fit`.
 #[derive(clap::Args)]
@@ -398,7 +398,7 @@ impl Fitted {
             unsure_signs: r.signs.as_ref().map(|s| s.unsure_count),
             leaves_of_unsure_sign: r.signs.as_ref().map(|s| s.unsure_leaves()),
             defects: self.defects.as_ref().map(defects),
-            notes: r.notes.clone(),
+            notes: r.notes.iter().map(|n| flags::named(n)).collect(),
             ..Default::default()
         }
     }

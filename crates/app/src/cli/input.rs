@@ -10,6 +10,7 @@ use glam::DVec3;
 
 use super::cost;
 use super::failure::{Failure, Outcome};
+use super::flags;
 use super::quantity::{Memory, human_bytes};
 
 /// Something that can be fitted.
@@ -103,7 +104,10 @@ pub fn reading(e: FormatError) -> Failure {
             e.path.display(),
             human_bytes(*needed)
         )),
-        _ => Failure::input(e),
+        fault => match fault.choice() {
+            Some(choice) => Failure::input(format!("{e} ({})", flags::of(choice))),
+            None => Failure::input(e),
+        },
     }
 }
 

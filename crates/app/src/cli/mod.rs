@@ -12,6 +12,7 @@ mod eval;
 mod failure;
 mod field;
 mod fit;
+mod flags;
 mod info;
 mod input;
 mod interrupt;

@@ -204,7 +204,7 @@ impl Stage<'_> {
         let before = &self.open.loaded().meta;
         let options: Vec<String> = std::env::args().skip(1).collect();
         let mut notes = before.notes.clone();
-        notes.push("moved by a scene: errors and leaves are those of the fit before".into());
+        notes.push("moved by a scene; its errors and leaves are those of the fit before".into());
         let meta = FieldMeta {
             notes,
             provenance: serde_json::json!({

@@ -19,6 +19,9 @@ pub struct VolumeChoice {
     /// Distances between neighbouring voxels in mm, in place of those in the file: one number, or three
     #[arg(long, value_name = "N|X,Y,Z")]
     spacing: Option<OneOrThree<f64>>,
+    /// Which volume of a time series, of echoes or channels to read, counted from 0
+    #[arg(long, value_name = "N")]
+    volume: Option<usize>,
     /// The file has no header: voxels along x (fastest), y and z
     #[arg(long, value_name = "X,Y,Z", requires = "voxel")]
     shape: Option<Triple<usize>>,
@@ -101,6 +104,7 @@ impl VolumeChoice {
             } else {
                 self.spacing.as_ref().map(|s| s.0)
             },
+            volume: self.volume,
             raw,
             dicom: DicomOptions {
                 series: self.series.clone(),

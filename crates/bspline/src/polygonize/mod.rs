@@ -50,6 +50,7 @@ mod piece;
 mod placement;
 mod roots;
 mod sampling;
+mod settle;
 mod stitch;
 mod surface;
 mod table;
@@ -63,6 +64,7 @@ pub use self::block_mesh::{BlockMesh, BlockUpdate};
 pub use self::check::{MeshCheck, check_mesh};
 pub use self::mesh::Mesh;
 pub use self::options::{MeshReport, Placement, PolygonizeError, PolygonizeOptions};
+pub use self::settle::{SettleOptions, SettleReport, settle};
 
 /// The surface `{ f = iso }` over the cells of `frame`.
 ///

@@ -1,6 +1,7 @@
 //! Laws of the mesher: what every mesh must be, on fields chosen to break it.
 
 mod fields;
+mod settle;
 
 use std::f64::consts::PI;
 use std::ops::ControlFlow;

@@ -182,8 +182,8 @@ fn rim(faces: &Faces, idle: &[bool]) -> Option<Rim> {
 
 fn bounds_nothing(defects: &MeshDefects) -> FitError {
     FitError::Degenerate(format!(
-        "the {} triangles enclose nothing: their winding number is nowhere above 1/2; close the surface, or fit it as \
-         a cloud (--as cloud)",
+        "the {} triangles enclose nothing: their winding number is nowhere above 1/2; close the surface, or \
+         fit it as a cloud",
         defects.triangles
     ))
 }

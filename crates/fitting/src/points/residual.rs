@@ -87,7 +87,7 @@ pub(crate) fn report<T: Real>(
     if !invented.is_empty() {
         notes.push(format!(
             "the surface crosses {} cells of 1/64 of the box far from all points: it is invented there (leaves without \
-             samples; isoclay mesh --trim leaves it open)",
+             samples; a mesh can be trimmed there)",
             invented.len()
         ));
         leaves.extend(invented);

@@ -114,7 +114,7 @@ pub(crate) fn doubt(samples: &Samples, tree: &Tree) -> Option<String> {
     (isolated > DOUBTS[0] || contradicted > DOUBTS[1]).then(|| {
         format!(
             "{:.1} % of the points stand apart from the others and {:.1} % are contradicted by their neighbours: if \
-             these are outliers, fit with --robust",
+             these are outliers, fit them by the robust loss",
             100.0 * isolated,
             100.0 * contradicted
         )

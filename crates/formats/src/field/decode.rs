@@ -8,14 +8,20 @@ use super::chunk::Chunk;
 use super::cursor::Cursor;
 use super::encode::{END, HEADER, LEAVES, LEVEL, NOTES, PROVENANCE, REPORT, SIGNS};
 use super::levels::{self, Level};
-use super::{AnyField, FieldMeta, LeafRecord, LoadedField, MAGIC, MAX_LEVELS, SourceKind, Stored, VERSION};
+use super::valid::{self, Wrong};
+use super::{AnyField, FieldMeta, LeafRecord, LoadedField, MAGIC, SourceKind, Stored, VERSION};
 use crate::error::excerpt;
 use crate::limits::Budget;
-use crate::volumes::geometry::is_usable;
 use crate::{Fault, ReadLimits, Unit};
 
-/// Most cells of the finest level along an axis; bricks and slots are counted in 32 bits.
-const MAX_CELLS: u64 = 1 << 30;
+/// What a file says that no field has.
+pub(super) fn written_wrongly(Wrong { what, value }: Wrong) -> Fault {
+    Fault::Value {
+        what,
+        value,
+        remedy: "no field has this; the file was written wrongly",
+    }
+}
 
 /// Reads the bytes of a field file.
 ///
@@ -94,13 +100,7 @@ struct Header {
 
 impl Header {
     fn read(raw: &[u8]) -> Result<Self, Fault> {
-        let bad = |what, value: String| {
-            Err(Fault::Value {
-                what,
-                value,
-                remedy: "no field has this; the file was written wrongly",
-            })
-        };
+        let bad = |what, value| Err(written_wrongly(Wrong { what, value }));
         let mut c = Cursor::new(raw, "the header");
         let [bytes_per_value, source, unit, has_iso] = [c.u8()?, c.u8()?, c.u8()?, c.u8()?];
         let level_count = c.u32()?;
@@ -124,28 +124,14 @@ impl Header {
         let Some(unit) = Unit::from_code(unit) else {
             return bad("the unit of length", unit.to_string());
         };
-        if !(1..=MAX_LEVELS as u32).contains(&level_count) {
-            return bad("the number of levels", level_count.to_string());
+        if has_iso > 1 {
+            return bad("the mark of the iso-value", has_iso.to_string());
         }
-        if cells
-            .iter()
-            .any(|n| *n == 0 || (u64::from(*n) << (level_count - 1)) > MAX_CELLS)
-        {
-            return bad(
-                "the lattice",
-                format!("{cells:?} cells with {level_count} levels"),
-            );
-        }
-        let world_from_lattice = DAffine3::from_cols_array(&map);
-        if !is_usable(&world_from_lattice) {
-            return bad("the map from lattice to world", format!("{map:?}"));
-        }
-        if !(slope.is_finite() && slope >= 0.0) {
-            return bad("the slope outside of the box", slope.to_string());
-        }
-        if has_iso > 1 || !iso.is_finite() {
-            return bad("the iso-value", format!("{iso} (flag {has_iso})"));
-        }
+        let lattice = Lattice {
+            world_from_lattice: DAffine3::from_cols_array(&map),
+            cells,
+        };
+        valid::frame(&lattice, level_count.into(), slope, Some(iso)).map_err(written_wrongly)?;
         let iso = (has_iso == 1).then_some(iso);
         let meta = FieldMeta {
             source,
@@ -157,10 +143,7 @@ impl Header {
         Ok(Self {
             bytes_per_value,
             level_count,
-            lattice: Lattice {
-                world_from_lattice,
-                cells,
-            },
+            lattice,
             slope,
             meta,
         })
@@ -221,15 +204,7 @@ fn assemble<T: Stored>(header: Header, chunks: &[Chunk], budget: &mut Budget) ->
             what: format!("{} levels are stored, {level_count} are stated", levels.len()),
         });
     }
-    if !meta.sign_confidence.is_empty() && meta.sign_confidence.len() != meta.leaves.len() {
-        return Err(Fault::Damaged {
-            what: format!(
-                "{} confidences are stored for {} leaves",
-                meta.sign_confidence.len(),
-                meta.leaves.len()
-            ),
-        });
-    }
+    valid::leaves(&meta.leaves, &meta.sign_confidence).map_err(written_wrongly)?;
     reserve_totals(&levels, budget)?;
     let field: AnyField = T::any(HierarchicalSpline::from_corrections(lattice, slope, levels));
     Ok(LoadedField {
@@ -291,9 +266,9 @@ fn confidences(raw: &[u8], budget: &mut Budget) -> Result<Vec<f32>, Fault> {
     let (all, rest) = raw.as_chunks::<4>();
     budget.reserve("the confidences", all.len() as u64, size_of::<f32>())?;
     let all: Vec<f32> = all.iter().map(|b| f32::from_le_bytes(*b)).collect();
-    if !rest.is_empty() || all.iter().any(|c| !(0.0..=1.0).contains(c)) {
+    if !rest.is_empty() {
         return Err(Fault::Damaged {
-            what: "the table of confidences holds something else".into(),
+            what: "the table of confidences ends within a number".into(),
         });
     }
     Ok(all)
@@ -309,7 +284,7 @@ fn leaves(raw: &[u8], budget: &mut Budget) -> Result<Vec<LeafRecord>, Fault> {
     let (counts, rms, max) = (column()?, column()?, column()?);
     c.end()?;
     budget.reserve("the leaf table", n, size_of::<LeafRecord>())?;
-    let leaves: Vec<_> = (0..count as usize)
+    Ok((0..count as usize)
         .map(|i| LeafRecord {
             level: levels[i],
             cell: cells.map(|column| u32::from_le_bytes(column[i])),
@@ -318,15 +293,5 @@ fn leaves(raw: &[u8], budget: &mut Budget) -> Result<Vec<LeafRecord>, Fault> {
             max: f32::from_le_bytes(max[i]),
             reason: reasons[i],
         })
-        .collect();
-    // Cells may be finer than the functions that were needed, but 2^32 along an edge is the end of counting.
-    match leaves
-        .iter()
-        .find(|l| !(l.rms.is_finite() && l.max.is_finite()) || l.level >= 32)
-    {
-        Some(l) => Err(Fault::Damaged {
-            what: format!("the leaf table holds {l:?}"),
-        }),
-        None => Ok(leaves),
-    }
+        .collect())
 }

@@ -5,8 +5,9 @@ use std::io::{self, Write};
 use bspline::HierarchicalSpline;
 
 use super::chunk::{self, Kind};
-use super::levels::{for_active, to_bytes};
-use super::{FieldMeta, MAGIC, MAX_LEVELS, Stored, VERSION};
+use super::levels::to_bytes;
+use super::valid::{self, Wrong};
+use super::{FieldMeta, MAGIC, Stored, VERSION};
 use crate::Fault;
 
 pub(super) const HEADER: Kind = *b"HEAD";
@@ -32,54 +33,25 @@ pub fn encode<T: Stored>(field: &HierarchicalSpline<T>, meta: &FieldMeta) -> Res
     Ok(bytes)
 }
 
-/// Refuses what reading would refuse.
+/// Refuses what reading would refuse, by the same rules.
 pub(super) fn check<T: Stored>(field: &HierarchicalSpline<T>, meta: &FieldMeta) -> Result<(), Fault> {
-    let refuse = |what, value: String| {
-        Err(Fault::Output {
-            what,
-            value,
-            remedy: "fit the input again",
-        })
-    };
-    if field.level_count() > MAX_LEVELS {
-        return refuse("a number of levels", field.level_count().to_string());
-    }
-    for level in 0..field.level_count() {
-        for (key, c) in field.corrections(level) {
-            let mut bad = None;
-            for_active(&c.mask, |slot| {
-                if !c.values[slot].is_finite() {
-                    bad = Some(slot);
-                }
-            });
-            if let Some(slot) = bad {
-                return refuse(
-                    "a coefficient",
-                    format!("{:?} in brick {:?} of level {level}", c.values[slot], key.0),
-                );
+    let all = || -> Result<(), Wrong> {
+        let count = field.level_count();
+        valid::frame(field.lattice(), count as u64, field.slope(), meta.iso)?;
+        for level in 0..count {
+            for (key, c) in field.corrections(level) {
+                valid::brick(field.lattice(), level, *key, c)?;
             }
         }
-    }
-    if let Some(leaf) = meta
-        .leaves
-        .iter()
-        .find(|l| !(l.rms.is_finite() && l.max.is_finite()))
-    {
-        return refuse("a residual", format!("{leaf:?}"));
-    }
-    if !meta.sign_confidence.is_empty() && meta.sign_confidence.len() != meta.leaves.len() {
-        return refuse(
-            "a table of confidences",
-            format!("{} for {} leaves", meta.sign_confidence.len(), meta.leaves.len()),
-        );
-    }
-    if let Some(c) = meta.sign_confidence.iter().find(|c| !(0.0..=1.0).contains(*c)) {
-        return refuse("a confidence", c.to_string());
-    }
-    if let Some(iso) = meta.iso.filter(|v| !v.is_finite()) {
-        return refuse("an iso-value", iso.to_string());
-    }
-    Ok(())
+        valid::leaves(&meta.leaves, &meta.sign_confidence)?;
+        let texts = [&meta.density_unit, &meta.report, &meta.provenance];
+        valid::lengths(texts.into_iter().chain(&meta.notes), meta)
+    };
+    all().map_err(|Wrong { what, value }| Fault::Output {
+        what,
+        value,
+        remedy: "no field has this; fit the input again",
+    })
 }
 
 /// Writes a checked field.

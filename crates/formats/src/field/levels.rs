@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use bspline::hierarchical::{BRICK, BrickKey, Corrections, Lattice};
 
-use super::Stored;
 use super::cursor::Cursor;
+use super::decode::written_wrongly;
+use super::{Stored, valid};
 use crate::Fault;
 use crate::limits::Budget;
 
@@ -83,8 +84,6 @@ pub(super) fn from_bytes<T: Stored>(
         count.into(),
         size_of::<Corrections<T>>() + 512 * T::BYTES + 64,
     )?;
-    // Functions stand at slots 0 ..= n+2 of each axis.
-    let last = lattice.cells_at(level as usize).map(|n| n + 2);
     let mut bricks = Vec::with_capacity(count as usize);
     let mut previous = None;
     let mut at = 0;
@@ -100,43 +99,15 @@ pub(super) fn from_bytes<T: Stored>(
         previous = Some(key);
         let mut c = Corrections::<T>::empty();
         c.mask = std::array::from_fn(|i| u64::from_le_bytes(std::array::from_fn(|b| mask[8 * i + b])));
-        if !(0..3).all(|a| key.0[a] <= last[a] / BRICK as u32) || !within(&c.mask, key, last) {
-            return Err(wrong(format!(
-                "brick {:?} of level {level} lies outside of the lattice",
-                key.0
-            )));
-        }
-        let mut is_finite = true;
         for_active(&c.mask, |slot| {
-            let value = T::from_bytes(|i| planes[i * active + at]);
-            is_finite &= value.is_finite();
-            c.values[slot] = value;
+            c.values[slot] = T::from_bytes(|i| planes[i * active + at]);
             at += 1;
         });
-        if !is_finite {
-            return Err(wrong(format!(
-                "brick {:?} of level {level} holds a value that is not finite",
-                key.0
-            )));
-        }
+        valid::brick(lattice, level as usize, key, &c).map_err(written_wrongly)?;
         bricks.push((key, Arc::new(c)));
     }
     // From a sorted list the tree is built in one go.
     Ok(bricks.into_iter().collect())
-}
-
-/// Whether all active slots of a brick are at most `last`, on each axis.
-fn within(mask: &[u64; BRICK], key: BrickKey, last: [u32; 3]) -> bool {
-    let room = |a: usize| last[a] - key.0[a] * BRICK as u32;
-    if (0..3).all(|a| room(a) >= BRICK as u32 - 1) {
-        return true;
-    }
-    let mut inside = true;
-    for_active(mask, |slot| {
-        let place = [slot / 64, slot / 8 % 8, slot % 8];
-        inside &= (0..3).all(|a| place[a] as u32 <= room(a));
-    });
-    inside
 }
 
 fn wrong(what: String) -> Fault {

@@ -6,6 +6,7 @@ mod decode;
 mod encode;
 mod levels;
 mod stored;
+mod valid;
 
 use std::path::Path;
 
@@ -114,8 +115,8 @@ pub struct LoadedField {
 /// Writes a field file, atomically.
 ///
 /// # Errors
-/// [`Fault::Output`] if the field or a leaf holds a value that is not finite, or has more levels than
-/// [`MAX_LEVELS`]; I/O.
+/// [`Fault::Output`] for whatever [`load`] would refuse: a value that is not finite, a brick outside of the lattice,
+/// more levels than [`MAX_LEVELS`]; I/O.
 pub fn save<T: Stored>(
     path: &Path,
     field: &HierarchicalSpline<T>,

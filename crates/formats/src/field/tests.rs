@@ -259,7 +259,10 @@ fn wrong_content_with_right_checksums_is_refused() {
         l[n - 1] = 0x7f;
         l[n - 1 - active] = 0x80;
     });
-    assert!(not_finite.contains("not finite"), "{not_finite}");
+    assert!(
+        not_finite.contains("a coefficient is NaN in brick"),
+        "{not_finite}"
+    );
 }
 
 #[test]
@@ -348,11 +351,51 @@ fn what_no_file_can_hold_is_refused_before_writing() {
         cells: [4, 4, 4],
     };
     let levels = vec![Level::from([(BrickKey([0; 3]), Arc::new(c))])];
-    let field = HierarchicalSpline::from_corrections(lattice, 1.0, levels);
-    let e = save(&path, &field, &FieldMeta::default())
-        .unwrap_err()
-        .to_string();
+    let refused = |slope: f64, levels: Vec<Level<f32>>, meta: &FieldMeta| {
+        let field = HierarchicalSpline::from_corrections(lattice, slope, levels);
+        save(&path, &field, meta).unwrap_err().to_string()
+    };
+    let e = refused(1.0, levels, &FieldMeta::default());
     assert!(e.contains("f.iclay") && e.contains("NaN"), "{e}");
+
+    // All that loading would refuse.
+    let brick = |slot: [usize; 3]| {
+        let mut c = Corrections::<f32>::empty();
+        c.set(slot, 1.0);
+        Arc::new(c)
+    };
+    let one = |key: [u32; 3], slot| vec![Level::from([(BrickKey(key), brick(slot))])];
+    let leaf = |level, rms| FieldMeta {
+        leaves: vec![LeafRecord {
+            level,
+            rms,
+            ..Default::default()
+        }],
+        ..Default::default()
+    };
+    let plain = FieldMeta::default();
+    for (e, part) in [
+        (
+            refused(f64::NAN, one([0; 3], [1; 3]), &plain),
+            "slope outside of the box of NaN",
+        ),
+        (
+            refused(-1.0, one([0; 3], [1; 3]), &plain),
+            "slope outside of the box of -1",
+        ),
+        (
+            refused(1.0, one([0; 3], [7, 1, 1]), &plain),
+            "outside of the lattice",
+        ),
+        (refused(1.0, one([0; 3], [1; 3]), &leaf(32, 0.0)), "level: 32"),
+        (refused(1.0, one([0; 3], [1; 3]), &leaf(1, f32::NAN)), "rms: NaN"),
+    ] {
+        assert!(e.contains(part), "{part}: {e}");
+    }
+    // A key that the lattice does not reach cannot even be evaluated; the rule is the same for both ways.
+    let c = brick([0; 3]);
+    let e = valid::brick(&lattice, 0, BrickKey([1, 0, 0]), &c).unwrap_err();
+    assert!(e.value.contains("outside of the lattice"), "{}", e.value);
     assert!(!path.exists());
 }
 

@@ -31,11 +31,19 @@ pub(crate) fn needs_double(vertices: &[DVec3]) -> bool {
     furthest * f64::from(f32::EPSILON) * 0.5 > 1e-6 * (max - min).length()
 }
 
+/// Furthest that rounding to `f32` moves a coordinate.
+pub(crate) fn rounding_to_single(points: &[DVec3]) -> f64 {
+    points
+        .iter()
+        .map(|p| (*p - p.as_vec3().as_dvec3()).abs().max_element())
+        .fold(0.0, f64::max)
+}
+
 /// Bytes gathered before they are handed on.
-pub(super) const CHUNK: usize = 1 << 16;
+pub(crate) const CHUNK: usize = 1 << 16;
 
 /// Hands `bytes` on once there are enough.
-pub(super) fn spill(out: &mut dyn Write, bytes: &mut Vec<u8>) -> io::Result<()> {
+pub(crate) fn spill(out: &mut dyn Write, bytes: &mut Vec<u8>) -> io::Result<()> {
     if bytes.len() >= CHUNK {
         out.write_all(bytes)?;
         bytes.clear();

@@ -1,32 +1,31 @@
 //! Meshes in and out, and coloured points out.
 
+#[cfg(feature = "cad")]
 pub(crate) mod gltf;
-mod gltf_write;
-mod mesh;
-mod obj_write;
-mod ply_write;
+pub(crate) mod mesh;
 mod read;
 mod stl;
-mod stl_write;
+#[cfg(feature = "cad")]
 pub(crate) mod threemf;
-mod threemf_write;
 mod triangle_mesh;
+#[cfg(feature = "cad")]
 pub(crate) mod vrml;
-mod vrml_write;
 mod weld;
 
 use std::io::{self, Write};
 use std::path::Path;
 
 pub use mesh::Mesh;
-pub(crate) use mesh::needs_double;
-pub use ply_write::save_points;
-pub(crate) use ply_write::write_points as write_ply_points;
+pub(crate) use mesh::{needs_double, rounding_to_single};
 pub(crate) use read::parse;
-pub use read::{parse_gltf, parse_stl, parse_threemf, parse_vrml, read};
+#[cfg(feature = "cad")]
+pub use read::{parse_gltf, parse_threemf, parse_vrml};
+pub use read::{parse_stl, read};
 pub use triangle_mesh::TriangleMesh;
 
 use crate::file_name::{extension, is_gz_name};
+pub use crate::points::ply::save_points;
+use crate::points::{obj, ply};
 use crate::{Fault, FormatError, Unit, atomic};
 
 /// Formats of meshes.
@@ -96,8 +95,14 @@ impl MeshFormat {
 pub fn save(path: &Path, mesh: &Mesh) -> Result<Vec<String>, FormatError> {
     let format = MeshFormat::from_path(path)?;
     // The counts of PLY, STL and the lengths of a binary glTF container.
-    let is_too_long =
-        format == MeshFormat::Glb && gltf_write::buffer_bytes(mesh) > u64::from(u32::MAX) - 4096;
+    #[cfg(feature = "cad")]
+    let is_too_long = format == MeshFormat::Glb && gltf::buffer_bytes(mesh) > u64::from(u32::MAX) - 4096;
+    #[cfg(not(feature = "cad"))]
+    let is_too_long = false;
+    #[cfg(not(feature = "cad"))]
+    if !matches!(format, MeshFormat::Ply | MeshFormat::Stl | MeshFormat::Obj) {
+        return Err(Fault::left_out("a mesh of this format", "cad").at(path));
+    }
     if mesh.vertices.len() > i32::MAX as usize || mesh.triangles.len() > u32::MAX as usize || is_too_long {
         return Err(Fault::Output {
             what: "a mesh",
@@ -160,13 +165,19 @@ pub fn write(out: &mut dyn Write, mesh: &Mesh, format: MeshFormat) -> io::Result
         "one colour per vertex"
     );
     match format {
-        MeshFormat::Ply => ply_write::write(out, mesh),
-        MeshFormat::Stl => stl_write::write(out, mesh),
-        MeshFormat::Obj => obj_write::write(out, mesh),
-        MeshFormat::Glb => gltf_write::write_binary(out, mesh),
-        MeshFormat::Gltf => gltf_write::write_text(out, mesh),
-        MeshFormat::ThreeMf => threemf_write::write(out, mesh),
-        MeshFormat::Vrml => vrml_write::write(out, mesh),
+        MeshFormat::Ply => ply::write(out, mesh),
+        MeshFormat::Stl => stl::write(out, mesh),
+        MeshFormat::Obj => obj::write(out, mesh),
+        #[cfg(feature = "cad")]
+        MeshFormat::Glb => gltf::write_binary(out, mesh),
+        #[cfg(feature = "cad")]
+        MeshFormat::Gltf => gltf::write_text(out, mesh),
+        #[cfg(feature = "cad")]
+        MeshFormat::ThreeMf => threemf::write(out, mesh),
+        #[cfg(feature = "cad")]
+        MeshFormat::Vrml => vrml::write(out, mesh),
+        #[cfg(not(feature = "cad"))]
+        _ => Err(io::ErrorKind::Unsupported.into()),
     }
 }
 

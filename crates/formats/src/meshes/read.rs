@@ -2,8 +2,10 @@
 
 use std::path::Path;
 
+use super::stl;
 use super::triangle_mesh::{TriangleMesh, finish};
-use super::{gltf, stl, threemf, vrml};
+#[cfg(feature = "cad")]
+use super::{gltf, threemf, vrml};
 use crate::detect::kind_of;
 use crate::kind::{Kind, MESHES, MeshFileFormat, PointFormat};
 use crate::limits::Budget;
@@ -45,10 +47,15 @@ pub(crate) fn parse(
     budget: &mut Budget,
 ) -> Result<RawShape, Fault> {
     match format {
-        MeshFileFormat::Gltf => gltf::parse(bytes, Some(path), budget),
-        MeshFileFormat::ThreeMf => threemf::parse(bytes, budget),
-        MeshFileFormat::Vrml => vrml::parse(bytes, budget),
         MeshFileFormat::Stl => stl::parse(bytes, budget),
+        #[cfg(not(feature = "cad"))]
+        other => Err(Fault::left_out(Kind::Mesh(other), "cad")),
+        #[cfg(feature = "cad")]
+        MeshFileFormat::Gltf => gltf::parse(bytes, Some(path), budget),
+        #[cfg(feature = "cad")]
+        MeshFileFormat::ThreeMf => threemf::parse(bytes, budget),
+        #[cfg(feature = "cad")]
+        MeshFileFormat::Vrml => vrml::parse(bytes, Some(path), budget),
     }
 }
 
@@ -57,6 +64,7 @@ pub(crate) fn parse(
 /// # Errors
 /// A [`Fault`] naming the node or accessor that contradicts the rest, a part that ends too early, or something
 /// that is not read (sparse accessors, compressed buffers).
+#[cfg(feature = "cad")]
 pub fn parse_gltf(bytes: &[u8], limits: &ReadLimits) -> Result<TriangleMesh, Fault> {
     let mut budget = Budget::new(limits);
     finish(gltf::parse(bytes, None, &mut budget)?, &mut budget)
@@ -67,19 +75,21 @@ pub fn parse_gltf(bytes: &[u8], limits: &ReadLimits) -> Result<TriangleMesh, Fau
 /// # Errors
 /// A [`Fault`] with the byte of the XML, the object or the part of the package that does not hold, components of
 /// themselves or without end, a required extension that is not read.
+#[cfg(feature = "cad")]
 pub fn parse_threemf(bytes: &[u8], limits: &ReadLimits) -> Result<TriangleMesh, Fault> {
     let mut budget = Budget::new(limits);
     finish(threemf::parse(bytes, &mut budget)?, &mut budget)
 }
 
-/// Reads the text of a VRML97 file.
+/// Reads the text of a VRML97 file; files that it inlines are left out with a note.
 ///
 /// # Errors
 /// A [`Fault`] with the line for text that breaks the format, an index beyond the points, nodes too deep or too
 /// many, a file of VRML 1.0.
+#[cfg(feature = "cad")]
 pub fn parse_vrml(bytes: &[u8], limits: &ReadLimits) -> Result<TriangleMesh, Fault> {
     let mut budget = Budget::new(limits);
-    finish(vrml::parse(bytes, &mut budget)?, &mut budget)
+    finish(vrml::parse(bytes, None, &mut budget)?, &mut budget)
 }
 
 /// Reads the bytes of an STL file, ascii or binary.

@@ -139,7 +139,7 @@ fn polygons_that_fold_are_cut_so_that_they_do_not() {
 #[test]
 fn what_a_mesh_leaves_out_is_counted() {
     let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv nan 0 0\nv 5 5 5\nf 1 2 3\nf 1 2 4\nf 1 1 2\nf 1 2\n";
-    let raw = points::obj::parse(text.as_bytes(), Wanted::Mesh, &mut Budget::new(&LIMITS)).unwrap();
+    let raw = obj::parse(text.as_bytes(), Wanted::Mesh, &mut Budget::new(&LIMITS)).unwrap();
     let mesh = triangle_mesh::finish(raw, &mut Budget::new(&LIMITS)).unwrap();
     assert_eq!((mesh.vertices.len(), mesh.triangles.len()), (3, 1));
     assert_eq!(
@@ -152,7 +152,7 @@ fn what_a_mesh_leaves_out_is_counted() {
         (4, 1, 2, 2)
     );
     assert_eq!(mesh.notes.len(), 3);
-    let raw = points::obj::parse(b"v 0 0 0\n", Wanted::Mesh, &mut Budget::new(&LIMITS)).unwrap();
+    let raw = obj::parse(b"v 0 0 0\n", Wanted::Mesh, &mut Budget::new(&LIMITS)).unwrap();
     let e = triangle_mesh::finish(raw, &mut Budget::new(&LIMITS)).unwrap_err();
     assert!(e.to_string().contains("0 of 0"), "{e}");
 }
@@ -175,6 +175,7 @@ fn ascii_stl_is_read_in_any_case_and_layout() {
         plain.clone(),
         plain.to_uppercase(),
         plain.replace('\n', "\r\n"),
+        plain.replace('\n', "\r"),
         format!("solid\n{}\nendsolid", FACET.replace('\n', " ")),
         format!("solid a\nendsolid a\n{plain}"),
     ] {

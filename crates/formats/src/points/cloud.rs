@@ -15,6 +15,9 @@ pub struct PointCloud {
     pub normal_source: NormalSource,
     /// Unit of the positions: millimetres where the file names any, otherwise unknown.
     pub unit: Unit,
+    /// Step of the file's coordinates along the finest axis, in the unit of the positions; `None` where the file has
+    /// floating-point numbers.
+    pub resolution: Option<f64>,
     /// Points in the file, kept or not.
     pub file_count: usize,
     /// Faces in the file; 0 if it has none.
@@ -53,6 +56,7 @@ impl PointCloud {
         for p in &mut self.positions {
             *p *= scale;
         }
+        self.resolution = self.resolution.map(|r| r * scale);
         self.unit = Unit::Millimetre;
         Ok(())
     }

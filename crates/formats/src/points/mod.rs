@@ -1,7 +1,9 @@
 //! Point clouds in, with the normals that a fit needs, and out.
 
 mod cloud;
+#[cfg(feature = "lidar")]
 mod e57;
+#[cfg(feature = "lidar")]
 mod las;
 mod normals;
 pub(crate) mod obj;
@@ -13,7 +15,9 @@ mod xyz;
 use std::path::Path;
 
 pub use cloud::{NormalSource, PointCloud};
+#[cfg(feature = "lidar")]
 pub use e57::parse_e57;
+#[cfg(feature = "lidar")]
 pub use las::parse_las;
 pub use obj::parse_obj;
 pub use pcd::parse_pcd;
@@ -43,8 +47,12 @@ fn read_faulty(path: &Path, limits: &ReadLimits) -> Result<PointCloud, Fault> {
         Kind::Cloud(PointFormat::Ply) => ply::parse(&bytes, Wanted::Cloud, budget),
         Kind::Cloud(PointFormat::Xyz) => xyz::parse(&bytes, budget),
         Kind::Cloud(PointFormat::Pcd) => pcd::parse(&bytes, budget),
+        #[cfg(feature = "lidar")]
         Kind::Cloud(PointFormat::Las) => las::parse(&bytes, budget),
+        #[cfg(feature = "lidar")]
         Kind::Cloud(PointFormat::E57) => e57::parse(&bytes, budget),
+        #[cfg(not(feature = "lidar"))]
+        kind @ Kind::Cloud(PointFormat::Las | PointFormat::E57) => Err(Fault::left_out(kind, "lidar")),
         Kind::Cloud(PointFormat::Obj) => obj::parse(&bytes, Wanted::Cloud, budget),
         Kind::Mesh(format) => meshes::parse(&bytes, format, path, budget),
         other => Err(Fault::UnknownKind {

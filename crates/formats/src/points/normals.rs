@@ -27,6 +27,7 @@ pub(super) fn finish(raw: RawShape, budget: &mut Budget) -> Result<PointCloud, F
         face_count,
         short_faces,
         unit,
+        resolution,
         notes,
         ..
     } = raw;
@@ -38,6 +39,7 @@ pub(super) fn finish(raw: RawShape, budget: &mut Budget) -> Result<PointCloud, F
         face_count,
         invalid_dropped,
         unit,
+        resolution,
         notes,
         ..Default::default()
     };

@@ -1,12 +1,13 @@
 //! Point clouds out.
 
-use std::io::{self, Write};
 use std::path::Path;
 
 use super::cloud::PointCloud;
-use super::{e57, las, pcd};
+#[cfg(feature = "lidar")]
+use super::{e57, las};
+use super::{pcd, ply, xyz};
 use crate::file_name::{extension, is_gz_name};
-use crate::meshes::{needs_double, write_ply_points};
+use crate::meshes::{needs_double, rounding_to_single};
 use crate::{Fault, FormatError, Unit, atomic};
 
 /// Formats of point clouds to be written.
@@ -24,8 +25,9 @@ const SUPPORTED: &str = ".ply, .pcd, .las, .laz, .e57, .xyz, .xyzn and .txt";
 
 /// Writes a cloud in the format of its name, atomically; normals go with the points where there are any.
 ///
-/// Coordinates are single precision in PLY and PCD, unless that would move points by more than a millionth of the
-/// cloud's diagonal (a small thing far from the origin): then they are double. LAS and LAZ hold multiples of a decimal step, a
+/// Coordinates are single precision in PLY and PCD, unless that would move points by more than half of the file's own
+/// step ([`PointCloud::resolution`]: points of neighbouring steps would become one), or by more than a millionth of
+/// the cloud's diagonal (a small thing far from the origin): then they are double, which a note says. LAS and LAZ hold multiples of a decimal step, a
 /// thousand-millionth of the cloud's extent or finer. The others keep all digits. E57 is in metres, and so are LAS and
 /// LAZ where the unit is known.
 /// The returned notes say what the format cannot hold.
@@ -42,7 +44,8 @@ pub fn save(path: &Path, cloud: &PointCloud) -> Result<Vec<String>, FormatError>
         "one normal per point"
     );
     let format = format_of(path).map_err(|fault| fault.at(path))?;
-    let double = needs_double(points);
+    let rounding = rounding_to_single(points);
+    let double = needs_double(points) || cloud.resolution.is_some_and(|r| rounding > 0.5 * r);
     if format != Format::Xyz && points.len() > u32::MAX as usize {
         return Err(Fault::Output {
             what: "a cloud",
@@ -52,15 +55,27 @@ pub fn save(path: &Path, cloud: &PointCloud) -> Result<Vec<String>, FormatError>
         .at(path));
     }
     match format {
-        Format::Ply => atomic::replace(path, |out| write_ply_points(out, points, normals, None))?,
+        Format::Ply => atomic::replace(path, |out| ply::write_points(out, points, normals, None, double))?,
         Format::Pcd => atomic::replace(path, |out| pcd::write(out, cloud, double))?,
+        #[cfg(not(feature = "lidar"))]
+        Format::Las | Format::Laz | Format::E57 => {
+            return Err(Fault::left_out("a cloud of this format", "lidar").at(path));
+        }
+        #[cfg(feature = "lidar")]
         Format::Las | Format::Laz => {
             atomic::replace(path, |out| las::write(out, cloud, format == Format::Laz))?
         }
+        #[cfg(feature = "lidar")]
         Format::E57 => atomic::replace(path, |out| e57::write(out, cloud))?,
-        Format::Xyz => atomic::replace(path, |out| write_xyz(out, cloud))?,
+        Format::Xyz => atomic::replace(path, |out| xyz::write(out, cloud))?,
     }
     let mut notes = Vec::new();
+    if double && matches!(format, Format::Ply | Format::Pcd) {
+        notes.push(format!(
+            "written in double precision: single would move points by up to {rounding:.3e} {}",
+            cloud.unit
+        ));
+    }
     if format == Format::E57 && cloud.unit == Unit::Unknown {
         notes.push("the unit of the cloud is not known; the file's numbers mean metres".into());
     }
@@ -85,27 +100,6 @@ fn format_of(path: &Path) -> Result<Format, Fault> {
         purpose: "point output",
         supported: SUPPORTED,
     })
-}
-
-/// A line a point, with the fewest digits that give every number back.
-fn write_xyz(out: &mut dyn Write, cloud: &PointCloud) -> io::Result<()> {
-    let mut digits = zmij::Buffer::new();
-    for (i, p) in cloud.positions.iter().enumerate() {
-        let normal = cloud.normals.as_ref().map(|n| n[i].to_array());
-        for (k, x) in p
-            .to_array()
-            .into_iter()
-            .chain(normal.into_iter().flatten())
-            .enumerate()
-        {
-            if k > 0 {
-                out.write_all(b" ")?;
-            }
-            out.write_all(digits.format(x).as_bytes())?;
-        }
-        out.write_all(b"\n")?;
-    }
-    Ok(())
 }
 
 #[cfg(test)]
@@ -139,7 +133,8 @@ mod tests {
                     let mut written = cloud(offset);
                     written.normals = written.normals.filter(|_| with_normals);
                     let notes = save(&path, &written).unwrap();
-                    assert_eq!(notes.len(), usize::from(scale > 1.0), "{notes:?}");
+                    let is_double = matches!(name, "a.ply" | "a.pcd") && offset != DVec3::ZERO;
+                    assert_eq!(notes.len(), usize::from(scale > 1.0 || is_double), "{notes:?}");
                     let back = read(&path, &ReadLimits::default()).unwrap();
                     assert_eq!(back.positions.len(), 40);
                     for (a, b) in back.positions.iter().zip(&written.positions) {
@@ -155,6 +150,28 @@ mod tests {
                 }
             }
         }
+        // A map of 800 km, in steps of a centimetre: rounding is small beside the diagonal, not beside a step.
+        let mut map = PointCloud {
+            positions: (0..1000)
+                .map(|i| DVec3::new(3e5 + 800.0 * f64::from(i), 5_400_000.0 + 0.01 * f64::from(i), 0.0))
+                .collect(),
+            resolution: Some(0.01),
+            ..Default::default()
+        };
+        for name in ["a.ply", "a.pcd"] {
+            let path = directory.path().join(name);
+            let notes = save(&path, &map).unwrap();
+            assert!(
+                notes[0].contains("double precision") && notes[0].contains("e-1 file unit"),
+                "{notes:?}"
+            );
+            assert_eq!(
+                read(&path, &ReadLimits::default()).unwrap().positions,
+                map.positions
+            );
+        }
+        map.resolution = None;
+        assert_eq!(save(&directory.path().join("a.ply"), &map).unwrap(), [""; 0]);
         let e = save(&directory.path().join("a.step"), &cloud(DVec3::ZERO)).unwrap_err();
         assert!(
             e.to_string().contains(".step is not a supported point output"),

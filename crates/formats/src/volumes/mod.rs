@@ -2,13 +2,14 @@
 //!
 //! | format | read | not read, and refused by name |
 //! | --- | --- | --- |
-//! | NIfTI-1, -2 | `.nii`, header and image pairs, both byte orders | time series, colour, complex |
-//! | DICOM | series, multi-frame files, see [`DicomOptions`] | colour, video |
-//! | NRRD | attached or detached, lists of files; raw, gzip, text, hex; RAS, LAS, LPS | bzip2, `block`, vectors, time |
-//! | MetaImage | `.mha`, `.mhd`, lists and patterns of files; raw, zlib, text; LPS as ITK has it | channels, other than 3 axes |
+//! | NIfTI-1, -2 | `.nii`, header and image pairs, both byte orders | colour, complex |
+//! | DICOM | series, multi-frame files, see [`DicomOptions`] | colour, video, mosaics |
+//! | NRRD | attached or detached, lists of files; raw, gzip, text, hex; RAS, LAS, LPS | bzip2, `block` |
+//! | MetaImage | `.mha`, `.mhd`, lists and patterns of files; raw, zlib, text; LPS as ITK has it | other than 3 axes |
 //! | TIFF | pages of a file (BigTIFF, ImageJ's form beyond 4 GB), files of a directory in the order of their numbers; plain, deflate, LZW, PackBits | colour, palettes, white as zero, JPEG |
 //! | raw | any layout that is stated, [`RawLayout`] | |
 //!
+//! Of a time series, of echoes and of channels (NIfTI, DICOM, NRRD, MetaImage) [`VolumeOptions::volume`] chooses one.
 //! Whole files may be gzipped. Voxels are integers of 8 to 64 bits or floats of 32 and 64, held as `f32`.
 //! A length unit is what the file names, else unknown: NRRD and MetaImage rarely name one, TIFF gives lengths only
 //! where ImageJ's description has all three and a unit; [`VolumeOptions::spacing_mm`] states what is missing.
@@ -17,18 +18,24 @@
 //! [`peek`] tells dimensions, spacing and memory need, [`range`] the densities in one pass that holds a slice,
 //! [`read`] gives the voxels; all three of a region and stride if asked. [`save_slices`] writes, slice by slice.
 
+#[cfg(feature = "medical")]
 mod detached;
+#[cfg(feature = "medical")]
 pub(crate) mod dicom;
 mod encode;
 pub(crate) mod geometry;
+#[cfg(feature = "medical")]
 pub(crate) mod metaimage;
+#[cfg(feature = "medical")]
 pub(crate) mod nifti;
+#[cfg(feature = "medical")]
 pub(crate) mod nrrd;
 mod open;
 mod options;
 mod part;
 mod raw;
 mod save;
+mod several;
 mod slices;
 mod stream;
 pub(crate) mod tiff;
@@ -38,12 +45,16 @@ mod vti;
 
 use std::path::Path;
 
-pub use dicom::{DicomOptions, Tilt, Uneven, parse_dicom};
+#[cfg(feature = "medical")]
+pub use dicom::parse_dicom;
 pub use encode::Grid;
+#[cfg(feature = "medical")]
 pub use metaimage::parse_metaimage;
+#[cfg(feature = "medical")]
 pub use nifti::{parse_nifti, write_nifti};
+#[cfg(feature = "medical")]
 pub use nrrd::parse_nrrd;
-pub use options::VolumeOptions;
+pub use options::{DicomOptions, Tilt, Uneven, VolumeOptions};
 pub use raw::{RawLayout, parse_raw};
 pub use save::{save, save_slices};
 pub use tiff::parse_tiff;
@@ -92,8 +103,8 @@ pub fn peek(path: &Path, options: &VolumeOptions) -> Result<Preview, FormatError
 /// Reads a volume, gzipped or not.
 ///
 /// # Errors
-/// A [`crate::Fault`] for a header that cannot be used, dimensions or types that are not read (time series, RGB,
-/// complex), a region outside of the volume, a file cut short, damaged compressed data, more bytes than the limits
+/// A [`crate::Fault`] for a header that cannot be used, several volumes and none chosen, types that are not read
+/// (RGB, complex), a region outside of the volume, a file cut short, damaged compressed data, more bytes than the limits
 /// allow, or no finite voxel.
 pub fn read(path: &Path, options: &VolumeOptions, limits: &ReadLimits) -> Result<Volume, FormatError> {
     let read = || {

@@ -4,8 +4,11 @@ use std::path::Path;
 
 use super::options::VolumeOptions;
 use super::part::Part;
+use super::several::Several;
 use super::slices::SliceSource;
-use super::{dicom, metaimage, nifti, nrrd, raw, tiff};
+#[cfg(feature = "medical")]
+use super::{dicom, metaimage, nifti, nrrd};
+use super::{raw, tiff};
 use crate::detect::detect;
 use crate::kind::{Kind, VolumeFormat};
 use crate::limits::Budget;
@@ -28,14 +31,24 @@ pub(super) fn open(path: &Path, options: &VolumeOptions, budget: &mut Budget) ->
         Some(_) => VolumeFormat::Raw,
         None => format_of(path)?,
     };
+    if let VolumeFormat::Tiff | VolumeFormat::TiffFolder | VolumeFormat::Raw = format {
+        // These hold one.
+        Several::choose(1, options.volume)?;
+    }
     let inner: Box<dyn SliceSource> = match (format, &options.raw) {
         (VolumeFormat::Raw, Some(layout)) => Box::new(raw::open(path, layout)?),
         (VolumeFormat::Raw, None) => unreachable!("never told from a file"),
-        (VolumeFormat::Dicom, _) => dicom::open(path, &options.dicom, budget)?,
-        (VolumeFormat::Nifti | VolumeFormat::NiftiPair, _) => Box::new(nifti::open(path)?),
-        (VolumeFormat::Nrrd, _) => nrrd::open(path, budget)?,
-        (VolumeFormat::MetaImage, _) => metaimage::open(path, budget)?,
+        #[cfg(feature = "medical")]
+        (VolumeFormat::Dicom, _) => dicom::open(path, &options.dicom, options.volume, budget)?,
+        #[cfg(feature = "medical")]
+        (VolumeFormat::Nifti | VolumeFormat::NiftiPair, _) => nifti::open(path, options.volume)?,
+        #[cfg(feature = "medical")]
+        (VolumeFormat::Nrrd, _) => nrrd::open(path, options.volume, budget)?,
+        #[cfg(feature = "medical")]
+        (VolumeFormat::MetaImage, _) => metaimage::open(path, options.volume, budget)?,
         (VolumeFormat::Tiff | VolumeFormat::TiffFolder, _) => tiff::open(path, budget)?,
+        #[cfg(not(feature = "medical"))]
+        (other, _) => return Err(Fault::left_out(Kind::Volume(other), "medical")),
     };
     let file_dims = inner.header().dims;
     Ok(Opened {

@@ -7,7 +7,9 @@ use glam::DAffine3;
 
 use super::encode::{Grid, NextSlice, Slices};
 use super::voxel::StoreAs;
-use super::{metaimage, nifti, nrrd, vti};
+use super::vti;
+#[cfg(feature = "medical")]
+use super::{metaimage, nifti, nrrd};
 use crate::file_name::{extension, is_gz_name};
 use crate::{Fault, FormatError, Unit};
 
@@ -94,10 +96,15 @@ fn save_with(path: &Path, grid: &Grid, store: StoreAs, next: &mut NextSlice) -> 
     };
     let is_gz = is_gz_name(path);
     match extension(path).as_str() {
+        #[cfg(feature = "medical")]
         "nii" => nifti::write(path, slices, is_gz),
+        #[cfg(feature = "medical")]
         "nrrd" if !is_gz => nrrd::write(path, slices),
+        #[cfg(feature = "medical")]
         "mha" if !is_gz => metaimage::write(path, slices),
         "vti" if !is_gz => vti::write(path, slices),
+        #[cfg(not(feature = "medical"))]
+        "nii" | "nrrd" | "mha" => Err(Fault::left_out("a volume of this format", "medical").at(path)),
         other => Err(Fault::UnknownKind {
             found: format!(".{other}{}", if is_gz { ".gz" } else { "" }),
             purpose: "volume output",

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use formats::volumes::{self, DicomOptions, Tilt, Uneven, Volume, VolumeOptions};
-use formats::{Fault, ReadLimits};
+use formats::{Choice, Fault, ReadLimits};
 use glam::DVec3;
 use tempfile::TempDir;
 
@@ -135,9 +135,11 @@ fn uneven_slices_are_refused_with_the_distances_and_resampled_on_request() {
             "uneven",
             "2.000000 mm between 0.dcm and 1.dcm",
             "5.000000 mm between 3.dcm and 4.dcm",
-            "--uneven",
+            "resampling",
         ],
     );
+    let e = volumes::read(&path, &VolumeOptions::default(), &ReadLimits::default()).unwrap_err();
+    assert_eq!(e.fault.choice(), Some(Choice::Uneven));
     let v = read_with(&path, RESAMPLE).unwrap();
     assert_eq!(v.header.dims, [6, 5, 7]);
     // The densities are linear along z, which linear interpolation keeps.
@@ -263,7 +265,7 @@ fn two_volumes_in_a_directory_are_listed_and_chosen_by_number_or_identifier() {
             "2, of which 2",
             "7 CT \"scan 7\", 3 pictures of 4 x 3",
             "1.2.3.9",
-            "--series",
+            "by its number or identifier",
         ],
     );
     let choose = |name: &str| {
@@ -346,18 +348,20 @@ fn a_file_that_is_cut_is_refused_by_name_before_its_slices_are_read() {
     let directory = directory(&pictures);
     let path = directory.path().join("001.dcm");
     let bytes = std::fs::read(&path).unwrap();
-    // In the pixels, in the header, in the first group.
-    for (keep, word) in [
-        (bytes.len() - 5, "needs 24 bytes, 19"),
-        (300, "ends too early"),
-        (150, "001.dcm"),
-    ] {
+    // In the pixels, and in the header behind the name of the series.
+    for (keep, word) in [(bytes.len() - 5, "needs 24 bytes, 19"), (300, "ends too early")] {
         std::fs::write(&path, &bytes[..keep]).unwrap();
         let e = volumes::peek(directory.path(), &VolumeOptions::default())
             .unwrap_err()
             .to_string();
         assert!(e.contains("001.dcm") && e.contains(word), "{keep}: {e}");
     }
+    // Nobody can tell what series this was: the others are read, and the file is named.
+    std::fs::write(&path, &bytes[..150]).unwrap();
+    let v = read(directory.path()).unwrap();
+    assert_eq!(v.header.dims, [4, 3, 2]);
+    let told = "1 DICOM files cannot be understood and were passed over, the first in 001.dcm";
+    assert!(v.notes[0].starts_with(told), "{:?}", v.notes);
     // Rows that the pixels do not have.
     Picture::axial(1.0)
         .with(0x0028_0010, b"US", 300u16.to_le_bytes())
@@ -369,6 +373,149 @@ fn a_file_that_is_cut_is_refused_by_name_before_its_slices_are_read() {
             .save(&name);
     }
     refused(read(directory.path()), &["000.dcm", "needs 2400 bytes, 24"]);
+}
+
+#[test]
+fn files_that_are_broken_or_of_another_series_do_not_block_a_directory() {
+    let mut pictures: Vec<Picture> = (0..3).map(|k| Picture::axial(f64::from(k))).collect();
+    let mut other = Picture::axial(7.0).with(0x0028_0030, b"DS", "1\\x");
+    other.series = 2;
+    pictures.push(other);
+    let directory = directory(&pictures);
+    let mut headless = Picture::axial(9.0).bytes();
+    headless.truncate(132);
+    std::fs::write(directory.path().join("zero.dcm"), headless).unwrap();
+    let v = read(directory.path()).unwrap();
+    assert_eq!(v.header.dims, [4, 3, 3]);
+    assert!(
+        v.notes[0].starts_with("2 DICOM files cannot be understood"),
+        "{:?}",
+        v.notes
+    );
+    // The series of the broken file is known, and it is the one that is asked for.
+    let options = DicomOptions {
+        series: Some("1.2.3.1".into()),
+        ..Default::default()
+    };
+    assert_eq!(read_with(directory.path(), options).unwrap().values, v.values);
+    refused(read(&directory.path().join("003.dcm")), &["(0028,0030)"]);
+    pictures[1].more.push((0x0028_0030, *b"DS", b"x\\1".to_vec()));
+    pictures[1].save(&directory.path().join("001.dcm"));
+    refused(read(directory.path()), &["in 001.dcm", "(0028,0030)"]);
+    // Nothing but broken files: the first is the answer.
+    for k in [0, 2] {
+        std::fs::remove_file(directory.path().join(format!("00{k}.dcm"))).unwrap();
+    }
+    refused(read(directory.path()), &["in 001.dcm"]);
+}
+
+/// Three time steps at four positions, the files in an order of their own.
+#[test]
+fn a_time_series_is_read_one_volume_at_a_time() {
+    let picture = |t: i16, z: i16| {
+        let mut p = Picture::axial(f64::from(z)).with(0x0020_0013, b"IS", format!("{}", 100 - 10 * t + z));
+        p.pixels.iter_mut().for_each(|v| *v = 100 * t + z);
+        p
+    };
+    let at = |t: i16, z: i16, tag: u32, value: i16| picture(t, z).with(tag, b"IS", value.to_string());
+    let read_number = |path: &Path, volume| {
+        let options = VolumeOptions {
+            volume,
+            ..Default::default()
+        };
+        volumes::read(path, &options, &ReadLimits::default())
+    };
+    // The instance number alone, which counts down, or a temporal position that counts up.
+    for (tag, falls) in [(0x0020_0013, true), (0x0020_0100, false)] {
+        let pictures: Vec<Picture> = [1, 0, 2]
+            .into_iter()
+            .flat_map(|t| (0..4).map(move |z| (t, z)))
+            .map(|(t, z)| if falls { picture(t, z) } else { at(t, z, tag, t) })
+            .collect();
+        let directory = directory(&pictures);
+        let e = read_number(directory.path(), None).unwrap_err();
+        assert_eq!(e.fault.choice(), Some(Choice::Volume), "{e}");
+        for n in 0..3i16 {
+            let v = read_number(directory.path(), Some(n as usize)).unwrap();
+            let t = if falls { 2 - n } else { n };
+            assert_eq!(v.header.dims, [4, 3, 4]);
+            assert_eq!(
+                [0, 3].map(|z| value(&v, 1, 1, z)),
+                [0, 3].map(|z| f32::from(100 * t + z))
+            );
+            assert!(
+                v.notes
+                    .iter()
+                    .any(|note| note.starts_with(&format!("volume {n} of 3")))
+            );
+        }
+        let e = read_number(directory.path(), Some(3)).unwrap_err().to_string();
+        assert!(e.contains("3 of 3") && e.contains("counted from 0"), "{e}");
+        // Without one picture the steps cannot be told apart.
+        std::fs::remove_file(directory.path().join("005.dcm")).unwrap();
+        let e = read_number(directory.path(), Some(0)).unwrap_err().to_string();
+        assert!(e.contains("2 to 3"), "{e}");
+    }
+    let single = directory(&[Picture::axial(0.0), Picture::axial(1.0)]);
+    assert!(read_number(single.path(), Some(0)).is_ok());
+    assert!(read_number(single.path(), Some(1)).is_err());
+}
+
+#[test]
+fn a_mosaic_is_refused_by_name() {
+    let mosaic = Picture::axial(0.0)
+        .with(0x0008_0008, b"CS", "ORIGINAL\\PRIMARY\\M\\ND\\MOSAIC ")
+        .with(0x0018_0050, b"DS", "3");
+    refused(
+        read(directory(&[mosaic]).path()),
+        &["mosaic", "Siemens", "dcm2niix"],
+    );
+}
+
+/// As networks send them: no preamble, and maybe no first group either.
+#[test]
+fn files_without_a_preamble_are_read() {
+    let plain = Picture::axial(0.0)
+        .with(0x0008_0005, b"CS", "ISO_IR 100")
+        .with(0x0018_0050, b"DS", "2");
+    let bytes = plain.bytes();
+    let expected = volumes::parse_dicom(&bytes, &DicomOptions::default(), &ReadLimits::default()).unwrap();
+    // 8 bytes and the identifier of the syntax, of 20.
+    let meta = [&[2, 0, 0, 0, b'U', b'L', 4, 0, 28, 0, 0, 0][..], &bytes[132..160]].concat();
+    let group2 = [&meta, &bytes[160..]].concat();
+    for (name, start) in [("group 2", &group2[..]), ("elements", &bytes[160..])] {
+        let v = volumes::parse_dicom(start, &DicomOptions::default(), &ReadLimits::default())
+            .unwrap_or_else(|e| panic!("{name}: {e}"));
+        assert_eq!(
+            (&v.values, &v.header),
+            (&expected.values, &expected.header),
+            "{name}"
+        );
+        assert!(
+            v.notes.iter().any(|n| n.contains("no DICOM preamble")),
+            "{:?}",
+            v.notes
+        );
+        let directory = tempfile::tempdir().unwrap();
+        std::fs::write(directory.path().join("a"), start).unwrap();
+        assert!(matches!(
+            formats::detect(directory.path()).unwrap(),
+            formats::Kind::Volume(_)
+        ));
+        assert_eq!(read(&directory.path().join("a")).unwrap().values, expected.values);
+    }
+    // Implicit, and with the high byte first.
+    for (tag, uid) in [("implicit-s16", "implicit"), ("big-s16", "big")] {
+        let bytes = std::fs::read(data().join(format!("syntax/{tag}.dcm"))).unwrap();
+        let length = u32::from_le_bytes(bytes[140..144].try_into().unwrap()) as usize;
+        let bare = &bytes[144 + length..];
+        let whole = volumes::parse_dicom(&bytes, &DicomOptions::default(), &ReadLimits::default()).unwrap();
+        let v = volumes::parse_dicom(bare, &DicomOptions::default(), &ReadLimits::default())
+            .unwrap_or_else(|e| panic!("{uid}: {e}"));
+        assert_eq!(v.values, whole.values, "{uid}");
+    }
+    let e = volumes::parse_dicom(&[8; 500], &DicomOptions::default(), &ReadLimits::default()).unwrap_err();
+    assert!(e.to_string().contains("is it a DICOM file"), "{e}");
 }
 
 #[test]
@@ -453,6 +600,14 @@ fn headers_that_claim_gigabytes_need_none() {
             Picture::axial(0.0)
                 .with(0x0028_0010, b"US", [255, 255])
                 .with(0x0028_0011, b"US", [255, 255]),
+        ),
+        // 65 535² doubles in 2³¹ frames: 2⁶⁶ bytes.
+        huge(
+            Picture::axial(0.0)
+                .with(0x0028_0008, b"IS", "2147483648")
+                .with(0x0028_0010, b"US", [255, 255])
+                .with(0x0028_0011, b"US", [255, 255])
+                .with(0x7FE0_0009, b"OD", [0; 96]),
         ),
     ];
     for bytes in claims {

@@ -85,7 +85,7 @@ fn push(out: &mut Vec<u8>, tag: u32, vr: [u8; 2], value: &[u8]) {
     out.extend((tag as u16).to_le_bytes());
     out.extend(vr);
     let length = value.len().next_multiple_of(2);
-    if matches!(&vr, b"OW" | b"OB" | b"SQ" | b"UN") {
+    if matches!(&vr, b"OW" | b"OB" | b"OD" | b"SQ" | b"UN") {
         out.extend([0, 0]);
         out.extend((length as u32).to_le_bytes());
     } else {

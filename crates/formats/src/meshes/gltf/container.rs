@@ -1,13 +1,13 @@
 //! Where the document and the buffers stand: a `.glb` file, or text with embedded or neighbouring buffers.
 
-use std::path::{Component, Path, PathBuf};
+use std::path::Path;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 
 use super::json::Root;
 use crate::limits::Budget;
-use crate::{Fault, input};
+use crate::{Fault, input, neighbour};
 
 /// The document and, in a `.glb`, the first buffer.
 pub(super) fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), Fault> {
@@ -122,18 +122,16 @@ fn neighbour(uri: &str, path: Option<&Path>, budget: &mut Budget) -> Result<Vec<
         remedy,
     };
     let name = decode_percent(uri).ok_or_else(|| refused("its name is no text"))?;
-    let relative = PathBuf::from(&name);
-    let stays = relative
-        .components()
-        .all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
-    if !stays || name.contains(':') || name.contains('\\') {
+    if name.contains(':') || name.contains('\\') {
         return Err(refused("only files beside the document are opened; put it there"));
     }
     let path =
         path.ok_or_else(|| refused("bytes alone have no files beside them; read the file by its name"))?;
-    let beside = path.parent().unwrap_or(Path::new("")).join(relative);
-    // The message would name the document alone.
-    let open = input::open(&beside).map_err(|e| Fault::Damaged {
+    let beside = neighbour::beside(Some(path), &name)
+        .map_err(|_| refused("only files beside the document are opened; put it there"))?;
+    // As it is: a buffer is bare numbers, whose first may look like any magic. The message would name the document
+    // alone.
+    let open = input::open_by_name(&beside).map_err(|e| Fault::Damaged {
         what: format!("its buffer {}: {e}", beside.display()),
     })?;
     open.read_all(budget)

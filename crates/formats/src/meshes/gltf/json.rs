@@ -8,7 +8,6 @@ use crate::limits::Budget;
 #[derive(Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(super) struct Root {
-    pub asset: Asset,
     pub scene: Option<u32>,
     pub scenes: Vec<Scene>,
     pub nodes: Vec<Node>,
@@ -21,8 +20,15 @@ pub(super) struct Root {
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
-pub(super) struct Asset {
-    pub version: String,
+struct Head {
+    asset: Asset,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+struct Asset {
+    /// Text, though drafts of version 1 had a number.
+    version: serde_json::Value,
 }
 
 #[derive(Debug, Default, Deserialize)]
@@ -118,10 +124,15 @@ pub(super) fn parse(text: &[u8], budget: &mut Budget) -> Result<Root, Fault> {
     budget.reserve("the document", objects, 3 * size_of::<Node>())?;
     budget.reserve("the document", items, 3 * size_of::<String>())?;
     budget.reserve("the document", text.len() as u64, 1)?;
-    let root: Root = serde_json::from_slice(text).map_err(|e| Fault::Damaged {
+    let damaged = |e| Fault::Damaged {
         what: format!("the JSON document does not hold: {e}"),
-    })?;
-    let version = root.asset.version.as_str();
+    };
+    // Lists of version 2 were objects before, so the version is asked first.
+    let Head { asset } = serde_json::from_slice(text).map_err(damaged)?;
+    let version = asset
+        .version
+        .as_str()
+        .map_or_else(|| asset.version.to_string(), str::to_owned);
     if version.split('.').next() != Some("2") {
         return Err(Fault::Value {
             what: "the version of glTF",
@@ -129,6 +140,7 @@ pub(super) fn parse(text: &[u8], budget: &mut Budget) -> Result<Root, Fault> {
             remedy: "2.x is read; export the file again",
         });
     }
+    let root: Root = serde_json::from_slice(text).map_err(damaged)?;
     let unread = root
         .extensions_required
         .iter()

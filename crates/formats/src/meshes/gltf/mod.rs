@@ -1,4 +1,4 @@
-//! glTF 2.0 in: the triangles of a scene, with the transforms of their nodes [Khronos, glTF 2.0 specification].
+//! glTF 2.0 in and out: the triangles of a scene, with the transforms of their nodes [Khronos, glTF 2.0 specification].
 //!
 //! Read are `.glb`, and `.gltf` with buffers embedded or beside it; triangles, strips and fans; indices of all
 //! three sizes; positions of any type, normalized ones too; colours of the vertices. Lengths are metres by the
@@ -7,6 +7,7 @@
 mod accessor;
 mod container;
 mod json;
+mod write;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -16,6 +17,7 @@ use glam::{DAffine3, DMat4, DQuat, DVec3};
 
 use self::accessor::View;
 use self::json::{Node, Primitive, Root};
+pub(super) use self::write::{buffer_bytes, write_binary, write_text};
 use super::weld::Welder;
 use crate::error::Place;
 use crate::limits::{Budget, Counted};

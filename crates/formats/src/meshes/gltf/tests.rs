@@ -200,6 +200,11 @@ fn contradictions_and_cycles_are_named() {
         ),
         (with("\"2.0\"", "\"1.0\""), "version of glTF is \"1.0\""),
         (
+            "{\"asset\":{\"version\":\"1.0\"},\"accessors\":{\"a\":{\"count\":1}},\"nodes\":{}}".into(),
+            "version of glTF is \"1.0\"",
+        ),
+        (with("\"2.0\"", "0.8"), "version of glTF is \"0.8\""),
+        (
             with(
                 "\"nodes\"",
                 "\"extensionsRequired\":[\"KHR_draco_mesh_compression\"],\"nodes\"",
@@ -276,6 +281,25 @@ fn what_is_written_comes_back_in_millimetres_near_and_far() {
             }
         }
     }
+}
+
+/// A buffer is bare numbers: its first bytes may be those of gzip.
+#[test]
+fn a_buffer_beside_the_document_is_taken_as_it_is() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut buffer = square();
+    buffer[..4].copy_from_slice(&[0x1f, 0x8b, 0x08, 0x3f]);
+    let text = scene("{\"mesh\":0}", ",\"indices\":1");
+    let (head, tail) = text.split_once("data:").unwrap();
+    let tail = tail.split_once('"').unwrap().1;
+    let path = directory.path().join("a.gltf");
+    std::fs::write(&path, format!("{head}a.bin\"{tail}")).unwrap();
+    std::fs::write(directory.path().join("a.bin"), &buffer).unwrap();
+    let mesh = meshes::read(&path, &LIMITS).unwrap();
+    assert_eq!(
+        mesh.vertices[0].x,
+        f64::from(f32::from_le_bytes([0x1f, 0x8b, 0x08, 0x3f])) * 1000.0
+    );
 }
 
 #[test]

@@ -1,7 +1,8 @@
-//! 3MF in: the build items of a package, their components and transforms [3MF Consortium, Core Specification 1.3;
+//! 3MF in and out: the build items of a package, their components and transforms [3MF Consortium, Core Specification 1.3;
 //! Production Extension 1.1, whose parts hold objects of their own].
 
 mod model;
+mod write;
 
 use std::collections::BTreeMap;
 use std::io::{Cursor, Read};
@@ -11,6 +12,7 @@ use quick_xml::events::Event;
 use zip::ZipArchive;
 
 use self::model::{Instance, Model, Object};
+pub(super) use self::write::write;
 use crate::limits::{Budget, Counted};
 use crate::raw::{Faces, RawShape};
 use crate::{Fault, Unit};

@@ -7,7 +7,7 @@ use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
 use crate::Fault;
-use crate::error::{Place, excerpt};
+use crate::error::{Place, excerpt, excerpt_of};
 use crate::limits::{Budget, Counted};
 
 /// A model part.
@@ -156,7 +156,7 @@ impl Parser<'_> {
             if !space.as_deref().is_some_and(|s| KNOWN_EXTENSIONS.contains(&s)) {
                 return Err(Fault::Value {
                     what: "a required extension",
-                    value: excerpt(space.as_deref().unwrap_or("undeclared").as_bytes()),
+                    value: excerpt_of(space.as_deref().unwrap_or("undeclared").as_bytes(), 200),
                     remedy: "it is not read; export a plain mesh",
                 });
             }

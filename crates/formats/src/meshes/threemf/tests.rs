@@ -124,8 +124,10 @@ fn what_is_wrong_is_named() {
     for (text, part) in [
         (one("unit=\"cubit\""), "unit \"cubit\""),
         (
-            one("xmlns:b=\"http://beams\" requiredextensions=\"b\""),
-            "http://beams",
+            one(
+                "xmlns:b=\"http://schemas.microsoft.com/3dmanufacturing/beamlattice/2017/02\" requiredextensions=\"b\"",
+            ),
+            "extension is \"http://schemas.microsoft.com/3dmanufacturing/beamlattice/2017/02\"",
         ),
         (one("requiredextensions=\"q\""), "undeclared"),
         (

@@ -1,15 +1,22 @@
-//! VRML97 in: the `IndexedFaceSet`s of a world, with the transforms above them [ISO/IEC 14772-1:1997].
+//! VRML97 in and out: the faces of a world, with the transforms above them [ISO/IEC 14772-1:1997].
 //!
-//! Taken are `DEF` and `USE`, `Transform`, `Switch` (what it shows), `LOD` (its first level), `ccw`, and polygons of
-//! any number of corners. Prototypes, inlined files and other geometry are left out, with a note. The standard says
-//! metres, but its writers do not keep to it: the unit is unknown.
+//! Taken are `IndexedFaceSet`, `Box`, `Sphere`, `Cone` and `Cylinder`; `DEF` and `USE`, `PROTO`, `Inline` of files
+//! beside this one, `Transform`, `Switch` (what it shows), `LOD` (its first level), `ccw`, and polygons of any number
+//! of corners. Other geometry is left out, with a note. The standard says metres, but its writers do not keep to it:
+//! the unit is unknown.
 
 mod nodes;
+mod primitives;
+mod proto;
 mod tokens;
+mod write;
+
+use std::path::Path;
 
 use glam::DAffine3;
 
 use self::nodes::{Node, Scene};
+pub(super) use self::write::write;
 use crate::Fault;
 use crate::error::Place;
 use crate::limits::{Budget, Counted};
@@ -22,36 +29,40 @@ pub(crate) fn looks_like_vrml(head: &[u8]) -> bool {
     head.starts_with(b"#VRML V")
 }
 
-pub(super) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<RawShape, Fault> {
+/// `path` is where inlined files are looked for.
+pub(super) fn parse(bytes: &[u8], path: Option<&Path>, budget: &mut Budget) -> Result<RawShape, Fault> {
     if bytes.is_empty() {
         return Err(Fault::Empty);
     }
-    let first = bytes.split(|b| matches!(b, b'\n' | b'\r')).next().unwrap_or(b"");
-    if !first.starts_with(b"#VRML V2.0") {
-        return Err(Fault::line(
-            1,
-            format!("the file starts with {}", crate::error::excerpt(first)),
-            "\"#VRML V2.0 utf8\" is read; export as VRML97 (2.0)",
-        ));
-    }
-    let scene = nodes::parse(bytes, budget)?;
+    let scene = nodes::parse(bytes, path, budget)?;
     let mut out = Out {
         positions: Counted::new("vertices"),
         faces: Faces::new(),
         corners: Vec::new(),
         instances: 0,
     };
-    for root in &scene.roots {
-        out.place(&scene, *root, DAffine3::IDENTITY, budget)?;
-    }
+    out.place_all(&scene, budget)?;
     let mut raw = RawShape {
         positions: out.positions.items,
         ..Default::default()
     };
-    if !scene.unread.is_empty() {
-        let all: Vec<_> = scene.unread.iter().copied().collect();
+    let unread: Vec<_> = scene.unread.iter().copied().collect();
+    if out.faces.count == 0 && !unread.is_empty() {
+        return Err(Fault::Value {
+            what: "the geometry of the world",
+            value: unread.join(", "),
+            remedy: "read are IndexedFaceSet, Box, Sphere, Cone and Cylinder; export it as one of these, in one file",
+        });
+    }
+    if !unread.is_empty() {
         raw.notes
-            .push(format!("not read and left out: {}", all.join(", ")));
+            .push(format!("not read and left out: {}", unread.join(", ")));
+    }
+    if scene.round_count > 0 {
+        raw.notes.push(format!(
+            "{} spheres, cones and cylinders became polygons of 64 sides, within 0.25 % of their radius",
+            scene.round_count
+        ));
     }
     out.faces.finish(&mut raw);
     Ok(raw)
@@ -65,82 +76,116 @@ struct Out {
 }
 
 impl Out {
-    /// Nodes are at most as deep as they were written, since none can hold itself.
-    fn place(
+    /// Walks over what the roots hold. Nodes that use each other can be as deep as the file is long, so the way back is
+    /// a list and not the stack; none can hold itself.
+    fn place_all(&mut self, scene: &Scene, budget: &mut Budget) -> Result<(), Fault> {
+        struct Open<'s> {
+            children: &'s [usize],
+            world_from_parent: DAffine3,
+        }
+        let mut open: Vec<Open> = vec![Open {
+            children: &scene.roots,
+            world_from_parent: DAffine3::IDENTITY,
+        }];
+        let mut deepest = 0;
+        while let Some(Open {
+            children,
+            world_from_parent,
+        }) = open.last_mut()
+        {
+            let Some((child, others)) = children.split_first() else {
+                open.pop();
+                continue;
+            };
+            *children = others;
+            let world_from_parent = *world_from_parent;
+            self.instances += 1;
+            if self.instances > MAX_INSTANCES {
+                return Err(Fault::Value {
+                    what: "the number of nodes",
+                    value: format!("above {MAX_INSTANCES}, those used again counted again"),
+                    remedy: "export a plain mesh",
+                });
+            }
+            match &scene.nodes[*child] {
+                Node::Group {
+                    parent_from_node,
+                    children,
+                    choice,
+                } => {
+                    let chosen = match choice {
+                        None => &children[..],
+                        Some(i) => children.get(*i).map_or(&[][..], std::slice::from_ref),
+                    };
+                    open.push(Open {
+                        children: chosen,
+                        world_from_parent: world_from_parent * *parent_from_node,
+                    });
+                    if open.len() > deepest {
+                        deepest = open.len();
+                        budget.reserve("the open nodes", 2, size_of::<Open>())?;
+                    }
+                }
+                Node::Points { .. } => {}
+                Node::Faces { .. } => self.faces(scene, *child, world_from_parent, budget)?,
+            }
+        }
+        Ok(())
+    }
+
+    /// Puts an `IndexedFaceSet` where it belongs.
+    fn faces(
         &mut self,
         scene: &Scene,
         node: usize,
         world_from_parent: DAffine3,
         budget: &mut Budget,
     ) -> Result<(), Fault> {
-        self.instances += 1;
-        if self.instances > MAX_INSTANCES {
+        let Node::Faces {
+            coord,
+            first,
+            count,
+            ccw,
+        } = &scene.nodes[node]
+        else {
+            return Ok(());
+        };
+        let indices = &scene.indices.items[*first..first + count];
+        let points = match coord.map(|c| &scene.nodes[c]) {
+            Some(Node::Points { first, count }) => &scene.points.items[*first..first + count],
+            _ => &[],
+        };
+        // A mirror turns the faces inside out.
+        let is_flipped = *ccw == (world_from_parent.matrix3.determinant() < 0.0);
+        let start = self.positions.items.len();
+        if start + points.len() > u32::MAX as usize {
             return Err(Fault::Value {
-                what: "the number of nodes",
-                value: format!("above {MAX_INSTANCES}, those used again counted again"),
-                remedy: "export a plain mesh",
+                what: "the number of vertices",
+                value: (start + points.len()).to_string(),
+                remedy: "fewer than 4294967296 can be read; split the world",
             });
         }
-        match &scene.nodes[node] {
-            Node::Group {
-                parent_from_node,
-                children,
-                choice,
-            } => {
-                let chosen = match choice {
-                    None => &children[..],
-                    Some(i) => children.get(*i).map_or(&[][..], std::slice::from_ref),
-                };
-                for child in chosen {
-                    self.place(scene, *child, world_from_parent * *parent_from_node, budget)?;
-                }
-                Ok(())
-            }
-            Node::Points { .. } => Ok(()),
-            Node::Faces {
-                coord,
-                first,
-                count,
-                ccw,
-            } => {
-                let indices = &scene.indices.items[*first..first + count];
-                let points = match coord.map(|c| &scene.nodes[c]) {
-                    Some(Node::Points { first, count }) => &scene.points.items[*first..first + count],
-                    _ => &[],
-                };
-                // A mirror turns the faces inside out.
-                let is_flipped = *ccw == (world_from_parent.matrix3.determinant() < 0.0);
-                let start = self.positions.items.len();
-                if start + points.len() > u32::MAX as usize {
-                    return Err(Fault::Value {
-                        what: "the number of vertices",
-                        value: (start + points.len()).to_string(),
-                        remedy: "fewer than 4294967296 can be read; split the world",
-                    });
-                }
-                for p in points {
-                    self.positions
-                        .push(world_from_parent.transform_point3(*p), budget)?;
-                }
-                let faces = indices.strip_suffix(&[-1]).unwrap_or(indices);
-                for face in faces.split(|i| *i == -1).filter(|f| !f.is_empty()) {
-                    if let Some(i) = face.iter().find(|i| **i as usize >= points.len()) {
-                        return Err(Fault::Syntax {
-                            place: Place::Row("IndexedFaceSet", self.instances as u64),
-                            what: format!("index {i} with {} points", points.len()),
-                            remedy: "the file contradicts itself; export it again",
-                        });
-                    }
-                    self.corners.clear();
-                    self.corners.extend(face.iter().map(|i| start as u32 + *i as u32));
-                    if is_flipped {
-                        self.corners.reverse();
-                    }
-                    self.faces.push(self.corners.iter().copied(), budget)?;
-                }
-                Ok(())
-            }
+        for p in points {
+            self.positions
+                .push(world_from_parent.transform_point3(*p), budget)?;
         }
+        let faces = indices.strip_suffix(&[-1]).unwrap_or(indices);
+        for face in faces.split(|i| *i == -1).filter(|f| !f.is_empty()) {
+            if let Some(i) = face.iter().find(|i| **i as usize >= points.len()) {
+                return Err(Fault::Syntax {
+                    place: Place::Row("IndexedFaceSet", self.instances as u64),
+                    what: format!("index {i} with {} points", points.len()),
+                    remedy: "the file contradicts itself; export it again",
+                });
+            }
+            self.corners.clear();
+            self.corners.extend(face.iter().map(|i| start as u32 + *i as u32));
+            if is_flipped {
+                self.corners.reverse();
+            }
+            self.faces.push(self.corners.iter().copied(), budget)?;
+        }
+        Ok(())
     }
 }
 

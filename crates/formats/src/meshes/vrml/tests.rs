@@ -93,13 +93,20 @@ fn coordinates_are_shared_and_switches_show_one_child() {
 fn what_is_left_out_is_named() {
     let text = format!(
         "WorldInfo {{ title \"a \\\" }} title\" info [ \"b\" ] }} PROTO P [ field SFVec3f a 0 0 0 ] {{ Group {{ }} }} \
-         EXTERNPROTO Q [ ] [ \"x.wrl\" ] {} {} Script {{ url \"javascript: {{\" }} ROUTE a.b TO c.d P {{ a 1 2 3 }}",
+         EXTERNPROTO Q [ ] [ \"x.wrl\" ] {} {} Script {{ url \"javascript: {{\" }} ROUTE a.b TO c.d P {{ a 1 2 3 }} Inline {{ }}",
         shape(SQUARE),
-        shape("Sphere { radius 2 }")
+        shape("ElevationGrid { height [ 1 2 ] }")
     );
     let mesh = read(&text).unwrap();
     assert_eq!(mesh.triangles.len(), 2);
-    assert_eq!(mesh.notes, ["not read and left out: PROTO, Sphere"]);
+    assert_eq!(
+        mesh.notes,
+        ["not read and left out: EXTERNPROTO, ElevationGrid, Inline"]
+    );
+    let e = read(&shape("ElevationGrid { height [ 1 2 ] }"))
+        .unwrap_err()
+        .to_string();
+    assert!(e.contains("geometry of the world is ElevationGrid"), "{e}");
 }
 
 #[test]
@@ -115,18 +122,20 @@ fn faults_name_the_line() {
             shape("IndexedFaceSet { coordIndex [ 0 1 2 ] }"),
             "index 0 with 0 points",
         ),
-        (
-            shape(&SQUARE.replace("0 1 0 ]", "0 1 ]")),
-            "CloseList where a number",
-        ),
+        (shape(&SQUARE.replace("0 1 0 ]", "0 1 ]")), "\"]\" where a number"),
         ("Group { children USE A }".into(), "USE of \"A\""),
         ("DEF A Group { children USE A }".into(), "USE of \"A\""),
         ("Group".into(), "body of a node"),
         ("Group [".into(), "no \"{\" after \"Group\""),
         ("Group { children [".into(), "end of a node"),
         ("}".into(), "outside of any node"),
-        ("PROTO X { }".into(), "prototype"),
-        (shape("Sphere { }"), "0 of 0"),
+        ("PROTO X { }".into(), "prototype without its fields"),
+        (shape("Sphere { radius -1 }"), "Sphere of length -1"),
+        (shape("Box { size 1 nan 1 }"), "Box of length NaN"),
+        (shape("Cone { heigth 1 }"), "\"heigth\" in a Cone"),
+        ("PROTO P [ ] { } P { a 1 }".into(), "no field \"a\""),
+        ("PROTO P [ field SFThing a ] { }".into(), "type \"SFThing\""),
+        ("PROTO P [ field SFString a 1 ] { }".into(), "\"1\" as the value"),
     ] {
         let e = read(&text).unwrap_err().to_string();
         assert!(e.contains(part), "{part}: {e}");
@@ -150,6 +159,150 @@ fn nesting_and_multiplied_use_end_at_a_count() {
         .unwrap_err()
         .to_string();
     assert!(e.contains("above 1000000"), "{e}");
+}
+
+/// Every node is used by the next one: as deep as the file is long, which is no matter of the stack.
+#[test]
+fn chains_of_use_are_walked_without_recursion() {
+    let chain: String = (1..=100_000)
+        .map(|i| format!("DEF N{i} Group {{ children USE N{} }} ", i - 1))
+        .collect();
+    let text = format!("#VRML V2.0 utf8\nDEF N0 {} {chain}", shape(SQUARE));
+    let e = meshes::parse_vrml(text.as_bytes(), &ReadLimits { max_bytes: 1 << 28 }).unwrap_err();
+    // Each root is walked anew: the chain of 1 412 is the last whole one.
+    assert!(e.to_string().contains("above 1000000"), "{e}");
+    let hidden = format!(
+        "#VRML V2.0 utf8\nSwitch {{ choice [ DEF N0 {} {chain} ] }} USE N100000",
+        shape(SQUARE)
+    );
+    let mesh = meshes::parse_vrml(hidden.as_bytes(), &ReadLimits { max_bytes: 1 << 28 }).unwrap();
+    assert_eq!(mesh.face_count, 1);
+}
+
+/// The volume by the divergence theorem, and whether every edge runs once each way.
+fn volume_if_closed(mesh: &TriangleMesh) -> Option<f64> {
+    let at = |v: u32| mesh.vertices[v as usize];
+    let mut edges = std::collections::BTreeMap::new();
+    for t in &mesh.triangles {
+        for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
+            *edges.entry((a.min(b), a.max(b))).or_insert(0) += if a < b { 1 } else { -1 };
+        }
+    }
+    let six: f64 = mesh
+        .triangles
+        .iter()
+        .map(|t| at(t[0]).dot(at(t[1]).cross(at(t[2]))))
+        .sum();
+    edges.values().all(|n| *n == 0).then_some(six / 6.0)
+}
+
+#[test]
+fn primitives_are_closed_outward_and_of_their_volume() {
+    use std::f64::consts::PI;
+    for (geometry, volume, faces) in [
+        ("Box { }", 8.0, 6),
+        ("Box { size 1 2 3 }", 6.0, 6),
+        ("Sphere { radius 2 }", 32.0 * PI / 3.0, 64 * 32),
+        ("Cone { bottomRadius 2 height 3 }", 4.0 * PI, 65),
+        ("Cylinder { radius 0.5 height 4 }", PI, 66),
+    ] {
+        let mesh = read(&shape(geometry)).unwrap();
+        let found = volume_if_closed(&mesh).expect("a closed surface");
+        // A polygon of 64 sides fills 1 − 1.6e-3 of its circle; the sphere loses as much along each of three axes.
+        assert!(
+            found <= volume * (1.0 + 1e-12) && found > volume * (1.0 - 5e-3),
+            "{geometry}: {found} of {volume}"
+        );
+        assert_eq!(mesh.face_count, faces, "{geometry}");
+        assert_eq!(mesh.notes.len(), usize::from(!geometry.starts_with("Box")));
+    }
+    let cup = read(&shape("Cylinder { top FALSE }")).unwrap();
+    assert_eq!(cup.face_count, 65);
+    assert!(
+        cup.vertices
+            .iter()
+            .all(|v| v.y.abs() == 1.0 && (v.x.hypot(v.z) - 1.0).abs() < 1e-15)
+    );
+}
+
+#[test]
+fn prototypes_stand_for_the_first_node_of_their_body_with_the_fields_of_the_instance() {
+    let wheel = format!(
+        "PROTO Wheel [ field SFVec3f at 5 0 0 exposedField SFNode form {0} field SFFloat size 1 eventIn SFBool go \
+         field MFString names [ \"IS\" ] ] {{ Transform {{ translation IS at scale 1 1 1 set_go IS go children [ \
+         Shape {{ geometry IS form }} ] }} {1} }}",
+        SQUARE,
+        shape(SQUARE)
+    );
+    let start = |body: &str| {
+        let mesh = read(&format!("{wheel} {body}")).unwrap();
+        (mesh.face_count, mesh.vertices[0])
+    };
+    assert_eq!(start("Wheel { }"), (1, DVec3::X * 5.0));
+    assert_eq!(
+        start("Group { children [ Wheel { at 0 7 0 names [ ] } Wheel { } ] }"),
+        (2, DVec3::Y * 7.0)
+    );
+    // A value in a value, a name of the file in a field, and a prototype in a prototype.
+    let sized = "PROTO Two [ field SFVec3f here 1 1 1 field MFNode more [ ] ] { Group { children [ Wheel { at IS here } \
+                 DEF A Wheel { at IS here } USE A Group { children IS more } ] } } DEF A Group { } \
+                 Two { here 2 0 0 more [ USE A DEF B Wheel { } ] } USE B";
+    assert_eq!(start(sized), (5, DVec3::X * 2.0));
+    // Points and indices out of fields, as some exporters of parts write them.
+    let table = "PROTO Net [ field MFVec3f p [ ] field MFInt32 i [ ] ] { IndexedFaceSet { coord Coordinate { point IS p } \
+                 coordIndex IS i } } Shape { geometry Net { i [ 0 1 2 -1 ] p [ 0 0 0, 1 0 0, 0 1 3 ] } }";
+    assert_eq!(read(table).unwrap().vertices[2], DVec3::new(0.0, 1.0, 3.0));
+}
+
+#[test]
+fn prototypes_end_however_they_hold_each_other() {
+    let e = read("PROTO A [ ] { A { } } A { }").unwrap_err().to_string();
+    assert!(e.contains("201 deep"), "{e}");
+    // Each holds the one before twice: 2⁶⁰ bodies.
+    let doubled: String = (1..60)
+        .map(|i| {
+            format!(
+                "PROTO P{i} [ ] {{ Group {{ children [ P{0} {{ }} P{0} {{ }} ] }} }} ",
+                i - 1
+            )
+        })
+        .collect();
+    let text = format!("#VRML V2.0 utf8\nPROTO P0 [ ] {{ Group {{ }} }} {doubled} P59 {{ }}");
+    for (max_bytes, part) in [(1 << 20, "ceiling"), (1 << 40, "prototypes, each use counted")] {
+        let e = meshes::parse_vrml(text.as_bytes(), &ReadLimits { max_bytes }).unwrap_err();
+        assert!(e.to_string().contains(part), "{e}");
+    }
+}
+
+#[test]
+fn files_beside_the_document_are_inlined_and_no_others() {
+    let directory = tempfile::tempdir().unwrap();
+    let write = |name: &str, body: &str| {
+        let path = directory.path().join(name);
+        std::fs::write(&path, format!("#VRML V2.0 utf8\n{body}")).unwrap();
+        path
+    };
+    let read = |path: &Path| meshes::read(path, &LIMITS).map_err(|e| e.to_string());
+    write("part.wrl", &shape(SQUARE));
+    write(
+        "half.wrl",
+        "Transform { translation 1 0 0 children Inline { url [ \"part.wrl\" ] } }",
+    );
+    let top = write(
+        "top.wrl",
+        "Transform { translation 0 2 0 children Inline { url [ \"http://x.org/half.wrl\", \"half.wrl\" ] } }",
+    );
+    assert_eq!(read(&top).unwrap().vertices[0], DVec3::new(1.0, 2.0, 0.0));
+    for (url, part) in [
+        ("\"../top.wrl\"", "an inlined file is \"../top.wrl\""),
+        ("\"http://x.org/a.wrl\"", "http://x.org/a.wrl"),
+        ("\"none.wrl\"", "in none.wrl: opening failed"),
+        ("\"loop.wrl\"", "9 deep"),
+        ("[ ]", "without an address"),
+    ] {
+        let e = read(&write("loop.wrl", &format!("Inline {{ url {url} }}"))).unwrap_err();
+        assert!(e.contains(part), "{part}: {e}");
+    }
 }
 
 #[test]

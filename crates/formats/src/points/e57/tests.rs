@@ -201,6 +201,29 @@ fn a_wrong_byte_is_seen_by_its_checksum_and_with_a_right_one_does_no_harm() {
     }
 }
 
+/// A description of nothing but open elements.
+#[test]
+fn a_deeply_nested_description_is_no_matter_of_the_stack() {
+    let xml = "<a>".repeat(100_000);
+    let mut head = b"ASTM-E57".to_vec();
+    let bytes = (48 + xml.len()).div_ceil(1020) * 1024;
+    head.extend([1u32, 0].into_iter().flat_map(u32::to_le_bytes));
+    head.extend(
+        [bytes as u64, 48, xml.len() as u64, 1024]
+            .into_iter()
+            .flat_map(u64::to_le_bytes),
+    );
+    head.extend(xml.bytes());
+    let mut file = Vec::new();
+    for page in head.chunks(1020) {
+        file.extend(page);
+        file.resize(file.len().next_multiple_of(1024), 0);
+    }
+    let limits = ReadLimits { max_bytes: 1 << 30 };
+    let e = parse_e57(&sealed(file), &limits).unwrap_err().to_string();
+    assert!(e.contains("XML"), "{e}");
+}
+
 /// `from` replaced wherever it stands.
 fn with_text(mut bytes: Vec<u8>, from: &str, to: &str) -> Vec<u8> {
     assert_eq!(from.len(), to.len());

@@ -69,6 +69,7 @@ pub(super) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<RawShape, Fault
         } else {
             Unit::Millimetre
         },
+        resolution: Some(header.scale.min_element() * unit.in_mm().unwrap_or(1.0)),
         notes,
         ..Default::default()
     })

@@ -202,7 +202,7 @@ fn layout(
                     "a count is a whole number below 65536",
                 )
             })?;
-        if let (Some(slot), 1) = (names.iter().position(|n| n == name), count) {
+        if let (Some(slot), 1) = (names.iter().position(|n| n.eq_ignore_ascii_case(name)), count) {
             found[slot] = found[slot].or(Some(Column {
                 kind,
                 offset: stride,

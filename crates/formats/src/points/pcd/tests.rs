@@ -93,6 +93,17 @@ fn a_file_cut_anywhere_is_refused() {
 }
 
 #[test]
+fn names_of_fields_are_the_same_in_capitals() {
+    for file in [ascii(), binary(), compressed()] {
+        let at = memchr::memmem::find(&file, b"FIELDS").unwrap() + 6;
+        let end = at + memchr::memchr(b'\n', &file[at..]).unwrap();
+        let mut loud = file.clone();
+        loud[at..end].make_ascii_uppercase();
+        assert_eq!(read(&loud).unwrap(), read(&file).unwrap());
+    }
+}
+
+#[test]
 fn holes_are_counted_and_a_viewpoint_is_noted() {
     let text = "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 2\nHEIGHT 2\n\
                 VIEWPOINT 1 0 0 1 0 0 0\nPOINTS 4\nDATA ascii\n0 0 0\nnan nan nan\n1 0 0\n1 1 1\n";

@@ -1,7 +1,8 @@
-//! PLY in: ascii and both binary encodings, any types and order of properties, extra ones skipped.
+//! PLY in and out. Read are ascii and both binary encodings, any types and order of properties, extra ones skipped.
 
 mod body;
 mod header;
+mod write;
 
 use glam::DVec3;
 
@@ -14,6 +15,9 @@ use crate::limits::Budget;
 use crate::raw::{Faces, RawShape, Wanted};
 use crate::text::Words;
 use crate::{Fault, ReadLimits};
+
+pub use write::save_points;
+pub(crate) use write::{write, write_points};
 
 /// Reads the text or bytes of a PLY file.
 ///

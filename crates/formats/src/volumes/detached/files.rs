@@ -1,38 +1,14 @@
 //! Data files that a header names: only such as lie beside it or below.
 
 use std::io::{self, Read};
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
 use super::{Content, Encoding, Layout, decoded};
 use crate::Fault;
 use crate::input::{self, SkipRead};
+use crate::neighbour::beside;
 use crate::volumes::stream::stored_bytes;
 use crate::volumes::volume::VolumeHeader;
-
-/// The file called `name` in the directory of `header`: no other directory can be reached by a header, so that a
-/// file from elsewhere cannot make a program read what it should not.
-pub(in crate::volumes) fn beside(header: Option<&Path>, name: &str) -> Result<PathBuf, Fault> {
-    let Some(header) = header else {
-        return Err(Fault::Value {
-            what: "the data file",
-            value: crate::error::excerpt(name.as_bytes()),
-            remedy: "bytes in memory have no files beside them; name the header's file",
-        });
-    };
-    let is_inside = !name.is_empty()
-        && !name.contains('\0')
-        && Path::new(name)
-            .components()
-            .all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
-    if !is_inside {
-        return Err(Fault::Value {
-            what: "the data file",
-            value: crate::error::excerpt(name.as_bytes()),
-            remedy: "only files in the header's directory or below it are read, by a relative name without ..",
-        });
-    }
-    Ok(header.parent().unwrap_or(Path::new("")).join(name))
-}
 
 /// Names made of a pattern as of C's printf and numbers: `slice%03d.raw 1 100 1`.
 pub(in crate::volumes) fn numbered(
@@ -195,20 +171,6 @@ impl SkipRead for Chain {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_header_reaches_nothing_but_its_own_directory() {
-        let header = Some(Path::new("/scans/ct/a.nhdr"));
-        assert_eq!(beside(header, "a.raw").unwrap(), Path::new("/scans/ct/a.raw"));
-        assert_eq!(
-            beside(header, "./b/a.raw").unwrap(),
-            Path::new("/scans/ct/./b/a.raw")
-        );
-        for name in ["", "/etc/passwd", "../a.raw", "b/../../a.raw", "a\0b"] {
-            assert!(beside(header, name).is_err(), "{name:?}");
-        }
-        assert!(beside(None, "a.raw").is_err());
-    }
 
     #[test]
     fn patterns_count_up_and_down_and_never_beyond_what_is_needed() {

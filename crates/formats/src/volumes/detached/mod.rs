@@ -6,7 +6,7 @@ mod inflate;
 mod lines;
 mod text;
 
-pub(super) use files::{beside, numbered};
+pub(super) use files::numbered;
 pub(super) use lines::Lines;
 
 use std::path::{Path, PathBuf};
@@ -14,6 +14,7 @@ use std::path::{Path, PathBuf};
 use inflate::{GzipBody, ZlibBody};
 use text::{HexBody, TextSlices};
 
+use super::several::{OneOf, Several};
 use super::slices::{self, SliceSource};
 use super::stream::{self, StreamSlices, check_length, stored_bytes};
 use super::volume::{Volume, VolumeHeader};
@@ -88,29 +89,34 @@ pub(super) struct Layout {
 
 /// A header and where its voxels are.
 pub(super) struct Parsed {
+    /// Of the volume that is read.
     pub header: VolumeHeader,
+    /// Which of those in the file, if there are several.
+    pub several: Option<Several>,
     pub notes: Vec<String>,
     pub layout: Layout,
     /// Data files; `None`: the voxels follow the header.
     pub files: Option<Vec<PathBuf>>,
 }
 
-/// Reads a header: of a content, of the file it is in if any.
-pub(super) type ReadHeader = fn(&mut Content<'_>, Option<&Path>, &mut Budget) -> Result<Parsed, Fault>;
+/// Reads a header: of a content, of the file it is in if any; and which of several volumes is wanted.
+pub(super) type ReadHeader =
+    fn(&mut Content<'_>, Option<&Path>, Option<usize>, &mut Budget) -> Result<Parsed, Fault>;
 
-/// Opens a header, and the voxels behind it or those it names.
+/// Opens a header, and the voxels behind it or those it names; of several volumes number `volume`.
 pub(super) fn open(
     path: &Path,
     read: ReadHeader,
+    volume: Option<usize>,
     budget: &mut Budget,
 ) -> Result<Box<dyn SliceSource>, Fault> {
-    voxels_behind(input::open(path)?.into(), Some(path), read, budget)
+    voxels_behind(input::open(path)?.into(), Some(path), read, volume, budget)
 }
 
 /// Reads a header and the voxels that follow it.
 pub(super) fn parse(bytes: &[u8], read: ReadHeader, limits: &ReadLimits) -> Result<Volume, Fault> {
     let mut budget = Budget::new(limits);
-    let mut source = voxels_behind(Content::of_bytes(bytes), None, read, &mut budget)?;
+    let mut source = voxels_behind(Content::of_bytes(bytes), None, read, None, &mut budget)?;
     slices::read(&mut *source, &mut budget)
 }
 
@@ -118,13 +124,22 @@ fn voxels_behind<'a>(
     mut content: Content<'a>,
     path: Option<&Path>,
     read: ReadHeader,
+    volume: Option<usize>,
     budget: &mut Budget,
 ) -> Result<Box<dyn SliceSource + 'a>, Fault> {
-    let parsed = read(&mut content, path, budget)?;
-    match parsed.files {
-        None => attached(parsed.header, parsed.notes, parsed.layout, content),
-        Some(paths) => in_files(parsed.header, parsed.notes, parsed.layout, paths),
-    }
+    let parsed = read(&mut content, path, volume, budget)?;
+    let whole = match &parsed.several {
+        Some(several) => several.file_header(&parsed.header)?,
+        None => parsed.header.clone(),
+    };
+    let inner = match parsed.files {
+        None => attached(whole, parsed.notes, parsed.layout, content),
+        Some(paths) => in_files(whole, parsed.notes, parsed.layout, paths),
+    }?;
+    Ok(match parsed.several {
+        Some(several) => Box::new(OneOf::new(inner, parsed.header, several)),
+        None => inner,
+    })
 }
 
 /// Voxels that follow their header.

@@ -18,6 +18,13 @@ pub(super) fn is_scalar(data: &DataSet) -> Result<(), Fault> {
             "reports and plans hold none; name the files of an image series",
         );
     };
+    if data.is_mosaic {
+        return refuse(
+            "the kind of the picture",
+            "a mosaic, which holds the slices of a volume as tiles (Siemens)".into(),
+            "split it first, for instance by dcm2niix, and read what that writes",
+        );
+    }
     if data.syntax.codec.is_none() {
         return Err(syntax::refusal(&data.syntax_uid));
     }
@@ -125,7 +132,7 @@ pub(super) fn frame_count(data: &DataSet) -> Result<u32, Fault> {
         }
         (Some(length), left) if is_native => {
             let frame = u64::from(data.rows) * u64::from(data.columns) * layout_of(data).bytes as u64;
-            short(frame * u64::from(count), length.into())?;
+            short(frame.saturating_mul(count.into()), length.into())?;
             short(length.into(), left.unwrap_or(u64::MAX))?;
         }
         _ => {

@@ -16,6 +16,10 @@ pub(super) struct DataSet {
     pub sop_class: String,
     /// Third value of the image type: what kind of image it is.
     pub flavour: String,
+    /// Whether the image type says that slices lie as tiles in one picture.
+    pub is_mosaic: bool,
+    /// Whether the file starts with a preamble and its mark.
+    pub has_preamble: bool,
     pub rows: u32,
     pub columns: u32,
     /// `None` if the element is absent, as in files of one frame.
@@ -68,6 +72,8 @@ pub(super) struct Attributes {
     pub intercept: Option<f64>,
     /// Unit of the rescaled values.
     pub rescale_type: Option<String>,
+    /// What tells pictures of one position apart: temporal position, trigger time, acquisition, echo time, instance.
+    pub order: [Option<f64>; 5],
 }
 
 impl Attributes {
@@ -82,6 +88,7 @@ impl Attributes {
             slope: self.slope.or(other.slope),
             intercept: self.intercept.or(other.intercept),
             rescale_type: self.rescale_type.clone().or_else(|| other.rescale_type.clone()),
+            order: std::array::from_fn(|i| self.order[i].or(other.order[i])),
         }
     }
 }
@@ -127,24 +134,51 @@ enum Owner {
 const SHARED_GROUPS: Tag = 0x5200_9229;
 const PER_FRAME_GROUPS: Tag = 0x5200_9230;
 const DETECTOR: Tag = 0x0054_0022;
-/// Plane position, plane orientation, pixel measures, pixel value transformation.
-const MACROS: [Tag; 4] = [0x0020_9113, 0x0020_9116, 0x0028_9110, 0x0028_9145];
+/// Frame content, plane position, plane orientation, pixel measures, pixel value transformation.
+const MACROS: [Tag; 5] = [0x0020_9111, 0x0020_9113, 0x0020_9116, 0x0028_9110, 0x0028_9145];
+/// Temporal position (and that of a frame), trigger time, acquisition, echo time, instance, each with its place in
+/// [`Attributes::order`].
+const ORDER: [(Tag, usize); 6] = [
+    (0x0020_0100, 0),
+    (0x0020_9128, 0),
+    (0x0018_1060, 1),
+    (0x0020_0012, 2),
+    (0x0018_0081, 3),
+    (0x0020_0013, 4),
+];
 
 /// Longest value that is read; the offsets of thousands of frames fit.
 const LONGEST: u32 = 1 << 16;
 
-/// Whether a file starts like DICOM.
+/// Whether a file starts like DICOM. [`LOOK`] bytes suffice.
 pub(crate) fn looks_like_dicom(head: &[u8]) -> bool {
-    head.get(128..132) == Some(b"DICM")
+    Start::of(head).is_some()
+}
+
+/// A file that cannot be understood.
+#[derive(Debug)]
+pub(super) struct Broken {
+    pub fault: Fault,
+    /// Identifier of its series, if it was met before.
+    pub series: String,
+}
+
+impl From<Fault> for Broken {
+    fn from(fault: Fault) -> Self {
+        Self {
+            fault,
+            series: String::new(),
+        }
+    }
 }
 
 /// Opens a file and reads it up to its pixels; `None` if it is no DICOM file.
 ///
 /// # Errors
 /// [`Fault::Damaged`], [`Fault::Truncated`]; [`Fault::Value`] for numbers that are none.
-pub(super) fn read(location: &Location, budget: &mut Budget) -> Result<Option<DataSet>, Fault> {
+pub(super) fn read(location: &Location, budget: &mut Budget) -> Result<Option<DataSet>, Broken> {
     let mut stream = location.open()?;
-    let Some(uid) = meta_group(&mut stream)? else {
+    let Some((uid, has_preamble)) = meta_group(&mut stream)? else {
         return Ok(None);
     };
     let syntax = Syntax::from_uid(&uid);
@@ -157,9 +191,16 @@ pub(super) fn read(location: &Location, budget: &mut Budget) -> Result<Option<Da
         data: DataSet::new(syntax, uid),
         frames: Counted::new("the frames' positions"),
     };
-    reader.elements(End::File, Scope::Root, syntax.encoding)?;
+    let result = reader.elements(End::File, Scope::Root, syntax.encoding);
     let mut data = reader.data;
+    if let Err(fault) = result {
+        return Err(Broken {
+            fault,
+            series: data.series.uid,
+        });
+    }
     data.frames = reader.frames.items;
+    data.has_preamble = has_preamble;
     Ok(Some(data))
 }
 
@@ -173,14 +214,19 @@ pub(super) fn reopen(location: &Location, data: &DataSet) -> Result<Stream, Faul
     Ok(stream)
 }
 
-/// Reads the elements of group 2, which are explicit in every file, and stops after them. The transfer syntax, or
-/// `None` if the file is no DICOM.
-fn meta_group(stream: &mut Stream) -> Result<Option<String>, Fault> {
+/// Reads the elements of group 2, which are explicit in every file, and stops after them. The transfer syntax and
+/// whether there was a preamble, or `None` if the file is no DICOM.
+fn meta_group(stream: &mut Stream) -> Result<Option<(String, bool)>, Fault> {
     const TRANSFER_SYNTAX: Tag = 0x0002_0010;
-    let mut head = [0; 132];
+    let mut head = [0; LOOK];
     let got = stream.fill_or_end(&mut head)?;
-    if !looks_like_dicom(&head[..got]) {
+    let Some(start) = Start::of(&head[..got]) else {
         return Ok(None);
+    };
+    let has_preamble = start == Start::Preamble;
+    stream.back_to(if has_preamble { 132 } else { 0 })?;
+    if let Start::Elements(uid) = start {
+        return Ok(Some((uid.into(), false)));
     }
     let mut uid = None;
     loop {
@@ -192,7 +238,7 @@ fn meta_group(stream: &mut Stream) -> Result<Option<String>, Fault> {
             let missing = || Fault::Damaged {
                 what: "the file names no transfer syntax".into(),
             };
-            return uid.ok_or_else(missing).map(Some);
+            return uid.ok_or_else(missing).map(|uid| Some((uid, has_preamble)));
         }
         let element = element::parse(&head, stream, Encoding::EXPLICIT)?;
         match element.length {
@@ -202,6 +248,55 @@ fn meta_group(stream: &mut Stream) -> Result<Option<String>, Fault> {
             _ => element::skip(stream, &element, Encoding::EXPLICIT)?,
         }
     }
+}
+
+/// How a file starts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Start {
+    /// With 128 bytes of anything and the mark, as the standard says.
+    Preamble,
+    /// With group 2.
+    Group2,
+    /// With the data set itself, in the syntax of that identifier: networks send them so.
+    Elements(&'static str),
+}
+
+/// Bytes that tell how a file starts.
+pub(super) const LOOK: usize = 400;
+
+impl Start {
+    fn of(head: &[u8]) -> Option<Self> {
+        if head.get(128..132) == Some(b"DICM") {
+            return Some(Self::Preamble);
+        }
+        // Two short elements, the first of them in group 2 or 8: there are always several in these groups.
+        if starts_with_elements(head, Encoding::EXPLICIT, 0x0002) {
+            return Some(Self::Group2);
+        }
+        let big = Encoding {
+            explicit: true,
+            big_endian: true,
+        };
+        let ways = [
+            (Encoding::EXPLICIT, "1.2.840.10008.1.2.1"),
+            (big, "1.2.840.10008.1.2.2"),
+            (Encoding::IMPLICIT, "1.2.840.10008.1.2"),
+        ];
+        ways.into_iter()
+            .find(|(encoding, _)| starts_with_elements(head, *encoding, 0x0008))
+            .map(|(_, uid)| Self::Elements(uid))
+    }
+}
+
+/// Whether two elements stand at the start, in order and both of `group`.
+fn starts_with_elements(head: &[u8], encoding: Encoding, group: Tag) -> bool {
+    let first = element::short_head(head, encoding).filter(|(e, _)| e.tag >> 16 == group);
+    let second = first.and_then(|(e, at)| {
+        let next = at + e.length? as usize;
+        let (second, _) = element::short_head(head.get(next..)?, encoding)?;
+        Some((e.tag, second.tag))
+    });
+    second.is_some_and(|(a, b)| a < b && b >> 16 == group)
 }
 
 /// Where a run of elements ends.
@@ -319,6 +414,11 @@ impl Reader<'_> {
             Scope::Root | Scope::Groups(Owner::All) | Scope::Group(Owner::All) => &mut self.data.common,
             Scope::Groups(Owner::Frame(i)) | Scope::Group(Owner::Frame(i)) => &mut self.frames.items[i],
         };
+        if let Some((_, slot)) = ORDER.iter().find(|(t, _)| *t == tag) {
+            // Nothing depends on it but the order of a time series.
+            let whole = value.integer(tag).ok().flatten().map(|n| n as f64);
+            attributes.order[*slot] = value.real(tag).ok().flatten().or(whole);
+        }
         match tag {
             0x0020_0032 => attributes.position = value.reals(tag)?,
             0x0020_0037 => attributes.orientation = value.reals(tag)?,
@@ -329,6 +429,7 @@ impl Reader<'_> {
             0x0028_1053 | 0x3004_000E => attributes.slope = value.real(tag)?,
             0x0028_1052 => attributes.intercept = value.real(tag)?,
             0x0028_1054 => attributes.rescale_type = Some(value.label()),
+
             _ if scope == Scope::Root => self.take_root(tag, value)?,
             _ => {}
         }
@@ -339,7 +440,10 @@ impl Reader<'_> {
         let d = &mut self.data;
         let count = |value: &Value| value.integer(tag).map(|n| n.and_then(|n| u32::try_from(n).ok()));
         match tag {
-            0x0008_0008 => d.flavour = value.part(2),
+            0x0008_0008 => {
+                d.flavour = value.part(2);
+                d.is_mosaic = value.text().split('\\').any(|part| part.trim() == "MOSAIC");
+            }
             0x0008_0016 => d.sop_class = value.label(),
             0x0008_0060 => d.series.modality = value.label(),
             0x0008_103E => d.series.description = value.label(),
@@ -390,11 +494,15 @@ fn is_wanted(tag: Tag) -> bool {
             | 0x0008_0060
             | 0x0008_103E
             | 0x0018_0050
+            | 0x0018_0081
             | 0x0018_0088
+            | 0x0018_1060
             | 0x0020_000E
-            | 0x0020_0011
+            | 0x0020_0011..=0x0020_0013
             | 0x0020_0032
             | 0x0020_0037
+            | 0x0020_0100
+            | 0x0020_9128
             | 0x0028_0002
             | 0x0028_0004
             | 0x0028_0008
@@ -417,6 +525,8 @@ impl DataSet {
             series: SeriesId::default(),
             sop_class: String::new(),
             flavour: String::new(),
+            is_mosaic: false,
+            has_preamble: true,
             rows: 0,
             columns: 0,
             frame_count: None,

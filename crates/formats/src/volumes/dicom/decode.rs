@@ -219,6 +219,8 @@ impl Source {
             rows: data.rows as usize,
             columns: data.columns as usize,
             bytes_per_pixel: layout.bytes,
+            bits_stored: layout.bits_stored,
+            signed: layout.signed,
         };
         if layout.swapped_pairs && frame_count > 1 && shape.pixel_count() % 2 == 1 {
             return Err(Fault::Value {

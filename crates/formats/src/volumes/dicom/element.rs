@@ -76,6 +76,25 @@ pub(super) fn parse(head: &[u8; 8], stream: &mut Stream, encoding: Encoding) -> 
     })
 }
 
+/// The head of an element whose value has at most 255 bytes, and where that starts; `None` for all else.
+pub(super) fn short_head(head: &[u8], encoding: Encoding) -> Option<(Element, usize)> {
+    let first: &[u8; 8] = head.first_chunk()?;
+    let tag = u32::from(short(&first[..2], encoding)) << 16 | u32::from(short(&first[2..4], encoding));
+    let vr = [first[4], first[5]];
+    let (length, at) = match encoding.explicit {
+        false => (long(&first[4..], encoding), 8),
+        true if has_short_length(vr) => (u32::from(short(&first[6..], encoding)), 8),
+        true if matches!(&vr, b"OB" | b"UN") => (long(head.get(8..12)?, encoding), 12),
+        true => return None,
+    };
+    let element = Element {
+        tag,
+        vr,
+        length: Some(length),
+    };
+    (length < 256).then_some((element, at))
+}
+
 fn defined(length: u32) -> Option<u32> {
     (length != u32::MAX).then_some(length)
 }

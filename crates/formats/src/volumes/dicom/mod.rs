@@ -27,51 +27,22 @@ use std::sync::Arc;
 pub(crate) use dataset::looks_like_dicom;
 pub(crate) use scan::holds_dicom;
 
+use super::options::{DicomOptions, Tilt, Uneven};
 use super::slices;
 use super::slices::SliceSource;
 use super::volume::Volume;
 use crate::limits::Budget;
 use crate::{Fault, ReadLimits};
 
-/// Choices for DICOM series.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct DicomOptions {
-    /// Which series, by its number or its unique identifier; needed where there are several volumes.
-    pub series: Option<String>,
-    /// What to do about slices at uneven distances, a missing one included.
-    pub uneven: Uneven,
-    /// What to do about slices that are tilted against their stack.
-    pub tilt: Tilt,
-}
-
-/// What to do about slices at uneven distances.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Uneven {
-    /// An error that says where.
-    #[default]
-    Refuse,
-    /// Linear interpolation along the stack, at the smallest distance that occurs.
-    Resample,
-}
-
-/// What to do about a tilted gantry.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Tilt {
-    /// The voxels stay where they were measured, on a grid with an oblique axis: nothing is lost.
-    #[default]
-    Keep,
-    /// Linear interpolation onto a grid with right angles, for formats and programs that need them.
-    Resample,
-}
-
-/// Opens the series that `path` stands for.
+/// Opens the series that `path` stands for; of several volumes at the same positions number `volume`.
 pub(super) fn open(
     path: &Path,
     options: &DicomOptions,
+    volume: Option<usize>,
     budget: &mut Budget,
 ) -> Result<Box<dyn SliceSource>, Fault> {
     let found = scan::find(path, options, budget)?;
-    Ok(Box::new(series::Series::new(found, options, budget)?))
+    Ok(Box::new(series::Series::new(found, options, volume, budget)?))
 }
 
 /// Reads the bytes of one file.
@@ -83,7 +54,7 @@ pub fn parse_dicom(bytes: &[u8], options: &DicomOptions, limits: &ReadLimits) ->
     budget.reserve("the file's content", bytes.len() as u64, 1)?;
     let found = scan::one(Arc::from(bytes), &mut budget)?;
     slices::read(
-        &mut series::Series::new(found, options, &mut budget)?,
+        &mut series::Series::new(found, options, None, &mut budget)?,
         &mut budget,
     )
 }

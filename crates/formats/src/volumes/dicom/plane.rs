@@ -18,6 +18,8 @@ pub(super) struct Plane {
     /// Step from column to column and from row to row, LPS, mm.
     pub steps: [DVec3; 2],
     pub rescale: Rescale,
+    /// What tells it from others at the same position, see [`Attributes::order`].
+    pub order: [f64; 5],
 }
 
 /// Deviation from unit length or a right angle that directions may have: they are written with 6 digits or more.
@@ -89,6 +91,7 @@ impl Plane {
             // The spacing between columns is the step along a row, and the second of the two.
             steps: [row * between_columns, column * between_rows],
             rescale,
+            order: attributes.order.map(|n| n.unwrap_or(f64::NEG_INFINITY)),
         })
     }
 }

@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::DicomOptions;
-use super::dataset::{self, DataSet, SeriesId, looks_like_dicom};
+use super::dataset::{self, Broken, DataSet, LOOK, SeriesId, looks_like_dicom};
 use super::stream::Location;
-use crate::Fault;
 use crate::input::io_fault;
 use crate::limits::Budget;
+use crate::{Choice, Fault};
 
 /// One file of a series.
 #[derive(Debug)]
@@ -38,7 +38,9 @@ const DIRECTORY_CLASS: &str = "1.2.840.10008.1.3.10";
 /// The file in `bytes` alone.
 pub(super) fn one(bytes: Arc<[u8]>, budget: &mut Budget) -> Result<Found, Fault> {
     let location = Location::Memory(bytes);
-    let data = dataset::read(&location, budget)?.ok_or_else(no_dicom)?;
+    let data = dataset::read(&location, budget)
+        .map_err(|b| b.fault)?
+        .ok_or_else(no_dicom)?;
     Ok(Found {
         files: vec![File {
             location,
@@ -61,7 +63,9 @@ pub(super) fn find(path: &Path, options: &DicomOptions, budget: &mut Budget) -> 
         return all.choose(options.series.as_deref());
     }
     let location = Location::Path(path.into());
-    let data = dataset::read(&location, budget)?.ok_or_else(no_dicom)?;
+    let data = dataset::read(&location, budget)
+        .map_err(|b| b.fault)?
+        .ok_or_else(no_dicom)?;
     if data.frame_count.is_some_and(|n| n > 1) {
         let name = name_of(path, path.parent().unwrap_or(path));
         return Ok(Found {
@@ -83,7 +87,7 @@ pub(crate) fn holds_dicom(path: &Path) -> Result<bool, Fault> {
     fn look(path: &Path, depth: usize) -> Result<bool, Fault> {
         let (files, directories) = entries(path, &mut |_| Ok(()))?;
         for file in files {
-            let mut head = [0; 132];
+            let mut head = [0; LOOK];
             // What cannot be opened is named when the directory is read.
             let got = match Location::Path(file).open() {
                 Ok(mut stream) => stream.fill_or_end(&mut head)?,
@@ -128,9 +132,9 @@ fn entries(
 
 fn no_dicom() -> Fault {
     Fault::Value {
-        what: "the mark at byte 128",
-        value: "not DICM".into(),
-        remedy: "a DICOM file has it; old files without can be given one by dcmconv +F IN OUT (DCMTK)",
+        what: "the start of the file",
+        value: "neither the mark DICM at byte 128 nor elements of DICOM".into(),
+        remedy: "is it a DICOM file?",
     }
 }
 
@@ -144,6 +148,8 @@ struct Scan {
     /// Files that are no DICOM, and those that hold no picture.
     foreign: usize,
     blind: usize,
+    /// DICOM files that cannot be understood, each with its name.
+    broken: Vec<Broken>,
     has_catalogue: bool,
 }
 
@@ -172,21 +178,42 @@ impl Scan {
         for path in files {
             let name = name_of(&path, root);
             let location = Location::Path(path);
-            match dataset::read(&location, budget).map_err(|f| f.inside(&name))? {
-                None => self.foreign += 1,
-                Some(data) if data.pixels.is_none() => {
+            match dataset::read(&location, budget) {
+                // A matter of all files, not of this one.
+                Err(Broken {
+                    fault: fault @ Fault::Limit { .. },
+                    ..
+                }) => return Err(fault),
+                Err(Broken { fault, series }) => self.broken.push(Broken {
+                    fault: fault.inside(&name),
+                    series,
+                }),
+                Ok(None) => self.foreign += 1,
+                Ok(Some(data)) if data.pixels.is_none() => {
                     self.has_catalogue |= data.sop_class == DIRECTORY_CLASS;
                     self.blind += usize::from(data.sop_class != DIRECTORY_CLASS);
                 }
-                Some(data) => self.files.push(File { location, name, data }),
+                Ok(Some(data)) => self.files.push(File { location, name, data }),
             }
         }
         Ok(directories)
     }
 
     /// The files of the series with that number or identifier, or of the only one that is a volume.
-    fn choose(self, wanted: Option<&str>) -> Result<Found, Fault> {
+    ///
+    /// Files that cannot be understood are passed over with a note, unless they are known to belong to it.
+    fn choose(mut self, wanted: Option<&str>) -> Result<Found, Fault> {
         let mut notes = Vec::new();
+        if self.files.is_empty() && !self.broken.is_empty() {
+            return Err(self.broken.swap_remove(0).fault);
+        }
+        if let Some(first) = self.broken.first() {
+            notes.push(format!(
+                "{} DICOM files cannot be understood and were passed over, the first {}",
+                self.broken.len(),
+                first.fault
+            ));
+        }
         if self.foreign > 0 {
             notes.push(format!(
                 "{} files that are no DICOM were passed over",
@@ -219,6 +246,10 @@ impl Scan {
         let [chosen] = chosen[..] else {
             return Err(ambiguous(&order, &chosen, wanted, self.foreign + self.blind));
         };
+        let uid = &order[chosen].id.uid;
+        if let Some(i) = self.broken.iter().position(|b| b.series == *uid) {
+            return Err(self.broken.swap_remove(i).fault);
+        }
         if wanted.is_none() && order.len() > 1 {
             let others = order
                 .iter()
@@ -309,9 +340,10 @@ fn ambiguous(all: &[Group], chosen: &[usize], wanted: Option<&str>, others: usiz
         ),
         None => format!("{}, of which {} are volumes:{list}\n", all.len(), chosen.len()),
     };
-    Fault::Value {
+    Fault::Choose {
         what: "the number of series",
         value,
-        remedy: "choose one by its number or identifier (--series)",
+        remedy: "choose one by its number or identifier",
+        choice: Choice::Series,
     }
 }

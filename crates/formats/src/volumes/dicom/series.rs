@@ -39,11 +39,16 @@ struct Planes {
 }
 
 impl Series {
-    /// Arranges the files of a series.
+    /// Arranges the files of a series; `volume` is which of several at the same positions is meant.
     ///
     /// # Errors
     /// [`Fault::Value`] for what a volume cannot be made of, [`Fault::Truncated`] for pixels that are not all there.
-    pub fn new(found: Found, options: &DicomOptions, budget: &mut Budget) -> Result<Self, Fault> {
+    pub fn new(
+        found: Found,
+        options: &DicomOptions,
+        volume: Option<usize>,
+        budget: &mut Budget,
+    ) -> Result<Self, Fault> {
         let Found { files, mut notes } = found;
         let mut planes = Vec::new();
         for (i, file) in files.iter().enumerate() {
@@ -72,8 +77,14 @@ impl Series {
         let common = first.frames.first().unwrap_or(&first.common).or(&first.common);
         let step = common.between_slices.map(f64::abs).or(common.thickness);
         let step = step.filter(|s| (1e-6..1e6).contains(s));
-        let stack = stack::arrange(planes, plane_dims, step, options, &name)?;
+        let stack = stack::arrange(planes, plane_dims, step, options, volume, &name)?;
         notes.extend(stack.notes);
+        let bare = files.iter().filter(|f| !f.data.has_preamble).count();
+        if bare > 0 {
+            notes.push(format!(
+                "{bare} files have no DICOM preamble; they were read as elements from their first byte"
+            ));
+        }
         if first.format.photometric == "MONOCHROME1" {
             notes.push(
                 "small values are meant to look bright (MONOCHROME1); they are kept as they are".into(),

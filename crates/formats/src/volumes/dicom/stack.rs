@@ -6,7 +6,8 @@ use glam::{DMat3, DVec3};
 
 use super::plane::Plane;
 use super::{DicomOptions, Tilt, Uneven};
-use crate::Fault;
+use crate::volumes::several::Several;
+use crate::{Choice, Fault};
 
 /// Planes of a volume in order along their normal.
 #[derive(Debug)]
@@ -52,10 +53,13 @@ const ASIDE: f64 = 0.05;
 const UPRIGHT: f64 = 1e-4;
 /// Degrees of tilt that a stack may have; gantries do 30.
 const STEEPEST: f64 = 60.0;
+/// Pixels that an upright grid may be wider than the pictures.
+const MOST_GROWN: f64 = 1e6;
 /// Cosines that are equal, and spacings relative to each other.
 const EQUAL: f64 = 1e-4;
 
-/// Orders planes and looks at their distances. `name` is how a plane is called; `dims` are columns and rows.
+/// Orders planes and looks at their distances. `name` is how a plane is called; `dims` are columns and rows; `volume`
+/// is which of several at the same positions is meant.
 ///
 /// # Errors
 /// [`Fault::Value`] for planes of different orientation or spacing, for several at one position, for displaced
@@ -65,6 +69,7 @@ pub(super) fn arrange(
     dims: [usize; 2],
     single_step: Option<f64>,
     options: &DicomOptions,
+    volume: Option<usize>,
     name: &dyn Fn(&Plane) -> String,
 ) -> Result<Stack, Fault> {
     same_directions(&planes, name)?;
@@ -73,6 +78,9 @@ pub(super) fn arrange(
     // Equal positions keep the order of the files.
     planes.sort_by(|a, b| along(a).total_cmp(&along(b)));
     let mut notes = Vec::new();
+    if let Some(wanted) = volume {
+        planes = one_volume(planes, &along, wanted, &mut notes)?;
+    }
     let (planes, copies) = part_copies(planes, &along, name)?;
     if !copies.is_empty() {
         notes.push(format!(
@@ -112,10 +120,11 @@ pub(super) fn arrange(
             ((0..planes.len()).map(Slice::whole).collect(), step)
         }
         Some(what) if options.uneven == Uneven::Refuse => {
-            return Err(Fault::Value {
+            return Err(Fault::Choose {
                 what: "the distance between slices",
                 value: what,
-                remedy: "look for missing files, or ask for resampling along the normal (--uneven resample)",
+                remedy: "look for missing files, or ask for resampling along the normal",
+                choice: Choice::Uneven,
             });
         }
         Some(what) => {
@@ -200,18 +209,66 @@ pub(super) fn some(names: impl Iterator<Item = String>) -> String {
     names.join(", ")
 }
 
+/// Distance along the normal below which two planes are at the same place.
+fn same_place(sorted: &[Plane], along: &dyn Fn(&Plane) -> f64) -> f64 {
+    let extent = along(&sorted[sorted.len() - 1]) - along(&sorted[0]);
+    // Median of the distances that are one: what files round to is far below.
+    let mut distances: Vec<f64> = sorted.windows(2).map(|w| along(&w[1]) - along(&w[0])).collect();
+    distances.retain(|d| *d > 1e-6 * extent && *d > 1e-6);
+    distances.sort_by(f64::total_cmp);
+    distances.get(distances.len() / 2).map_or(1e-6, |m| SAME * m)
+}
+
+/// The planes of volume number `wanted` of those that stand at the same positions, in their order in time.
+fn one_volume(
+    sorted: Vec<Plane>,
+    along: &dyn Fn(&Plane) -> f64,
+    wanted: usize,
+    notes: &mut Vec<String>,
+) -> Result<Vec<Plane>, Fault> {
+    let same = same_place(&sorted, along);
+    let mut groups: Vec<Vec<Plane>> = Vec::new();
+    for p in sorted {
+        match groups.last_mut() {
+            Some(group) if along(&p) - along(&group[0]) <= same => group.push(p),
+            _ => groups.push(vec![p]),
+        }
+    }
+    let least = groups.iter().map(Vec::len).min().unwrap_or(0);
+    let most = groups.iter().map(Vec::len).max().unwrap_or(0);
+    if least != most {
+        return Err(Fault::Value {
+            what: "the number of pictures at each position",
+            value: format!("{least} to {most}"),
+            remedy: "volumes can be told apart where each position has as many pictures; give the files of one volume",
+        });
+    }
+    let number = Several::choose(most as u64, Some(wanted))?.map_or(0, |s| s.number);
+    if most > 1 {
+        notes.push(format!(
+            "volume {number} of {most}, counted from 0: at each position the pictures were taken in the order of \
+             temporal position, trigger time, acquisition, echo time and instance"
+        ));
+    }
+    let in_time = |a: &Plane, b: &Plane| {
+        let keys = a.order.iter().zip(&b.order).map(|(a, b)| a.total_cmp(b));
+        keys.fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then)
+    };
+    let chosen = groups.into_iter().map(|mut group| {
+        // Equal ones keep the order of the files.
+        group.sort_by(in_time);
+        group.swap_remove(number)
+    });
+    Ok(chosen.collect())
+}
+
 /// One plane a position, and those that stand where another is.
 fn part_copies(
     sorted: Vec<Plane>,
     along: &dyn Fn(&Plane) -> f64,
     name: &dyn Fn(&Plane) -> String,
 ) -> Result<(Vec<Plane>, Vec<(usize, Plane)>), Fault> {
-    let extent = along(&sorted[sorted.len() - 1]) - along(&sorted[0]);
-    // Median of the distances that are one: what files round to is far below.
-    let mut distances: Vec<f64> = sorted.windows(2).map(|w| along(&w[1]) - along(&w[0])).collect();
-    distances.retain(|d| *d > 1e-6 * extent && *d > 1e-6);
-    distances.sort_by(f64::total_cmp);
-    let same = distances.get(distances.len() / 2).map_or(1e-6, |m| SAME * m);
+    let same = same_place(&sorted, along);
     let (mut planes, mut copies) = (Vec::<Plane>::new(), Vec::new());
     let count = sorted.len();
     for p in sorted {
@@ -238,14 +295,15 @@ fn part_copies(
         }
     }
     if copies.len() >= planes.len() && planes.len() > 1 {
-        return Err(Fault::Value {
+        return Err(Fault::Choose {
             what: "the number of pictures at each position",
             value: format!(
                 "{} on average ({count} at {})",
                 count / planes.len(),
                 planes.len()
             ),
-            remedy: "a time series, several echoes or phases: give the files of one volume only",
+            remedy: "a time series, several echoes or phases: choose one volume by its number, counted from 0",
+            choice: Choice::Volume,
         });
     }
     Ok((planes, copies))
@@ -388,6 +446,13 @@ fn tilt(grid: &mut Grid, normal: DVec3, tilt: Tilt, notes: &mut Vec<String>) -> 
         let last = drift[axis] * (grid.slices.len() - 1) as f64;
         // Whole pixels that the grid grows by, at the end or before its begin.
         let grown = (last.abs() - 1e-9).max(0.0).ceil();
+        if grown > MOST_GROWN {
+            return Err(Fault::Value {
+                what: "the width of the upright grid",
+                value: format!("{grown:e} pixels more than a picture's"),
+                remedy: "the positions and the spacing of the pixels contradict each other; keep the slices tilted",
+            });
+        }
         let before = if last < 0.0 { grown } else { 0.0 };
         grid.dims[axis] += grown as usize;
         grid.origin -= [s0, s1][axis] * before;

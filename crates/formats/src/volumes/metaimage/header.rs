@@ -8,8 +8,10 @@ use glam::{DAffine3, DMat3, DVec3};
 
 use crate::error::excerpt;
 use crate::limits::Budget;
-use crate::volumes::detached::{Content, Encoding, Layout, Lines, Parsed, Start, beside, numbered};
+use crate::neighbour::beside;
+use crate::volumes::detached::{Content, Encoding, Layout, Lines, Parsed, Start, numbered};
 use crate::volumes::geometry::{RAS_FROM_LPS, checked_dims, in_world, usable};
+use crate::volumes::several::Several;
 use crate::volumes::volume::{Orientation, VolumeHeader};
 use crate::volumes::voxel::VoxelType;
 use crate::{Fault, Unit};
@@ -66,7 +68,12 @@ impl Fields {
 }
 
 /// Reads a header from the start of `content`, up to the line that says where the voxels are.
-pub(super) fn read(content: &mut Content, path: Option<&Path>, budget: &mut Budget) -> Result<Parsed, Fault> {
+pub(super) fn read(
+    content: &mut Content,
+    path: Option<&Path>,
+    volume: Option<usize>,
+    budget: &mut Budget,
+) -> Result<Parsed, Fault> {
     let mut lines = Lines::new(content, budget);
     let mut fields = Fields::default();
     let is_list = loop {
@@ -110,17 +117,27 @@ pub(super) fn read(content: &mut Content, path: Option<&Path>, budget: &mut Budg
             listed.push(beside(path, line.trim())?);
         }
     }
-    interpret(&fields, is_list.then_some(listed), path)
+    interpret(&fields, is_list.then_some(listed), path, volume)
 }
 
-fn interpret(fields: &Fields, listed: Option<Vec<PathBuf>>, path: Option<&Path>) -> Result<Parsed, Fault> {
+fn interpret(
+    fields: &Fields,
+    listed: Option<Vec<PathBuf>>,
+    path: Option<&Path>,
+    volume: Option<usize>,
+) -> Result<Parsed, Fault> {
     let dims = dims(fields)?;
-    if let Some((name, channels)) = fields.get(&["ElementNumberOfChannels"])
-        && channels != "1"
-    {
-        return Err(fields.bad(name, "one number a voxel is read; take one channel out"));
-    }
-    let mut notes = Vec::new();
+    const CHANNELS: &str = "ElementNumberOfChannels";
+    let several = match fields.numbers::<1, u64>(&[CHANNELS], "a whole number is needed")? {
+        Some([0]) => return Err(fields.bad(CHANNELS, "a voxel has at least one number")),
+        channels => Several::choose(channels.map_or(1, |c| c[0]), volume)?,
+    };
+    // The channels of a voxel stand together.
+    let several = several.map(|s| Several {
+        is_interleaved: true,
+        ..s
+    });
+    let mut notes = Vec::from_iter(several.map(|s| s.note()));
     let (world_from_voxel, orientation, unit) = place(fields, &mut notes)?;
     if let Some((name, value)) = fields.get(&[
         "ElementToIntensityFunctionSlope",
@@ -157,6 +174,7 @@ fn interpret(fields: &Fields, listed: Option<Vec<PathBuf>>, path: Option<&Path>)
             Some(paths) => Some(paths),
             None => data_files(fields, path, dims)?,
         },
+        several,
         header,
         notes,
         layout: Layout {

@@ -6,6 +6,7 @@ use super::affine::{self, Transforms};
 use crate::input::read_fault;
 use crate::kind::VolumeFormat;
 use crate::volumes::geometry::checked_dims;
+use crate::volumes::several::Several;
 use crate::volumes::volume::VolumeHeader;
 use crate::volumes::voxel::VoxelType;
 use crate::{Fault, Unit};
@@ -16,7 +17,10 @@ const SIZE_2: usize = 540;
 /// A header and what reading the voxels needs of it.
 #[derive(Debug)]
 pub(super) struct Parsed {
+    /// Of the volume that is read.
     pub header: VolumeHeader,
+    /// Which of those in the file, if there are several.
+    pub several: Option<Several>,
     pub notes: Vec<String>,
     pub big_endian: bool,
     /// The voxels are in a file of their own.
@@ -102,8 +106,8 @@ struct Fields {
     transforms: Transforms,
 }
 
-/// Reads a header from the start of a content.
-pub(super) fn read(source: &mut impl Read) -> Result<Parsed, Fault> {
+/// Reads a header from the start of a content; `volume` is which of several is wanted.
+pub(super) fn read(source: &mut impl Read, volume: Option<usize>) -> Result<Parsed, Fault> {
     let mut raw = [0; SIZE_2];
     fill(source, &mut raw[..SIZE_1], 0)?;
     let (size, big) = sizes(&raw).ok_or_else(|| Fault::Value {
@@ -136,7 +140,7 @@ pub(super) fn read(source: &mut impl Read) -> Result<Parsed, Fault> {
     } else {
         version_2(&b)
     };
-    let mut parsed = check(fields, size, is_pair)?;
+    let mut parsed = check(fields, size, is_pair, volume)?;
     parsed.big_endian = big;
     Ok(parsed)
 }
@@ -203,7 +207,7 @@ fn version_2(b: &Bytes) -> Fields {
     }
 }
 
-fn check(f: Fields, size: usize, is_pair: bool) -> Result<Parsed, Fault> {
+fn check(f: Fields, size: usize, is_pair: bool, volume: Option<usize>) -> Result<Parsed, Fault> {
     let axes = f.dim[0];
     if !(1..=7).contains(&axes) {
         return Err(Fault::Value {
@@ -221,13 +225,9 @@ fn check(f: Fields, size: usize, is_pair: bool) -> Result<Parsed, Fault> {
             remedy: "every dimension is at least 1",
         });
     }
-    if let Some(i) = (4..8).find(|i| extent(*i) > 1) {
-        return Err(Fault::Value {
-            what: "the number of volumes in the file",
-            value: format!("{} (dimension {i})", extent(i)),
-            remedy: "take one out, in nibabel img.slicer[..., 0], and save it as its own file",
-        });
-    }
+    // The first of the further axes runs fastest: a number counts through all of them.
+    let count = (4..8).map(extent).fold(1u64, |n, d| n.saturating_mul(d as u64));
+    let several = Several::choose(count, volume)?;
     let dims = checked_dims([1, 2, 3].map(extent))?;
     let stored = VoxelType::from_code(f.datatype).ok_or_else(|| Fault::Value {
         what: "the voxel type",
@@ -249,7 +249,7 @@ fn check(f: Fields, size: usize, is_pair: bool) -> Result<Parsed, Fault> {
             remedy: "it is a whole number of bytes after the header; is the header damaged?",
         });
     }
-    let mut notes = Vec::new();
+    let mut notes = Vec::from_iter(several.map(|s| s.note()));
     let (mut world_from_voxel, orientation) = affine::choose(&f.transforms, &mut notes)?;
     let unit = match f.units & 7 {
         1 => Unit::Metre,
@@ -290,6 +290,7 @@ fn check(f: Fields, size: usize, is_pair: bool) -> Result<Parsed, Fault> {
     };
     Ok(Parsed {
         header,
+        several,
         notes,
         big_endian: false,
         is_pair,

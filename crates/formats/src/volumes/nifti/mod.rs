@@ -10,7 +10,9 @@ pub(crate) use header::nifti_format;
 pub(super) use write::write;
 pub use write::write_nifti;
 
+use super::several::OneOf;
 use super::slices;
+use super::slices::SliceSource;
 use super::stream::{StreamSlices, check_length, skip};
 use super::volume::Volume;
 use crate::input::{self, SkipRead};
@@ -23,14 +25,14 @@ use crate::{Fault, ReadLimits};
 /// As [`super::read`], without the path.
 pub fn parse_nifti(bytes: &[u8], limits: &ReadLimits) -> Result<Volume, Fault> {
     let mut source = single(Box::new(bytes), Some(bytes.len() as u64))?;
-    slices::read(&mut source, &mut Budget::new(limits))
+    slices::read(&mut *source, &mut Budget::new(limits))
 }
 
-/// Opens `.nii`, or `.hdr` with its `.img`.
-pub(super) fn open(path: &Path) -> Result<StreamSlices<'static>, Fault> {
+/// Opens `.nii`, or `.hdr` with its `.img`; of several volumes number `volume`.
+pub(super) fn open(path: &Path, volume: Option<usize>) -> Result<Box<dyn SliceSource>, Fault> {
     let input = input::open(&header_of(path))?;
     let (mut source, bound) = (input.source, input.length_bound);
-    let parsed = header::read(&mut source)?;
+    let parsed = header::read(&mut source, volume)?;
     if parsed.is_pair {
         let image = input::open_by_name(&image_of(path)?)?;
         return voxels(parsed, 0, Box::new(image.source), image.length_bound);
@@ -39,8 +41,11 @@ pub(super) fn open(path: &Path) -> Result<StreamSlices<'static>, Fault> {
     voxels(parsed, consumed, Box::new(source), bound)
 }
 
-fn single<'a>(mut source: Box<dyn SkipRead + 'a>, bound: Option<u64>) -> Result<StreamSlices<'a>, Fault> {
-    let parsed = header::read(&mut source)?;
+fn single<'a>(
+    mut source: Box<dyn SkipRead + 'a>,
+    bound: Option<u64>,
+) -> Result<Box<dyn SliceSource + 'a>, Fault> {
+    let parsed = header::read(&mut source, None)?;
     if parsed.is_pair {
         return Err(Fault::Value {
             what: "the magic",
@@ -53,22 +58,25 @@ fn single<'a>(mut source: Box<dyn SkipRead + 'a>, bound: Option<u64>) -> Result<
 }
 
 /// `source`, of at most `bound` bytes, stands at byte `at`.
-fn voxels(
+fn voxels<'a>(
     parsed: header::Parsed,
     at: u64,
-    mut source: Box<dyn SkipRead + '_>,
+    mut source: Box<dyn SkipRead + 'a>,
     bound: Option<u64>,
-) -> Result<StreamSlices<'_>, Fault> {
+) -> Result<Box<dyn SliceSource + 'a>, Fault> {
+    let whole = match &parsed.several {
+        Some(several) => several.file_header(&parsed.header)?,
+        None => parsed.header.clone(),
+    };
     if let Some(bound) = bound {
-        check_length(&parsed.header, bound.saturating_sub(parsed.voxels_at))?;
+        check_length(&whole, bound.saturating_sub(parsed.voxels_at))?;
     }
     skip(&mut *source, parsed.voxels_at - at)?;
-    Ok(StreamSlices::new(
-        parsed.header,
-        parsed.notes,
-        parsed.big_endian,
-        source,
-    ))
+    let inner = Box::new(StreamSlices::new(whole, parsed.notes, parsed.big_endian, source));
+    Ok(match parsed.several {
+        Some(several) => Box::new(OneOf::new(inner, parsed.header, several)),
+        None => inner,
+    })
 }
 
 /// The file of a pair that has the header.

@@ -4,6 +4,7 @@ use glam::{DAffine3, DMat3, DVec3};
 
 use super::fields::Fields;
 use crate::volumes::geometry::{RAS_FROM_LPS, in_world, usable};
+use crate::volumes::several::Several;
 use crate::volumes::volume::Orientation;
 use crate::{Fault, Unit};
 
@@ -14,6 +15,8 @@ pub(super) struct Axes {
     /// Number of axes of the file.
     count: usize,
     pub sizes: [i64; 3],
+    /// Which volume is read, if a fourth axis counts several.
+    pub several: Option<Several>,
 }
 
 /// A map and what is known of it.
@@ -24,10 +27,9 @@ pub(super) struct Placed {
 }
 
 impl Axes {
-    /// Three axes, or four of which one has a single sample and is none of space.
-    pub fn of(fields: &Fields) -> Result<Self, Fault> {
-        let remedy =
-            "a volume has three axes of space and one number a voxel; take one channel or time step out";
+    /// Three axes of space, and maybe one of volumes, of which number `volume` is wanted.
+    pub fn of(fields: &Fields, volume: Option<usize>) -> Result<Self, Fault> {
+        let remedy = "a volume has three axes of space, and at most one of time steps or channels before or after them";
         let sizes: Vec<i64> = fields.numbers("sizes")?.unwrap_or_default();
         let dimension = fields.numbers::<usize>("dimension")?.unwrap_or_default();
         if dimension != [sizes.len()] {
@@ -52,15 +54,25 @@ impl Axes {
             kind && direction
         };
         let mut places: Vec<usize> = (0..sizes.len()).filter(|a| is_space(*a)).collect();
-        if places.len() == 4 && sizes.len() == 4 && sizes[3] == 1 {
+        // Where nothing tells them apart, the slowest counts volumes.
+        if places.len() == 4 && sizes.len() == 4 {
             places.pop();
         }
-        let others_are_single = (0..sizes.len()).all(|a| places.contains(&a) || sizes[a] == 1);
+        let other = (0..sizes.len()).find(|a| !places.contains(a));
+        let is_single = other.is_none_or(|a| sizes[a] == 1);
         match <[usize; 3]>::try_from(places) {
-            Ok(places) if sizes.len() <= 4 && others_are_single => Ok(Self {
+            Ok(places) if sizes.len() <= 4 && (is_single || matches!(other, Some(0 | 3))) => Ok(Self {
                 places,
                 count: sizes.len(),
                 sizes: places.map(|a| sizes[a]),
+                several: match other.map(|a| u64::try_from(sizes[a])) {
+                    None => Several::choose(1, volume)?,
+                    Some(Ok(count @ 1..)) => Several::choose(count, volume)?.map(|s| Several {
+                        is_interleaved: other == Some(0),
+                        ..s
+                    }),
+                    Some(_) => return Err(fields.bad("sizes", "every axis has at least one sample")),
+                },
             }),
             _ if kinds.is_empty() => Err(fields.bad("sizes", remedy)),
             _ => Err(fields.bad("kinds", remedy)),

@@ -7,13 +7,19 @@ use super::geometry::{self, Axes};
 use crate::Fault;
 use crate::error::excerpt;
 use crate::limits::Budget;
-use crate::volumes::detached::{Content, Encoding, Layout, Lines, Parsed, Start, beside, numbered};
+use crate::neighbour::beside;
+use crate::volumes::detached::{Content, Encoding, Layout, Lines, Parsed, Start, numbered};
 use crate::volumes::geometry::checked_dims;
 use crate::volumes::volume::VolumeHeader;
 use crate::volumes::voxel::VoxelType;
 
 /// Reads a header from the start of `content`, up to the blank line that ends it.
-pub(super) fn read(content: &mut Content, path: Option<&Path>, budget: &mut Budget) -> Result<Parsed, Fault> {
+pub(super) fn read(
+    content: &mut Content,
+    path: Option<&Path>,
+    volume: Option<usize>,
+    budget: &mut Budget,
+) -> Result<Parsed, Fault> {
     let mut lines = Lines::new(content, budget);
     let magic = lines.next()?.ok_or(Fault::Empty)?;
     if !matches!(
@@ -65,14 +71,19 @@ pub(super) fn read(content: &mut Content, path: Option<&Path>, budget: &mut Budg
             ));
         }
     }
-    interpret(&fields, listed, path)
+    interpret(&fields, listed, path, volume)
 }
 
-fn interpret(fields: &Fields, listed: Option<Vec<String>>, path: Option<&Path>) -> Result<Parsed, Fault> {
+fn interpret(
+    fields: &Fields,
+    listed: Option<Vec<String>>,
+    path: Option<&Path>,
+    volume: Option<usize>,
+) -> Result<Parsed, Fault> {
     let stored = voxel_type(fields)?;
-    let axes = Axes::of(fields)?;
+    let axes = Axes::of(fields, volume)?;
     let dims = checked_dims(axes.sizes)?;
-    let mut notes = Vec::new();
+    let mut notes = Vec::from_iter(axes.several.map(|s| s.note()));
     let placed = geometry::place(fields, &axes, &mut notes)?;
     let header = VolumeHeader {
         dims,
@@ -114,7 +125,13 @@ fn interpret(fields: &Fields, listed: Option<Vec<String>>, path: Option<&Path>) 
     let skip_lines = skip("lineskip")?;
     let skip_lines = u64::try_from(skip_lines).map_err(|_| fields.bad("lineskip", "it is 0 or more"))?;
     Ok(Parsed {
-        files: data_files(fields, listed, path, dims)?,
+        files: data_files(
+            fields,
+            listed,
+            path,
+            axes.several.map_or(Ok(dims), |s| s.file_dims(dims))?,
+        )?,
+        several: axes.several,
         header,
         notes,
         layout: Layout {

@@ -28,6 +28,10 @@ pub fn parse_nrrd(bytes: &[u8], limits: &ReadLimits) -> Result<Volume, Fault> {
     detached::parse(bytes, header::read, limits)
 }
 
-pub(super) fn open(path: &Path, budget: &mut Budget) -> Result<Box<dyn SliceSource>, Fault> {
-    detached::open(path, header::read, budget)
+pub(super) fn open(
+    path: &Path,
+    volume: Option<usize>,
+    budget: &mut Budget,
+) -> Result<Box<dyn SliceSource>, Fault> {
+    detached::open(path, header::read, volume, budget)
 }

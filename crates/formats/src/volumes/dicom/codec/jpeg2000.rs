@@ -34,11 +34,8 @@ pub(super) fn decode(compressed: &[u8], shape: &Shape, out: &mut Vec<u8>) -> Res
             format!("it has {} samples", component.samples().len()),
         ));
     }
-    // The decoder shifts signed samples up as it does unsigned ones.
-    let shift = if size.signed { 1i32 << (size.bits - 1) } else { 0 };
     for sample in component.samples() {
-        let number = sample.round() as i32 - shift;
-        out.extend_from_slice(&(number as u16).to_le_bytes());
+        out.extend_from_slice(&(size.number(*sample, shape) as u16).to_le_bytes());
     }
     Ok(2)
 }
@@ -53,6 +50,28 @@ struct Size {
 }
 
 impl Size {
+    /// The number that a decoded sample stands for.
+    ///
+    /// A lossy stream overshoots at edges: what is beyond the depth of the stream, or beyond the bits that the header
+    /// says are stored, is their end and not what their bits would wrap to.
+    fn number(&self, sample: f32, shape: &Shape) -> i32 {
+        let top = (1i32 << self.bits) - 1;
+        // The decoder shifts signed samples up as it does unsigned ones.
+        let shift = if self.signed { 1i32 << (self.bits - 1) } else { 0 };
+        let number = sample.round().clamp(0.0, top as f32) as i32 - shift;
+        if self.signed != shape.signed || shape.bits_stored >= self.bits {
+            return number;
+        }
+        let (low, high) = match shape.signed {
+            true => (
+                -(1 << (shape.bits_stored - 1)),
+                (1 << (shape.bits_stored - 1)) - 1,
+            ),
+            false => (0, (1 << shape.bits_stored) - 1),
+        };
+        number.clamp(low, high)
+    }
+
     fn read(stream: &[u8]) -> Result<Self, Fault> {
         const START: [u8; 4] = [0xFF, 0x4F, 0xFF, 0x51];
         // In a file with boxes the code stream stands at the end; files of DICOM have none.
@@ -92,5 +111,48 @@ impl Size {
             return Err(damaged("JPEG 2000", format!("it has {tiles} tiles")));
         }
         Ok(this)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn overshoot_ends_at_the_stored_depth() {
+        let number = |bits, signed, bits_stored, header_signed, sample| {
+            let size = Size {
+                width: 1,
+                height: 1,
+                components: 1,
+                bits,
+                signed,
+            };
+            let shape = Shape {
+                rows: 1,
+                columns: 1,
+                bytes_per_pixel: 2,
+                bits_stored,
+                signed: header_signed,
+            };
+            size.number(sample, &shape)
+        };
+        for (bits, stored) in [(12, 12), (16, 12), (12, 16)] {
+            for (sample, expected) in [(-0.7, 0), (-300.0, 0), (5.4, 5), (4095.6, 4095), (4400.0, 4095)] {
+                assert_eq!(
+                    number(bits, false, stored, false, sample),
+                    expected,
+                    "{bits} {stored} {sample}"
+                );
+            }
+        }
+        for (sample, expected) in [(-3.0, -2048), (0.0, -2048), (2048.0, 0), (4099.0, 2047)] {
+            assert_eq!(number(12, true, 12, true, sample), expected, "{sample}");
+        }
+        assert_eq!(number(16, true, 12, true, 32768.0 + 2050.0), 2047);
+        assert_eq!(number(16, true, 12, true, 32768.0 - 2050.0), -2048);
+        // Header and stream disagree about the sign: the bits are what there is.
+        assert_eq!(number(16, false, 12, true, 4000.0), 4000);
+        assert_eq!(number(16, false, 16, false, 70_000.0), 65_535);
     }
 }

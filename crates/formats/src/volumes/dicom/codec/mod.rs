@@ -16,6 +16,9 @@ pub(super) struct Shape {
     pub columns: usize,
     /// 1, 2 or 4, as the header says.
     pub bytes_per_pixel: usize,
+    /// Bits and sign of the stored numbers, as the header says.
+    pub bits_stored: u32,
+    pub signed: bool,
 }
 
 impl Shape {

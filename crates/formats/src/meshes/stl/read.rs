@@ -2,10 +2,10 @@
 
 use glam::DVec3;
 
-use super::weld::Welder;
 use crate::Fault;
 use crate::error::excerpt;
 use crate::limits::Budget;
+use crate::meshes::weld::Welder;
 use crate::raw::{Faces, RawShape};
 use crate::text::{Lines, number};
 
@@ -13,7 +13,7 @@ use crate::text::{Lines, number};
 const HEAD: u64 = 84;
 const ROW: u64 = 50;
 
-pub(super) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<RawShape, Fault> {
+pub(in crate::meshes) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<RawShape, Fault> {
     if bytes.is_empty() {
         return Err(Fault::Empty);
     }

@@ -1,4 +1,6 @@
-//! OBJ in: `v`, `vn` and `f`; everything else is skipped.
+//! OBJ in and out. Read are `v`, `vn` and `f`; everything else is skipped.
+
+mod write;
 
 use glam::{DVec3, Vec3};
 
@@ -7,8 +9,10 @@ use super::normals;
 use crate::error::excerpt;
 use crate::limits::{Budget, Counted};
 use crate::raw::{Faces, NO_NORMAL, RawShape, Wanted};
-use crate::text::{Lines, integer, number};
+use crate::text::{Lines, integer, number, utf8};
 use crate::{Fault, ReadLimits};
+
+pub(crate) use write::write;
 
 /// Reads the text of an OBJ file.
 ///
@@ -30,6 +34,7 @@ pub(crate) fn parse(bytes: &[u8], wanted: Wanted, budget: &mut Budget) -> Result
     if bytes.is_empty() {
         return Err(Fault::Empty);
     }
+    let bytes = &*utf8(bytes, budget)?;
     let mut positions = Counted::new("points");
     let mut vertex_normals = Counted::new("normals");
     let mut faces = Faces::new();
@@ -218,6 +223,22 @@ mod tests {
         ] {
             assert_eq!(read(&text).unwrap(), plain, "{text}");
         }
+    }
+
+    #[test]
+    fn text_of_windows_is_read_too() {
+        let text = format!("# ä\r\n{SQUARE}f 1 2 3 4\n");
+        let plain = read(&text).unwrap();
+        let wide: Vec<u8> = [0xfeff]
+            .into_iter()
+            .chain(text.encode_utf16())
+            .flat_map(u16::to_le_bytes)
+            .collect();
+        assert_eq!(parse_obj(&wide, &ReadLimits::default()).unwrap(), plain);
+        assert_eq!(
+            read(&text.replace("\r\n", "\n").replace('\n', "\r")).unwrap(),
+            plain
+        );
     }
 
     #[test]

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::mesh::{CHUNK, Mesh, needs_double, spill};
 use crate::file_name::{extension, is_gz_name};
+use crate::meshes::mesh::{CHUNK, Mesh, needs_double, spill};
 use crate::{Fault, FormatError, atomic};
 
 /// Writes points with an optional colour each as binary PLY, atomically.
@@ -34,21 +34,31 @@ pub fn save_points(
         }
         .at(path));
     }
-    atomic::replace(path, |out| write_points(out, points, normals, colors))
+    let double = needs_double(points);
+    atomic::replace(path, |out| write_points(out, points, normals, colors, double))
 }
 
-/// [`save_points`] to a stream.
+/// [`save_points`] to a stream, with coordinates of double precision or not.
 pub(crate) fn write_points(
     out: &mut dyn Write,
     points: &[DVec3],
     normals: Option<&[DVec3]>,
     colors: Option<&[[u8; 3]]>,
+    double: bool,
 ) -> io::Result<()> {
-    write_vertices(out, points, normals, colors, None)
+    write_vertices(out, points, normals, colors, double, None)
 }
 
-pub(super) fn write(out: &mut dyn Write, mesh: &Mesh) -> io::Result<()> {
-    write_vertices(out, mesh.vertices, None, mesh.colors, Some(mesh.triangles.len()))?;
+pub(crate) fn write(out: &mut dyn Write, mesh: &Mesh) -> io::Result<()> {
+    let double = needs_double(mesh.vertices);
+    write_vertices(
+        out,
+        mesh.vertices,
+        None,
+        mesh.colors,
+        double,
+        Some(mesh.triangles.len()),
+    )?;
     let mut bytes = Vec::with_capacity(CHUNK + 16);
     for t in mesh.triangles {
         let mut row = [3; 13];
@@ -66,6 +76,7 @@ fn write_vertices(
     points: &[DVec3],
     normals: Option<&[DVec3]>,
     colors: Option<&[[u8; 3]]>,
+    double: bool,
     faces: Option<usize>,
 ) -> io::Result<()> {
     assert!(
@@ -76,7 +87,6 @@ fn write_vertices(
         colors.is_none_or(|c| c.len() == points.len()),
         "one colour per point"
     );
-    let double = needs_double(points);
     let kind = if double { "double" } else { "float" };
     write!(
         out,

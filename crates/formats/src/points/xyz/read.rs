@@ -2,10 +2,10 @@
 
 use glam::DVec3;
 
-use super::cloud::PointCloud;
-use super::normals;
 use crate::error::excerpt;
 use crate::limits::{Budget, Counted};
+use crate::points::cloud::PointCloud;
+use crate::points::normals;
 use crate::raw::RawShape;
 use crate::text::{Lines, integer, number};
 use crate::{Fault, ReadLimits};
@@ -27,7 +27,7 @@ pub fn parse_xyz(bytes: &[u8], limits: &ReadLimits) -> Result<PointCloud, Fault>
     normals::finish(parse(bytes, &mut budget)?, &mut budget)
 }
 
-pub(super) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<RawShape, Fault> {
+pub(in crate::points) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<RawShape, Fault> {
     let mut notes = Vec::new();
     let mut positions = Counted::new("points");
     let mut normals = Counted::new("normals");

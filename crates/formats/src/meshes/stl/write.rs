@@ -4,9 +4,9 @@ use std::io::{self, Write};
 
 use glam::DVec3;
 
-use super::mesh::{CHUNK, Mesh, spill};
+use crate::meshes::mesh::{CHUNK, Mesh, spill};
 
-pub(super) fn write(out: &mut dyn Write, mesh: &Mesh) -> io::Result<()> {
+pub(in crate::meshes) fn write(out: &mut dyn Write, mesh: &Mesh) -> io::Result<()> {
     // The text must not start with "solid": readers would take the file for an ascii one.
     let mut header = [b' '; 80];
     header[..18].copy_from_slice(b"binary STL isoclay");

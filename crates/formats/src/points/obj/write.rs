@@ -2,9 +2,9 @@
 
 use std::io::{self, Write};
 
-use super::mesh::{CHUNK, Mesh, needs_double, spill};
+use crate::meshes::mesh::{CHUNK, Mesh, needs_double, spill};
 
-pub(super) fn write(out: &mut dyn Write, mesh: &Mesh) -> io::Result<()> {
+pub(crate) fn write(out: &mut dyn Write, mesh: &Mesh) -> io::Result<()> {
     let double = needs_double(mesh.vertices);
     let mut bytes = Vec::with_capacity(CHUNK + 256);
     bytes.extend_from_slice(b"# isoclay\n");

@@ -6,7 +6,7 @@ use base64::engine::general_purpose::STANDARD;
 use base64::write::EncoderWriter;
 use glam::{DVec3, Vec3};
 
-use super::mesh::{CHUNK, Mesh, needs_double, spill};
+use crate::meshes::mesh::{CHUNK, Mesh, needs_double, spill};
 
 /// Positions and how they are stored: single precision about an origin of double precision.
 struct Layout {
@@ -115,13 +115,13 @@ impl Layout {
 }
 
 /// Bytes of the buffer of a mesh; a binary container counts to 2³² − 1.
-pub(super) fn buffer_bytes(mesh: &Mesh) -> u64 {
+pub(in crate::meshes) fn buffer_bytes(mesh: &Mesh) -> u64 {
     12 * (mesh.vertices.len() as u64 + mesh.triangles.len() as u64)
         + mesh.colors.map_or(0, |c| 4 * c.len() as u64)
 }
 
 /// Writes a `.glb` file.
-pub(super) fn write_binary(out: &mut dyn Write, mesh: &Mesh) -> io::Result<()> {
+pub(in crate::meshes) fn write_binary(out: &mut dyn Write, mesh: &Mesh) -> io::Result<()> {
     let layout = Layout::of(mesh);
     let mut document = layout.document(mesh, "}]}");
     while !document.len().is_multiple_of(4) {
@@ -140,7 +140,7 @@ pub(super) fn write_binary(out: &mut dyn Write, mesh: &Mesh) -> io::Result<()> {
 }
 
 /// Writes a `.gltf` file with its buffer in it.
-pub(super) fn write_text(out: &mut dyn Write, mesh: &Mesh) -> io::Result<()> {
+pub(in crate::meshes) fn write_text(out: &mut dyn Write, mesh: &Mesh) -> io::Result<()> {
     let layout = Layout::of(mesh);
     let document = layout.document(mesh, ",\"uri\":\"data:application/octet-stream;base64,");
     out.write_all(document.as_bytes())?;

@@ -5,8 +5,8 @@ use std::io::{self, Cursor, Write};
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
-use super::mesh::{CHUNK, Mesh, needs_double, spill};
 use crate::Unit;
+use crate::meshes::mesh::{CHUNK, Mesh, needs_double, spill};
 
 const TYPES: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
     <Types xmlns=\"http://schemas.openxmlformats.org/package/2006/content-types\">\
@@ -18,7 +18,7 @@ const RELATIONSHIPS: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
     Type=\"http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel\"/></Relationships>\n";
 
 /// Writes the package; it is gathered in memory, since a package is finished at its start.
-pub(super) fn write(out: &mut dyn Write, mesh: &Mesh) -> io::Result<()> {
+pub(in crate::meshes) fn write(out: &mut dyn Write, mesh: &Mesh) -> io::Result<()> {
     let mut package = ZipWriter::new(Cursor::new(Vec::new()));
     let options = SimpleFileOptions::default().large_file(mesh.triangles.len() > 20_000_000);
     for (name, content) in [("[Content_Types].xml", TYPES), ("_rels/.rels", RELATIONSHIPS)] {

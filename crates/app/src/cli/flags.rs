@@ -1,0 +1,50 @@
+//! The libraries say in words what would help; here the words get the options of this program.
+
+use formats::Choice;
+
+/// The option that a choice of the readers is made by.
+pub fn of(choice: Choice) -> &'static str {
+    match choice {
+        Choice::Series => "--series NUMBER|UID",
+        Choice::Uneven => "--uneven resample",
+        Choice::Volume => "--volume N",
+    }
+}
+
+/// What the fitting library advises, and the option for it.
+const ADVICE: [(&str, &str); 4] = [
+    ("fit them by the robust loss", "--robust"),
+    ("fit it as a cloud", "--as cloud"),
+    ("a mesh can be trimmed there", "isoclay mesh --trim"),
+    (
+        "raise the memory ceiling or lower the depth limit",
+        "--memory, --max-depth",
+    ),
+];
+
+/// `text` with the option behind each piece of advice.
+pub fn named(text: &str) -> String {
+    let mut text = text.to_owned();
+    for (words, option) in ADVICE {
+        if let Some(at) = text.find(words) {
+            text.insert_str(at + words.len(), &format!(" ({option})"));
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn advice_names_its_option() {
+        let limit = fitting::FitError::MemoryLimit { needed: 2, limit: 1 }.to_string();
+        assert!(named(&limit).ends_with("(--memory, --max-depth)"), "{limit}");
+        assert_eq!(
+            named("these are outliers, fit them by the robust loss, or not"),
+            "these are outliers, fit them by the robust loss (--robust), or not"
+        );
+        assert_eq!(named("nothing to advise"), "nothing to advise");
+    }
+}
