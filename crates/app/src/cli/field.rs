@@ -304,9 +304,11 @@ fn signs(stored: StoredSigns, leaf_confidence: &[f32]) -> SignReport {
 
 fn leaf(r: &LeafRecord) -> Option<Leaf> {
     use StopReason::*;
-    let reason = [Tolerance, Depth, NoData, Noise, Budget, Memory, Neighbours, Crease]
-        .into_iter()
-        .find(|s| *s as u8 == r.reason)?;
+    let reason = [
+        Tolerance, Depth, NoData, Noise, Budget, Memory, Neighbours, Crease,
+    ]
+    .into_iter()
+    .find(|s| *s as u8 == r.reason)?;
     Some(Leaf {
         level: r.level,
         cell: r.cell,

@@ -5,9 +5,9 @@ use bspline::hierarchical::{BRICK, BrickKey, HALO};
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::Plan;
 use super::judge::Quality;
 use super::probes::{Cell, Octants, Probe, cell_of, center, child};
-use super::Plan;
 use crate::points::band::Band;
 use crate::points::band_solve::{BandSample, BrickSamples};
 use crate::points::stencil::{Spot, gather};
@@ -79,7 +79,13 @@ pub(super) fn by_brick(cells: &[Cell]) -> Vec<(BrickKey, std::ops::Range<usize>)
 
 impl<T: Real> Conditions<T> {
     /// All conditions in cells whose coefficients the band holds: those of its own cells, and those round them.
-    pub fn new(depth: usize, band: &Band<T>, cells: &[Cell], octants: &[Octants], around: &Around<'_>) -> Self {
+    pub fn new(
+        depth: usize,
+        band: &Band<T>,
+        cells: &[Cell],
+        octants: &[Octants],
+        around: &Around<'_>,
+    ) -> Self {
         let near = near_masks(depth, band, cells);
         let place = |probe: &Probe| -> Option<u32> {
             let cell = cell_of(probe.at, depth);
@@ -93,7 +99,11 @@ impl<T: Real> Conditions<T> {
         let of = |index: u32| {
             let first = others[0].len();
             let i = index as usize;
-            if i < first { &others[0][i] } else { &others[1][i - first] }
+            if i < first {
+                &others[0][i]
+            } else {
+                &others[1][i - first]
+            }
         };
         let total = (others[0].len() + others[1].len()) as u32;
         placed.par_extend(

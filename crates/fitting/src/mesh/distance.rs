@@ -1,6 +1,5 @@
 //! What the fit asks of a mesh: signed distance and its gradient, anywhere.
 
-
 use bspline::Aabb;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -175,7 +174,12 @@ impl MeshDistance {
 
     /// Area of the surface in the unit box.
     pub(crate) fn unit_area(&self) -> f64 {
-        self.surface.boundary.corners.iter().map(|t| area_vector(t).length()).sum()
+        self.surface
+            .boundary
+            .corners
+            .iter()
+            .map(|t| area_vector(t).length())
+            .sum()
     }
 
     /// Diagonal of the box round the mesh, world units.
@@ -212,12 +216,20 @@ impl MeshDistance {
     /// Distance at `p` of the unit box, given what was found at a point near by.
     pub(crate) fn at(&self, p: DVec3, near: Option<(DVec3, &Distance)>) -> Distance {
         let found = self.surface.boundary.nearest(p, near.map_or(0, |n| n.1.hint));
-        self.follow(p, &found, near).unwrap_or_else(|| self.wind(p, &found))
+        self.follow(p, &found, near)
+            .unwrap_or_else(|| self.wind(p, &found))
     }
 
     /// [`MeshDistance::at`] for eight places near each other and near the one that something is known of.
-    pub(crate) fn at_eight(&self, places: &[DVec3; PLACES], near: Option<(DVec3, &Distance)>) -> [Distance; PLACES] {
-        let found = self.surface.boundary.nearest_of_eight(places, near.map_or(0, |n| n.1.hint));
+    pub(crate) fn at_eight(
+        &self,
+        places: &[DVec3; PLACES],
+        near: Option<(DVec3, &Distance)>,
+    ) -> [Distance; PLACES] {
+        let found = self
+            .surface
+            .boundary
+            .nearest_of_eight(places, near.map_or(0, |n| n.1.hint));
         let mut last: Option<(DVec3, Distance)> = None;
         std::array::from_fn(|i| {
             let (p, found) = (places[i], &found[i]);

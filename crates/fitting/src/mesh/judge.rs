@@ -89,7 +89,9 @@ impl Quality {
             if cell_of(found.foot, depth) == cell.at {
                 let (f, slope) = field(found.foot);
                 out.feet.add((f, slope));
-                out.turn += found.gradient(place).map_or(0.0, |g| (slope - g).length_squared());
+                out.turn += found
+                    .gradient(place)
+                    .map_or(0.0, |g| (slope - g).length_squared());
             }
         }
         out

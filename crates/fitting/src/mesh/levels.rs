@@ -40,7 +40,13 @@ const CREASE_SHARE: f64 = 0.25;
 const CREASE_ROOM: usize = 200_000;
 
 /// Bytes held at once with so many bricks and cells on a level.
-pub(crate) fn bytes<T>(bricks: usize, cells: usize, settled: usize, triangles: usize, vertices: usize) -> u64 {
+pub(crate) fn bytes<T>(
+    bricks: usize,
+    cells: usize,
+    settled: usize,
+    triangles: usize,
+    vertices: usize,
+) -> u64 {
     let per_cell = size_of::<Cell>() + size_of::<Octants>() + 32 * size_of::<BandSample<T>>();
     let mesh = triangles * 600 + vertices * 64;
     let probes = settled * (size_of::<Probe>() + size_of::<BandSample<T>>());
@@ -178,10 +184,13 @@ impl Octree<'_> {
             .zip(found)
             .map(|(c, q)| verdict(q, c, self.plan))
             .collect();
-        let splits_of = |kind: Verdict| -> Vec<usize> { (0..cells.len()).filter(|&i| verdicts[i] == kind).collect() };
+        let splits_of =
+            |kind: Verdict| -> Vec<usize> { (0..cells.len()).filter(|&i| verdicts[i] == kind).collect() };
         let plan = self.plan;
         let children = |parents: &[usize]| -> Vec<Cell> {
-            let parts = parents.iter().flat_map(|&i| parts(plan, depth, &cells[i], &octants[i], &found[i]));
+            let parts = parents
+                .iter()
+                .flat_map(|&i| parts(plan, depth, &cells[i], &octants[i], &found[i]));
             parts.collect()
         };
         let count = |parents: &[usize]| -> usize {
@@ -200,8 +209,7 @@ impl Octree<'_> {
         } else {
             let elsewhere = count(&split);
             self.elsewhere += elsewhere;
-            let matters =
-                self.left_at_creases + left > (CREASE_SHARE * plan.tolerance).powi(2) * plan.area;
+            let matters = self.left_at_creases + left > (CREASE_SHARE * plan.tolerance).powi(2) * plan.area;
             let room = self.elsewhere.max(CREASE_ROOM).saturating_sub(self.on_creases);
             let kept = match matters {
                 true => affordable(creased.clone(), room, urgency, count),
@@ -214,7 +222,10 @@ impl Octree<'_> {
             split.sort_unstable();
             self.on_creases += count(&split) - elsewhere;
         }
-        let budget = self.plan.coefficients.map(|c| c.saturating_sub(self.coefficients));
+        let budget = self
+            .plan
+            .coefficients
+            .map(|c| c.saturating_sub(self.coefficients));
         if let Some(budget) = budget {
             let kept = affordable(split.clone(), budget, urgency, count);
             let mut is_kept = vec![false; cells.len()];
@@ -225,7 +236,11 @@ impl Octree<'_> {
         }
         let mut next = children(&split);
         let at: Vec<[u32; 3]> = next.iter().map(|c| c.at).collect();
-        if !room(bricks_near(depth + 1, &at, REACH).0.len(), next.len(), self.settled.len()) {
+        if !room(
+            bricks_near(depth + 1, &at, REACH).0.len(),
+            next.len(),
+            self.settled.len(),
+        ) {
             stop(&split, StopReason::Memory);
             split.clear();
             next.clear();
@@ -282,7 +297,12 @@ impl Octree<'_> {
     }
 
     /// Fits the corrections of one level, and judges its cells.
-    fn refine<T: Real>(&mut self, depth: usize, coarser: &Coarser<'_, T>, room: impl Room) -> (Band<T>, Level<T>) {
+    fn refine<T: Real>(
+        &mut self,
+        depth: usize,
+        coarser: &Coarser<'_, T>,
+        room: impl Room,
+    ) -> (Band<T>, Level<T>) {
         let octants = self.ask(depth);
         let at: Vec<[u32; 3]> = self.cells.iter().map(|c| c.at).collect();
         let mut band = Band::around_reaching(depth, &at, REACH, coarser);

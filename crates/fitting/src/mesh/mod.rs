@@ -48,6 +48,8 @@ pub struct MeshOptions {
 const DEFAULT_DEPTH: usize = 10;
 /// Coefficients when the caller names neither them nor a tolerance: about two seconds of one core, and 250 MiB.
 const DEFAULT_COEFFICIENTS: usize = 400_000;
+/// Coefficients of the coarsest level, which fills the box.
+const COARSEST: usize = ((1 << BASE_DEPTH) + 3usize).pow(3);
 /// Tolerance when the caller gives none, in diagonals.
 const DEFAULT_TOLERANCE: f64 = 1e-4;
 
@@ -91,6 +93,13 @@ pub fn fit_mesh<T: Real>(
                 requirement,
             });
         }
+    }
+    if let Some(least) = options.coefficients.filter(|&c| c < COARSEST) {
+        return Err(FitError::Option {
+            option: "coefficients",
+            value: least as f64,
+            requirement: "a mesh takes at least the 42875 of the coarsest level",
+        });
     }
     control.step("sorting triangles", 0.0)?;
     control.reserve(levels::bytes::<T>(0, 0, 0, triangles.len(), vertices.len()))?;

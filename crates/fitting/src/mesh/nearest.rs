@@ -112,7 +112,10 @@ pub(crate) fn closest_point(p: DVec3, &[a, b, c]: &[DVec3; 3]) -> (DVec3, Featur
     }
     let va = d3 * d6 - d5 * d4;
     if va <= 0.0 && d4 >= d3 && d5 >= d6 {
-        return (b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6))), Feature::Edge(1));
+        return (
+            b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6))),
+            Feature::Edge(1),
+        );
     }
     let share = 1.0 / (va + vb + vc);
     (a + ab * (vb * share) + ac * (vc * share), Feature::Inner)

@@ -120,14 +120,22 @@ fn to_box(p: &Packet, node: &Node) -> Lanes {
 fn to_triangle(p: &Packet, &[a, b, c]: &[DVec3; 3]) -> Lanes {
     let edges = [b - a, c - b, a - c];
     let normal = edges[0].cross(-edges[2]);
-    let squares = [edges[0].length_squared(), edges[1].length_squared(), edges[2].length_squared()];
+    let squares = [
+        edges[0].length_squared(),
+        edges[1].length_squared(),
+        edges[2].length_squared(),
+    ];
     let square = normal.length_squared();
     let longest = squares[0].max(squares[1]).max(squares[2]);
     let is_flat = square > SLIVER * longest * longest;
     let over_plane = if is_flat { 1.0 / square } else { 0.0 };
     let starts = [a, b, c];
     // Normals of the edges in the plane, inwards.
-    let inward = [normal.cross(edges[0]), normal.cross(edges[1]), normal.cross(edges[2])];
+    let inward = [
+        normal.cross(edges[0]),
+        normal.cross(edges[1]),
+        normal.cross(edges[2]),
+    ];
     let mut inverse = [0.0; 3];
     for e in 0..3 {
         inverse[e] = if squares[e] > 0.0 { 1.0 / squares[e] } else { 0.0 };
@@ -147,7 +155,11 @@ fn to_triangle(p: &Packet, &[a, b, c]: &[DVec3; 3]) -> Lanes {
         }
         let height = (p.x[l] - a.x) * normal.x + (p.y[l] - a.y) * normal.y + (p.z[l] - a.z) * normal.z;
         let plane = height * height * over_plane;
-        out[l] = if is_over && plane < nearest { plane } else { nearest };
+        out[l] = if is_over && plane < nearest {
+            plane
+        } else {
+            nearest
+        };
     }
     out
 }

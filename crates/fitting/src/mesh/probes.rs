@@ -22,9 +22,7 @@ impl Probe {
         Self {
             at,
             value: found.value() as f32,
-            normal: found
-                .gradient(at)
-                .map_or([0.0; 3], |g| (-g).as_vec3().to_array()),
+            normal: found.gradient(at).map_or([0.0; 3], |g| (-g).as_vec3().to_array()),
             size: size as f32,
         }
     }

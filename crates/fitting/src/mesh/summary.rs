@@ -105,7 +105,9 @@ pub(super) fn summary<T: Real>(
         .collect();
     out.rms = (errors.iter().map(|e| e * e).sum::<f64>() / SAMPLES as f64).sqrt();
     out.max = errors.iter().copied().fold(out.max, f64::max);
-    out.p95 = *errors.select_nth_unstable_by(SAMPLES * 95 / 100, f64::total_cmp).1;
+    out.p95 = *errors
+        .select_nth_unstable_by(SAMPLES * 95 / 100, f64::total_cmp)
+        .1;
     out.bound = out.max + field.rounding_bound();
     out.notes = notes(&above, area);
     out

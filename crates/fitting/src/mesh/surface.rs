@@ -161,7 +161,13 @@ fn rim(faces: &Faces, idle: &[bool]) -> Option<Rim> {
         if open.len() >= RIM_BOXES || !open.iter().any(is_inner) {
             break;
         }
-        let below = |n: u32| if is_inner(&n) { vec![n + 1, edges.nodes[n as usize].first] } else { vec![n] };
+        let below = |n: u32| {
+            if is_inner(&n) {
+                vec![n + 1, edges.nodes[n as usize].first]
+            } else {
+                vec![n]
+            }
+        };
         open = open.into_iter().flat_map(below).collect();
     }
     let length_in = |n: u32| -> f64 {
@@ -172,7 +178,9 @@ fn rim(faces: &Faces, idle: &[bool]) -> Option<Rim> {
                 stack.extend([n + 1, node.first]);
             }
             let triangles = node.first..node.first + node.count;
-            sum += triangles.map(|t| lengths[edges.ids[t as usize] as usize]).sum::<f64>();
+            sum += triangles
+                .map(|t| lengths[edges.ids[t as usize] as usize])
+                .sum::<f64>();
         }
         sum
     };
