@@ -139,7 +139,7 @@ fn missing_empty_and_unknown_files() {
     bench.write("empty.ply", "");
     refused(&bench, "empty.ply", 3, &["empty"]);
     bench.write("text.docx", "hello");
-    refused(&bench, "text.docx", 3, &["supported"]);
+    refused(&bench, "text.docx", 3, &["not read here", ".nrrd"]);
     std::fs::create_dir(bench.path("folder.ply")).unwrap();
     refused(&bench, "folder.ply", 3, &["directory"]);
 }
@@ -268,6 +268,46 @@ fn a_full_disk() {
             run.stderr
         );
     }
+}
+
+/// Reports of several files, of which one meets a full disk: none of them is left, and old ones stay.
+#[test]
+fn a_full_disk_leaves_no_part_of_a_report() {
+    let bench = Bench::new();
+    bench.json("phantom sphere -o cloud.ply --count 500");
+    bench.json("fit cloud.ply -o field.iclay --max-depth 6");
+    let region = "[region]\nmin = [-0.4, -0.4, 0.4]\nmax = [0.4, 0.4, 1.1]\nlevel = 0\n[time]\nduration = 0.02\nstep = 0.01\n";
+    bench.write("scene.toml", format!("field = \"field.iclay\"\n{region}"));
+    for (last, command) in [
+        ("report.json", "check field.iclay cloud.ply -o out"),
+        (
+            "frame-00002.ply",
+            "simulate scene.toml -o moved.iclay --frames out --every 1",
+        ),
+    ] {
+        std::fs::create_dir(bench.path("out")).unwrap();
+        bench.write("out/error.ply", "old");
+        std::os::unix::fs::symlink("/dev/full", bench.path("out").join(last)).unwrap();
+        let run = bench.run(command);
+        assert_eq!(run.code, 4, "{command}: {}", run.stderr);
+        assert!(
+            run.stderr.contains(last) && run.stderr.contains("free some space"),
+            "{command}: {}",
+            run.stderr
+        );
+        let mut names: Vec<_> = std::fs::read_dir(bench.path("out"))
+            .unwrap()
+            .map(|e| e.unwrap().file_name())
+            .collect();
+        names.sort();
+        assert_eq!(names, ["error.ply", last], "{command}");
+        assert_eq!(std::fs::read(bench.path("out/error.ply")).unwrap(), b"old");
+        assert!(!bench.path("moved.iclay").exists(), "{command}");
+        std::fs::remove_dir_all(bench.path("out")).unwrap();
+    }
+    // A directory that was made for a report goes with it.
+    let run = bench.run("check field.iclay nowhere.ply -o made/for/it");
+    assert!(run.code == 3 && !bench.path("made").exists());
 }
 
 /// Ctrl-C in the middle of a fit: exit code 4, the old file as it was, nothing beside it.

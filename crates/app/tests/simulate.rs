@@ -242,7 +242,7 @@ fn what_cannot_be_is_refused_by_line_or_table_with_a_remedy_and_writes_nothing()
         (
             "damping = 1.0",
             "damping = \"w\"",
-            ["line 9", "nothing is called w"],
+            ["line 9", "no variable or function called w"],
         ),
         (
             "max = [0.5, 0.5, 1.14]",
@@ -284,7 +284,7 @@ fn what_cannot_be_is_refused_by_line_or_table_with_a_remedy_and_writes_nothing()
         (
             "step = 0.05",
             "step = 0.5\nintegrator = \"symplectic\"",
-            ["unstable beyond", "sub-steps"],
+            ["unstable beyond", "shorter steps"],
         ),
         (
             "step = 0.05",
@@ -295,6 +295,11 @@ fn what_cannot_be_is_refused_by_line_or_table_with_a_remedy_and_writes_nothing()
             "step = 0.05",
             "step = 0.5\ntolerance = 1",
             ["[time] tolerance", "adaptive"],
+        ),
+        (
+            "step = 0.05",
+            "step = 0.5\nintegrator = \"adaptive\"\nshortest = 2\nlongest = 1",
+            ["[time] shortest", "longer than the longest step"],
         ),
         (
             "step = 0.05",

@@ -4,14 +4,18 @@
 //! and 74.9 ms, hold the graphical update too. Painted is a stiff ball at a contrast of 100; steps are 30 times the
 //! explicit limit of the uniform material.
 
+use std::collections::BTreeMap;
+
+use bspline::hierarchical::Lattice as FieldLattice;
 use bspline::polygonize::{BlockMesh, PolygonizeOptions};
-use bspline::{Aabb, Frame, TensorSpline};
+use bspline::{Aabb, Frame, HierarchicalSpline, TensorSpline};
 use criterion::measurement::{Measurement, ValueFormatter, WallTime};
 use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_main};
 use dynamics::integrators::Integrator;
 use dynamics::lattice::{Lattice, Rim, TensorWorkspace};
 use dynamics::matter::{Matter, Quantity};
 use dynamics::patch::Patch;
+use dynamics::region::{Cells, Region, RegionOptions};
 use dynamics::solve::SolverOptions;
 use dynamics::springs::{Law, Neighbours, StepMatrix, Weights};
 use dynamics::study::{Pattern, loads, spring_weights};
@@ -244,9 +248,62 @@ fn operator(c: &mut Criterion<CpuTime>) {
     group.finish();
 }
 
+/// Forty steps of 48 × 12 × 12 cells under a push on one end that grows from step to step, with all of them awake and with
+/// parts asleep.
+fn sleep(c: &mut Criterion<CpuTime>) {
+    let lattice = FieldLattice {
+        world_from_lattice: DAffine3::IDENTITY,
+        cells: [48, 12, 12],
+    };
+    let flat = HierarchicalSpline::<f32>::from_corrections(lattice, 1.0, vec![BTreeMap::new()]);
+    let cells = Cells {
+        level: 0,
+        first: [0; 3],
+        count: lattice.cells,
+    };
+    let mut group = c.benchmark_group("forty steps under a growing push");
+    group.sample_size(10);
+    for (material, contrast) in [("uniform", 1.0), ("painted", 30.0)] {
+        let mut matter = Matter {
+            damping: Quantity::Constant(3.0),
+            ..Matter::default()
+        };
+        if contrast > 1.0 {
+            let stiffness = matter.stiffness.paint(65 * 17 * 17).iter_mut();
+            stiffness.step_by(7).for_each(|k| *k = contrast);
+        }
+        let options = RegionOptions::of(&flat, 0);
+        let region = Region::new(&flat, cells, matter, &options).expect("a region");
+        let near = |i: usize| {
+            let at = [i / 289, i / 17 % 17, i % 17].map(|k| k as f32);
+            (at[0] - 12.0).powi(2) + (at[1] - 8.0).powi(2) + (at[2] - 8.0).powi(2)
+        };
+        let push: Vec<f32> = (0..65 * 289).map(|i| (-0.3 * near(i)).exp()).collect();
+        for (name, parts) in [("awake", false), ("parts asleep", true)] {
+            let mut region = region.clone();
+            region.set_parts_sleep(parts);
+            group.bench_function(BenchmarkId::new(name, material), |b| {
+                b.iter_batched_ref(
+                    || region.clone(),
+                    |region| {
+                        for step in 0..40 {
+                            let size = 0.002 * (10 + step) as f32;
+                            let force: Vec<f32> = push.iter().map(|f| size * f).collect();
+                            region.set_force(&force).expect("finite");
+                            region.step(Integrator::TrBdf2, 0.1).expect("a step");
+                        }
+                    },
+                    BatchSize::PerIteration,
+                );
+            });
+        }
+    }
+    group.finish();
+}
+
 criterion_group! {
     name = benches;
     config = Criterion::default().with_measurement(CpuTime).warm_up_time(std::time::Duration::from_millis(300)).measurement_time(std::time::Duration::from_secs(1));
-    targets = step, step_and_remesh, changes, sizes, operator
+    targets = step, step_and_remesh, changes, sizes, operator, sleep
 }
 criterion_main!(benches);

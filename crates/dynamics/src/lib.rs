@@ -47,3 +47,4 @@ mod rest;
 pub mod solve;
 pub mod springs;
 pub mod study;
+mod units;

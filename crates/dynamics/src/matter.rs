@@ -7,6 +7,7 @@ use bspline::Real;
 
 use crate::lattice::Lattice;
 use crate::springs::{Neighbours, SpringWeights, Weights};
+use crate::units::InUnits;
 
 /// One quantity over the samples of a patch.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,7 +45,12 @@ impl Quantity {
         }
     }
 
-    fn check(&self, what: &'static str, samples: usize, may_vanish: bool) -> Result<(), MatterError> {
+    pub(crate) fn check(
+        &self,
+        what: &'static str,
+        samples: usize,
+        may_vanish: bool,
+    ) -> Result<(), MatterError> {
         let wrong = |v: f64| !(v.is_finite() && (v > 0.0 || (may_vanish && v == 0.0)));
         match self {
             Self::Constant(v) if wrong(*v) => Err(MatterError::Value {
@@ -86,8 +92,23 @@ pub enum MatterError {
         /// The value.
         value: f64,
     },
+    /// Numbers of single samples that the precision cannot hold.
+    #[error(
+        "the {what} of single samples lies between {least:.1e} and {largest:.1e}, which {precision} cannot hold side by \
+         side; paint with less contrast, or measure lengths in another unit"
+    )]
+    Range {
+        /// Which quantity.
+        what: &'static str,
+        /// The least.
+        least: f64,
+        /// The largest.
+        largest: f64,
+        /// Name of the precision.
+        precision: &'static str,
+    },
     /// A list of the wrong length.
-    #[error("{what} has {found} values, the patch has {needed} samples")]
+    #[error("{what} has {found} values; the patch needs {needed}")]
     Length {
         /// Which quantity.
         what: &'static str,
@@ -138,6 +159,14 @@ pub struct Lumped<T> {
     pub springs: Vec<SpringWeights<T>>,
 }
 
+/// Mass, damping and ground stiffness of the samples, each in a unit of its own.
+#[derive(Clone, Debug)]
+pub(crate) struct ScaledMatter<T> {
+    pub mass: InUnits<T>,
+    pub damping: InUnits<T>,
+    pub ground: InUnits<T>,
+}
+
 impl Matter {
     /// The numbers on a lattice. A spring lies half in the volume of each of its samples: it has the harmonic mean of
     /// their stiffness.
@@ -147,6 +176,53 @@ impl Matter {
     pub fn lumped<T: Real>(
         &self,
         lattice: &Lattice<T>,
+        neighbours: Neighbours,
+    ) -> Result<Lumped<T>, MatterError> {
+        self.lumped_on(lattice, neighbours)
+    }
+
+    /// The numbers in units of their own, so that all magnitudes fit the precision; with the springs.
+    ///
+    /// # Errors
+    /// [`MatterError`].
+    pub(crate) fn in_units<T: Real>(
+        &self,
+        lattice: &Lattice<T>,
+        neighbours: Neighbours,
+    ) -> Result<(ScaledMatter<T>, Vec<SpringWeights<f64>>), MatterError> {
+        let lumped: Lumped<f64> = self.lumped_on(lattice, neighbours)?;
+        let scaled = ScaledMatter {
+            mass: InUnits::new(&lumped.mass),
+            damping: InUnits::new(&lumped.damping),
+            ground: InUnits::new(&lumped.ground),
+        };
+        let check = |what, (least, largest): (f64, f64), fits: bool| {
+            if fits && largest.is_finite() {
+                return Ok(());
+            }
+            Err(MatterError::Range {
+                what,
+                least,
+                largest,
+                precision: match T::NAME {
+                    "f32" => "single precision",
+                    _ => "double precision",
+                },
+            })
+        };
+        let least = scaled.mass.weights.range().0;
+        check("mass", lumped.mass.range(), least > 0.0)?;
+        check("damping", lumped.damping.range(), true)?;
+        check("ground stiffness", lumped.ground.range(), true)?;
+        for s in &lumped.springs {
+            check("stiffness", s.weights.range(), true)?;
+        }
+        Ok((scaled, lumped.springs))
+    }
+
+    fn lumped_on<T: Real, U: Real>(
+        &self,
+        lattice: &Lattice<U>,
         neighbours: Neighbours,
     ) -> Result<Lumped<T>, MatterError> {
         let samples = lattice.sample_count();
@@ -185,7 +261,7 @@ impl Matter {
                 // Where the lattice ends the number is not read.
                 let j = i.wrapping_add_signed(offset).min(samples - 1);
                 let (a, b) = (self.stiffness.at(i), self.stiffness.at(j));
-                let mean = if a + b > 0.0 { 2.0 * a * b / (a + b) } else { 0.0 };
+                let mean = if a + b > 0.0 { 2.0 * a * (b / (a + b)) } else { 0.0 };
                 T::from_f64(mean * factor * own.map_or(1.0, |f| f[i]))
             };
             let weights = Weights::Each((0..samples).map(weight).collect());

@@ -4,9 +4,10 @@ use bspline::Real;
 
 use crate::constraints::{ConstraintError, Held};
 use crate::lattice::{Lattice, TensorWorkspace};
-use crate::matter::{Lumped, Matter, MatterError};
+use crate::matter::{Matter, MatterError, Quantity, ScaledMatter};
 use crate::solve::{SolveError, SolverOptions, StepSolver};
 use crate::springs::{Law, Neighbours, Plasticity, SpringNetwork, SpringWeights, StepMatrix, Weights};
+use crate::units::largest;
 
 /// Why a patch cannot be made or moved.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -21,7 +22,7 @@ pub enum PatchError {
     #[error(transparent)]
     Constraint(#[from] ConstraintError),
     /// A list that does not fit the lattice.
-    #[error("{found} {what}; the patch has {needed}")]
+    #[error("{found} {what} were given; the patch needs {needed}")]
     Length {
         /// Of what.
         what: &'static str,
@@ -40,13 +41,47 @@ pub enum PatchError {
         /// The value.
         value: f64,
     },
-    /// A scale of densities that is no scale.
+    /// A length per density that is not positive and finite.
     #[error(
-        "the scale of densities is {scale}; it has to be positive and finite (1/median |∇f| is a good one)"
+        "the scale of densities is {scale}; it has to be positive and finite (1 over the usual slope of the field at its \
+         surface is a good one)"
     )]
     Scale {
         /// Length per density.
         scale: f64,
+    },
+    /// A step after which a number is not finite.
+    #[error(
+        "{what} {index} would become {value}: the motion leaves the range of {precision}; take back the forces or the \
+         material that drive it, or use double precision"
+    )]
+    Overflow {
+        /// Which list of the state.
+        what: &'static str,
+        /// Place in it.
+        index: usize,
+        /// The number.
+        value: f64,
+        /// Name of the precision.
+        precision: &'static str,
+    },
+    /// Springs of other directions than those of the patch.
+    #[error("springs along {found:?}; the patch needs {needed:?}, in this order")]
+    Directions {
+        /// Steps of the springs given.
+        found: Vec<[isize; 3]>,
+        /// Steps of the springs needed.
+        needed: Vec<[isize; 3]>,
+    },
+    /// Options of adaptive steps that cannot be kept.
+    #[error("adaptive steps: {what} is {value}; it has to be {needed}")]
+    Adaptive {
+        /// Which option.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it may be.
+        needed: String,
     },
     /// Springs across diagonals on a lattice that is not cubic.
     #[error(
@@ -57,29 +92,35 @@ pub enum PatchError {
         /// Spacing along x, y and z.
         spacing: [f64; 3],
     },
-    /// A rate of relaxation that is none.
-    #[error("the rate of relaxation is {rate} per second; it has to be finite and at least 0 (0 is elastic)")]
+    /// A rate of relaxation that is negative or not finite.
+    #[error(
+        "rest lengths cannot follow at a rate of {rate} per second; the rate has to be finite and 0 or above (0 keeps \
+         the solid elastic)"
+    )]
     Rate {
         /// The rate.
         rate: f64,
     },
-    /// A weight that is no share.
-    #[error("the weight of sample {index} is {value}; weights of relaxation lie between 0 and 1")]
+    /// A weight that does not lie between 0 and 1.
+    #[error(
+        "the weight of sample {index} is {value}; it has to lie between 0 (keeps its rest) and 1 (follows fully)"
+    )]
     Weight {
         /// Which sample.
         index: usize,
         /// Its weight.
         value: f64,
     },
-    /// A time step that is no step.
-    #[error("the time step is {dt}; it has to be positive and finite")]
+    /// A time step that is not positive and finite.
+    #[error("the time step is {dt} s; it has to be positive and finite")]
     TimeStep {
         /// The step in seconds.
         dt: f64,
     },
     /// An explicit step beyond its bound.
     #[error(
-        "an explicit step of {dt:.3e} is unstable beyond {limit:.3e}; use sub-steps or an implicit scheme"
+        "an explicit step of {dt:.3e} s is unstable beyond {limit:.3e} s; use shorter steps, or an implicit scheme such as \
+         tr-bdf2"
     )]
     Unstable {
         /// The step asked for.
@@ -138,13 +179,15 @@ impl<T: Copy> State<T> {
 pub struct Patch<T> {
     pub(crate) neighbours: Neighbours,
     pub(crate) matter: Matter,
-    pub(crate) lumped: Lumped<T>,
+    pub(crate) lumped: ScaledMatter<T>,
     pub(crate) network: SpringNetwork<T>,
     pub(crate) plasticity: Plasticity<T>,
     pub(crate) state: State<T>,
     /// Densities of the field the patch was cut from, and where the ground springs rest.
     pub(crate) base: Vec<T>,
     pub(crate) external: Vec<T>,
+    /// Largest of them.
+    pub(crate) external_size: f64,
     pub(crate) held: Option<Box<Held<T>>>,
     pub(crate) solver: StepSolver<T>,
     /// For the mass alone, made by the first explicit step.
@@ -152,12 +195,12 @@ pub struct Patch<T> {
     /// `M + ΔtD` with the version and the step it was made for.
     pub(crate) mass_matrix: Option<(u64, f64, StepMatrix<T>)>,
     pub(crate) matrix: StepMatrix<T>,
-    /// Version, damping and stiffness that the matrix holds.
-    pub(crate) filled: Option<(u64, f64, f64)>,
+    /// Version, damping, stiffness and unit that the matrix holds.
+    pub(crate) filled: Option<(u64, f64, f64, f64)>,
     /// What the solver was made for.
     pub(crate) prepared: Option<Prepared>,
-    /// Counts changes of the matter.
-    pub(crate) version: u64,
+    /// Counts changes of matter and constraints.
+    pub(crate) changes: u64,
     pub(crate) limit: Option<(u64, f64)>,
     pub(crate) work: Scratch<T>,
     pub(crate) workspace: TensorWorkspace<T>,
@@ -169,6 +212,8 @@ pub(crate) struct Prepared {
     pub version: u64,
     pub damping: f64,
     pub stiffness: f64,
+    /// Of the matrix.
+    pub unit: f64,
     /// Residual of the first solve with it.
     pub residual: f64,
 }
@@ -178,7 +223,13 @@ pub(crate) struct Prepared {
 pub(crate) struct Scratch<T> {
     /// Impulse on the samples.
     pub g: Vec<T>,
+    /// Forces on the samples, in `force_unit`.
     pub force: Vec<T>,
+    pub force_unit: f64,
+    /// Work of the external forces since the step began.
+    pub work: f64,
+    /// What the densities moved over an adaptive step.
+    pub moved: Vec<f64>,
     pub x: Vec<T>,
     pub dx: Vec<T>,
     pub first_x: Vec<T>,
@@ -210,18 +261,18 @@ impl<T: Real> Patch<T> {
         if neighbours != Neighbours::Six && !cubic {
             return Err(PatchError::NotCubic { spacing });
         }
-        let lumped = matter.lumped(&lattice, neighbours)?;
+        let (lumped, springs) = matter.in_units(&lattice, neighbours)?;
         let dims = lattice.sample_dims();
-        let network = SpringNetwork::new(dims, spacing, law, lumped.springs.clone(), d);
+        let network = SpringNetwork::in_units(dims, spacing, law, &springs, d);
         let steps: Vec<_> = neighbours.directions().iter().map(|d| d.step).collect();
-        let springs = lumped.springs.iter().map(|s| SpringWeights {
+        let springs = network.springs().iter().map(|s| SpringWeights {
             direction: s.direction,
             weights: match law {
                 Law::Linear { .. } => s.weights.clone(),
                 Law::FourD { .. } => Weights::Each(vec![T::zero(); m]),
             },
         });
-        let matrix = StepMatrix::new(dims, lumped.mass.clone(), springs.collect());
+        let matrix = StepMatrix::new(dims, lumped.mass.weights.clone(), springs.collect());
         let zeros = |n: usize| vec![T::zero(); n];
         let state = State {
             p: zeros(n),
@@ -237,6 +288,7 @@ impl<T: Real> Patch<T> {
             plasticity: Plasticity::Elastic,
             base: d.to_vec(),
             external: zeros(m),
+            external_size: 0.0,
             held: None,
             solver: StepSolver::new(lattice, &steps, options),
             mass_solver: None,
@@ -244,11 +296,14 @@ impl<T: Real> Patch<T> {
             matrix,
             filled: None,
             prepared: None,
-            version: 0,
+            changes: 0,
             limit: None,
             work: Scratch {
                 g: zeros(m),
                 force: zeros(m),
+                force_unit: 1.0,
+                work: 0.0,
+                moved: Vec::new(),
                 x: zeros(n),
                 dx: zeros(m),
                 first_x: zeros(n),
@@ -274,16 +329,48 @@ impl<T: Real> Patch<T> {
     /// change onto its hard constraints.
     ///
     /// # Errors
-    /// [`PatchError::Length`], [`PatchError::NotFinite`].
+    /// [`PatchError::Length`], [`PatchError::NotFinite`], [`PatchError::Overflow`]; the state is then the one before.
     pub fn set_state(&mut self, p: &[T], v: &[T]) -> Result<(), PatchError> {
         let n = self.lattice().coefficient_count();
         finite("coefficient", p, n)?;
         finite("velocity", v, n)?;
+        self.work.before.copy_from(&self.state);
         self.state.p.copy_from_slice(p);
         self.state.v.copy_from_slice(v);
         self.sample_state();
         self.meet_constraints();
-        Ok(())
+        self.keep_if_finite()
+    }
+
+    /// Goes back to the state before if this one is not finite.
+    ///
+    /// # Errors
+    /// [`PatchError::Overflow`].
+    pub(crate) fn keep_if_finite(&mut self) -> Result<(), PatchError> {
+        let State { p, v, d, w } = &self.state;
+        let lists = [
+            ("coefficient", p),
+            ("velocity of coefficient", v),
+            ("density", d),
+            ("velocity of sample", w),
+        ];
+        let wrong = lists.iter().find_map(|(what, list)| {
+            let index = first_not_finite(list)?;
+            Some((*what, index, list[index].as_f64()))
+        });
+        let Some((what, index, value)) = wrong else {
+            return Ok(());
+        };
+        self.state.copy_from(&self.work.before);
+        Err(PatchError::Overflow {
+            what,
+            index,
+            value,
+            precision: match T::NAME {
+                "f32" => "single precision",
+                _ => "double precision",
+            },
+        })
     }
 
     /// Densities and rates of the samples from the coefficients.
@@ -306,11 +393,41 @@ impl<T: Real> Patch<T> {
     /// # Errors
     /// [`PatchError::Matter`]; the old matter then stays.
     pub fn set_matter(&mut self, matter: Matter) -> Result<(), PatchError> {
-        self.lumped = matter.lumped(self.solver.lattice(), self.neighbours)?;
+        let (lumped, springs) = matter.in_units(self.solver.lattice(), self.neighbours)?;
+        self.lumped = lumped;
         self.matter = matter;
-        self.network.set_springs(self.lumped.springs.clone());
-        self.version += 1;
+        self.network.set_springs(&springs);
+        self.changes += 1;
         Ok(())
+    }
+
+    /// Replaces the stiffness of the springs, also while the patch moves: forces, the matrix of the steps and the bound of
+    /// the explicit ones follow. It holds until the [matter](Self::set_matter) is set again.
+    ///
+    /// # Errors
+    /// [`PatchError::Directions`] for other directions than those of the patch, [`PatchError::Matter`] for a list of
+    /// another length and for numbers that are negative or not finite; the old springs then stay.
+    pub fn set_springs(&mut self, springs: &[SpringWeights<f64>]) -> Result<(), PatchError> {
+        let steps = |s: &[SpringWeights<f64>]| s.iter().map(|s| s.direction.step).collect::<Vec<_>>();
+        let needed: Vec<_> = self.neighbours.directions().iter().map(|d| d.step).collect();
+        let found = steps(springs);
+        if found != needed {
+            return Err(PatchError::Directions { found, needed });
+        }
+        for s in springs {
+            let values = match &s.weights {
+                Weights::Constant(v) => Quantity::Constant(*v),
+                Weights::Each(v) => Quantity::PerSample(v.clone()),
+            };
+            values.check("spring stiffness", self.base.len(), true)?;
+        }
+        self.network.set_springs(springs);
+        Ok(())
+    }
+
+    /// Counts all that the matrix of a step depends on.
+    pub(crate) fn version(&self) -> u64 {
+        self.changes + self.network.changes()
     }
 
     /// Sets the external forces on the densities of the samples, which hold until they are set again.
@@ -319,8 +436,14 @@ impl<T: Real> Patch<T> {
     /// [`PatchError::Length`], [`PatchError::NotFinite`]; the old forces then stay.
     pub fn set_force(&mut self, force: &[T]) -> Result<(), PatchError> {
         finite("force", force, self.external.len())?;
-        self.external.copy_from_slice(force);
+        self.write_force(|external| external.copy_from_slice(force));
         Ok(())
+    }
+
+    /// Changes the external forces.
+    pub(crate) fn write_force(&mut self, write: impl FnOnce(&mut [T])) {
+        write(&mut self.external);
+        self.external_size = largest(&self.external);
     }
 
     /// The springs and their rest state.
@@ -348,22 +471,30 @@ impl<T: Real> Patch<T> {
     pub(crate) fn kinetic(&self) -> f64 {
         let w = &self.state.w;
         let terms = w.iter().enumerate();
-        0.5 * terms
+        let sum: f64 = terms
             .map(|(i, w)| self.lumped.mass.at(i).as_f64() * w.as_f64() * w.as_f64())
-            .sum::<f64>()
+            .sum();
+        0.5 * self.lumped.mass.unit * sum
     }
 
     pub(crate) fn ground_energy(&self) -> f64 {
-        if let Weights::Constant(g) = self.lumped.ground
-            && g == T::zero()
-        {
+        if self.lumped.ground.unit == 0.0 {
             return 0.0;
         }
         let sigma2 = self.network.law().scale().powi(2);
         let away = self.state.d.iter().zip(&self.base).enumerate();
         let terms = away.map(|(i, (d, b))| self.lumped.ground.at(i).as_f64() * (*d - *b).as_f64().powi(2));
-        0.5 * sigma2 * terms.sum::<f64>()
+        0.5 * sigma2 * self.lumped.ground.unit * terms.sum::<f64>()
     }
+}
+
+/// Place of the first number that is not finite.
+fn first_not_finite<T: Real>(list: &[T]) -> Option<usize> {
+    // Whole chunks at a time: a loop that may end at any number is not vectorized.
+    let fine = |chunk: &[T]| chunk.iter().fold(true, |fine, v| fine & v.is_finite());
+    let chunk = list.chunks(256).position(|c| !fine(c))?;
+    let inside = list[256 * chunk..].iter().position(|v| !v.is_finite())?;
+    Some(256 * chunk + inside)
 }
 
 /// Refuses lists of the wrong length or with NaN or infinity.
@@ -381,7 +512,7 @@ pub(crate) fn finite<T: Real>(what: &'static str, list: &[T], needed: usize) -> 
             needed,
         });
     }
-    match list.iter().position(|v| !v.is_finite()) {
+    match first_not_finite(list) {
         Some(index) => Err(PatchError::NotFinite {
             what,
             index,

@@ -18,7 +18,7 @@ impl<T: Real> Patch<T> {
         self.network.rest_at(&self.state.d);
         self.base.copy_from_slice(&self.state.d);
         self.state.p.fill(T::zero());
-        self.external.fill(T::zero());
+        self.write_force(|external| external.fill(T::zero()));
         self.stop();
     }
 
@@ -31,32 +31,49 @@ impl<T: Real> Patch<T> {
     /// `σ√(2E/M)` with the kinetic energy `E` and the mass `M` of all samples: a length per second.
     pub(crate) fn mean_speed(&self) -> f64 {
         let count = self.state.d.len();
-        let mass: f64 = match &self.lumped.mass {
+        let masses: f64 = match &self.lumped.mass.weights {
             Weights::Constant(m) => m.as_f64() * count as f64,
             Weights::Each(m) => m.iter().map(|m| m.as_f64()).sum(),
         };
+        let mass = self.lumped.mass.unit * masses;
         self.network.law().scale() * (2.0 * self.kinetic() / mass).sqrt()
     }
 
-    /// Largest `σ|Aᵀf|/(AᵀM1)` over the free coefficients, `f` all forces but damping: a length per second squared, the
-    /// acceleration of matter that hangs together only within the support of a coefficient.
+    /// Largest `σ|Aᵀf|/(AᵀM1)` over the free coefficients: a length per second squared, the acceleration of matter that
+    /// hangs together only within the support of a coefficient. `f` are all forces but damping, those of constraint
+    /// springs and what hard constraints bear included. NaN if one is.
     pub(crate) fn unbalanced(&mut self) -> f64 {
         let scale = self.network.law().scale();
-        scale * self.unbalanced_each().fold(0.0, f64::max)
+        let larger = |m: f64, a: f64| if m.is_nan() || a <= m { m } else { a };
+        scale * self.unbalanced_each().fold(0.0, larger)
     }
 
     /// The same of each coefficient, without `σ`.
     pub(crate) fn unbalanced_each(&mut self) -> impl Iterator<Item = f64> + '_ {
         self.forces(None);
-        let work = &mut self.work;
+        let unit = self.work.force_unit;
+        let (mut force, mut gathered) = (
+            std::mem::take(&mut self.work.force),
+            std::mem::take(&mut self.work.first_x),
+        );
+        if self.lattice().is_square() {
+            self.balance(unit, &mut force);
+        }
         let lattice = self.solver.lattice();
-        lattice.gather(&work.force, &mut work.first_x, &mut self.workspace);
+        lattice.gather(&force, &mut gathered, &mut self.workspace);
+        if !lattice.is_square() {
+            self.balance(unit, &mut gathered);
+        }
+        let work = &mut self.work;
+        (work.force, work.first_x) = (force, gathered);
         for (i, m) in work.first_dx.iter_mut().enumerate() {
             *m = self.lumped.mass.at(i);
         }
+        let lattice = self.solver.lattice();
         lattice.gather(&work.first_dx, &mut work.x, &mut self.workspace);
         let pairs = work.first_x.iter().zip(&work.x);
-        pairs.map(|(f, m)| f.as_f64().abs() / m.as_f64())
+        let factor = unit / self.lumped.mass.unit;
+        pairs.map(move |(f, m)| factor * (f.as_f64().abs() / m.as_f64()))
     }
 
     /// Rates of the samples from those of the coefficients.

@@ -251,7 +251,7 @@ fn inconsistent_hard_constraints_are_refused_by_name_and_change_nothing() {
         .set_constraints(&[point("rim", [0.0, 4.0, 4.0], 0.0, Hold::Hard)])
         .unwrap_err();
     assert!(
-        refused.to_string().contains("hard constraints rim contradict"),
+        refused.to_string().contains("hard constraint rim asks for"),
         "{refused}"
     );
     // What is there already may be asked for.
@@ -464,7 +464,7 @@ fn nonsense_is_refused_with_its_name() {
         (nan, "constraint nan: density is NaN"),
         (slack, "constraint slack: the stiffness is 0"),
         (nowhere, "constraint nowhere: density of the field is NaN"),
-        (sample, "constraint sample: sample 1000 of 1000"),
+        (sample, "constraint sample names sample 1000"),
     ] {
         let refused = p.set_constraints(&[c]).unwrap_err().to_string();
         assert!(refused.contains(expected), "{refused}");

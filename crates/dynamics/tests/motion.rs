@@ -291,3 +291,67 @@ fn steps_do_not_allocate_after_the_first() {
         }
     }
 }
+
+#[test]
+fn adaptive_steps_are_never_longer_than_asked() {
+    let options = AdaptiveOptions {
+        tolerance: 1e-3,
+        shortest: 0.05,
+        longest: 0.2,
+        energy_gain: 0.01,
+        acceleration: None,
+    };
+    for asked in [1e-6, 0.01, 0.05, 0.1, 0.3] {
+        let mut p = mode(0.0);
+        let report = p.adaptive_step(asked, &options).unwrap();
+        assert!(report.step.dt <= asked, "{} of {asked}", report.step.dt);
+        assert!((0.05..=0.2).contains(&report.next_dt));
+    }
+}
+
+#[test]
+fn bounds_of_adaptive_steps_that_cannot_hold_are_refused() {
+    let good = AdaptiveOptions {
+        tolerance: 1e-3,
+        shortest: 1e-3,
+        longest: 1.0,
+        energy_gain: 0.01,
+        acceleration: None,
+    };
+    let mut p = mode(0.0);
+    let before = p.state().clone();
+    for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let cases = [
+            AdaptiveOptions {
+                shortest: bad,
+                ..good
+            },
+            AdaptiveOptions { longest: bad, ..good },
+            AdaptiveOptions {
+                tolerance: bad,
+                ..good
+            },
+            AdaptiveOptions {
+                acceleration: Some(bad),
+                ..good
+            },
+        ];
+        for options in cases {
+            let refused = p.adaptive_step(0.1, &options).unwrap_err();
+            println!("{refused}");
+        }
+        assert!(p.adaptive_step(bad, &good).is_err());
+    }
+    for energy_gain in [-1.0, f64::NAN] {
+        assert!(
+            p.adaptive_step(0.1, &AdaptiveOptions { energy_gain, ..good })
+                .is_err()
+        );
+    }
+    let crossed = AdaptiveOptions {
+        shortest: 2.0,
+        ..good
+    };
+    assert!(p.adaptive_step(0.1, &crossed).is_err());
+    assert_eq!(*p.state(), before);
+}

@@ -1,5 +1,5 @@
 use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use fitting::mesh::MeshDistance;
 use fitting::{Cancel, StopReason, UnsupportedComponent, unsupported_components};
@@ -11,10 +11,13 @@ use glam::DVec3;
 use serde_json::json;
 
 use super::cost::Cost;
-use super::failure::{Failure, OrFail, Outcome};
+use super::failure::{Failure, Outcome};
 use super::field::OpenField;
-use super::input::{self, Input, Shape, writing};
+use super::input::{self, Input, Shape};
+use super::quantity::threads;
 use super::sample::voxel_frame;
+use super::source::{FIELDS, SAMPLES, Source, input_formats};
+use super::staged::StagedFiles;
 use super::summary::Summary;
 use super::volume_choice::VolumeChoice;
 use super::{interrupt, set_threads};
@@ -26,22 +29,25 @@ use crate::check::{
 /// Arguments of `isoclay check`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Field (.iclay)
+    /// Field (.iclay); - reads standard input
     field: PathBuf,
-    /// What it was fitted to
+    /// What it was fitted to; - reads standard input
     input: PathBuf,
     /// What to take a file with faces for [default: cloud for PLY and OBJ, mesh for files that hold nothing else]
     #[arg(long = "as", value_enum, value_name = "KIND")]
     shape: Option<Shape>,
+    /// Format of the input where neither its content nor its name tells it
+    #[arg(long, value_name = "FORMAT", value_parser = input_formats())]
+    format: Option<String>,
     /// Directory for error.ply, octree.ply and report.json; made if missing
     #[arg(short, long, value_name = "REPORT_DIR")]
     output: Option<PathBuf>,
     /// Threads to work with [default: all cores]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = threads)]
     threads: Option<NonZeroUsize>,
     /// Print one JSON object instead of a table
     #[arg(long)]
-    json: bool,
+    pub json: bool,
     #[command(flatten)]
     volume: VolumeChoice,
 }
@@ -69,16 +75,15 @@ pub fn run(args: &Args) -> Outcome {
     set_threads(args.threads)?;
     let cancel = Cancel::new();
     interrupt::cancel_on_interrupt(&cancel)?;
-    if let Some(d) = args.output.as_ref().filter(|d| d.exists() && !d.is_dir()) {
-        return Err(Failure::usage(format!(
-            "-o {}: is no directory; name another",
-            d.display()
-        )));
-    }
-    let open = OpenField::load(&args.field)?;
+    let report = (args.output.as_ref())
+        .map(|directory| StagedFiles::new("-o", directory))
+        .transpose()?;
+    let field = Source::open(&args.field, None, FIELDS, &cancel)?;
+    let source = Source::open(&args.input, args.format.as_deref(), SAMPLES, &cancel)?;
+    let open = OpenField::load(&field)?;
     let leaves = &open.report().leaves;
     let index = LeafIndex::new(open.lattice(), leaves);
-    let measured = match input::read(&args.input, args.shape, &args.volume.options(None)?, None)? {
+    let measured = match input::read(&source, args.shape, &args.volume, None, None)? {
         Input::Cloud(cloud) => measure_cloud(&open, &index, &cloud),
         Input::Mesh(mesh) => measure_mesh(&open, &index, &mesh)?,
         Input::Volume(volume) => measure_volume(&open, &index, &volume),
@@ -87,11 +92,11 @@ pub fn run(args: &Args) -> Outcome {
     if measured.count == 0 {
         return Err(Failure::input(format!(
             "{}: there is no sample to measure at",
-            args.input.display()
+            source.name()
         )));
     }
-    if let Some(directory) = &args.output {
-        write_report(directory, args, &open, &index, &measured)?;
+    if let Some(staged) = report {
+        write_report(staged, [field.name(), source.name()], &open, &index, &measured)?;
     }
     let (s, audit) = (&measured.statistics, &measured.audit);
     // An interpolating fit aims at none.
@@ -253,24 +258,17 @@ fn measure_volume(open: &OpenField, index: &LeafIndex, volume: &Volume) -> Measu
 
 /// Writes the two pictures and the figures.
 fn write_report(
-    directory: &Path,
-    args: &Args,
+    mut staged: StagedFiles,
+    [field, input]: [&str; 2],
     open: &OpenField,
     index: &LeafIndex,
     measured: &Measured,
 ) -> Outcome {
-    std::fs::create_dir_all(directory)
-        .map_err(|e| anyhow::anyhow!("-o {}: cannot be made ({e})", directory.display()))
-        .or_limit()?;
     let full_scale = measured.statistics.p99.max(f64::MIN_POSITIVE);
     let colors: Vec<[u8; 3]> = measured.errors.iter().map(|e| viridis(e / full_scale)).collect();
-    formats::meshes::save_points(
-        &directory.join("error.ply"),
-        &measured.positions,
-        None,
-        Some(&colors),
-    )
-    .map_err(writing)?;
+    staged.write("error.ply", |path| {
+        formats::meshes::save_points(path, &measured.positions, None, Some(&colors))
+    })?;
 
     let (report, audit) = (open.report(), &measured.audit);
     let finest = report.leaves.iter().map(|l| l.level).max().unwrap_or(0).max(1);
@@ -288,12 +286,12 @@ fn write_report(
             };
             (leaf.sample_count > 0 || refused).then(|| (index.corners(i), color))
         });
-    write_boxes(&directory.join("octree.ply"), boxes).map_err(writing)?;
+    staged.write("octree.ply", |path| write_boxes(path, boxes))?;
 
     let text = json!({
-        "field": args.field.display().to_string(),
+        "field": field,
         "field_sha256": open.sha256(),
-        "input": args.input.display().to_string(),
+        "input": input,
         "samples": measured.count,
         "unit": measured.unit,
         "tolerance": report.tolerance,
@@ -309,9 +307,7 @@ fn write_report(
         "octree_ply": { "boxes": "edges of the leaves with samples, violet coarse to yellow fine; red: above the \
                                   tolerance and not split for lack of data" },
     });
-    formats::atomic::replace(&directory.join("report.json"), |out| {
-        serde_json::to_writer_pretty(&mut *out, &text)?;
-        out.write_all(b"\n")
-    })
-    .map_err(writing)
+    staged.write_text("report.json", &format!("{text:#}\n"))?;
+    staged.publish()?;
+    Ok(())
 }

@@ -15,9 +15,11 @@ use formats::volumes::Volume;
 use super::cost::Cost;
 use super::failure::{Failure, Outcome, explain};
 use super::field::{self, either};
-use super::input::{self, Input, Shape, bounding_box, check_output, remaining};
+use super::input::{self, Input, Shape, bounding_box, remaining};
+use super::output::Output;
 use super::progress::Bar;
-use super::quantity::{Memory, Tolerance, positive};
+use super::quantity::{Memory, Tolerance, between, count, positive, threads};
+use super::source::{SAMPLES, Source, input_formats};
 use super::summary::Summary;
 use super::unoriented::{Oriented, Unoriented};
 use super::volume_choice::VolumeChoice;
@@ -26,26 +28,30 @@ use super::{flags, interrupt, set_threads};
 /// Arguments of `isoclay fit`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Point cloud with normals or faces (.ply, .obj, .xyz), mesh (.stl and others, see --as) or volume (.nii), each also gzipped (.gz)
+    /// Point cloud (.ply .obj .pcd .las .laz .e57 .xyz), mesh (.stl .gltf .glb .3mf .wrl, see --as) or volume (.nii .nrrd
+    /// .mha .tif), also gzipped; a directory of DICOM or TIFF slices; - reads standard input
     input: PathBuf,
-    /// Field to write (.iclay)
+    /// Field to write (.iclay); - writes to standard output
     #[arg(short, long, value_name = "FIELD")]
-    output: PathBuf,
+    pub output: PathBuf,
     /// What to fit of a file with faces. Meshes become the solid that their triangles bound [default: cloud for PLY
     /// and OBJ, mesh for files that hold nothing else]
     #[arg(long = "as", value_enum, value_name = "KIND")]
     shape: Option<Shape>,
+    /// Format of the input where neither its content nor its name tells it
+    #[arg(long, value_name = "FORMAT", value_parser = input_formats())]
+    format: Option<String>,
     #[command(flatten)]
     choice: Choice,
     /// Memory that the process may hold, such as 2GiB
     #[arg(long, value_name = "SIZE")]
     memory: Option<Memory>,
     /// Threads to work with [default: all cores]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = threads)]
     threads: Option<NonZeroUsize>,
     /// Print one JSON object instead of a table
     #[arg(long)]
-    json: bool,
+    pub json: bool,
     #[command(flatten)]
     volume: VolumeChoice,
 }
@@ -56,25 +62,25 @@ pub struct Choice {
     /// Rms residual that each leaf stays below, or says why not. Clouds: a distance in the file's unit, in mm,
     /// or in per cent of the diagonal. Volumes: a density, or per cent of the range between the 1st and the 99th
     /// percentile [default: what the noise justifies; for clean data 0.01% of the diagonal, 0.5% of the range]
-    #[arg(long, value_name = "T[mm|%]")]
+    #[arg(long, value_name = "T[mm|%]", allow_hyphen_values = true)]
     pub tolerance: Option<Tolerance>,
     /// Meshes: half the width of the band round the surface in which no error is above the tolerance, a length like
     /// it [default: eight tolerances]
-    #[arg(long, value_name = "L[mm|%]")]
+    #[arg(long, value_name = "L[mm|%]", allow_hyphen_values = true)]
     pub band: Option<Tolerance>,
     /// Coefficients to spend
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = count)]
     pub coefficients: Option<NonZeroUsize>,
     /// Finest level allowed. Clouds: 2^N cells along the box, 6 to 16. Volumes: 0 is a knot every four voxels, 2 one
     /// at every voxel
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=16))]
+    #[arg(long, value_name = "N", value_parser = between::<u8>(0, 16))]
     pub max_depth: Option<u8>,
     /// How to fit: a volume adaptively or by interpolation, a cloud by gradients or by offset pairs [default:
     /// adaptive; gradient]
     #[arg(long, value_enum)]
     pub method: Option<Method>,
     /// Weight of the bending energy [default: chosen from the data]
-    #[arg(long, value_name = "μ", value_parser = positive)]
+    #[arg(long, value_name = "μ", value_parser = positive, allow_hyphen_values = true)]
     pub smoothing: Option<f64>,
     /// Estimate the normals of a cloud that has none (or not those of its file), and how to tell inside from outside
     #[arg(long, value_enum, value_name = "ROUTE", num_args = 0..=1, require_equals = true,
@@ -139,18 +145,14 @@ pub struct Fitted {
 /// Fits a file and writes the field.
 pub fn run(args: &Args) -> Outcome {
     let cost = Cost::start();
-    check_output(&args.output, &["iclay"])?;
-    set_threads(args.threads)?;
     let cancel = Cancel::new();
     interrupt::cancel_on_interrupt(&cancel)?;
+    let source = Source::open(&args.input, args.format.as_deref(), SAMPLES, &cancel)?;
+    let output = Output::check("-o", &args.output, &["iclay"], None, &[&source])?;
+    set_threads(args.threads)?;
     let bar = Bar::new();
     bar.show("reading", 0.0);
-    let input = input::read(
-        &args.input,
-        args.shape,
-        &args.volume.options(args.choice.unit)?,
-        args.memory,
-    )?;
+    let input = input::read(&source, args.shape, &args.volume, args.choice.unit, args.memory)?;
     interrupt::check(&cancel)?;
     let shown = bar.clone();
     let mut control = Control {
@@ -158,13 +160,8 @@ pub fn run(args: &Args) -> Outcome {
         cancel,
         memory_limit: args.memory.map(remaining),
     };
-    let fitted = fit(&input, &args.choice, &mut control).map_err(|f| {
-        if f.code() == 3 {
-            f.about(args.input.display())
-        } else {
-            f
-        }
-    })?;
+    let fitted = fit(&input, &args.choice, &mut control)
+        .map_err(|f| if f.code() == 3 { f.about(source.name()) } else { f })?;
     interrupt::check(&control.cancel)?;
     bar.show("writing", 0.99);
     let meta = FieldMeta {
@@ -174,15 +171,14 @@ pub fn run(args: &Args) -> Outcome {
         provenance: provenance(args),
         ..Default::default()
     };
-    let sha256 = field::save(&args.output, &fitted.field, &fitted.report, meta)?;
+    let sha256 = field::save(&output, &fitted.field, &fitted.report, meta)?;
     bar.clear();
     Summary {
         field_sha256: Some(sha256),
-        output: Some(args.output.display().to_string()),
         ..fitted.summary(&input)
     }
     .with_cost(&cost)
-    .print(args.json)
+    .print_after(&output, args.json)
 }
 
 /// Where the field comes from, for the file: enough to make it again.
@@ -214,7 +210,7 @@ fn fit_cloud<T: Stored>(cloud: &PointCloud, choice: &Choice, control: &mut Contr
         Some(Method::OffsetPairs) => NormalForm::OffsetPairs,
         Some(Method::Adaptive | Method::Interpolate) => {
             return Err(Failure::usage(
-                "--method adaptive and interpolate are for volumes; a point cloud takes gradient or offset-pairs",
+                "--method adaptive and --method interpolate are for volumes; a point cloud takes gradient or offset-pairs",
             ));
         }
     };
@@ -302,7 +298,7 @@ fn fit_voxels<T: Stored>(volume: &Volume, choice: &Choice, control: &mut Control
         Some(Method::Interpolate) => VolumeMethod::Interpolate,
         Some(Method::Gradient | Method::OffsetPairs) => {
             return Err(Failure::usage(
-                "--method gradient and offset-pairs are for point clouds; a volume takes adaptive or interpolate",
+                "--method gradient and --method offset-pairs are for point clouds; a volume takes adaptive or interpolate",
             ));
         }
     };

@@ -58,7 +58,7 @@ impl Formula {
         };
         if text.len() > LONGEST {
             return Err(format!(
-                "a formula of {} bytes; at most {LONGEST} are read",
+                "the formula has {} bytes; at most {LONGEST} are possible",
                 text.len()
             ));
         }
@@ -67,7 +67,7 @@ impl Formula {
         };
         let root = parser.comparison(0).map_err(wrong)?;
         if !parser.rest.is_empty() {
-            return Err(wrong(format!("{:?} is too much", parser.rest)));
+            return Err(wrong(format!("it should end before {:?}", parser.rest)));
         }
         Ok(Self {
             text: text.into(),
@@ -202,7 +202,7 @@ impl Parser<'_> {
         if name.is_empty() {
             return Err(match rest {
                 "" => "it ends too early".into(),
-                rest => format!("{rest:?} begins no number, variable or function"),
+                rest => format!("{rest:?} is neither a number nor a variable nor a function"),
             });
         }
         self.rest = rest.trim_start();
@@ -212,7 +212,8 @@ impl Parser<'_> {
         if name == "PI" {
             return Ok(Node::Number(std::f64::consts::PI));
         }
-        let function = function(name).ok_or_else(|| format!("nothing is called {name}"))?;
+        let function =
+            function(name).ok_or_else(|| format!("there is no variable or function called {name}"))?;
         self.expect('(')?;
         let first = self.comparison(depth + 1)?;
         let node = match function {
@@ -238,7 +239,7 @@ impl Parser<'_> {
             end += if exponent > 0 { 1 + sign + exponent } else { 0 };
         }
         let (number, rest) = self.rest.split_at(end);
-        let value = number.parse().map_err(|_| format!("{number} is no number"))?;
+        let value = number.parse().map_err(|_| format!("{number} is not a number"))?;
         self.rest = rest.trim_start();
         Ok(Node::Number(value))
     }

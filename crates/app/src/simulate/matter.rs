@@ -99,7 +99,7 @@ pub fn plasticity<T: Real>(scene: &Scene, samples: &Samples) -> Result<Plasticit
         return match scene.plasticity.under_pulls {
             true => Err(wrong(
                 "[plasticity] rate",
-                "is missing; write how fast rest follows under the pulls",
+                "is missing; write at which rate, per second, rest lengths follow under the pulls",
             )),
             false => Ok(Plasticity::Elastic),
         };

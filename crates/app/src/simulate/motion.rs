@@ -23,9 +23,9 @@ pub struct StepLine {
     pub time: f64,
     /// Its length.
     pub dt: f64,
-    /// Iterations of the last solve.
+    /// Iterations of the solve that took most.
     pub iterations: usize,
-    /// Residual of that solve, relative to the impulse.
+    /// Largest residual that a solve left, relative to its impulse.
     pub residual: f64,
     /// How it was solved; empty asleep.
     pub method: &'static str,
@@ -306,14 +306,16 @@ impl<'a, T: Real> Simulation<'a, T> {
             .lattice()
             .spacing(self.region.cells().level)
             .min_element();
+        let longest = time.longest.map_or(time.step.0 * LONGER, |l| l.0);
         let shortest = time.shortest.map_or(time.step.0 / SHORTER, |s| s.0);
         AdaptiveOptions {
             tolerance: time.tolerance.map_or(
                 TOLERANCE * cell / self.region.patch().springs().law().scale(),
                 |t| t.0,
             ),
-            shortest,
-            longest: time.longest.map_or(time.step.0 * LONGER, |l| l.0).max(shortest),
+            // What the scene does not say follows what it says.
+            shortest: shortest.min(longest),
+            longest,
             energy_gain: ENERGY_GAIN,
             acceleration: time.acceleration.map(|a| a.0),
         }
@@ -361,6 +363,16 @@ fn check_times(scene: &Scene) -> Result<(), SimulateError> {
         ));
     }
     let (duration, step) = (time.duration.0, time.step.0);
+    let longest = time.longest.map_or(step * LONGER, |l| l.0);
+    if let Some(shortest) = time.shortest.filter(|s| s.0 > longest) {
+        return Err(wrong(
+            "[time] shortest",
+            format!(
+                "{} s is longer than the longest step, {longest} s; shorten it, or write a larger longest",
+                shortest.0
+            ),
+        ));
+    }
     if step > duration {
         return Err(wrong(
             "[time] step",
@@ -371,7 +383,7 @@ fn check_times(scene: &Scene) -> Result<(), SimulateError> {
         return Err(wrong(
             "[time] step",
             format!(
-                "{step} s makes {:.0} steps of {duration} s; at most 10 million are made",
+                "{step} s divides {duration} s into {:.0} steps; at most 10 million are possible",
                 duration / step
             ),
         ));

@@ -96,7 +96,7 @@ pub fn cut<T: Real>(
         (Some(n), _) => {
             return Err(wrong(
                 "[law] neighbours",
-                format!("{n} springs at a sample; write 6, 18 or 26"),
+                format!("a sample cannot have {n} neighbours; write 6, 18 or 26"),
             ));
         }
     };
@@ -134,7 +134,7 @@ fn level<T: Real>(scene: &Scene, field: &HierarchicalSpline<T>) -> Result<usize,
         return Err(wrong(
             "[region] level",
             format!(
-                "a pull of radius {radius} asks for level {level}; enlarge it or write a level of at most 16"
+                "a pull of radius {radius} needs level {level}; make the pull wider, or write a level of at most 16"
             ),
         ));
     }

@@ -294,7 +294,10 @@ impl Paint {
             return Err("along has no points; give the centre of a ball, or the points of a stroke".into());
         }
         if let Some(fade) = self.fade.filter(|f| f.0 > 1.0) {
-            return Err(format!("a fade of {} of the radius; it is at most 1", fade.0));
+            return Err(format!(
+                "fade is {}; it can be at most 1, the whole radius",
+                fade.0
+            ));
         }
         if self.substance == Substance::Mass && self.value.0 == 0.0 {
             return Err("a mass of 0 moves infinitely fast; write a value above 0".into());

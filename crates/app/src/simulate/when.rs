@@ -24,21 +24,25 @@ impl When {
         let (from, until) = self.span();
         if until <= from {
             return Err(format!(
-                "it lasts from {from} s until {until} s; let it end after it begins"
+                "it begins at {from} s and ends at {until} s; let it end after it begins"
             ));
         }
         let ramp = self.ramp.map_or(0.0, |r| r.0);
         if 2.0 * ramp > until - from {
             return Err(format!(
-                "two ramps of {ramp} s are longer than the {} s it lasts; shorten ramp",
+                "two ramps of {ramp} s are longer than the {} s that it lasts; shorten ramp",
                 until - from
             ));
         }
         match (self.every, self.share) {
-            (None, Some(_)) => Err("share is a part of a cycle; say how long that is with every".into()),
-            (Some(_), Some(share)) if share.0 > 1.0 => {
-                Err(format!("a share of {} of the cycle; it is at most 1", share.0))
-            }
+            (None, Some(_)) => Err(
+                "share is the part of a cycle in which it is on; write the length of the cycle as every"
+                    .into(),
+            ),
+            (Some(_), Some(share)) if share.0 > 1.0 => Err(format!(
+                "share is {}; it can be at most 1, the whole cycle",
+                share.0
+            )),
             _ => Ok(()),
         }
     }

@@ -56,7 +56,7 @@ pub enum ConstraintError {
         length: f64,
     },
     /// A sample that does not exist.
-    #[error("constraint {label}: sample {index} of {count}; indices start at 0")]
+    #[error("constraint {label} names sample {index}; the patch has {count}, numbered from 0")]
     Sample {
         /// Which constraint.
         label: String,
@@ -75,7 +75,7 @@ pub enum ConstraintError {
         /// Its value.
         value: f64,
     },
-    /// A stiffness that is none.
+    /// A stiffness that is not positive.
     #[error(
         "constraint {label}: the stiffness is {value}; it has to be positive (leave the constraint out for 0)"
     )]
@@ -85,10 +85,10 @@ pub enum ConstraintError {
         /// The stiffness.
         value: f64,
     },
-    /// A curve without length, or a distance that is none.
+    /// A curve without length, or a distance between its samples that is not positive or too small.
     #[error(
-        "curve {label}: {points} points, length {length}, sampled every {spacing}; length and distance have to be \
-         positive, with at most {} samples",
+        "curve {label} has {points} points and the length {length}, and is to be sampled every {spacing}; both have to \
+         be positive, and at most {} samples are possible",
         MOST_SAMPLES
     )]
     Curve {
@@ -103,8 +103,8 @@ pub enum ConstraintError {
     },
     /// A lattice whose multigrid does not bear constraints.
     #[error(
-        "{coefficients} coefficients, as many as samples, are more than the direct limit of {limit}, and the multigrid \
-         on the samples does not take constraints: sample more finely, or raise the limit"
+        "a patch with as many samples as coefficients takes constraints up to {limit} coefficients, and this one has \
+         {coefficients}; sample it more finely, or raise the direct limit of the solver"
     )]
     Multigrid {
         /// Free coefficients.
@@ -112,14 +112,24 @@ pub enum ConstraintError {
         /// Up to how many the matrix is factorized.
         limit: usize,
     },
-    /// Hard constraints that contradict each other, or one that no free coefficient reaches.
+    /// A hard constraint where nothing may move.
     #[error(
-        "hard constraints {} contradict each other: the last would have to give up {gap:.3e}; leave one out, \
-         correct its density, or use a spring", rows.join(", ")
+        "hard constraint {label} asks for a density that is {gap:.3e} away, where no coefficient may move; move it away \
+         from the rim, or leave it out"
+    )]
+    Unreachable {
+        /// Its name.
+        label: String,
+        /// What is missing.
+        gap: f64,
+    },
+    /// Hard constraints that contradict each other.
+    #[error(
+        "hard constraints {} contradict each other: when the others hold, the last is off by a density of {gap:.3e}; \
+         leave one out, correct its density, or use a spring", rows.join(", ")
     )]
     Inconsistent {
-        /// Their names; the last is the one that follows from the others but for its density. A single one reaches no
-        /// free coefficient.
+        /// Their names; the last is the one that follows from the others but for its density.
         rows: Vec<String>,
         /// Missing density of the last when the others hold.
         gap: f64,

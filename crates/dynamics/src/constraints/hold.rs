@@ -120,7 +120,7 @@ impl<T: Real> Patch<T> {
         self.held = held;
         self.mass_solver = None;
         self.mass_matrix = None;
-        self.version += 1;
+        self.changes += 1;
         self.meet_constraints();
         Ok(())
     }
@@ -195,6 +195,38 @@ impl<T: Real> Patch<T> {
             u.copy_from_slice(&self.state.p);
             v.copy_from_slice(&self.state.v);
         }
+    }
+
+    /// Completes forces on the unknowns, multiples of `unit`, by those of the constraints: what the springs pull with, and
+    /// what the hard ones bear.
+    pub(crate) fn balance(&mut self, unit: f64, forces: &mut [T]) {
+        let Some(mut held) = self.held.take() else {
+            return;
+        };
+        self.displace(&mut held);
+        let u = &held.moved[0];
+        for ((row, stiffness), target) in held.springs.iter().zip(&held.targets) {
+            let pull = stiffness * (target - spring_value(row, u)) / unit;
+            for (i, w) in row {
+                forces[*i] += T::from_f64(pull * w);
+            }
+        }
+        held.hard.rows.close(forces, |_| 0.0);
+        self.held = Some(held);
+    }
+
+    /// What constraint springs gain when the coefficients have grown by `moved(i)` since the state `p`.
+    pub(crate) fn constraint_energy_change(&self, p: &[T], moved: impl Fn(usize) -> f64) -> f64 {
+        let sigma2 = self.network.law().scale().powi(2);
+        let rows = self.held.iter().flat_map(|h| h.constraints.iter().zip(&h.rows));
+        let gains = rows.map(|(c, row)| match c.hold {
+            Hold::Spring(k) => {
+                let closed: f64 = row.terms.iter().map(|(i, w)| w * moved(*i)).sum();
+                sigma2 * k * closed * (0.5 * closed - (row.target - row.value(p)))
+            }
+            Hold::Hard => 0.0,
+        });
+        gains.sum()
     }
 
     /// Sets what the constraints do in the next solve: springs push with `force` times their force, and the hard ones

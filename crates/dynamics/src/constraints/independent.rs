@@ -50,7 +50,7 @@ impl Independent {
     /// orthogonalized twice.
     ///
     /// # Errors
-    /// [`ConstraintError::Inconsistent`].
+    /// [`ConstraintError::Inconsistent`], [`ConstraintError::Unreachable`].
     pub fn new(rows: &[(&str, &Row)]) -> Result<Self, ConstraintError> {
         let mut columns: Vec<usize> = rows.iter().flat_map(|r| r.1.terms.iter().map(|t| t.0)).collect();
         columns.sort_unstable();
@@ -63,8 +63,8 @@ impl Independent {
             let length = row.terms.iter().map(|t| t.1 * t.1).sum::<f64>().sqrt();
             if length <= REACH * row.weight {
                 if row.target.abs() > CONSISTENT * row.size {
-                    return Err(ConstraintError::Inconsistent {
-                        rows: vec![(*label).to_owned()],
+                    return Err(ConstraintError::Unreachable {
+                        label: (*label).to_owned(),
                         gap: row.target,
                     });
                 }

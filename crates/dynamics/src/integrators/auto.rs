@@ -48,8 +48,12 @@ struct Work {
 
 impl Work {
     fn new<T: Real>(lattice: &Lattice<T>, springs: usize) -> Self {
-        let [nx, ny, nz] = lattice.coefficient_dims().map(|n| n as f64);
-        let [mx, my, mz] = lattice.sample_dims().map(|m| m as f64);
+        Self::on(lattice.coefficient_dims(), lattice.sample_dims(), springs)
+    }
+
+    fn on(coefficients: [usize; 3], samples: [usize; 3], springs: usize) -> Self {
+        let [nx, ny, nz] = coefficients.map(|n| n as f64);
+        let [mx, my, mz] = samples.map(|m| m as f64);
         Self {
             coefficients: nx * ny * nz,
             samples: mx * my * mz,
@@ -57,7 +61,7 @@ impl Work {
             sampling: 8.0 * (nx * ny * mz + nx * my * mz + mx * my * mz),
             edges: nx + ny + nz,
             bands: [(4.0 * ny + 3.0) * nz + 3.0, (my + 1.0) * mz + 1.0],
-            square: lattice.is_square(),
+            square: coefficients == samples,
         }
     }
 
@@ -85,6 +89,25 @@ impl Work {
         }
     }
 
+    /// Making the solver: lists, and what the method needs. That a factor may be made beside the steps changes nothing.
+    fn preparation(&self, method: Method, factor: bool) -> f64 {
+        let (n, lists) = (self.coefficients, 60.0 * self.samples);
+        let cycle = 60.0 * (self.matrix() + 4.0 * n * self.edges);
+        let of = |method| match method {
+            Method::FastDiagonalization => 0.0,
+            Method::Direct => 1150.0 * n + n * self.bands[0] * self.bands[0],
+            Method::SampleDirect => self.samples * self.bands[1] * self.bands[1],
+            Method::SampleMultigrid => 3000.0 * self.samples,
+            Method::VCycle => cycle,
+        };
+        let beside = if factor && method == Method::VCycle {
+            of(Method::Direct)
+        } else {
+            0.0
+        };
+        lists + of(method) + beside
+    }
+
     /// The matrix of a step.
     fn matrix(&self) -> f64 {
         let stencil = (2.0 + 4.0 * self.springs) * self.samples;
@@ -102,11 +125,72 @@ impl Work {
     }
 }
 
+/// Operations of a patch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Operations {
+    /// Of one solve, with all that a step does round it.
+    pub solve: f64,
+    /// Of making the solver.
+    pub preparation: f64,
+    /// Of all forces on the coefficients.
+    pub look: f64,
+}
+
 impl<T: Real> Patch<T> {
-    /// The method that a matrix takes on this lattice.
-    fn method(&self, uniform: bool) -> Method {
-        let few = self.lattice().coefficient_count() <= self.solver.options().direct_limit;
-        match (uniform, self.lattice().is_square(), few) {
+    /// What steps cost.
+    pub(crate) fn operations(&self) -> Operations {
+        let lattice = self.lattice();
+        self.operations_on(lattice.coefficient_dims(), lattice.sample_dims())
+    }
+
+    /// What they would cost on a part of this patch.
+    pub(crate) fn operations_on(&self, coefficients: [usize; 3], samples: [usize; 3]) -> Operations {
+        let work = Work::on(coefficients, samples, self.network.springs().len());
+        let count: usize = coefficients.iter().product();
+        let options = self.solver.options();
+        let method = self.method(self.is_even(), count, coefficients == samples);
+        let factor = count <= options.background_limit;
+        // A factor beside the steps takes the place of the cycle.
+        let solving = match method {
+            Method::VCycle if factor => Method::Direct,
+            other => other,
+        };
+        let iterations = match solving {
+            Method::VCycle | Method::SampleMultigrid => ITERATED,
+            _ => 1.0,
+        };
+        let law = self.network.law();
+        Operations {
+            solve: work.solve(law, solving, iterations),
+            preparation: work.preparation(method, factor),
+            look: work.forces(law) + 2.0 * work.sampling,
+        }
+    }
+
+    /// Whether there is a solver for the matter as it is.
+    pub(crate) fn has_solver(&self) -> bool {
+        self.mass_solver.is_some() || self.prepared.is_some_and(|p| p.version == self.version())
+    }
+
+    /// Whether the matrix of a step is the same everywhere.
+    fn is_even(&self) -> bool {
+        let springs = self.network.springs();
+        let constant = |w: &Weights<T>| matches!(w, Weights::Constant(_));
+        self.has_even_mass()
+            && self.lumped.ground.is_constant()
+            && springs.len() == 3
+            && springs.iter().all(|s| constant(&s.weights))
+            && matches!(self.network.law(), Law::Linear { .. })
+    }
+
+    fn has_even_mass(&self) -> bool {
+        self.lumped.mass.is_constant() && self.lumped.damping.is_constant()
+    }
+
+    /// The method that a matrix takes on so many coefficients.
+    fn method(&self, uniform: bool, coefficients: usize, square: bool) -> Method {
+        let few = coefficients <= self.solver.options().direct_limit;
+        match (uniform, square, few) {
             (true, ..) => Method::FastDiagonalization,
             (_, true, true) => Method::SampleDirect,
             (_, true, false) => Method::SampleMultigrid,
@@ -128,27 +212,24 @@ impl<T: Real> Patch<T> {
             return Err(PatchError::TimeStep { dt });
         }
         let parts = self.explicit_parts(dt)?;
-        let (law, lumped) = (self.network.law(), &self.lumped);
-        let work = Work::new(self.lattice(), lumped.springs.len());
-        let constant = |w: &Weights<T>| matches!(w, Weights::Constant(_));
-        let even_mass = constant(&lumped.mass) && constant(&lumped.damping);
-        let even = even_mass
-            && constant(&lumped.ground)
-            && lumped.springs.len() == 3
-            && lumped.springs.iter().all(|s| constant(&s.weights))
-            && matches!(law, Law::Linear { .. });
+        let law = self.network.law();
+        let work = Work::new(self.lattice(), self.network.springs().len());
         let solve = |uniform: bool, rough: f64| {
-            let method = self.method(uniform);
+            let lattice = self.lattice();
+            let method = self.method(uniform, lattice.coefficient_count(), lattice.is_square());
             let iterations = match method {
                 Method::VCycle | Method::SampleMultigrid => rough,
                 _ => 1.0,
             };
             work.solve(law, method, iterations)
         };
-        let undamped = matches!(&lumped.damping, Weights::Constant(c) if *c == T::zero());
-        let kicks = if undamped { parts + 1.0 } else { 2.0 * parts };
-        let explicit_work = kicks * solve(even_mass, TO_ROUNDING);
-        let implicit_work = 2.0 * solve(even, ITERATED);
+        let kicks = if self.lumped.damping.unit == 0.0 {
+            parts + 1.0
+        } else {
+            2.0 * parts
+        };
+        let explicit_work = kicks * solve(self.has_even_mass(), TO_ROUNDING);
+        let implicit_work = 2.0 * solve(self.is_even(), ITERATED);
         let explicit = explicit_work < implicit_work;
         Ok(Choice {
             integrator: if explicit {

@@ -6,6 +6,7 @@ use crate::lattice::TensorWorkspace;
 use crate::patch::{Patch, PatchError};
 use crate::solve::{Lanczos, SolveReport, StepSolver, System, add_spring, dot};
 use crate::springs::{SpringWeights, StepMatrix, Weights};
+use crate::units::binary_unit;
 
 /// Share of the bound that a step may use: the bound is an estimate from below of the largest eigenvalue.
 const SAFETY: f64 = 0.95;
@@ -72,17 +73,25 @@ pub(crate) fn largest_frequency<T: Real>(
 }
 
 impl<T: Real> Patch<T> {
-    /// The matrix `M + aD`.
+    /// The power of two in whose units `M + aD` is written.
+    fn mass_unit(&self, damping: f64) -> f64 {
+        binary_unit(self.lumped.mass.unit.max(damping * self.lumped.damping.unit))
+    }
+
+    /// The matrix `M + aD`, in its unit.
     fn mass_matrix(&self, damping: f64) -> StepMatrix<T> {
-        let springs = self.lumped.springs.iter().take(3).map(|s| SpringWeights {
+        let springs = self.network.springs().iter().take(3).map(|s| SpringWeights {
             direction: s.direction,
             weights: Weights::Constant(T::zero()),
         });
-        let a = T::from_f64(damping);
-        let lumped = &self.lumped;
-        let mass = match (&lumped.mass, &lumped.damping) {
-            (Weights::Constant(m), Weights::Constant(c)) => Weights::Constant(*m + a * *c),
-            (m, c) => Weights::Each((0..self.base.len()).map(|i| m.at(i) + a * c.at(i)).collect()),
+        let (m, c) = (&self.lumped.mass, &self.lumped.damping);
+        let unit = self.mass_unit(damping);
+        let factors = [m.unit / unit, damping * c.unit / unit].map(T::from_f64);
+        let one = |i: usize| factors[0] * m.at(i) + factors[1] * c.at(i);
+        let mass = if m.is_constant() && c.is_constant() {
+            Weights::Constant(one(0))
+        } else {
+            Weights::Each((0..self.base.len()).map(one).collect())
         };
         StepMatrix::new(self.matrix.dims(), mass, springs.collect())
     }
@@ -98,47 +107,59 @@ impl<T: Real> Patch<T> {
         })
     }
 
-    /// The largest stable explicit step, `2/√λ_max(M̃⁻¹K̃)`, by Lanczos steps, without hard constraints, which only raise it; of the 4-D law with all tangent factors 1,
-    /// which they never exceed. Infinite without stiffness.
+    /// The largest stable explicit step, `2/√λ_max(M̃⁻¹K̃)`, by Lanczos steps, without hard constraints, which only raise
+    /// it; of the 4-D law with all tangent factors 1, which they never exceed. Infinite without stiffness.
     ///
     /// # Errors
     /// [`PatchError::Solve`].
     pub fn explicit_limit(&mut self) -> Result<f64, PatchError> {
+        let now = self.version();
         if let Some((version, limit)) = self.limit
-            && version == self.version
+            && version == now
         {
             return Ok(limit);
         }
         let mass = self.mass_matrix(0.0);
-        let scale = self.network.law().scale().powi(2);
-        let springs = self.lumped.springs.iter().map(|s| SpringWeights {
+        let sigma2 = self.network.law().scale().powi(2);
+        let held = self.held.as_deref().map_or(&[][..], Held::springs);
+        let stiffest = held.iter().fold(0.0_f64, |m, (_, k)| m.max(k / sigma2));
+        let ground = &self.lumped.ground;
+        let unit = binary_unit(self.network.stiffness_unit().max(ground.unit).max(stiffest));
+        if unit == 0.0 {
+            self.limit = Some((now, f64::INFINITY));
+            return Ok(f64::INFINITY);
+        }
+        let springs = self.network.springs().iter().map(|s| SpringWeights {
             direction: s.direction,
-            weights: s.weights.scaled(scale),
+            weights: s.weights.scaled(self.network.stiffness_unit() / unit),
         });
         let stiffness = StepMatrix::new(
             self.matrix.dims(),
-            self.lumped.ground.scaled(scale),
+            ground.weights.scaled(ground.unit / unit),
             springs.collect(),
         );
+        let held = held.iter().map(|(row, k)| (row.clone(), k / (sigma2 * unit)));
+        let held: Vec<_> = held.collect();
         let mut solver = self.mass_solver();
         self.mass_matrix = None;
         solver.prepare(&mass)?;
-        let springs = self.held.as_deref().map_or(&[][..], Held::springs);
-        let largest = largest_frequency(&stiffness, springs, &mass, &mut solver);
+        let largest = largest_frequency(&stiffness, &held, &mass, &mut solver);
         self.mass_solver = Some(solver);
+        // (λ in units of its own) · σ²·(unit of stiffness)/(unit of mass)
+        let largest = largest * (sigma2 * unit / self.mass_unit(0.0)).sqrt();
         let limit = if largest > 0.0 {
             2.0 / largest
         } else {
             f64::INFINITY
         };
-        self.limit = Some((self.version, limit));
+        self.limit = Some((now, limit));
         Ok(limit)
     }
 
     /// Refuses steps beyond the bound.
     pub(super) fn check_explicit(&mut self, dt: f64) -> Result<(), PatchError> {
         let limit = SAFETY * self.explicit_limit()?;
-        if dt > limit {
+        if limit.is_nan() || dt > limit {
             return Err(PatchError::Unstable { dt, limit });
         }
         Ok(())
@@ -154,7 +175,7 @@ impl<T: Real> Patch<T> {
     /// `v += Δt (M̃ + ΔtD̃)⁻¹ Aᵀ(f - Dw)`, `p += Δt v`.
     pub(super) fn symplectic_step(&mut self, dt: f64) -> Result<Moved, PatchError> {
         self.check_explicit(dt)?;
-        self.aim(dt, 1.0 / dt, 1.0);
+        self.aim(dt / self.mass_unit(dt), 1.0 / dt, 1.0);
         let (report, clamped) = self.kick(dt, dt)?;
         self.drift(dt);
         Ok((report, clamped, None))
@@ -165,47 +186,55 @@ impl<T: Real> Patch<T> {
     pub(super) fn verlet_steps(&mut self, dt: f64, parts: usize) -> Result<Moved, PatchError> {
         let h = dt / parts as f64;
         self.check_explicit(h)?;
-        let merge = matches!(&self.lumped.damping, Weights::Constant(c) if *c == T::zero());
+        let merge = self.lumped.damping.unit == 0.0;
+        let mut worst: Option<(SolveReport, usize)> = None;
+        let mut kicked = |(report, clamped): (SolveReport, usize)| {
+            let (before, most) = worst.unwrap_or((report, clamped));
+            worst = Some((before.and(report), most.max(clamped)));
+        };
         let mut kick = 0.5 * h;
-        let mut clamped = 0;
         for part in 0..parts {
             // Hard constraints are met by the drift, then by the velocity.
-            self.aim(kick, 1.0 / h, 1.0);
-            clamped = clamped.max(self.kick(kick, 0.5 * kick)?.1);
+            self.aim(kick / self.mass_unit(0.5 * kick), 1.0 / h, 1.0);
+            kicked(self.kick(kick, 0.5 * kick)?);
             self.drift(h);
             if merge && part + 1 < parts {
                 kick = h;
                 continue;
             }
             kick = 0.5 * h;
-            self.aim(kick, 0.0, 1.0);
-            let (report, count) = self.kick(kick, 0.5 * kick)?;
-            clamped = clamped.max(count);
-            if part + 1 == parts {
-                return Ok((report, clamped, None));
-            }
+            self.aim(kick / self.mass_unit(0.5 * kick), 0.0, 1.0);
+            kicked(self.kick(kick, 0.5 * kick)?);
         }
-        unreachable!("there is a last part")
+        let (report, clamped) = worst.expect("there is a first part");
+        Ok((report, clamped, None))
     }
 
     /// `p += Δt v`.
     fn drift(&mut self, dt: f64) {
-        let (state, t) = (&mut self.state, T::from_f64(dt));
+        let state = &mut self.state;
+        let grown = |d: T, w: T| T::from_f64(d.as_f64() + dt * w.as_f64());
         for (p, v) in state.p.iter_mut().zip(&state.v) {
-            *p += t * *v;
+            *p = grown(*p, *v);
         }
-        for (d, w) in state.d.iter_mut().zip(&state.w) {
-            *d += t * *w;
+        let mut done = 0.0;
+        for ((d, w), f) in state.d.iter_mut().zip(&state.w).zip(&self.external) {
+            *d = grown(*d, *w);
+            done += w.as_f64() * f.as_f64();
         }
+        self.work.work += dt * done;
     }
 
     /// `v += Δt (M̃ + aD̃)⁻¹ Aᵀ(f - Dw)`: the damping of the velocity after the kick with `a = Δt`, of the mean one with
     /// `a = Δt/2`.
     fn kick(&mut self, dt: f64, damping: f64) -> Result<(SolveReport, usize), PatchError> {
         let clamped = self.forces(None);
-        let t = T::from_f64;
+        let unit = self.mass_unit(damping);
+        let lost = dt * self.lumped.damping.unit / unit;
+        let pushed = dt * self.work.force_unit / unit;
         for (i, g) in self.work.g.iter_mut().enumerate() {
-            *g = t(dt) * (self.work.force[i] - self.lumped.damping.at(i) * self.state.w[i]);
+            let damped = lost * self.lumped.damping.at(i).as_f64() * self.state.w[i].as_f64();
+            *g = T::from_f64(pushed * self.work.force[i].as_f64() - damped);
         }
         let mut solver = self.mass_solver();
         if let (Some(held), None) = (&self.held, solver.border_mut()) {
@@ -215,10 +244,11 @@ impl<T: Real> Patch<T> {
         if let (Some(held), Some(border)) = (&self.held, solver.border_mut()) {
             held.aim(border);
         }
+        let version = self.version();
         let kept = self
             .mass_matrix
             .take()
-            .filter(|m| (m.0, m.1) == (self.version, damping));
+            .filter(|m| (m.0, m.1) == (version, damping));
         let (matrix, prepared) = match kept {
             Some((.., matrix)) => (matrix, Ok(())),
             None => {
@@ -231,7 +261,7 @@ impl<T: Real> Patch<T> {
         let report = prepared.map(|()| solver.solve(&matrix, &work.g, &mut work.x, &mut work.dx));
         self.mass_solver = Some(solver);
         let report = report?;
-        self.mass_matrix = Some((self.version, damping, matrix));
+        self.mass_matrix = Some((version, damping, matrix));
         let state = &mut self.state;
         for (v, x) in state.v.iter_mut().zip(&work.x) {
             *v += *x;
@@ -239,6 +269,6 @@ impl<T: Real> Patch<T> {
         for (w, dx) in state.w.iter_mut().zip(&work.dx) {
             *w += *dx;
         }
-        Ok((report, clamped))
+        Ok((report.checked()?, clamped))
     }
 }

@@ -3,58 +3,88 @@ use bspline::Real;
 use crate::patch::{Patch, PatchError, Prepared};
 use crate::solve::{ITERATED, Method, SolveReport};
 use crate::springs::{Law, Weights};
+use crate::units::binary_unit;
 
 /// Beyond this ratio of step sizes a factor is not tried again: four in `Δt²` costs about eight iterations.
 const STALE: f64 = 4.0;
 /// Residual, relative to the impulse, that a solve with an old factor may leave.
 const TRUSTED: f64 = 1e-3;
 
-/// What a step returns to its caller: the last solve, the clamp count, the error estimate.
+/// What a step returns to its caller: the worst of its solves, the largest clamp count, the error estimate.
 pub(super) type Moved = (SolveReport, usize, Option<f64>);
 
 impl<T: Real> Patch<T> {
-    /// All forces on the samples at the present state: external, springs, ground, but not damping. With them, of the
-    /// 4-D law, the tangent `stiffness·σ²kτ`. Returns the number of springs with a negative tangent.
-    pub(crate) fn forces(&mut self, stiffness: Option<f64>) -> usize {
-        let (force, d) = (&mut self.work.force, &self.state.d);
-        force.copy_from_slice(&self.external);
-        let springs = match (self.network.law(), stiffness) {
-            (Law::FourD { .. }, Some(factor)) => {
-                self.network
-                    .add_forces_and_tangent(d, force, factor, &mut self.matrix.springs)
-            }
-            _ => self.network.add_forces(d, force),
+    /// All forces on the samples at the present state: external, springs, ground, but not damping, as multiples of
+    /// `work.force_unit`. With them, of the 4-D law, the tangent `tangent·σ²kτ`. Returns the number of springs with a
+    /// negative tangent.
+    pub(crate) fn forces(&mut self, tangent: Option<f64>) -> usize {
+        let d = &self.state.d;
+        let sigma2 = self.network.law().scale().powi(2);
+        let ground = &self.lumped.ground;
+        let unit = binary_unit(
+            self.external_size
+                .max(self.network.force_unit())
+                .max(sigma2 * ground.unit),
+        );
+        let unit = if unit > 0.0 { unit } else { 1.0 };
+        self.work.force_unit = unit;
+        let force = &mut self.work.force;
+        let inverse = 1.0 / unit;
+        for (f, e) in force.iter_mut().zip(&self.external) {
+            *f = T::from_f64(e.as_f64() * inverse);
+        }
+        let tangent = match self.network.law() {
+            Law::FourD { .. } => tangent.map(|t| (t, &mut self.matrix.springs[..])),
+            Law::Linear { .. } => None,
         };
-        let sigma2 = T::from_f64(self.network.law().scale().powi(2));
-        match &self.lumped.ground {
-            Weights::Constant(g) if *g == T::zero() => (),
-            ground => {
-                for (i, f) in force.iter_mut().enumerate() {
-                    *f -= ground.at(i) * sigma2 * (d[i] - self.base[i]);
-                }
+        let clamped = self.network.add_forces_in(unit, d, force, tangent);
+        if ground.unit > 0.0 {
+            let factor = T::from_f64(sigma2 * ground.unit * inverse);
+            for (i, f) in force.iter_mut().enumerate() {
+                *f -= factor * ground.at(i) * (d[i] - self.base[i]);
             }
         }
-        springs.clamped
+        clamped
+    }
+
+    /// The power of two in whose units the matrix `M̃ + aD̃ + bK̃` is written: a factor that may still serve knows it in
+    /// its own.
+    pub(super) fn matrix_unit(&self, damping: f64, stiffness: f64) -> f64 {
+        if let Some(p) = self.prepared.filter(|p| self.is_near(p, stiffness)) {
+            return p.unit;
+        }
+        let sigma2 = self.network.law().scale().powi(2);
+        let springs = self.network.stiffness_unit().max(self.lumped.ground.unit);
+        let of_springs = stiffness * sigma2 * springs;
+        binary_unit(
+            (self.lumped.mass.unit)
+                .max(damping * self.lumped.damping.unit)
+                .max(of_springs),
+        )
+    }
+
+    /// Whether a factor may serve for a matrix with this stiffness.
+    fn is_near(&self, p: &Prepared, stiffness: f64) -> bool {
+        p.version == self.version() && (1.0 / STALE..=STALE).contains(&(stiffness / p.stiffness))
     }
 
     /// Solves `(M̃ + aD̃ + bK̃) x = Aᵀg` into `work.x`, `work.dx`; tangents of the 4-D law are those of [`forces`].
     ///
     /// [`forces`]: Self::forces
     pub(super) fn solve_step(&mut self, damping: f64, stiffness: f64) -> Result<SolveReport, PatchError> {
-        let (version, four_d) = (self.version, matches!(self.network.law(), Law::FourD { .. }));
+        let (version, four_d) = (self.version(), matches!(self.network.law(), Law::FourD { .. }));
+        let unit = self.matrix_unit(damping, stiffness);
         let same = self
             .prepared
             .is_some_and(|p| p.version == version && p.damping == damping && p.stiffness == stiffness);
         // An old factor may solve for the matrix of another step.
-        if four_d || self.filled != Some((version, damping, stiffness)) {
-            self.fill_matrix(damping, stiffness);
-            self.filled = Some((version, damping, stiffness));
+        let filled = Some((version, damping, stiffness, unit));
+        if four_d || self.filled != filled {
+            self.fill_matrix(damping, stiffness, unit);
+            self.filled = filled;
         }
-        let near = self.prepared.is_some_and(|p| {
-            let ratio = stiffness / p.stiffness;
-            p.version == version && (1.0 / STALE..=STALE).contains(&ratio)
-        });
-        self.aim_implicit(stiffness);
+        let near = self.prepared.is_some_and(|p| self.is_near(&p, stiffness));
+        self.aim_implicit(stiffness / unit);
         // The diagonalization of constant material costs nothing to renew.
         let mut fresh = !near || (!same && self.matrix.is_uniform());
         loop {
@@ -72,9 +102,10 @@ impl<T: Real> Patch<T> {
                     version,
                     damping,
                     stiffness,
+                    unit,
                     residual,
                 });
-                return Ok(report);
+                return Ok(report.checked()?);
             }
             let known = self.prepared.map_or(0.0, |p| p.residual);
             // Those that iterate stop there.
@@ -89,18 +120,25 @@ impl<T: Real> Patch<T> {
         }
     }
 
-    /// Writes `M + aD + bG` and, of the linear law, `bσ²k` into the matrix.
-    fn fill_matrix(&mut self, damping: f64, stiffness: f64) {
+    /// Writes `M + aD + bG` and, of the linear law, `bσ²k` into the matrix, as multiples of `unit`.
+    fn fill_matrix(&mut self, damping: f64, stiffness: f64, unit: f64) {
         let scale = stiffness * self.network.law().scale().powi(2);
-        let (a, b) = (T::from_f64(damping), T::from_f64(scale));
         let lumped = &self.lumped;
-        let diagonal = |i: usize| lumped.mass.at(i) + a * lumped.damping.at(i) + b * lumped.ground.at(i);
-        let constant = [&lumped.mass, &lumped.damping, &lumped.ground]
-            .iter()
-            .all(|w| matches!(w, Weights::Constant(_)));
+        let parts = [
+            (&lumped.mass, 1.0),
+            (&lumped.damping, damping),
+            (&lumped.ground, scale),
+        ];
+        let constant = parts.iter().all(|(w, _)| w.is_constant());
+        let parts = parts.map(|(w, factor)| (w, T::from_f64(factor * w.unit / unit)));
+        let diagonal = |i: usize| {
+            let [m, d, g] = parts.each_ref().map(|(w, factor)| *factor * w.at(i));
+            m + d + g
+        };
         write(&mut self.matrix.mass, constant, self.base.len(), diagonal);
         if let Law::Linear { .. } = self.network.law() {
-            for (to, from) in self.matrix.springs.iter_mut().zip(&lumped.springs) {
+            let b = T::from_f64(scale * self.network.stiffness_unit() / unit);
+            for (to, from) in self.matrix.springs.iter_mut().zip(self.network.springs()) {
                 let constant = matches!(from.weights, Weights::Constant(_));
                 write(&mut to.weights, constant, self.base.len(), |i| {
                     b * from.weights.at(i)
@@ -113,34 +151,43 @@ impl<T: Real> Patch<T> {
     /// [DIS eq. 12] in displacement and velocity: with `p_{i-1} = p_i - Δt v` it reads
     /// `(M̃ + ½Δt D̃ + Δt² K̃) Δp = Δt M̃v - ½Δt² D̃v + Δt² Aᵀ(f_ext + f_int)`.
     pub(super) fn paper_step(&mut self, dt: f64) -> Result<Moved, PatchError> {
-        let clamped = self.forces(Some(dt * dt));
-        let t = T::from_f64;
-        for (i, g) in self.work.g.iter_mut().enumerate() {
-            let momentum = t(dt) * self.lumped.mass.at(i) - t(0.5 * dt * dt) * self.lumped.damping.at(i);
-            *g = momentum * self.state.w[i] + t(dt * dt) * self.work.force[i];
+        let (a, b) = (0.5 * dt, dt * dt);
+        let unit = self.matrix_unit(a, b);
+        let clamped = self.forces(Some(b / unit));
+        let work = &mut self.work;
+        let (mass, damping) = (&self.lumped.mass, &self.lumped.damping);
+        let (kept, lost) = (dt * mass.unit / unit, a * dt * damping.unit / unit);
+        let pushed = b * work.force_unit / unit;
+        for (i, g) in work.g.iter_mut().enumerate() {
+            let momentum = kept * mass.at(i).as_f64() - lost * damping.at(i).as_f64();
+            *g = T::from_f64(momentum * self.state.w[i].as_f64() + pushed * work.force[i].as_f64());
         }
-        self.aim(dt * dt, 1.0, 0.0);
-        let report = self.solve_step(0.5 * dt, dt * dt)?;
+        self.aim(b / unit, 1.0, 0.0);
+        let report = self.solve_step(a, b)?;
         let (work, state) = (&self.work, &mut self.state);
+        let rate = |x: T| T::from_f64(x.as_f64() / dt);
         for (v, x) in state.v.iter_mut().zip(&work.x) {
-            *v = *x / t(dt);
+            *v = rate(*x);
         }
         for (w, dx) in state.w.iter_mut().zip(&work.dx) {
-            *w = *dx / t(dt);
+            *w = rate(*dx);
         }
         self.advance();
         Ok((report, clamped, None))
     }
 
     /// `p += x`, `d += dx`.
-    pub(super) fn advance(&mut self) {
-        let (work, state) = (&self.work, &mut self.state);
+    fn advance(&mut self) {
+        let (work, state) = (&mut self.work, &mut self.state);
         for (p, x) in state.p.iter_mut().zip(&work.x) {
             *p += *x;
         }
-        for (d, dx) in state.d.iter_mut().zip(&work.dx) {
+        let mut done = 0.0;
+        for ((d, dx), f) in state.d.iter_mut().zip(&work.dx).zip(&self.external) {
             *d += *dx;
+            done += dx.as_f64() * f.as_f64();
         }
+        work.work += done;
     }
 
     /// Both stages have the matrix `M̃ + cD̃ + c²K̃`, `c = (1 - 1/√2)Δt`.
@@ -152,48 +199,52 @@ impl<T: Real> Patch<T> {
         let gamma = 2.0 - std::f64::consts::SQRT_2;
         let beta = (1.0 - gamma).powi(2) / (gamma * (2.0 - gamma));
         let c = 0.5 * gamma * dt;
-        let t = T::from_f64;
-        let mut clamped = self.forces(Some(c * c));
-        for (i, g) in self.work.g.iter_mut().enumerate() {
-            *g =
-                t(2.0 * c) * (self.lumped.mass.at(i) * self.state.w[i]) + t(2.0 * c * c) * self.work.force[i];
+        let unit = self.matrix_unit(c, c * c);
+        let of_mass = self.lumped.mass.unit / unit;
+        let clamped = self.forces(Some(c * c / unit));
+        let work = &mut self.work;
+        let of_force = c * c * work.force_unit / unit;
+        for (i, g) in work.g.iter_mut().enumerate() {
+            let momentum = of_mass * self.lumped.mass.at(i).as_f64() * self.state.w[i].as_f64();
+            *g = T::from_f64(2.0 * (c * momentum + of_force * work.force[i].as_f64()));
         }
-        self.aim(2.0 * c * c, 1.0, 0.0);
-        self.solve_step(c, c * c)?;
+        self.aim(2.0 * c * c / unit, 1.0, 0.0);
+        let first = self.solve_step(c, c * c)?;
+        let rate = |x: T, v: T| T::from_f64(x.as_f64() / c - v.as_f64());
         let (work, state) = (&mut self.work, &mut self.state);
         for (v, x) in state.v.iter_mut().zip(&work.x) {
-            *v = *x / t(c) - *v;
+            *v = rate(*x, *v);
         }
         for (w, dx) in state.w.iter_mut().zip(&work.dx) {
-            *w = *dx / t(c) - *w;
+            *w = rate(*dx, *w);
         }
-        std::mem::swap(&mut work.first_x, &mut work.x);
-        std::mem::swap(&mut work.first_dx, &mut work.dx);
-        for (p, x) in state.p.iter_mut().zip(&work.first_x) {
-            *p += *x;
-        }
-        for (d, dx) in state.d.iter_mut().zip(&work.first_dx) {
-            *d += *dx;
-        }
-        clamped = clamped.max(self.forces(Some(c * c)));
+        self.advance();
+        std::mem::swap(&mut self.work.first_x, &mut self.work.x);
+        std::mem::swap(&mut self.work.first_dx, &mut self.work.dx);
+        // The factor may have been renewed, in another unit.
+        let unit = self.matrix_unit(c, c * c);
+        let of_mass = self.lumped.mass.unit / unit;
+        let of_damping = c * self.lumped.damping.unit / unit;
+        let clamped = clamped.max(self.forces(Some(c * c / unit)));
         let work = &mut self.work;
+        let of_force = c * c * work.force_unit / unit;
         for (i, g) in work.g.iter_mut().enumerate() {
-            let (m, damping) = (self.lumped.mass.at(i), self.lumped.damping.at(i));
-            let velocity = t(1.0 + beta) * self.state.w[i] - t(beta) * work.before.w[i];
-            let first = t(beta) * work.first_dx[i];
-            *g = t(c) * (m * velocity) + (m + t(c) * damping) * first + t(c * c) * work.force[i];
+            let m = of_mass * self.lumped.mass.at(i).as_f64();
+            let damping = of_damping * self.lumped.damping.at(i).as_f64();
+            let velocity = (1.0 + beta) * self.state.w[i].as_f64() - beta * work.before.w[i].as_f64();
+            let first = beta * work.first_dx[i].as_f64();
+            *g = T::from_f64(c * (m * velocity) + (m + damping) * first + of_force * work.force[i].as_f64());
         }
-        self.aim(c * c, 1.0, 0.0);
-        let report = self.solve_step(c, c * c)?;
+        self.aim(c * c / unit, 1.0, 0.0);
+        let second = self.solve_step(c, c * c)?;
         let error = self.tr_bdf2_finish(dt, gamma, beta, c);
-        Ok((report, clamped, Some(error)))
+        Ok((first.and(second), clamped, Some(error)))
     }
 
     /// Velocities and positions after the second stage, and the error: the difference to the third-order companion
     /// [M. E. Hosea and L. F. Shampine, *Analysis and implementation of TR-BDF2*, 1996], root mean square over the
     /// samples.
     fn tr_bdf2_finish(&mut self, dt: f64, gamma: f64, beta: f64, c: f64) -> f64 {
-        let t = T::from_f64;
         let w = std::f64::consts::SQRT_2 / 4.0;
         let difference = [
             w - (1.0 - w) / 3.0,
@@ -201,12 +252,13 @@ impl<T: Real> Patch<T> {
             gamma / 2.0 - gamma / 6.0,
         ];
         let (work, state) = (&self.work, &mut self.state);
+        let rate = |x: T, first: T| T::from_f64((x.as_f64() - beta * first.as_f64()) / c);
         for ((v, x), first) in state.v.iter_mut().zip(&work.x).zip(&work.first_x) {
-            *v = (*x - t(beta) * *first) / t(c);
+            *v = rate(*x, *first);
         }
         let mut error = 0.0;
         for (i, v) in state.w.iter_mut().enumerate() {
-            let after = (work.dx[i] - t(beta) * work.first_dx[i]) / t(c);
+            let after = rate(work.dx[i], work.first_dx[i]);
             let rates = [work.before.w[i], *v, after];
             let one: f64 = difference.iter().zip(rates).map(|(e, w)| e * w.as_f64()).sum();
             error += (dt * one).powi(2);

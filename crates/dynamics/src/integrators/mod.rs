@@ -8,6 +8,7 @@ mod implicit;
 
 pub use adaptive::{AdaptiveOptions, AdaptiveReport};
 pub use auto::Choice;
+pub(crate) use auto::Operations;
 pub(crate) use explicit::largest_frequency;
 
 use bspline::Real;
@@ -56,11 +57,12 @@ pub struct StepReport {
     pub integrator: Integrator,
     /// Equal parts that the step was made of.
     pub substeps: usize,
-    /// The last solve of the step.
+    /// The worst of the solves that the step was made of: most iterations, largest residual, any negative curvature; the
+    /// method is that of the last.
     pub solve: SolveReport,
-    /// Springs whose negative tangent was taken as 0.
+    /// Springs whose negative tangent was taken as 0, in the stage that had most.
     pub clamped: usize,
-    /// Work of the external forces over the step.
+    /// Work of the external forces over the step, from the increments themselves.
     pub work: f64,
     /// Estimate of the step's error in the densities, root mean square; of TR-BDF2 only.
     pub error: Option<f64>,
@@ -70,8 +72,8 @@ impl<T: Real> Patch<T> {
     /// Moves the patch by `dt` seconds; then rest lengths follow as the [plasticity](crate::springs::Plasticity) says.
     ///
     /// # Errors
-    /// [`PatchError::TimeStep`], [`PatchError::Unstable`] of an explicit step beyond its bound, [`PatchError::Solve`].
-    /// The state is then the one before.
+    /// [`PatchError::TimeStep`], [`PatchError::Unstable`] of an explicit step beyond its bound, [`PatchError::Solve`],
+    /// [`PatchError::Overflow`] if a number of the new state would not be finite. The state is then the one before.
     pub fn step(&mut self, integrator: Integrator, dt: f64) -> Result<StepReport, PatchError> {
         let report = self.try_step(integrator, dt)?;
         self.flow(dt);
@@ -84,6 +86,7 @@ impl<T: Real> Patch<T> {
             return Err(PatchError::TimeStep { dt });
         }
         self.work.before.copy_from(&self.state);
+        self.work.work = 0.0;
         let (integrator, substeps) = match integrator {
             Integrator::Auto => {
                 let choice = self.choose(dt)?;
@@ -101,18 +104,14 @@ impl<T: Real> Patch<T> {
             self.restore();
         }
         let (solve, clamped, error) = moved?;
-        let before = &self.work.before;
-        let path = self.state.d.iter().zip(&before.d).zip(&self.external);
-        let work = path
-            .map(|((now, then), f)| (*now - *then).as_f64() * f.as_f64())
-            .sum();
+        self.keep_if_finite()?;
         Ok(StepReport {
             dt,
             integrator,
             substeps,
             solve,
             clamped,
-            work,
+            work: self.work.work,
             error,
         })
     }

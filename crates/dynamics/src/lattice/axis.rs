@@ -3,6 +3,7 @@ use bspline::{Basis, KnotVector};
 use nalgebra::{Cholesky, DMatrix};
 
 use super::banded::Banded;
+use super::dense::transposed_product;
 
 /// Which coefficients at the ends of an axis keep their values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,8 +59,10 @@ pub enum LatticeError {
         /// Its pivot relative to its diagonal element.
         pivot: f64,
     },
-    /// A length that is no length.
-    #[error("axis {axis}: the sample spacing is {spacing}; it has to be positive and finite")]
+    /// A distance that is not positive and finite.
+    #[error(
+        "axis {axis}: the samples would lie {spacing} apart; their distance has to be positive and finite"
+    )]
     Spacing {
         /// Which axis.
         axis: usize,
@@ -124,7 +127,7 @@ impl Axis {
     /// Refuses collocation matrices whose columns are dependent to within a few units of rounding.
     fn check_rank(&self, axis: usize) -> Result<(), LatticeError> {
         let a = self.collocation().to_dense();
-        let mut gram = a.transpose() * a;
+        let mut gram = transposed_product(&a, &a);
         let n = gram.nrows();
         let diagonal: Vec<f64> = (0..n).map(|i| gram[(i, i)]).collect();
         for j in 0..n {
@@ -254,9 +257,9 @@ impl Axis {
             a
         };
         let (fine, target) = (matrix(&self.knots), matrix(&coarse.knots));
-        let gram =
-            Cholesky::new(fine.transpose() * &fine).expect("functions on their own spans are independent");
-        let all = gram.solve(&(fine.transpose() * target));
+        let gram = Cholesky::new(transposed_product(&fine, &fine))
+            .expect("functions on their own spans are independent");
+        let all = gram.solve(&transposed_product(&fine, &target));
         let (rows, columns) = (self.first_free(), coarse.first_free());
         let row = |i: usize| {
             let weights = (0..coarse.free_count()).map(move |c| (c, i + rows, c + columns));

@@ -10,6 +10,14 @@ pub(crate) const PAD: usize = 8;
 /// Rows of the product computed together.
 const ROWS: usize = 6;
 
+/// `aᵀb`, summed in order: nalgebra's own product fuses multiplications and additions on machines that can.
+pub(crate) fn transposed_product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    DMatrix::from_fn(a.ncols(), b.ncols(), |i, j| {
+        let terms = (0..a.nrows()).map(|k| a[(k, i)] * b[(k, j)]);
+        terms.sum()
+    })
+}
+
 /// A square matrix and its transpose, padded for products along any axis.
 #[derive(Clone, Debug)]
 pub(crate) struct DenseAxis<T> {

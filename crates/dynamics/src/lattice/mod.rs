@@ -9,7 +9,7 @@ mod tensor;
 
 pub use axis::{Axis, LatticeError, Rim};
 pub use banded::Banded;
-pub(crate) use dense::{DenseAxis, PAD, multiply, multiply_last};
+pub(crate) use dense::{DenseAxis, PAD, multiply, multiply_last, transposed_product};
 pub use grid::Lattice;
 pub(crate) use tensor::TensorProduct;
 pub use tensor::TensorWorkspace;

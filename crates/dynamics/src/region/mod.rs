@@ -64,7 +64,7 @@ pub enum RegionError {
     #[error(transparent)]
     Patch(#[from] PatchError),
     /// No function lies inside.
-    #[error("axis {axis}: a region of {count} cells has nothing that may move; take at least {MIN_CELLS}")]
+    #[error("axis {axis}: in a region of {count} cells nothing can move; take at least {MIN_CELLS} cells")]
     TooFewCells {
         /// Which axis.
         axis: usize,
@@ -73,7 +73,8 @@ pub enum RegionError {
     },
     /// Not in the field.
     #[error(
-        "axis {axis}: {count} cells from number {first} on; the level has {cells}: move or shrink the region"
+        "axis {axis}: the region takes {count} cells from cell {first} on, but the level ends after {cells} cells; move \
+         the region or make it smaller"
     )]
     Outside {
         /// Which axis.
@@ -87,7 +88,7 @@ pub enum RegionError {
     },
     /// Larger than memory allows for.
     #[error(
-        "a region of {count:?} {what}; at most {MAX_EDGE} on an axis and {MAX_SIZE} in all: \
+        "the region would have {count:?} {what}; at most {MAX_EDGE} on an axis and {MAX_SIZE} in all are possible: \
          use a coarser level or a smaller box"
     )]
     TooLarge {
@@ -96,8 +97,10 @@ pub enum RegionError {
         /// On each axis.
         count: [u64; 3],
     },
-    /// A density of samples that is none.
-    #[error("{value} samples per cell on axis {axis}; it has to be positive and finite (1 to 2 is usual)")]
+    /// A number of samples per cell that is not positive and finite.
+    #[error(
+        "{value} samples per cell on axis {axis}; the number has to be positive and finite (1 to 2 is usual)"
+    )]
     SamplesPerCell {
         /// Which axis.
         axis: usize,
@@ -106,7 +109,7 @@ pub enum RegionError {
     },
     /// Axes that are not perpendicular in the world.
     #[error(
-        "the axes of the field meet with a cosine of {cosine:.2e}; springs need perpendicular ones: \
+        "two axes of the field are not perpendicular (the cosine of their angle is {cosine:.2e}), which springs need; \
          resample the field on a grid that is not sheared"
     )]
     Sheared {
@@ -115,8 +118,8 @@ pub enum RegionError {
     },
     /// Bricks of the level are missing and would reach out of the region.
     #[error(
-        "the field has no functions of level {level} in cells {first:?} to {end:?}, and making them would change \
-         roundings outside the region: take the box that `Cells::widened` gives"
+        "the field has no functions of level {level} in cells {first:?} to {end:?}, and making them would change values \
+         outside the region by rounding; take the box that `Cells::widened` gives"
     )]
     Spills {
         /// Level of the region.
@@ -126,11 +129,11 @@ pub enum RegionError {
         /// Behind its last cell.
         end: [u32; 3],
     },
-    /// A tensor-product patch with coefficients that are none.
+    /// A tensor-product patch with coefficients that are not finite.
     #[error(transparent)]
     Tensor(#[from] TensorError),
     /// Baked onto a field on other knots.
-    #[error("the region was cut from a field on another lattice; bake it onto a version of that field")]
+    #[error("the region was cut out of a field on another lattice; bake it onto a version of that field")]
     OtherLattice,
 }
 
@@ -178,10 +181,8 @@ pub struct Region<T> {
     patch: Patch<T>,
     thresholds: Thresholds,
     asleep: bool,
-    parts_sleep: bool,
+    parts: parts::Parts,
     part: Option<Box<parts::Part<T>>>,
-    /// Steps until it is looked at again what is awake.
-    steps_to_look: usize,
 }
 
 impl<T: Real> Region<T> {
@@ -241,9 +242,8 @@ impl<T: Real> Region<T> {
             patch,
             thresholds: options.sleep,
             asleep: true,
-            parts_sleep: false,
+            parts: parts::Parts::default(),
             part: None,
-            steps_to_look: 0,
         })
     }
 
@@ -260,6 +260,8 @@ impl<T: Real> Region<T> {
     /// The patch, to change its matter, rest or state; wakes the region.
     pub fn patch_mut(&mut self) -> &mut Patch<T> {
         self.wake();
+        self.part = None;
+        self.parts.forget();
         &mut self.patch
     }
 
@@ -326,6 +328,7 @@ impl<T: Real> Region<T> {
         let baked = self.bake(onto)?;
         self.patch.rest_here();
         self.part = None;
+        self.parts.forget();
         self.asleep = true;
         Ok(baked)
     }
@@ -333,7 +336,8 @@ impl<T: Real> Region<T> {
     /// Lets an elastic solid go: force := 0, and it swings back to its rest. What it was cut from is, to the bit, the shape
     /// that it returns to.
     pub fn release_elastic(&mut self) {
-        self.patch.external.fill(T::zero());
+        let none = vec![T::zero(); self.patch.external.len()];
+        self.set_force(&none).expect("zeros, one per sample, are forces");
         self.wake();
     }
 }

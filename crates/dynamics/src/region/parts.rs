@@ -3,24 +3,84 @@
 use bspline::{KnotVector, Real};
 
 use super::Region;
-use crate::integrators::{Integrator, StepReport};
+use super::sleep::solves;
+use crate::integrators::{Integrator, Operations, StepReport};
 use crate::lattice::{Axis, Lattice, LatticeError, Rim};
 use crate::matter::{Matter, Quantity};
 use crate::patch::{Patch, PatchError};
-use crate::springs::{Plasticity, Weights};
+use crate::springs::{Plasticity, SpringWeights, Weights};
 
-/// Steps between two looks at the whole region, whose cost is that of its forces.
+/// Steps between two looks at the whole region, whose cost is that of its forces; up to eight times as many while looks
+/// find nothing to cut.
 const LOOK: usize = 4;
-/// Coefficients beyond those that move, on each side.
+const MOST_MISSES: u32 = 3;
+/// Coefficients beyond those that move, on each side, of a part that is cut: twice as many each time that one was outgrown.
 const MARGIN: usize = 3;
+/// Of a part that is kept.
+const LEAST_MARGIN: usize = 2;
+const MOST_GROWTHS: u32 = 3;
 /// Share of the samples above which a part does not pay.
 const WORTH: f64 = 0.6;
+/// Of its samples that a part has to lose for a smaller one to be cut.
+const SHRINK: f64 = 0.5;
 
 /// The part of a region that is awake.
 #[derive(Clone, Debug)]
 pub(super) struct Part<T> {
     pub patch: Patch<T>,
     window: Window,
+    /// Operations that it saved, less what it cost.
+    earned: f64,
+}
+
+/// Whether parts sleep, and what that costs and saves, in operations.
+///
+/// A part is cut when what it costs has been saved before: by other parts, or by what this one would have saved while it
+/// was waited for. So a motion that outgrows every part costs hardly more than one without parts.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Parts {
+    pub on: bool,
+    pub steps_to_look: usize,
+    /// Looks in a row that found nothing to cut.
+    misses: u32,
+    /// Parts in a row that were outgrown.
+    growths: u32,
+    /// Saved so far and not spent.
+    savings: f64,
+    /// Doubled by each part that did not earn what it cost.
+    patience: f64,
+    /// Spent on parts since the matter changed, as long as the whole has no solver of its own.
+    before_whole: f64,
+    pub operations: f64,
+    pub cuts: usize,
+}
+
+impl Default for Parts {
+    fn default() -> Self {
+        Self {
+            on: false,
+            steps_to_look: 0,
+            misses: 0,
+            growths: 0,
+            savings: 0.0,
+            patience: 1.0,
+            before_whole: 0.0,
+            operations: 0.0,
+            cuts: 0,
+        }
+    }
+}
+
+impl Parts {
+    /// All that was learnt of one matter says nothing of another.
+    pub fn forget(&mut self) {
+        *self = Self {
+            on: self.on,
+            operations: self.operations,
+            cuts: self.cuts,
+            ..Self::default()
+        };
+    }
 }
 
 /// A box of cells whose ends are samples.
@@ -36,6 +96,24 @@ struct Window {
 impl Window {
     fn coefficients(&self) -> [usize; 3] {
         self.cells.map(|c| c - 3)
+    }
+
+    fn sample_count(&self) -> usize {
+        self.samples.iter().product()
+    }
+
+    /// Whether it holds the coefficients `low ..= high` of `all` on each axis, and a margin that ends where those do.
+    fn holds(&self, [low, high]: [[usize; 3]; 2], all: [usize; 3]) -> bool {
+        (0..3).all(|k| {
+            let end = self.first[k] + self.cells[k] - 3;
+            let before = low[k].saturating_sub(LEAST_MARGIN) >= self.first[k];
+            before && (high[k] + LEAST_MARGIN).min(all[k] - 1) < end
+        })
+    }
+
+    /// Whether sample `z` of the row `x`, `y` lies in it.
+    fn has_sample(&self, at: [usize; 3]) -> bool {
+        (0..3).all(|k| (self.first_sample[k]..self.first_sample[k] + self.samples[k]).contains(&at[k]))
     }
 }
 
@@ -77,38 +155,55 @@ impl<T: Real> Region<T> {
     ///
     /// Parts are boxes whose ends are samples: cells and samples have to meet more often than at the ends of the
     /// region, as they do every three cells with 4/3 samples a cell if the number of cells is a multiple of three. What
-    /// sleeps stands still until it is off its balance by more than the threshold, which is looked at every fourth step.
-    /// Regions under constraints stay whole. Off at first.
+    /// sleeps stands still until it is off its balance by more than the threshold, which is looked at every few steps.
+    /// A part stays cut while only the forces change, and across sleep. Regions under constraints stay whole. Off at first.
     pub fn set_parts_sleep(&mut self, parts: bool) {
-        self.parts_sleep = parts;
         self.part = None;
-        self.steps_to_look = 0;
+        self.parts.forget();
+        self.parts.on = parts;
     }
 
     /// Samples that the next step moves.
     pub fn awake_samples(&self) -> usize {
         match (&self.part, self.asleep) {
             (_, true) => 0,
-            (Some(part), false) => part.window.samples.iter().product(),
+            (Some(part), false) => part.window.sample_count(),
             (None, false) => self.patch.lattice().sample_count(),
         }
     }
 
+    /// Operations that the steps so far have taken, counted by what the solver does, not timed: those of the steps, of
+    /// looking at what moves, and of making solvers for the region and for its parts.
+    pub fn operations(&self) -> f64 {
+        self.parts.operations
+    }
+
+    /// Parts that were cut out so far.
+    pub fn cuts(&self) -> usize {
+        self.parts.cuts
+    }
+
     /// A step of what is awake.
     pub(super) fn step_parts(&mut self, integrator: Integrator, dt: f64) -> Result<StepReport, PatchError> {
-        if !self.parts_sleep || !self.patch.constraints().is_empty() {
+        let solves = solves(integrator) as f64;
+        if !self.parts.on || !self.patch.constraints().is_empty() {
             self.part = None;
-            return self.patch.step(integrator, dt);
+            return self.step_whole(integrator, dt);
         }
-        if self.steps_to_look == 0 {
-            self.look()?;
-            self.steps_to_look = LOOK;
+        if self.parts.steps_to_look == 0 {
+            self.look(solves)?;
+            self.parts.steps_to_look = LOOK << self.parts.misses;
         }
-        self.steps_to_look -= 1;
+        self.parts.steps_to_look -= 1;
+        let saved = self.whole_operations().solve;
         let Some(part) = &mut self.part else {
-            return self.patch.step(integrator, dt);
+            return self.step_whole(integrator, dt);
         };
         let report = part.patch.step(integrator, dt)?;
+        let taken = part.patch.operations().solve;
+        part.earned += solves * (saved - taken);
+        self.parts.savings += solves * (saved - taken);
+        self.parts.operations += solves * taken;
         let (w, state) = (part.window, &mut self.patch.state);
         let lattice = self.patch.solver.lattice();
         let (n, m) = (lattice.coefficient_dims(), lattice.sample_dims());
@@ -130,14 +225,100 @@ impl<T: Real> Region<T> {
         Ok(report)
     }
 
+    fn step_whole(&mut self, integrator: Integrator, dt: f64) -> Result<StepReport, PatchError> {
+        let ready = self.patch.has_solver();
+        let report = self.patch.step(integrator, dt)?;
+        let taken = self.whole_operations();
+        self.parts.operations += solves(integrator) as f64 * taken.solve;
+        if !ready {
+            self.parts.operations += taken.preparation;
+        }
+        Ok(report)
+    }
+
+    fn whole_operations(&self) -> Operations {
+        self.patch.operations()
+    }
+
+    /// Sets the forces of the part too. Those beside it are looked at before the next step if they may wake something.
+    pub(super) fn force_changed(&mut self, before: &[T]) {
+        let Some(part) = &mut self.part else { return };
+        let m = self.patch.lattice().sample_dims();
+        let external = &self.patch.external;
+        let w = part.window;
+        part.patch
+            .write_force(|force| force.copy_from_slice(&crop(external, m, w.first_sample, w.samples)));
+        let limit = self.thresholds.acceleration / self.patch.springs().law().scale();
+        let mass = &self.patch.lumped.mass;
+        let wakes = external.iter().zip(before).enumerate().any(|(i, (now, then))| {
+            let change = (now.as_f64() - then.as_f64()).abs();
+            change > limit * mass.value(i) && !w.has_sample([i / m[2] / m[1], i / m[2] % m[1], i % m[2]])
+        });
+        if wakes {
+            self.parts.steps_to_look = 0;
+        }
+    }
+
+    /// Gives the part up.
+    pub(super) fn drop_part(&mut self) {
+        if let Some(part) = self.part.take() {
+            let paid = part.earned >= 0.0;
+            self.parts.patience = if paid { 1.0 } else { 2.0 * self.parts.patience };
+        }
+    }
+
     /// Chooses what is awake: all coefficients that move, or are off their balance, by more than the thresholds.
-    fn look(&mut self) -> Result<(), PatchError> {
-        let wanted = self.awake_window();
-        if self.part.as_ref().map(|p| p.window) == wanted {
+    fn look(&mut self, solves: f64) -> Result<(), PatchError> {
+        let moving = self.moving();
+        let whole = self.whole_operations();
+        self.parts.operations += whole.look;
+        let all = self.patch.lattice().coefficient_dims();
+        let kept = match (&self.part, moving) {
+            (Some(part), Some(moving)) => part.window.holds(moving, all),
+            (part, None) => part.is_some(),
+            (None, _) => false,
+        };
+        if !kept && self.part.is_some() {
+            self.parts.growths = (self.parts.growths + 1).min(MOST_GROWTHS);
+            self.drop_part();
+        }
+        let wanted = moving.and_then(|moving| self.window(moving));
+        let smaller = |w: &Window| {
+            let now = self.part.as_ref().map(|p| p.window.sample_count() as f64);
+            now.is_none_or(|now| w.sample_count() as f64 <= SHRINK * now)
+        };
+        let Some(window) = wanted.filter(smaller) else {
+            self.parts.misses = if self.part.is_some() {
+                0
+            } else {
+                (self.parts.misses + 1).min(MOST_MISSES)
+            };
+            return Ok(());
+        };
+        self.parts.misses = 0;
+        let price = self.patch.operations_on(window.coefficients(), window.samples);
+        let now = self
+            .part
+            .as_ref()
+            .map_or(whole.solve, |p| p.patch.operations().solve);
+        // What the whole would have to spend instead.
+        let spared = if self.part.is_some() || self.patch.has_solver() {
+            0.0
+        } else {
+            whole.preparation - self.parts.before_whole
+        };
+        let cost = price.preparation;
+        if now <= price.solve || cost > self.parts.savings + spared {
+            let missed = solves * (now - price.solve) * LOOK as f64;
+            self.parts.savings += missed.max(0.0) / self.parts.patience;
             return Ok(());
         }
-        self.part = None;
-        let Some(window) = wanted else { return Ok(()) };
+        let from_savings = (cost - spared.max(0.0)).max(0.0);
+        self.parts.savings -= from_savings;
+        self.parts.before_whole += cost - from_savings;
+        self.parts.operations += cost;
+        self.parts.cuts += 1;
+        self.drop_part();
         // What falls asleep stops.
         let n = self.patch.lattice().coefficient_dims();
         let moving = crop(&self.patch.state.v, n, window.first, window.coefficients());
@@ -151,12 +332,16 @@ impl<T: Real> Region<T> {
         );
         self.patch.sample_velocities();
         let patch = self.cut(&window)?;
-        self.part = Some(Box::new(Part { patch, window }));
+        self.part = Some(Box::new(Part {
+            patch,
+            window,
+            earned: -from_savings,
+        }));
         Ok(())
     }
 
-    /// The least window round what is awake; `None` for the whole region.
-    fn awake_window(&mut self) -> Option<Window> {
+    /// The first and the last coefficient that is awake, on each axis; `None` if none is.
+    fn moving(&mut self) -> Option<[[usize; 3]; 2]> {
         let [_, ny, nz] = self.patch.lattice().coefficient_dims();
         let scale = self.patch.springs().law().scale();
         let limits = self.thresholds;
@@ -164,16 +349,20 @@ impl<T: Real> Region<T> {
         let speeds = self.patch.state.v.clone();
         let accelerations = self.patch.unbalanced_each();
         for (i, (v, a)) in speeds.iter().zip(accelerations).enumerate() {
-            if scale * v.as_f64().abs() > limits.speed || scale * a > limits.acceleration {
+            let quiet = scale * v.as_f64().abs() <= limits.speed && scale * a <= limits.acceleration;
+            if !quiet {
                 let at = [i / nz / ny, i / nz % ny, i % nz];
                 low = std::array::from_fn(|k| low[k].min(at[k]));
                 high = std::array::from_fn(|k| high[k].max(at[k]));
             }
         }
-        if low[0] == usize::MAX {
-            return None;
-        }
+        (low[0] != usize::MAX).then_some([low, high])
+    }
+
+    /// The window round what moves; `None` for the whole region.
+    fn window(&self, [low, high]: [[usize; 3]; 2]) -> Option<Window> {
         let samples = self.patch.lattice().sample_dims();
+        let margin = MARGIN << self.parts.growths;
         let mut window = Window {
             first: [0; 3],
             cells: [0; 3],
@@ -185,15 +374,14 @@ impl<T: Real> Region<T> {
             let meetings = greatest_common_divisor(cells, gaps);
             let (period, step) = (cells / meetings, gaps / meetings);
             // Function i reaches over cells i to i + 4.
-            let first = low[k].saturating_sub(MARGIN) / period;
-            let end = (high[k] + 4 + MARGIN).div_ceil(period).min(meetings);
+            let first = low[k].saturating_sub(margin) / period;
+            let end = (high[k] + 4 + margin).div_ceil(period).min(meetings);
             window.first[k] = first * period;
             window.cells[k] = (end - first) * period;
             window.first_sample[k] = first * step;
             window.samples[k] = (end - first) * step + 1;
         }
-        let share =
-            window.samples.iter().product::<usize>() as f64 / samples.iter().product::<usize>() as f64;
+        let share = window.sample_count() as f64 / samples.iter().product::<usize>() as f64;
         (share <= WORTH).then_some(window)
     }
 
@@ -230,11 +418,23 @@ impl<T: Real> Region<T> {
         let options = whole.solver.options();
         let mut part = Patch::new(lattice, matter, law, whole.neighbours, &d, options)?;
         part.base = samples(&whole.base);
-        part.external = samples(&whole.external);
+        part.write_force(|force| force.copy_from_slice(&samples(&whole.external)));
         let n = whole.lattice().coefficient_dims();
         part.state.p = crop(&whole.state.p, n, w.first, w.coefficients());
         part.state.v = crop(&whole.state.v, n, w.first, w.coefficients());
         part.state.w = samples(&whole.state.w);
+        let network = whole.springs();
+        let springs = network.springs().iter().map(|s| SpringWeights {
+            direction: s.direction,
+            weights: match &s.weights {
+                Weights::Constant(k) => Weights::Constant(network.stiffness_unit() * k.as_f64()),
+                Weights::Each(k) => {
+                    let inside = samples(k).into_iter();
+                    Weights::Each(inside.map(|k| network.stiffness_unit() * k.as_f64()).collect())
+                }
+            },
+        });
+        part.network.set_springs(&springs.collect::<Vec<_>>());
         let rest = part.network.rest_mut();
         let from = whole.springs().rest();
         rest.differences = from.differences.iter().map(|r| samples(r)).collect();

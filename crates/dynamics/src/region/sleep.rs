@@ -16,7 +16,7 @@ use crate::patch::PatchError;
 pub struct Thresholds {
     /// Speed of the mean kinetic energy, `σ√(2E/M)`, in lengths per second.
     pub speed: f64,
-    /// Unbalanced force over mass of any free coefficient, in lengths per second squared; also what a force has to exceed
+    /// Unbalanced force over mass of any free coefficient, constraint springs and what hard constraints bear included, in lengths per second squared; also what a force has to exceed
     /// to wake the region.
     pub acceleration: f64,
 }
@@ -27,11 +27,10 @@ impl<T: Real> Region<T> {
         self.asleep
     }
 
-    /// Wakes the region, all of it until it is looked at which parts may sleep.
+    /// Wakes the region; before the next step it is looked at which parts of it may sleep on.
     pub fn wake(&mut self) {
         self.asleep = false;
-        self.part = None;
-        self.steps_to_look = 0;
+        self.parts.steps_to_look = 0;
     }
 
     /// Sets the external forces on the samples. A region asleep wakes if they leave more unbalanced than the threshold;
@@ -43,26 +42,33 @@ impl<T: Real> Region<T> {
         if self.patch.external == force {
             return Ok(());
         }
+        let before = self.part.is_some().then(|| self.patch.external.clone());
         self.patch.set_force(force)?;
-        self.part = None;
-        self.steps_to_look = 0;
-        if self.asleep {
-            self.asleep = self.patch.unbalanced() <= self.thresholds.acceleration;
+        if let Some(before) = before {
+            self.force_changed(&before);
+        }
+        if self.asleep && !self.is_balanced() {
+            self.wake();
         }
         Ok(())
+    }
+
+    /// Whether no coefficient of the whole is off its balance by more than the threshold. NaN is not balanced.
+    fn is_balanced(&mut self) -> bool {
+        self.patch.unbalanced() <= self.thresholds.acceleration
     }
 
     /// Falls asleep, and drops what is left of the velocity, where both thresholds hold.
     pub(super) fn rest_if_quiet(&mut self) {
         // The speed is cheap and decides most of the time. NaN stays awake.
         let moving = self.part.as_mut().map_or(&mut self.patch, |part| &mut part.patch);
-        if moving.mean_speed() <= self.thresholds.speed
-            && moving.unbalanced() <= self.thresholds.acceleration
-            // Of the whole, when a part is quiet.
-            && (self.part.is_none() || self.patch.unbalanced() <= self.thresholds.acceleration)
-        {
+        let quiet = moving.mean_speed() <= self.thresholds.speed
+            && moving.unbalanced() <= self.thresholds.acceleration;
+        if quiet && (self.part.is_none() || self.is_balanced()) {
             self.patch.stop();
-            self.part = None;
+            if let Some(part) = &mut self.part {
+                part.patch.stop();
+            }
             self.asleep = true;
         }
     }
@@ -73,12 +79,16 @@ impl<T: Real> Region<T> {
         if self.asleep {
             return 0;
         }
-        let solves = match integrator {
-            Integrator::Paper | Integrator::Symplectic => 1,
-            // Auto takes explicit sub-steps only where they cost less than the two solves.
-            Integrator::Verlet | Integrator::TrBdf2 | Integrator::Auto => 2,
-        };
-        solves * self.awake_samples() as u64
+        solves(integrator) * self.awake_samples() as u64
+    }
+}
+
+/// Solves of a step.
+pub(super) fn solves(integrator: Integrator) -> u64 {
+    match integrator {
+        Integrator::Paper | Integrator::Symplectic => 1,
+        // Auto takes explicit sub-steps only where they cost less than the two solves.
+        Integrator::Verlet | Integrator::TrBdf2 | Integrator::Auto => 2,
     }
 }
 

@@ -20,7 +20,7 @@ impl<T: Real> Region<T> {
             return Ok(None);
         }
         // The whole of it: its balance of energy is judged.
-        self.wake();
+        self.drop_part();
         let report = self.patch.adaptive_step(dt, options)?;
         self.rest_if_quiet();
         Ok(Some(report))

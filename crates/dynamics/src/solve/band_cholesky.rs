@@ -40,7 +40,10 @@ impl Layout {
 
 /// A pivot that is not positive: the matrix is not positive definite in the working precision.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("pivot {pivot:.3e} at row {row}: the matrix is not positive definite in this precision")]
+#[error(
+    "the matrix of the step is not positive definite in this precision (pivot {pivot:.3e} in row {row}); take less contrast \
+     of stiffness and mass, or double precision"
+)]
 pub struct NotPositive {
     /// Row of the pivot.
     pub row: usize,

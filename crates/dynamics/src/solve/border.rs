@@ -75,6 +75,24 @@ impl<T: Real> Border<T> {
         }
     }
 
+    /// Size of the impulses and gaps.
+    pub fn size(&self) -> f64 {
+        let pushes = self.springs.iter().zip(&self.impulses).map(|(row, impulse)| {
+            let weight = row.iter().fold(0.0_f64, |m, (_, w)| m.max(w.abs()));
+            weight * impulse.abs()
+        });
+        pushes
+            .chain(self.gaps.iter().map(|g| g.abs()))
+            .fold(0.0, f64::max)
+    }
+
+    /// Multiplies impulses and gaps.
+    pub fn scale(&mut self, factor: f64) {
+        for v in self.impulses.iter_mut().chain(&mut self.gaps) {
+            *v *= factor;
+        }
+    }
+
     /// `row·x` of a row of the border.
     fn row_times(&self, row: usize, x: &[T]) -> f64 {
         match row.checked_sub(self.soft()) {

@@ -6,7 +6,7 @@ use bspline::vectorized;
 use nalgebra::{Cholesky, DMatrix, SymmetricEigen};
 
 use super::pcg::Preconditioner;
-use crate::lattice::{Banded, DenseAxis, Lattice, PAD, multiply, multiply_last};
+use crate::lattice::{Banded, DenseAxis, Lattice, PAD, multiply, multiply_last, transposed_product};
 use crate::springs::StepMatrix;
 
 /// `z = s∘(V⊗V⊗V) [ (V⊗V⊗V)ᵀ(s∘r) / (a + b_x λ_i + b_y λ_j + b_z λ_k) ]` with, on each axis, `AᵀK₁A V = AᵀA V Λ`,
@@ -27,8 +27,8 @@ pub struct FastDiagonalization<T> {
 fn pencil(a: &Banded<f64>) -> (DMatrix<f64>, Vec<f64>) {
     let d = a.differences().to_dense();
     let a = a.to_dense();
-    let stiffness = d.transpose() * d;
-    let gram = a.transpose() * a;
+    let stiffness = transposed_product(&d, &d);
+    let gram = transposed_product(&a, &a);
     let l = Cholesky::new(gram)
         .expect("axes are refused when their samples do not determine the coefficients")
         .unpack();

@@ -6,9 +6,12 @@
 
 use bspline::Real;
 
-use super::band_cholesky::BandCholesky;
+use super::band_cholesky::{BandCholesky, NotPositive};
 use crate::lattice::{Banded, Lattice, TensorProduct, TensorWorkspace};
 use crate::springs::{StepMatrix, Weights};
+
+/// First share, in units of rounding, that a diagonal is raised by, and the ratio of one try to the next.
+const RAISED: f64 = 16.0;
 
 /// How the two factors of a pair are taken from the rows of a collocation matrix.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -205,9 +208,44 @@ impl Galerkin {
         }
     }
 
+    /// Makes a band of the right size the factor of `AᵀSA`.
+    ///
+    /// With about as many coefficients as samples some of them move hardly any sample, and the matrix may not be positive
+    /// definite to rounding. Then its diagonal is raised by a few units of rounding, or the least multiple of them that
+    /// helps: the factor is a preconditioner, and what it lacks the iteration adds.
+    ///
+    /// # Errors
+    /// [`NotPositive`] if raising it by a hundredth does not help.
+    pub fn factorize<T: Real>(
+        &mut self,
+        s: &StepMatrix<T>,
+        into: &mut BandCholesky<T>,
+    ) -> Result<(), NotPositive> {
+        self.accumulate(s);
+        let mut raised = 0.0;
+        loop {
+            self.write(raised, into);
+            match into.factorize() {
+                Err(_) if raised < 1e-2 => {
+                    raised = if raised == 0.0 {
+                        RAISED * T::UNIT_ROUND_OFF
+                    } else {
+                        RAISED * raised
+                    };
+                }
+                done => return done,
+            }
+        }
+    }
+
     /// Writes `AᵀSA` into a band of the right size.
     pub fn assemble<T: Real>(&mut self, s: &StepMatrix<T>, into: &mut BandCholesky<T>) {
         self.accumulate(s);
+        self.write(0.0, into);
+    }
+
+    /// Writes the matrix that was summed last, its diagonal larger by the share `raised`.
+    fn write<T: Real>(&self, raised: f64, into: &mut BandCholesky<T>) {
         into.clear();
         let [nx, ny, nz] = self.dims;
         let [_, py, pz] = self.pair_dims;
@@ -229,7 +267,8 @@ impl Galerkin {
                             };
                             for k2 in from..(k + rz + 1).min(nz) {
                                 let v = self.sums[row + k * (2 * rz + 1) + k2 + rz - k];
-                                into.set(number(i + ox, j2, k2), number(i, j, k), v);
+                                let (to, from) = (number(i + ox, j2, k2), number(i, j, k));
+                                into.set(to, from, if to == from { v * (1.0 + raised) } else { v });
                             }
                         }
                     }

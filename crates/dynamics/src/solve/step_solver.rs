@@ -13,6 +13,7 @@ use super::sample_multigrid::SampleMultigrid;
 use super::v_cycle::{VCycle, VCycleOptions};
 use crate::lattice::{Lattice, TensorProduct, TensorWorkspace};
 use crate::springs::StepMatrix;
+use crate::units::{binary_unit, largest};
 
 /// Limits of a solve.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,6 +64,9 @@ const EXACT: f64 = 64.0;
 /// by a few units.
 const DIAGONALIZED: f64 = 4096.0;
 
+/// Impulses whose squares, and those of their residuals, are far from the ends of the range of single precision.
+const ORDINARY: std::ops::Range<f64> = 1e-6..1e12;
+
 /// How a step was solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Method {
@@ -100,9 +104,48 @@ pub struct SolveReport {
     pub iteration: PcgReport,
 }
 
+impl SolveReport {
+    /// The worst of this solve and a later one.
+    pub(crate) fn and(self, later: Self) -> Self {
+        let (a, b) = (self.iteration, later.iteration);
+        Self {
+            method: later.method,
+            iteration: PcgReport {
+                iterations: a.iterations.max(b.iterations),
+                // Not a number is worst of all, and no number is below it.
+                residual: if a.residual.is_nan() {
+                    a.residual
+                } else {
+                    b.residual.max(a.residual)
+                },
+                negative_curvature: a.negative_curvature.or(b.negative_curvature),
+            },
+        }
+    }
+
+    /// Refuses a solve that did not begin.
+    pub(crate) fn checked(self) -> Result<Self, SolveError> {
+        match self.iteration.negative_curvature {
+            Some(curvature) if self.iteration.iterations == 0 || curvature.is_nan() => {
+                Err(SolveError::Indefinite { curvature })
+            }
+            _ => Ok(self),
+        }
+    }
+}
+
 /// Why a matrix cannot be solved.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SolveError {
+    /// A solve that met no positive curvature where it began.
+    #[error(
+        "the curvature along the first direction is {curvature:.3e}; the matrix of the step is not positive definite in \
+         this precision, so take less contrast of stiffness and mass, or double precision"
+    )]
+    Indefinite {
+        /// The curvature.
+        curvature: f64,
+    },
     /// Not positive definite.
     #[error(transparent)]
     NotPositive(#[from] NotPositive),
@@ -233,8 +276,7 @@ impl<T: Real> StepSolver<T> {
             Painted::None => unreachable!("made above"),
             Painted::Direct(direct) => {
                 let (galerkin, factor) = &mut **direct;
-                galerkin.assemble(s, factor);
-                factor.factorize()?;
+                galerkin.factorize(s, factor)?;
                 Method::Direct
             }
             Painted::Background(background) => {
@@ -326,6 +368,22 @@ impl<T: Real> StepSolver<T> {
             _ => EXACT * T::UNIT_ROUND_OFF,
         });
         let cap = self.options.iterations;
+        if self.inverse.is_some() {
+            self.b.copy_from_slice(g);
+        } else {
+            self.lattice.gather(g, &mut self.b, &mut self.workspace);
+        }
+        // Solved for an impulse of about one, whose squares no precision loses.
+        let unit = self.impulse_unit();
+        if unit != 1.0 {
+            for b in &mut self.b {
+                *b = T::from_f64(b.as_f64() / unit);
+            }
+            if let Some(border) = &mut self.border {
+                border.scale(1.0 / unit);
+            }
+        }
+        let solved_by = self.method;
         let iteration = if let Some(inverse) = &mut self.inverse {
             let preconditioner = active(self.method, &mut self.painted, &mut self.diagonalization);
             let mut system = SampleSystem {
@@ -333,8 +391,8 @@ impl<T: Real> StepSolver<T> {
                 preconditioner: &mut Dynamic(preconditioner),
             };
             let report = match &mut self.border {
-                Some(border) => border.solve(&mut system, g, dx, cap, tolerance),
-                None => self.iteration.solve(&mut system, g, dx, cap, tolerance),
+                Some(border) => border.solve(&mut system, &self.b, dx, cap, tolerance),
+                None => self.iteration.solve(&mut system, &self.b, dx, cap, tolerance),
             };
             for (d, dx) in inverse.d.iter_mut().zip(dx.iter()) {
                 *d = dx.as_f64();
@@ -347,23 +405,37 @@ impl<T: Real> StepSolver<T> {
             }
             report
         } else {
-            self.lattice.gather(g, &mut self.b, &mut self.workspace);
             let report = self.iterate(s, x, Some(dx), cap, tolerance);
-            let solved_by = self.method;
             if let (Painted::Background(background), None) = (&mut self.painted, &self.border)
                 && solved_by != Method::FastDiagonalization
             {
                 background.advance(s, report);
                 self.settle_method();
             }
-            return SolveReport {
-                method: solved_by,
-                iteration: report,
-            };
+            report
         };
+        if unit != 1.0 {
+            if let Some(border) = &mut self.border {
+                border.scale(unit);
+            }
+            for x in x.iter_mut().chain(dx) {
+                *x = T::from_f64(x.as_f64() * unit);
+            }
+        }
         SolveReport {
-            method: self.method,
+            method: solved_by,
             iteration,
+        }
+    }
+
+    /// The power of two that the impulses are divided by; 1 where they are of ordinary size, which saves two passes and
+    /// changes no bit.
+    fn impulse_unit(&self) -> f64 {
+        let size = largest(&self.b).max(self.border.as_ref().map_or(0.0, |b| b.size()));
+        if size == 0.0 || ORDINARY.contains(&size) {
+            1.0
+        } else {
+            binary_unit(size)
         }
     }
 

@@ -98,8 +98,8 @@ fn geometric_mean<T: Real>(weights: &Weights<T>, floor: f64) -> f64 {
         Weights::Each(w) => {
             let largest = w.iter().fold(0.0_f64, |m, w| m.max(w.as_f64()));
             let low = (floor * largest).max(f64::MIN_POSITIVE);
-            let logs: f64 = w.iter().map(|w| w.as_f64().max(low).ln()).sum();
-            (logs / w.len() as f64).exp()
+            let logs: f64 = w.iter().map(|w| libm::log(w.as_f64().max(low))).sum();
+            libm::exp(logs / w.len() as f64)
         }
     }
 }
@@ -200,8 +200,7 @@ impl<T: Real> VCycle<T> {
     /// # Errors
     /// [`NotPositive`] if the coarsest level cannot be factorized.
     pub fn prepare(&mut self, s: &StepMatrix<T>) -> Result<(), NotPositive> {
-        self.assembly.assemble(s, &mut self.factor);
-        self.factor.factorize()?;
+        self.assembly.factorize(s, &mut self.factor)?;
         let mass = geometric_mean(&s.mass, 1e-9);
         let mut along = [0.0; 3];
         for spring in &s.springs {

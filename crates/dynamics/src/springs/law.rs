@@ -6,6 +6,7 @@ use bspline::Real;
 use bspline::vectorized;
 
 use super::stencil::{SpringWeights, Weights};
+use crate::units::{binary_unit, springs_in_units};
 
 /// Which law, with its scale `σ`, a length per density: without it a density could not be added to a distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,36 +44,47 @@ impl Law {
 /// `Δ = 0` the law itself gives no force, and rounding would choose the side.
 const FLAT: f64 = 1e-3;
 
-/// One spring: energy, force on the density of its first sample, and tangent factor `τ` in `∂²E/∂d² = σ²kτ`.
+/// Beyond this many units a difference is the length of its spring, to rounding; its square might not be a number.
+const FAR: f64 = 1e9;
+
+/// `√(h² + Δ²)`.
+#[inline(always)]
+pub(super) fn length<T: Real>(h2: T, delta: T) -> T {
+    let far = delta.abs() > T::from_f64(FAR);
+    let root = (h2 + delta * delta).sqrt();
+    if far { delta.abs() } else { root }
+}
+
+/// One spring: how far it is stretched, by which slope that acts on the density of its first sample, and the tangent
+/// factor `τ` in `∂²E/∂d² = σ²kτ`.
 ///
 /// `rest` is `Δ₀`; of the 4-D law its sign is the orientation and `L₀ = s√(h² + Δ₀²)` with the rest scale `s`; of the
 /// linear one `Δ₀` is scaled itself.
 #[inline(always)]
 fn spring<T: Real, const FOUR_D: bool>(delta: T, rest: T, rest_scale: T, h2: T) -> (T, T, T) {
     if FOUR_D {
-        let length = (h2 + delta * delta).sqrt();
-        let rest_length = rest_scale * (h2 + rest * rest).sqrt();
-        let stretch = length - rest_length;
+        let now = length(h2, delta);
+        let rest_length = rest_scale * length(h2, rest);
+        let stretch = now - rest_length;
         let flat = T::from_f64(FLAT) * h2.sqrt();
         let pushed = delta.abs() < flat && stretch < T::zero() && rest != T::zero();
         let slope = if pushed {
             let side = if rest > T::zero() { flat } else { -flat };
-            side / length
+            side / now
         } else {
-            delta / length
+            delta / now
         };
-        let tangent = T::one() - rest_length * h2 / (length * length * length);
-        (stretch * stretch, stretch * slope, tangent)
+        let tangent = T::one() - rest_length * h2 / (now * now * now);
+        (stretch, slope, tangent)
     } else {
-        let stretch = delta - rest_scale * rest;
-        (stretch * stretch, stretch, T::one())
+        (delta - rest_scale * rest, T::one(), T::one())
     }
 }
 
 /// Rest of all springs: `Δ₀` per direction and starting sample, and how much each is scaled.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rest<T> {
-    /// `Δ₀` of each spring, per direction.
+    /// `Δ₀` of each spring, per direction, in units of [`SpringNetwork::length_unit`].
     pub differences: Vec<Vec<T>>,
     /// Scale of the rest lengths (4-D) or differences (linear); 1 leaves the rest state as it is.
     pub scale: Weights<T>,
@@ -92,12 +104,27 @@ pub struct SpringReport {
 pub struct SpringNetwork<T> {
     pub(super) dims: [usize; 3],
     pub(super) law: Law,
-    /// `k` per direction.
+    /// `k` per direction, in `stiffness_unit`.
     pub(super) springs: Vec<SpringWeights<T>>,
+    stiffness_unit: f64,
+    /// Of differences of density, rest lengths and `h`.
+    pub(super) length_unit: f64,
     /// `h²` per direction.
     pub(super) lengths: Vec<f64>,
     pub(super) rest: Rest<T>,
-    row: [Vec<T>; 2],
+    /// Changes of the stiffness so far.
+    changes: u64,
+    energies: Vec<f64>,
+    forces: Vec<T>,
+}
+
+/// What springs gained over an increment.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct EnergyChange {
+    /// Energy.
+    pub energy: f64,
+    /// What rounding of densities and forces may make of it.
+    pub rounding: f64,
 }
 
 impl<T: Real> SpringNetwork<T> {
@@ -112,12 +139,30 @@ impl<T: Real> SpringNetwork<T> {
         springs: Vec<SpringWeights<T>>,
         d: &[T],
     ) -> Self {
-        let length = |s: &SpringWeights<T>| {
-            (0..3)
-                .map(|a| (s.direction.step[a] as f64 * spacing[a]).powi(2))
-                .sum()
+        let exact: Vec<SpringWeights<f64>> = springs.iter().map(SpringWeights::convert).collect();
+        Self::in_units(dims, spacing, law, &exact, d)
+    }
+
+    /// The same from numbers in double precision.
+    pub(crate) fn in_units(
+        dims: [usize; 3],
+        spacing: [f64; 3],
+        law: Law,
+        springs: &[SpringWeights<f64>],
+        d: &[T],
+    ) -> Self {
+        // Linear springs know no length but that of their densities.
+        let unit = binary_unit(match law {
+            Law::Linear { scale } => scale,
+            Law::FourD { .. } => spacing.into_iter().fold(0.0, f64::max),
+        });
+        let length_unit = if unit > 0.0 { unit } else { 1.0 };
+        let length = |s: &SpringWeights<f64>| {
+            let along = |a: usize| s.direction.step[a] as f64 * spacing[a] / length_unit;
+            (0..3).map(|a| along(a).powi(2)).sum()
         };
         let count: usize = dims.iter().product();
+        let (stiffness_unit, scaled) = springs_in_units(springs);
         let mut out = Self {
             dims,
             law,
@@ -126,8 +171,12 @@ impl<T: Real> SpringNetwork<T> {
                 differences: vec![vec![T::zero(); count]; springs.len()],
                 scale: Weights::Constant(T::one()),
             },
-            springs,
-            row: [vec![T::zero(); dims[2]], vec![T::zero(); dims[2]]],
+            springs: scaled,
+            stiffness_unit,
+            length_unit,
+            changes: 0,
+            energies: vec![0.0; dims[2]],
+            forces: vec![T::zero(); dims[2]],
         };
         out.rest_at(d);
         out
@@ -138,23 +187,40 @@ impl<T: Real> SpringNetwork<T> {
         self.law
     }
 
-    /// Stiffness per direction.
+    /// Stiffness per direction, in units of [`stiffness_unit`](Self::stiffness_unit).
     pub fn springs(&self) -> &[SpringWeights<T>] {
         &self.springs
     }
 
-    /// Replaces the stiffness.
-    ///
-    /// # Panics
-    /// If the directions are others.
-    pub fn set_springs(&mut self, springs: Vec<SpringWeights<T>>) {
-        let directions = |s: &[SpringWeights<T>]| s.iter().map(|s| s.direction.step).collect::<Vec<_>>();
-        assert_eq!(
-            directions(&self.springs),
-            directions(&springs),
-            "the same directions"
-        );
-        self.springs = springs;
+    /// The power of two in whose units the stiffness is kept; 0 if no spring has any.
+    pub fn stiffness_unit(&self) -> f64 {
+        self.stiffness_unit
+    }
+
+    /// The power of two in whose units lengths are kept.
+    pub fn length_unit(&self) -> f64 {
+        self.length_unit
+    }
+
+    /// Length per density, in units of lengths.
+    pub(super) fn sigma(&self) -> f64 {
+        self.law.scale() / self.length_unit
+    }
+
+    /// The force on a density of a spring of the unit of stiffness, stretched by the unit of length.
+    pub(crate) fn force_unit(&self) -> f64 {
+        self.stiffness_unit * self.law.scale() * self.length_unit
+    }
+
+    /// Changes of the stiffness so far: of what is made for it, a version.
+    pub(crate) fn changes(&self) -> u64 {
+        self.changes
+    }
+
+    /// Replaces the stiffness by one of the same directions.
+    pub(crate) fn set_springs(&mut self, springs: &[SpringWeights<f64>]) {
+        (self.stiffness_unit, self.springs) = springs_in_units(springs);
+        self.changes += 1;
     }
 
     /// The rest state.
@@ -173,7 +239,7 @@ impl<T: Real> SpringNetwork<T> {
     /// If `d` has another length than the lattice.
     pub fn rest_at(&mut self, d: &[T]) {
         assert_eq!(d.len(), self.dims.iter().product::<usize>(), "samples");
-        let sigma = T::from_f64(self.law.scale());
+        let sigma = T::from_f64(self.sigma());
         for (rest, s) in self.rest.differences.iter_mut().zip(&self.springs) {
             rows_of(self.dims, s.direction.step, |from, to, count| {
                 for z in 0..count {
@@ -188,7 +254,7 @@ impl<T: Real> SpringNetwork<T> {
     /// # Panics
     /// If a length is wrong.
     pub fn add_forces(&mut self, d: &[T], force: &mut [T]) -> SpringReport {
-        self.evaluate(d, force, None)
+        self.evaluate::<true>(d, force, self.force_unit(), None)
     }
 
     /// The same, and writes `factor·σ²kτ` with `τ` clamped to `≥ 0` as the weights of a step matrix.
@@ -202,13 +268,30 @@ impl<T: Real> SpringNetwork<T> {
         factor: f64,
         tangent: &mut [SpringWeights<T>],
     ) -> SpringReport {
-        self.evaluate(d, force, Some((factor, tangent)))
+        self.evaluate::<true>(d, force, self.force_unit(), Some((factor, tangent)))
     }
 
-    fn evaluate(
+    /// The same forces as multiples of `unit`, and the tangent if it is asked for, without the energy; returns the springs
+    /// with a negative tangent.
+    pub(crate) fn add_forces_in(
+        &mut self,
+        unit: f64,
+        d: &[T],
+        force: &mut [T],
+        tangent: Option<(f64, &mut [SpringWeights<T>])>,
+    ) -> usize {
+        if self.stiffness_unit == 0.0 && tangent.is_none() {
+            return 0;
+        }
+        self.evaluate::<false>(d, force, self.force_unit() / unit, tangent)
+            .clamped
+    }
+
+    fn evaluate<const ENERGY: bool>(
         &mut self,
         d: &[T],
         force: &mut [T],
+        force_factor: f64,
         mut tangent: Option<(f64, &mut [SpringWeights<T>])>,
     ) -> SpringReport {
         let count: usize = self.dims.iter().product();
@@ -224,8 +307,8 @@ impl<T: Real> SpringNetwork<T> {
                 None => None,
             };
             let one = match self.law {
-                Law::Linear { .. } => self.direction::<false>(n, d, force, weights),
-                Law::FourD { .. } => self.direction::<true>(n, d, force, weights),
+                Law::Linear { .. } => self.direction::<false, ENERGY>(n, d, force, force_factor, weights),
+                Law::FourD { .. } => self.direction::<true, ENERGY>(n, d, force, force_factor, weights),
             };
             report.energy += one.energy;
             report.clamped += one.clamped;
@@ -233,20 +316,23 @@ impl<T: Real> SpringNetwork<T> {
         report
     }
 
-    fn direction<const FOUR_D: bool>(
+    fn direction<const FOUR_D: bool, const ENERGY: bool>(
         &mut self,
         n: usize,
         d: &[T],
         force: &mut [T],
-        mut tangent: Option<(f64, &mut [T])>,
+        force_factor: f64,
+        tangent: Option<(f64, &mut [T])>,
     ) -> SpringReport {
-        let sigma = T::from_f64(self.law.scale());
-        let sigma2 = self.law.scale().powi(2);
+        let sigma = T::from_f64(self.sigma());
+        let force_factor = T::from_f64(force_factor);
+        let sigma2k = self.law.scale().powi(2) * self.stiffness_unit;
+        let mut tangent = tangent.map(|(factor, t)| (T::from_f64(factor * sigma2k), t));
         let h2 = T::from_f64(self.lengths[n]);
         let springs = &self.springs[n];
         let rest = &self.rest.differences[n];
         let scale = &self.rest.scale;
-        let [energies, forces] = &mut self.row;
+        let (energies, forces) = (&mut self.energies, &mut self.forces);
         let mut report = SpringReport::default();
         vectorized(
             #[inline(always)]
@@ -258,12 +344,15 @@ impl<T: Real> SpringNetwork<T> {
                     for z in 0..count {
                         let k = springs.weights.at(from + z);
                         let s = scale.at(from + z);
-                        let (e, f, t) = spring::<T, FOUR_D>(sigma * (a[z] - b[z]), rest[z], s, h2);
-                        energies[z] = k * e;
-                        forces[z] = sigma * (k * f);
+                        let delta = sigma * (a[z] - b[z]);
+                        let (stretch, slope, t) = spring::<T, FOUR_D>(delta, rest[z], s, h2);
+                        forces[z] = force_factor * (k * (stretch * slope));
+                        if ENERGY {
+                            energies[z] = k.as_f64() * (stretch.as_f64() * stretch.as_f64());
+                        }
                         if let Some((factor, tangent)) = &mut tangent {
                             report.clamped += usize::from(t < T::zero());
-                            tangent[from + z] = T::from_f64(*factor * sigma2) * (k * t.max(T::zero()));
+                            tangent[from + z] = *factor * (k * t.max(T::zero()));
                         }
                     }
                     for (f, g) in force[from..from + count].iter_mut().zip(forces.iter()) {
@@ -272,11 +361,57 @@ impl<T: Real> SpringNetwork<T> {
                     for (f, g) in force[to..to + count].iter_mut().zip(forces.iter()) {
                         *f += *g;
                     }
-                    report.energy += 0.5 * energies.iter().map(|e| e.as_f64()).sum::<f64>();
+                    if ENERGY {
+                        report.energy += energies.iter().sum::<f64>();
+                    }
                 });
             },
         );
+        report.energy *= 0.5 * self.energy_unit();
         report
+    }
+
+    /// Of a spring of the unit of stiffness, twice, stretched by the unit of length.
+    fn energy_unit(&self) -> f64 {
+        self.stiffness_unit * self.length_unit * self.length_unit
+    }
+
+    /// What the springs gain when the densities `d` grow by `moved`, summed from what each spring gains: the difference of
+    /// two energies would be that of their rounding where densities are large and increments small.
+    pub(crate) fn energy_change(&self, d: &[T], moved: &[f64]) -> EnergyChange {
+        let sigma = self.sigma();
+        let four_d = matches!(self.law, Law::FourD { .. });
+        let mut sum = EnergyChange::default();
+        for ((springs, rest), h2) in self.springs.iter().zip(&self.rest.differences).zip(&self.lengths) {
+            rows_of(self.dims, springs.direction.step, |from, to, count| {
+                for z in 0..count {
+                    let (i, j) = (from + z, to + z);
+                    let k = springs.weights.at(i).as_f64();
+                    let (a, b) = (d[i].as_f64(), d[j].as_f64());
+                    // As the forces have it.
+                    let before = (T::from_f64(sigma) * (d[i] - d[j])).as_f64();
+                    let grown = sigma * (moved[i] - moved[j]);
+                    let (rest, s) = (rest[i].as_f64(), self.rest.scale.at(i).as_f64());
+                    let (change, size) = if four_d {
+                        let now = |delta: f64| length(*h2, delta);
+                        let (l, l1, rest) = (now(before), now(before + grown), s * now(rest));
+                        let longer = grown * (2.0 * before + grown) / (l + l1);
+                        (0.5 * longer * (l + l1 - 2.0 * rest), l + rest)
+                    } else {
+                        let stretch = before - s * rest;
+                        let size = before.abs() + (s * rest).abs();
+                        ((stretch + 0.5 * grown) * grown, size)
+                    };
+                    let size = size + sigma * (a.abs() + b.abs());
+                    sum.energy += k * change;
+                    sum.rounding += k * size * grown.abs();
+                }
+            });
+        }
+        let unit = self.energy_unit();
+        sum.energy *= unit;
+        sum.rounding *= T::UNIT_ROUND_OFF * unit;
+        sum
     }
 }
 

@@ -5,6 +5,7 @@ mod neighbours;
 mod plasticity;
 mod stencil;
 
+pub(crate) use law::EnergyChange;
 pub use law::{Law, Rest, SpringNetwork, SpringReport};
 pub use neighbours::{Direction, Neighbours};
 pub use plasticity::Plasticity;

@@ -1,7 +1,7 @@
 use bspline::Real;
 
 use super::Law;
-use super::law::{SpringNetwork, rows_of};
+use super::law::{SpringNetwork, length, rows_of};
 use crate::patch::{Patch, PatchError, finite};
 
 /// Whether springs keep their rest lengths.
@@ -57,12 +57,18 @@ impl<T: Real> Patch<T> {
     pub(crate) fn flow(&mut self, dt: f64) {
         match &self.plasticity {
             Plasticity::Elastic => (),
-            Plasticity::Clay { rate } => self.network.relax(&self.state.d, -(-rate * dt).exp_m1()),
+            Plasticity::Clay { rate } => self.network.relax(&self.state.d, -libm::expm1(-rate * dt)),
             Plasticity::Kernel { rate, weights } => {
                 self.network.relax_under(&self.state.d, weights, rate * dt);
             }
         }
     }
+}
+
+/// `√(L² - h²)`, 0 where `L` is shorter.
+fn leg<T: Real>(h2: T, length: T) -> T {
+    let h = h2.sqrt();
+    ((length - h).max(T::zero())).sqrt() * (length + h).sqrt()
 }
 
 impl<T: Real> SpringNetwork<T> {
@@ -83,13 +89,13 @@ impl<T: Real> SpringNetwork<T> {
         assert_eq!(weights.len(), d.len(), "weights");
         self.relax_by(d, |i, j| {
             let w = 0.5 * (weights[i] + weights[j]).as_f64();
-            T::from_f64(-(-a * w).exp_m1())
+            T::from_f64(-libm::expm1(-a * w))
         });
     }
 
     fn relax_by(&mut self, d: &[T], share: impl Fn(usize, usize) -> T) {
         assert_eq!(d.len(), self.dims.iter().product::<usize>(), "samples");
-        let sigma = T::from_f64(self.law.scale());
+        let sigma = T::from_f64(self.sigma());
         let four_d = matches!(self.law, Law::FourD { .. });
         let scale = &self.rest.scale;
         let springs = self.springs.iter().zip(&self.lengths);
@@ -106,10 +112,9 @@ impl<T: Real> SpringNetwork<T> {
                     } else if four_d {
                         // L₀ follows L and lies the way the spring does. Differences would pass through zero and
                         // stretch a spring that is turned inside out.
-                        let length = (h2 + now * now).sqrt();
-                        let before = s * (h2 + *rest * *rest).sqrt();
-                        let scaled = (before + share * (length - before)) / s;
-                        let size = (scaled * scaled - h2).max(T::zero()).sqrt();
+                        let before = s * length(h2, *rest);
+                        let scaled = (before + share * (length(h2, now) - before)) / s;
+                        let size = leg(h2, scaled);
                         if now < T::zero() { -size } else { size }
                     } else {
                         *rest + share * (now / s - *rest)

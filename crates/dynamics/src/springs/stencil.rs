@@ -32,6 +32,17 @@ impl<T: Real> Weights<T> {
         }
     }
 
+    /// Least and largest weight.
+    pub(crate) fn range(&self) -> (f64, f64) {
+        match self {
+            Self::Constant(w) => (w.as_f64(), w.as_f64()),
+            Self::Each(w) => w
+                .iter()
+                .map(|w| w.as_f64())
+                .fold((f64::INFINITY, 0.0), |(low, high), w| (low.min(w), high.max(w))),
+        }
+    }
+
     /// Row `row` of `length` weights; `constant` holds as many equal ones.
     #[inline(always)]
     fn row<'a>(&'a self, row: usize, length: usize, constant: &'a [T]) -> &'a [T] {
@@ -49,6 +60,16 @@ pub struct SpringWeights<T> {
     pub direction: Direction,
     /// Force on the density per difference of density.
     pub weights: Weights<T>,
+}
+
+impl<T: Real> SpringWeights<T> {
+    /// The same in another precision.
+    pub(crate) fn convert<U: Real>(&self) -> SpringWeights<U> {
+        SpringWeights {
+            direction: self.direction,
+            weights: self.weights.scaled(1.0),
+        }
+    }
 }
 
 /// A matrix on the samples, `S = diag(mass) + Σ_springs w (e_i − e_j)(e_i − e_j)ᵀ`, that is never formed.
@@ -115,10 +136,7 @@ impl<T: Real> StepMatrix<T> {
 
     /// The same matrix in another precision.
     pub fn convert<U: Real>(&self) -> StepMatrix<U> {
-        let springs = self.springs.iter().map(|s| SpringWeights {
-            direction: s.direction,
-            weights: s.weights.scaled(1.0),
-        });
+        let springs = self.springs.iter().map(SpringWeights::convert);
         StepMatrix::new(self.dims, self.mass.scaled(1.0), springs.collect())
     }
 

@@ -1,6 +1,9 @@
 //! Where methods fail: in each scene all values stay finite, no energy comes from nowhere, and the motion is within a
 //! factor of two of the one in steps sixteen times as fine.
 
+mod magnitudes;
+mod random_scenes;
+
 use dynamics::constraints::{Constraint, Hold, On};
 use dynamics::integrators::{AdaptiveOptions, Integrator};
 use dynamics::lattice::{Lattice, Rim};
