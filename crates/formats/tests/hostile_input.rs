@@ -230,3 +230,63 @@ fn a_promise_of_1e11_of_anything_costs_no_memory() {
         }
     }
 }
+
+/// Worlds of random words: nodes, prototypes and names that refer to each other in every order.
+#[test]
+fn worlds_of_random_words_end_within_the_ceiling() {
+    const FACES: &str =
+        "IndexedFaceSet { coord Coordinate { point [ 0 0 0, 1 0 0, 1 1 0 ] } coordIndex [ 0 1 2 -1 ] }";
+    let words = vec![
+        "DEF A ",
+        "DEF B ",
+        "USE A ",
+        "USE B ",
+        "Group { children [ ",
+        "Group { } ",
+        "PROTO P [ field SFNode a NULL exposedField MFNode b [ ] ] { ",
+        "PROTO Q [ field MFVec3f a [ 1 2 3 ] eventIn SFBool c ] { ",
+        "P { ",
+        "Q { ",
+        "P { } ",
+        "a ",
+        "b ",
+        "IS ",
+        "IS a ",
+        "IS b ",
+        "Transform { scale -1 2 1 children ",
+        "Switch { whichChoice 0 choice [ ",
+        "Shape { geometry ",
+        "Box { } ",
+        "Cylinder { height 3 } ",
+        "Inline { url \"a.wrl\" } ",
+        FACES,
+        "[ ",
+        "] ",
+        "} ",
+        "] } ",
+        "} } ",
+        "NULL ",
+        "1 ",
+    ];
+    let read = std::cell::Cell::new(0);
+    runner()
+        .run(
+            &prop::collection::vec(prop::sample::select(words), 0..40),
+            |words| {
+                let text = ["#VRML V2.0 utf8\n", FACES, &words.concat()].concat();
+                // Half of the worlds are closed, as far as they opened anything.
+                let open = text
+                    .matches('{')
+                    .count()
+                    .saturating_sub(text.matches('}').count());
+                let text = text + &"] } ".repeat(open * (words.len() % 2));
+                bounded("vrml", text.as_bytes(), |b| {
+                    read.set(read.get() + u32::from(meshes::parse_vrml(b, &LIMITS).is_ok()));
+                });
+                Ok(())
+            },
+        )
+        .unwrap();
+    let read = read.get();
+    assert!(read > CASES / 50 && read < CASES, "{read} of {CASES} were read");
+}
