@@ -11,6 +11,7 @@ use formats::field::SourceKind;
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::ceiling;
 use super::failure::{Failure, Outcome};
 use super::field::OpenField;
 use super::progress::Bar;

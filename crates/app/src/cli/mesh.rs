@@ -17,7 +17,7 @@ use super::quantity::{Tolerance, between, finite, human_number, threads};
 use super::source::{FIELDS, Source};
 use super::summary::Summary;
 use super::trim::{self, Sampled};
-use super::{ceiling, interrupt, set_threads};
+use super::{interrupt, set_threads};
 
 /// Arguments of `isoclay mesh`.
 #[derive(clap::Args)]

@@ -315,6 +315,12 @@ fn contour(
         first: &first,
         cells: placer.grids.frames[0].cells.map(|n| n as i32),
         mirrored: placer.grids.mirrored,
+        grid_from_world: placer
+            .grids
+            .frames
+            .iter()
+            .map(|f| f.world_from_grid.inverse())
+            .collect(),
         depth,
         open,
     };

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 
 use super::around::{Around, State};
 use super::grid::cell_index;
@@ -21,6 +21,8 @@ pub(super) struct Numbered<'a> {
     /// Coarsest cells of the frame.
     pub cells: [i32; 3],
     pub mirrored: bool,
+    /// By level.
+    pub grid_from_world: Vec<DAffine3>,
     pub depth: usize,
     /// Leave out what lies on the frame's faces.
     pub open: bool,
@@ -153,7 +155,11 @@ impl Numbered<'_> {
             );
             let at = self.code(around.level, around.block.key, owner.local, owner.crossing);
             let center = EXTRA + out.extras.len() as u32;
-            out.extras.push(([at[0], at[1], at[2], -1, -1, -1], point));
+            // Drawn from the edge, on which the vertex of a leaf beyond the frame may stand.
+            let corners = leaves.map(|l| self.position(around, &l)).iter().sum::<DVec3>() / 4.0;
+            let amid = self.grid_from_world[around.level].transform_point3(corners);
+            out.extras
+                .push(([at[0], at[1], at[2], -1, -1, -1], 0.5 * (point + amid)));
             let mut corners = Vec::with_capacity(8);
             for k in 0..4 {
                 if leaves[k].vertex != leaves[(k + 3) % 4].vertex {
