@@ -11,6 +11,7 @@ use super::failure::{Failure, OrFail, Outcome};
 use super::field::OpenField;
 use super::fineness::failed;
 use super::progress::Bar;
+use super::source::{FIELDS, Source};
 use super::staged::StagedFiles;
 use crate::charts::{Chart, MeshSubject, MeshTrial};
 
@@ -28,11 +29,12 @@ pub struct Args {
 /// Meshes every field in every way, prints a line of CSV each, and draws them.
 pub fn run(args: &Args, cancel: &Cancel) -> Outcome {
     for path in &args.fields {
-        let open = OpenField::load(path)?;
+        let source = Source::open(path, None, FIELDS, cancel)?;
+        let open = OpenField::load(&source)?;
         let lattice = open.lattice();
         let subject = MeshSubject {
             field: open.field(),
-            iso: open.iso_or(None, path)?,
+            iso: open.iso_or(None, &source)?,
             frame: Frame {
                 world_from_grid: lattice.world_from_lattice,
                 cells: lattice.cells,

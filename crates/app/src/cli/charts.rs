@@ -84,7 +84,7 @@ impl Args {
         match &self.subject {
             Subject::Fit(a) => a.json,
             Subject::Dynamics(a) => a.json,
-            Subject::Orient(_) | Subject::Hard(_) => false,
+            Subject::Orient(_) | Subject::Mesh(_) | Subject::Hard(_) => false,
         }
     }
 }
