@@ -147,11 +147,7 @@ fn to_triangle(p: &Packet, &[a, b, c]: &[DVec3; 3]) -> Lanes {
         for e in 0..3 {
             let (x, y, z) = (p.x[l] - starts[e].x, p.y[l] - starts[e].y, p.z[l] - starts[e].z);
             let t = (x * edges[e].x + y * edges[e].y + z * edges[e].z) * inverse[e];
-            #[allow(
-                clippy::manual_clamp,
-                reason = "where the edge has no length, t is not a number and must become 0"
-            )]
-            let t = t.max(0.0).min(1.0);
+            let t = t.clamp(0.0, 1.0);
             let (u, v, w) = (x - t * edges[e].x, y - t * edges[e].y, z - t * edges[e].z);
             let d = u * u + v * v + w * w;
             nearest = if d < nearest { d } else { nearest };

@@ -3,8 +3,7 @@
 //! A cell is divided where its chord error `κ h²/8` exceeds the one asked for, `κ` the largest curvature of the surface
 //! in it; until neighbours differ by one level at most; and never beyond the last level. Every loop in which the
 //! surface crosses the surface of a leaf gets a vertex, every crossed minimal edge a polygon through the leaves about
-//! it, so the mesh is closed and manifold whatever the signs at the nodes are [Ju, Losasso, Schaefer & Warren 2002,
-//! *Dual contouring of Hermite data*; Schaefer, Ju & Warren 2007, *Manifold dual contouring*].
+//! it, so the mesh is closed and manifold whatever the signs at the nodes are [Ju02, Schaefer07].
 
 mod around;
 mod cases;
