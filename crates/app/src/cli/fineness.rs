@@ -172,8 +172,11 @@ impl<'a> Adaptive<'a> {
             if count == 0 {
                 return Ok(trial);
             }
-            let exhausted = trial.report.leaves_at_limit > 0 && of_cells < 1e-2 * wanted;
             let is_met = error <= wanted;
+            // More than 5 % of the cells are as small as they may be and too coarse: smaller ones elsewhere do not help.
+            let report = &trial.report;
+            let exhausted = !is_met && 20 * report.leaves_at_limit > report.crossed_leaves
+                || report.leaves_at_limit > 0 && of_cells < 1e-2 * wanted;
             let coarser = best.as_ref().is_none_or(|b| count < b.mesh.triangles.len());
             if (is_met && coarser) || (exhausted && best.is_none()) {
                 best = Some(trial);
