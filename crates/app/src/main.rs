@@ -4,6 +4,7 @@ mod charts;
 mod check;
 mod cli;
 mod picture;
+mod pieces;
 mod simulate;
 
 use std::process::ExitCode;

@@ -1,6 +1,8 @@
 //! The grammar of the command line, its exit codes, and what goes to stdout.
 
 mod common;
+#[path = "common/wrong_values.rs"]
+mod wrong_values;
 
 use std::io::{Read, Write};
 use std::process::Stdio;
@@ -18,10 +20,10 @@ fn wrong_usage_ends_with_code_2_and_a_remedy() {
         ("fit", "--output"),
         ("fit cloud.ply", "--output"),
         ("fit cloud.ply -o out.iclay --tolerance 1cm", "0.2mm"),
-        ("fit cloud.ply -o out.iclay --tolerance -1", "unexpected"),
+        ("fit cloud.ply -o out.iclay --tolerance -1", "above zero"),
         ("fit cloud.ply -o out.iclay --tolerance 1mm", "--unit"),
         ("fit cloud.ply -o out.iclay --memory 2Gib", "2GiB"),
-        ("fit cloud.ply -o out.iclay --threads 0", "threads"),
+        ("fit cloud.ply -o out.iclay --threads 0", "1 to 1024"),
         ("fit cloud.ply -o out.iclay --method exact", "interpolate"),
         ("fit cloud.ply -o out.iclay --method interpolate", "volumes"),
         ("fit cloud.ply -o out.iclay --unit inch", "mm, cm or m"),
@@ -289,4 +291,291 @@ fn trim_leaves_holes_open_and_says_how_much_was_invented() {
     assert!((0.75..0.97).contains(&share), "three holes of 6 %: {share}");
     let far = bench.json("mesh field.iclay -o far.ply --trim 100%");
     assert_eq!(far["triangles"], whole["triangles"]);
+}
+
+/// What the fit says of a field, what the field remembers, and what is measured again are the same figures, to the bit.
+#[test]
+fn fit_info_and_check_agree() {
+    let bench = Bench::new();
+    bench.json("phantom cup -o clean.ply --count 9000");
+    bench.json("phantom cup -o noisy.ply --count 9000 --noise 1%");
+    bench.json("phantom head -o head.nii --size 40 --noise 2%");
+    for (input, options) in [
+        ("clean.ply", ""),
+        ("clean.ply", "--tolerance 1e-5 --max-depth 7"),
+        ("clean.ply", "--coefficients 50000 --precision f64"),
+        ("clean.ply", "--unoriented"),
+        ("clean.ply", "--method offset-pairs"),
+        ("noisy.ply", ""),
+        ("noisy.ply", "--robust"),
+        ("noisy.ply", "--unoriented --robust"),
+        ("head.nii", ""),
+        ("head.nii", "--tolerance 2%"),
+        ("head.nii", "--coefficients 3000"),
+        ("head.nii", "--smoothing 0.5 --precision f64"),
+        ("head.nii", "--method interpolate"),
+    ] {
+        let fit = bench.json(&format!("fit {input} -o field.iclay {options}"));
+        let info = bench.json("info field.iclay");
+        let check = bench.json(&format!("check field.iclay {input}"));
+        for key in [
+            "input_count",
+            "used_count",
+            "coefficients",
+            "rms",
+            "p95",
+            "max",
+            "bound",
+            "leaves",
+        ] {
+            let value = number(&fit, key);
+            assert_eq!(value, number(&info, key), "{input} {options}: {key} of info");
+            assert_eq!(value, number(&check, key), "{input} {options}: {key} of check");
+        }
+        assert_eq!(
+            fit["leaves_over_tolerance"], check["leaves_over_tolerance"],
+            "{input} {options}"
+        );
+        assert_eq!(
+            fit["leaves_over_tolerance"], info["leaves_over_tolerance"],
+            "{input} {options}"
+        );
+        assert!(
+            number(&fit, "bound") >= number(&fit, "max"),
+            "{input} {options}: {fit}"
+        );
+    }
+}
+
+/// A field is not measured against what it was not fitted to, unless that is asked for.
+#[test]
+fn check_refuses_what_does_not_belong_together() {
+    let bench = Bench::new();
+    bench.json("phantom sphere -o ball.ply --count 3000");
+    bench.json("phantom sphere -o other.ply --count 3000 --seed 2");
+    bench.json("phantom head -o head.nii --size 24");
+    bench.json("phantom head -o noisy.nii --size 24 --noise 1%");
+    bench.json("fit ball.ply -o ball.iclay");
+    bench.json("fit head.nii -o head.iclay");
+    for (field, input, word) in [
+        ("ball.iclay", "other.ply", "other samples"),
+        ("ball.iclay", "head.nii", "fitted to a cloud"),
+        ("head.iclay", "noisy.nii", "other samples"),
+        ("head.iclay", "ball.ply", "fitted to a volume"),
+        ("head.iclay", "head.nii --stride 2", "other samples"),
+    ] {
+        let run = bench.run(&format!("check {field} {input} -o report"));
+        assert_eq!(run.code, 2, "{field} {input}: {}", run.stderr);
+        assert!(
+            run.stderr.contains(word) && run.stderr.contains("--anyway"),
+            "{}",
+            run.stderr
+        );
+        assert!(!bench.path("report").exists());
+        let anyway = bench.json(&format!("check {field} {input} --anyway"));
+        assert!(number(&anyway, "max") > 0.0, "{anyway}");
+    }
+    // The same samples in another file are the same input.
+    bench.json("convert ball.ply ball.xyz");
+    bench.json("check ball.iclay ball.xyz");
+}
+
+/// Every option of every command answers a wrong value with exit code 2 or 3 and a message that names the option and the
+/// value and says what would be right. `cli::tests` sees to it that no option is missing in the table.
+#[test]
+fn a_wrong_value_is_named_with_its_option_and_its_remedy() {
+    let bench = Bench::new();
+    bench.json("phantom sphere -o cloud.ply --count 500");
+    bench.json("phantom head -o head.nii --size 16");
+    bench.json("fit cloud.ply -o field.iclay --max-depth 6");
+    bench.write("notes.docx", "some words");
+    let region =
+        "[region]\nmin = [-0.5, -0.5, 0.6]\nmax = [0.5, 0.5, 1.3]\n[time]\nduration = 0.01\nstep = 0.01\n";
+    bench.write("scene.toml", format!("field = \"field.iclay\"\n{region}"));
+    let before = bench.files();
+    let mut wrong = Vec::new();
+    for (commands, options, arguments, word) in wrong_values::ROWS {
+        for (k, command) in commands.split(' ').enumerate() {
+            let names: Vec<&str> = options.split(' ').collect();
+            let option = names[k.min(names.len() - 1)];
+            let mut typed = command.replace('_', " ");
+            let mut value = "";
+            for part in arguments.split(' ') {
+                value = part.split_once('*').map_or(value, |(_, v)| v);
+                typed += " ";
+                typed += &match part {
+                    "@cloud" | "@volume" => wrong_values::besides(command, part),
+                    "@out" => wrong_values::out(command).to_string(),
+                    part => part.replace('*', ""),
+                };
+            }
+            let run = bench.run(&typed);
+            let short = match option {
+                "--output" => "-o",
+                long if long.starts_with("--") => long,
+                _ => "",
+            };
+            let said = &run.stderr;
+            let is_right = matches!(run.code, 2 | 3)
+                && said.contains(value)
+                && said.contains(short)
+                && said.contains(word)
+                && !said.contains("panicked");
+            if std::env::var_os("ISOCLAY_SHOW_MESSAGES").is_some() || !is_right {
+                wrong.push(format!("{typed}\n  {} {said}", run.code));
+            }
+            if bench.files() != before {
+                wrong.push(format!("{typed}\n  something was left behind"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// What comes and goes through pipes is to the byte what comes and goes through files; tables and notes go to stderr.
+#[test]
+fn pipes_carry_the_bytes_of_files() {
+    let bench = Bench::new();
+    bench.json("phantom torus -o cloud.ply --count 2000");
+    bench.json("convert cloud.ply cloud.xyz");
+    bench.json("fit cloud.ply -o field.iclay --max-depth 6");
+    bench.json("phantom head -o head.nii --size 16");
+    let read = |name: &str| std::fs::read(bench.path(name)).unwrap();
+    for (file, typed, input, expected) in [
+        ("mesh.ply", "mesh - -o - --resolution 32", "field.iclay", None),
+        (
+            "mesh.stl",
+            "mesh - -o - --format stl --resolution 32",
+            "field.iclay",
+            None,
+        ),
+        (
+            "out.pcd",
+            "convert - - --format pcd",
+            "cloud.ply",
+            Some("convert cloud.ply out.pcd"),
+        ),
+        (
+            "out.xyz",
+            "convert - - --input-format xyz --format xyz",
+            "cloud.xyz",
+            Some("convert cloud.xyz out.xyz"),
+        ),
+        (
+            "out.nrrd",
+            "convert - - --format nrrd",
+            "head.nii",
+            Some("convert head.nii out.nrrd"),
+        ),
+        (
+            "out.nii",
+            "sample field.iclay --like - -o -",
+            "head.nii",
+            Some("sample field.iclay --like head.nii -o out.nii"),
+        ),
+        (
+            "out.png",
+            "picture - -o - --size 32x32",
+            "field.iclay",
+            Some("picture field.iclay -o out.png --size 32x32"),
+        ),
+    ] {
+        let to_file = expected.map_or_else(
+            || format!("mesh field.iclay -o {file} --resolution 32"),
+            String::from,
+        );
+        bench.json(&to_file);
+        let (run, bytes) = bench.pipe(typed, &read(input));
+        assert_eq!(run.code, 0, "{typed}: {}", run.stderr);
+        assert!(bytes == read(file), "{typed}: {} bytes", bytes.len());
+        assert!(run.stderr.contains("standard output"), "{typed}: {}", run.stderr);
+    }
+    // The arguments are in the file, so that only what it holds is the same.
+    let (run, field) = bench.pipe("fit - -o - --max-depth 6 --json", &read("cloud.ply"));
+    bench.write("piped.iclay", field);
+    let summary: serde_json::Value = serde_json::from_str(run.stderr.lines().last().unwrap()).unwrap();
+    assert_eq!(
+        summary["field_sha256"],
+        bench.json("info piped.iclay")["field_sha256"]
+    );
+    assert_eq!(
+        summary["field_sha256"],
+        bench.json("info field.iclay")["field_sha256"]
+    );
+    let (run, said) = bench.pipe("info - --format xyz --json", &read("cloud.xyz"));
+    assert_eq!(run.code, 0, "{}", run.stderr);
+    assert!(String::from_utf8(said).unwrap().contains("\"points\":2000"));
+    let (run, _) = bench.pipe("check - cloud.ply --json", &read("field.iclay"));
+    assert_eq!(run.code, 0, "{}", run.stderr);
+
+    let before = bench.files();
+    for (typed, word) in [
+        ("info -", "--format"),
+        ("check - -", "only once"),
+        (
+            "fit - -o out.iclay --format xyz",
+            "standard input: the number of points",
+        ),
+        ("mesh - -o out.ply", "standard input: is no fitted field"),
+    ] {
+        let (run, out) = bench.pipe(typed, b"no numbers here");
+        assert!(
+            matches!(run.code, 2 | 3) && run.stderr.contains(word),
+            "{typed}: {}",
+            run.stderr
+        );
+        assert!(out.is_empty(), "{typed}");
+    }
+    // A device tells no format by its name.
+    assert_eq!(bench.run("mesh field.iclay -o /dev/null --format glb").code, 0);
+    assert_eq!(bench.files(), before);
+}
+
+#[test]
+fn errors_are_json_objects_too() {
+    let bench = Bench::new();
+    bench.json("phantom sphere -o cloud.ply --count 500");
+    for (typed, code, word, remedy) in [
+        (
+            "mesh nowhere.iclay -o out.ply --json",
+            3,
+            "nowhere.iclay",
+            Some("check the path"),
+        ),
+        (
+            "mesh cloud.ply -o out.ply --json",
+            3,
+            "fitted field",
+            Some("isoclay fit cloud.ply"),
+        ),
+        (
+            "fit cloud.ply -o out.iclay --json --memory 1MiB",
+            4,
+            "memory",
+            Some("--memory"),
+        ),
+        ("fit cloud.ply --json", 2, "--output", Some("Usage")),
+        (
+            "info cloud.ply --json --spacing 2",
+            2,
+            "Reading volumes",
+            Some("leave them out"),
+        ),
+    ] {
+        let run = bench.run(typed);
+        assert_eq!(run.code, code, "{typed}: {}", run.stderr);
+        let object: serde_json::Value = serde_json::from_str(run.stdout.lines().last().unwrap()).unwrap();
+        assert_eq!(object["exit_code"], code);
+        assert!(object["message"].as_str().unwrap().contains(word), "{object}");
+        assert_eq!(
+            object["remedy"].as_str().map(|r| r.contains(remedy.unwrap())),
+            Some(true),
+            "{object}"
+        );
+        assert!(!run.stderr.is_empty(), "people read it too");
+    }
+    // Standard output is the data's, even if they never come.
+    let run = bench.run("mesh cloud.ply -o - --json");
+    assert!(run.stdout.is_empty() && run.stderr.lines().last().unwrap().starts_with('{'));
+    assert!(bench.run("mesh cloud.ply -o out.ply").stdout.is_empty());
 }

@@ -96,6 +96,167 @@ fn what_makes_no_sense_is_refused_with_the_remedy() {
     assert_eq!(bench.files(), ["cloud.ply", "cloud.xyz", "field.iclay"]);
 }
 
+/// The input itself under any name, and the files that a header or a directory stands for.
+#[test]
+fn no_input_is_ever_overwritten() {
+    let bench = Bench::new();
+    bench.json("phantom sphere -o cloud.ply --count 100");
+    bench.json("phantom head -o head.nii --size 8");
+    let link = |to: &str, name: &str| std::os::unix::fs::symlink(to, bench.path(name)).unwrap();
+    std::fs::create_dir(bench.path("d")).unwrap();
+    link("cloud.ply", "link.ply");
+    link("d/../link.ply", "twice.ply");
+    std::fs::hard_link(bench.path("cloud.ply"), bench.path("hard.ply")).unwrap();
+    let header = "NRRD0005\ntype: uint8\ndimension: 3\nsizes: 4 4 4\nencoding: raw\n";
+    bench.write("one.nhdr", format!("{header}data file: my voxels.raw\n\n"));
+    bench.write("my voxels.raw", [7; 64]);
+    link("my voxels.raw", "voxels.nii");
+    bench.write("many.nhdr", format!("{header}data file: slice%02d.raw 1 4 1\n\n"));
+    (1..5).for_each(|i| bench.write(&format!("slice{i:02}.raw"), [i as u8; 16]));
+    link("slice03.raw", "slice.nii");
+    let mut pair = std::fs::read(bench.path("head.nii")).unwrap();
+    bench.write("pair.img", pair.split_off(352));
+    pair[344..348].copy_from_slice(b"ni1\0");
+    pair[108..112].copy_from_slice(&0f32.to_le_bytes());
+    bench.write("pair.hdr", pair);
+    link("pair.img", "image.nii");
+    for file in std::fs::read_dir(dicom("ct")).unwrap().flatten() {
+        std::fs::copy(file.path(), bench.path("d").join(file.file_name())).unwrap();
+    }
+    let slice = std::fs::read_dir(bench.path("d"))
+        .unwrap()
+        .next()
+        .unwrap()
+        .unwrap();
+    link(slice.path().to_str().unwrap(), "ct.nii");
+    let before: Vec<_> = bench
+        .files()
+        .iter()
+        .map(|f| (f.clone(), std::fs::read(bench.path(f)).ok()))
+        .collect();
+    for (arguments, word) in [
+        ("cloud.ply cloud.ply", "itself"),
+        ("cloud.ply d/../cloud.ply", "itself"),
+        ("cloud.ply link.ply", "itself"),
+        ("twice.ply cloud.ply", "itself"),
+        ("hard.ply link.ply", "itself"),
+        ("one.nhdr voxels.nii", "holds data of one.nhdr"),
+        ("many.nhdr slice.nii", "holds data of many.nhdr"),
+        ("pair.hdr image.nii", "holds data of pair.hdr"),
+        ("d ct.nii", "one of the files of d"),
+    ] {
+        let run = bench.run(&format!("convert {arguments}"));
+        assert_eq!(run.code, 2, "{arguments}: {}{}", run.stdout, run.stderr);
+        assert!(run.stderr.contains(word), "{arguments}: {}", run.stderr);
+    }
+    let after: Vec<_> = bench
+        .files()
+        .iter()
+        .map(|f| (f.clone(), std::fs::read(bench.path(f)).ok()))
+        .collect();
+    assert!(before == after, "a file changed");
+    // What is no input may be replaced, also beside one.
+    for _ in 0..2 {
+        bench.json("convert one.nhdr out.nii");
+        bench.json("convert d d/out.nii");
+    }
+}
+
+fn dicom(name: &str) -> String {
+    format!(
+        "{}/../formats/tests/data/dicom/{name}",
+        env!("CARGO_MANIFEST_DIR")
+    )
+}
+
+/// Options of voxels without a header, next to --as, whose name inside the program was the same.
+#[test]
+fn voxels_without_a_header_are_fitted_and_converted() {
+    let bench = Bench::new();
+    bench.write(
+        "v.raw",
+        (0..1000u16)
+            .flat_map(|i| (i % 97).to_le_bytes())
+            .collect::<Vec<u8>>(),
+    );
+    let raw = "--shape 10,10,10 --voxel uint16 --spacing 2";
+    bench.json(&format!("convert v.raw v.nii {raw}"));
+    let info = bench.json("info v.nii");
+    assert_eq!(info["spacing"], serde_json::json!([2.0, 2.0, 2.0]));
+    assert_eq!(
+        bench.json(&format!("fit v.raw -o v.iclay {raw} --method interpolate"))["input_count"],
+        1000
+    );
+    assert_eq!(
+        bench.json(&format!("check v.iclay v.raw {raw}"))["input_count"],
+        1000
+    );
+}
+
+#[test]
+fn a_sampled_volume_keeps_the_box_and_the_type_of_the_other() {
+    let bench = Bench::new();
+    let head = data("head.nii.gz");
+    bench.json(&format!(
+        "convert {head} part.nii --region 20:60,30:70,10:40 --store int16"
+    ));
+    bench.json("fit part.nii -o field.iclay --max-depth 1");
+    let part = bench.json("info part.nii");
+    let ends = |info: &Value| -> Vec<f64> {
+        let m = &info["world_from_voxel"];
+        let dims = &info["dims"];
+        let at = |i: usize, far: bool| {
+            let voxel = |a: usize| {
+                if far {
+                    dims[a].as_f64().unwrap() - 0.5
+                } else {
+                    -0.5
+                }
+            };
+            (0..3).map(|a| m[i][a].as_f64().unwrap() * voxel(a)).sum::<f64>() + m[i][3].as_f64().unwrap()
+        };
+        (0..6).map(|k| at(k % 3, k > 2)).collect()
+    };
+    for (spacing, voxel, out) in [
+        ("", "", "out.nii"),
+        ("--spacing 3", "", "out.nrrd"),
+        ("--spacing 0.9,2,5", "--store float32", "out.mha"),
+    ] {
+        bench.json(&format!(
+            "sample field.iclay --like part.nii -o {out} {spacing} {voxel}"
+        ));
+        let info = bench.json(&format!("info {out}"));
+        assert_eq!(
+            info["stored"],
+            if voxel.is_empty() {
+                part["stored"].clone()
+            } else {
+                "float32".into()
+            },
+            "{out}"
+        );
+        for (a, b) in ends(&part).iter().zip(ends(&info)) {
+            assert!((a - b).abs() < 1e-3, "{spacing}: the box moved from {a} to {b}");
+        }
+        if spacing.is_empty() {
+            assert_eq!(info["dims"], part["dims"]);
+        }
+    }
+    let clipped = bench.json("sample field.iclay --like part.nii -o out.nii --store uint8");
+    let note = clipped["notes"].to_string();
+    assert!(
+        note.contains("rounded to whole numbers") && note.contains("held to 0 or 255"),
+        "{note}"
+    );
+    let range = bench.json("info out.nii")["range"].clone();
+    assert!(range[0] == 0.0 && range[1].as_f64() <= Some(255.0), "{range}");
+    // A distance is no density: whole numbers would leave nothing of it.
+    bench.json("phantom sphere -o cloud.ply --count 500");
+    bench.json("fit cloud.ply -o ball.iclay --max-depth 6");
+    bench.json("sample ball.iclay --like part.nii -o ball.nii");
+    assert_eq!(bench.json("info ball.nii")["stored"], "float32");
+}
+
 /// Voxels as they are evaluated: nothing of a file's compression.
 fn inflate(bench: &Bench, name: &str) -> Vec<u8> {
     bench.json(&format!("convert {name} plain.nii"));

@@ -139,7 +139,7 @@ fn missing_empty_and_unknown_files() {
     bench.write("empty.ply", "");
     refused(&bench, "empty.ply", 3, &["empty"]);
     bench.write("text.docx", "hello");
-    refused(&bench, "text.docx", 3, &["supported"]);
+    refused(&bench, "text.docx", 3, &["not read here", ".nrrd"]);
     std::fs::create_dir(bench.path("folder.ply")).unwrap();
     refused(&bench, "folder.ply", 3, &["directory"]);
 }
@@ -270,6 +270,46 @@ fn a_full_disk() {
     }
 }
 
+/// Reports of several files, of which one meets a full disk: none of them is left, and old ones stay.
+#[test]
+fn a_full_disk_leaves_no_part_of_a_report() {
+    let bench = Bench::new();
+    bench.json("phantom sphere -o cloud.ply --count 500");
+    bench.json("fit cloud.ply -o field.iclay --max-depth 6");
+    let region = "[region]\nmin = [-0.4, -0.4, 0.4]\nmax = [0.4, 0.4, 1.1]\nlevel = 0\n[time]\nduration = 0.02\nstep = 0.01\n";
+    bench.write("scene.toml", format!("field = \"field.iclay\"\n{region}"));
+    for (last, command) in [
+        ("report.json", "check field.iclay cloud.ply -o out"),
+        (
+            "frame-00002.ply",
+            "simulate scene.toml -o moved.iclay --frames out --every 1",
+        ),
+    ] {
+        std::fs::create_dir(bench.path("out")).unwrap();
+        bench.write("out/error.ply", "old");
+        std::os::unix::fs::symlink("/dev/full", bench.path("out").join(last)).unwrap();
+        let run = bench.run(command);
+        assert_eq!(run.code, 4, "{command}: {}", run.stderr);
+        assert!(
+            run.stderr.contains(last) && run.stderr.contains("free some space"),
+            "{command}: {}",
+            run.stderr
+        );
+        let mut names: Vec<_> = std::fs::read_dir(bench.path("out"))
+            .unwrap()
+            .map(|e| e.unwrap().file_name())
+            .collect();
+        names.sort();
+        assert_eq!(names, ["error.ply", last], "{command}");
+        assert_eq!(std::fs::read(bench.path("out/error.ply")).unwrap(), b"old");
+        assert!(!bench.path("moved.iclay").exists(), "{command}");
+        std::fs::remove_dir_all(bench.path("out")).unwrap();
+    }
+    // A directory that was made for a report goes with it.
+    let run = bench.run("check field.iclay nowhere.ply -o made/for/it");
+    assert!(run.code == 3 && !bench.path("made").exists());
+}
+
 /// Ctrl-C in the middle of a fit: exit code 4, the old file as it was, nothing beside it.
 #[test]
 fn a_cancelled_fit() {
@@ -299,4 +339,237 @@ fn a_cancelled_fit() {
         "the old file"
     );
     assert_eq!(bench.files(), before);
+}
+
+/// Ctrl-C at moments of a fixed sequence, in every command: exit code 4 wherever the work is, also where nothing looks
+/// at a flag (`eval` waits for its input), and no half-written file. A command that was done before ends with 0.
+#[test]
+fn ctrl_c_ends_every_command() {
+    use std::process::Stdio;
+    use std::time::Duration;
+    let bench = Bench::new();
+    bench.json("phantom gyroid -o cloud.ply --count 150000");
+    bench.json("phantom head -o head.nii --size 96");
+    bench.json("fit cloud.ply -o field.iclay");
+    bench.json("mesh field.iclay -o mesh.stl --resolution 150");
+    let before = bench.files();
+    let mut draw = 0x2545_f491_4f6c_dd1du64;
+    let mut cancelled = Vec::new();
+    for command in [
+        "fit cloud.ply -o out.iclay --tolerance 1e-6 --threads 1",
+        "fit cloud.ply -o out.iclay --unoriented --threads 1",
+        "fit cloud.ply -o out.iclay --robust --threads 1",
+        "fit mesh.stl -o out.iclay --tolerance 0.0005% --threads 1",
+        "fit head.nii -o out.iclay --tolerance 0.01% --threads 1",
+        "mesh field.iclay -o out.ply --resolution 1000 --threads 1",
+        "check field.iclay cloud.ply --threads 1",
+        "sample field.iclay --like head.nii -o out.nii",
+        "picture field.iclay -o out.png --size 2000x2000",
+        "convert mesh.stl out.obj",
+        "info mesh.stl",
+        "phantom gyroid -o out.ply --count 3000000",
+        "eval field.iclay --points -",
+    ] {
+        let mut child = bench
+            .command()
+            .args(command.split_whitespace())
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let open_input = child.stdin.take();
+        draw = draw
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        std::thread::sleep(Duration::from_millis(100 + (draw >> 33) % 400));
+        let pid = rustix::process::Pid::from_child(&child);
+        // A process that has ended stays until it is waited for.
+        rustix::process::kill_process(pid, rustix::process::Signal::INT).unwrap();
+        let run = Run::from(child.wait_with_output().unwrap());
+        drop(open_input);
+        let written: Vec<String> = bench
+            .files()
+            .into_iter()
+            .filter(|f| !before.contains(f))
+            .collect();
+        match run.code {
+            0 => written
+                .iter()
+                .for_each(|f| std::fs::remove_file(bench.path(f)).unwrap()),
+            4 => {
+                assert!(run.stderr.contains("cancelled"), "{command}: {}", run.stderr);
+                assert!(written.is_empty(), "{command}: left {written:?}");
+                cancelled.push(command);
+            }
+            other => panic!("{command}: code {other}: {}", run.stderr),
+        }
+    }
+    assert!(
+        cancelled.contains(&"eval field.iclay --points -") && cancelled.len() > 4,
+        "only {cancelled:?}"
+    );
+}
+
+/// Coordinates of a survey keep their millimetres from a cloud in text to the field, its values and its mesh.
+#[test]
+fn a_survey_keeps_its_millimetres() {
+    let bench = Bench::new();
+    let centre = [5_400_000.123, 3_500_000.456, 117.25];
+    let count = 4000;
+    let mut text = format!(
+        "ply\nformat ascii 1.0\nelement vertex {count}\nproperty float x\nproperty float y\nproperty float z\n\
+         property float nx\nproperty float ny\nproperty float nz\nend_header\n"
+    );
+    for (p, n) in sphere(count) {
+        let [x, y, z] = [0, 1, 2].map(|a| centre[a] + p[a]);
+        writeln!(text, "{x:.4} {y:.4} {z:.4} {} {} {}", n[0], n[1], n[2]).unwrap();
+    }
+    bench.write("survey.ply", text);
+    let fitted = fit(&bench, "survey.ply").json();
+    assert!(number(&fitted, "max") < 1e-3, "{fitted}");
+    bench.json("mesh out.iclay -o mesh.ply --resolution 40");
+    let mesh = formats::meshes::read(&bench.path("mesh.ply"), &formats::ReadLimits::default()).unwrap();
+    for v in mesh.vertices {
+        let r = v.distance(glam::DVec3::from_array(centre));
+        assert!((r - 1.0).abs() < 2e-3, "a vertex at {v} lies {r} from the centre");
+    }
+    let [x, y, z] = centre;
+    bench.write("at.xyz", format!("{} {y} {z}\n{} {y} {z}\n", x + 1.0, x + 0.99));
+    let values = bench.run("eval out.iclay --points at.xyz");
+    let value = |line: usize| -> f64 {
+        let line = values
+            .stdout
+            .lines()
+            .filter(|l| !l.starts_with(|c: char| c.is_alphabetic()))
+            .nth(line)
+            .unwrap();
+        line.split([' ', ',', '\t']).nth(3).unwrap().parse().unwrap()
+    };
+    assert!(
+        value(0).abs() < 1e-3 && (value(1) - 0.01).abs() < 1e-3,
+        "{}",
+        values.stdout
+    );
+    for name in ["out.xyz", "out2.ply", "out.pcd"] {
+        bench.json(&format!("convert survey.ply {name}"));
+        let back = formats::points::read(&bench.path(name), &formats::ReadLimits::default()).unwrap();
+        for (p, (unit, _)) in back.positions.iter().zip(sphere(count)) {
+            let wanted = glam::DVec3::from_array([0, 1, 2].map(|a| centre[a] + unit[a]));
+            assert!(
+                (*p - wanted).abs().max_element() < 1e-4,
+                "{name}: {p} for {wanted}"
+            );
+        }
+    }
+}
+
+/// Limits that cannot be kept, or that mean nothing, are refused or doubted in words.
+#[test]
+fn limits_that_cannot_be_kept() {
+    let bench = Bench::new();
+    bench.write("ball.xyz", xyz(sphere(3000)));
+    for (options, words) in [
+        ("--coefficients 20000", &["--coefficients 20000", "42875"][..]),
+        ("--max-depth 3", &["--max-depth 3", "from 6 to 16"]),
+    ] {
+        let run = bench.run(&format!("fit ball.xyz -o out.iclay {options}"));
+        assert_eq!(run.code, 2, "{options}: {}", run.stderr);
+        assert!(words.iter().all(|w| run.stderr.contains(w)), "{}", run.stderr);
+        assert!(!bench.path("out.iclay").exists());
+    }
+    let note =
+        |options: &str| bench.json(&format!("fit ball.xyz -o out.iclay {options}"))["notes"].to_string();
+    assert!(note("--tolerance 10").contains("larger than the object"));
+    assert!(note("--tolerance 1e-9 --max-depth 6").contains("--precision f64"));
+    assert!(!note("--tolerance 1e-9 --max-depth 6 --precision f64").contains("--precision"));
+    assert!(!note("--tolerance 0.01").contains("--tolerance"));
+    let fitted = bench.json("fit ball.xyz -o out.iclay --tolerance 1e-5 --coefficients 45000");
+    assert!(number(&fitted, "coefficients") <= 45000.0, "{fitted}");
+    assert!(
+        fitted["notes"]
+            .to_string()
+            .contains("--coefficients leaves no room"),
+        "{fitted}"
+    );
+}
+
+/// The ceiling on memory holds in whatever phase: the peak stays within it, and the run ends with the field that there
+/// is without it, with a note that says what it cost, or with exit code 4.
+#[test]
+fn memory_stays_below_its_ceiling() {
+    let bench = Bench::new();
+    bench.json("phantom gyroid -o clean.ply --count 300000");
+    bench.json("phantom cup -o noisy.ply --count 120000 --noise 1%");
+    bench.json("phantom head -o head.nii --size 128");
+    bench.json("fit clean.ply -o field.iclay");
+    bench.json("mesh field.iclay -o mesh.stl --resolution 120");
+    // A list of a million corners in one face.
+    let mut long =
+        b"ply\nformat binary_little_endian 1.0\nelement vertex 4\nproperty float x\nproperty float y\n\
+        property float z\nelement face 1\nproperty list uint uchar vertex_indices\nend_header\n"
+            .to_vec();
+    [0f32, 0., 0., 1., 0., 0., 0., 1., 0., 0., 0., 1.]
+        .iter()
+        .for_each(|v| long.extend(v.to_le_bytes()));
+    long.extend(6_000_000u32.to_le_bytes());
+    long.extend((0..6_000_000u32).map(|i| (i % 4) as u8));
+    bench.write("long.ply", long);
+    for (command, limits) in [
+        ("fit clean.ply -o out.iclay --tolerance 1e-4", &[128u64, 160][..]),
+        ("fit clean.ply -o out.iclay --unoriented", &[128, 200]),
+        ("fit clean.ply -o out.iclay --method offset-pairs", &[128]),
+        ("fit clean.ply -o out.iclay --precision f64 --robust", &[128]),
+        ("fit noisy.ply -o out.iclay", &[128]),
+        ("fit noisy.ply -o out.iclay --unoriented=tagging", &[128]),
+        ("fit mesh.stl -o out.iclay", &[128, 256]),
+        ("fit head.nii -o out.iclay --tolerance 0.02%", &[128]),
+        (
+            "fit head.nii -o out.iclay --method interpolate --precision f64",
+            &[128],
+        ),
+        ("mesh field.iclay -o out.ply --resolution 500", &[128, 200]),
+        ("check field.iclay clean.ply", &[128]),
+        ("info long.ply", &[128, 256]),
+        ("convert long.ply out.stl --as mesh", &[200]),
+        ("picture field.iclay -o out.png --size 3000x3000", &[128]),
+        ("phantom gyroid -o out.ply --count 4000000", &[128]),
+    ] {
+        for &limit in limits {
+            let (code, peak, said) = peak_of(&bench, &format!("{command} --memory {limit}MiB"));
+            let bound = limit as f64 * 1.05 + 24.0;
+            assert!(peak <= bound, "{command}: {peak:.0} MiB of {limit} (code {code})");
+            assert!(
+                code == 0 || code == 4,
+                "{command} in {limit} MiB: code {code}: {said}"
+            );
+        }
+    }
+}
+
+/// Exit code, largest resident size in MiB and messages of a run.
+fn peak_of(bench: &Bench, command: &str) -> (i32, f64, String) {
+    use std::process::Stdio;
+    let mut child = bench
+        .command()
+        .args(command.split_whitespace())
+        .stdout(Stdio::null())
+        .stderr(std::fs::File::create(bench.path("stderr")).unwrap())
+        .spawn()
+        .unwrap();
+    let status = format!("/proc/{}/status", child.id());
+    let mut peak = 0u64;
+    let code = loop {
+        // The mark only rises: the last look before the end has it, up to what the last millisecond added.
+        let text = std::fs::read_to_string(&status).unwrap_or_default();
+        if let Some(line) = text.lines().find_map(|l| l.strip_prefix("VmHWM:")) {
+            peak = line.trim().trim_end_matches("kB").trim().parse().unwrap();
+        }
+        if let Some(status) = child.try_wait().unwrap() {
+            break status.code().expect("the program ends by itself");
+        }
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    };
+    let said = std::fs::read_to_string(bench.path("stderr")).unwrap();
+    (code, peak as f64 / 1024.0, said)
 }

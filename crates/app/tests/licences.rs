@@ -126,3 +126,73 @@ fn every_dependency_has_an_allowed_licence_and_source() {
     assert!(nodes.len() > 20, "only {} packages were seen", nodes.len());
     assert!(bad.is_empty(), "{}", bad.join("\n"));
 }
+
+/// The keys in brackets that begin with one, as `[Hua04 eq. 12; Piegl97]`.
+fn keys_cited(text: &str) -> BTreeSet<String> {
+    let is_key = |word: &&str| {
+        let letters = word.trim_end_matches(|c: char| c.is_ascii_digit());
+        let mut chars = letters.chars();
+        letters.len() + 2 == word.len()
+            && letters.len() > 2
+            && chars.next().is_some_and(|c| c.is_ascii_uppercase())
+            && chars.all(|c| c.is_ascii_lowercase())
+    };
+    let brackets = text.split('[').skip(1).filter_map(|rest| rest.split(']').next());
+    let words = brackets.filter_map(|inside| {
+        let words: Vec<&str> = inside
+            .split(|c: char| !c.is_alphanumeric())
+            .filter(|w| !w.is_empty())
+            .collect();
+        words.first().is_some_and(is_key).then_some(words)
+    });
+    let keys = words.flatten().filter(is_key);
+    keys.map(str::to_owned).collect()
+}
+
+/// Comments of Rust files and Markdown below a directory, generated files left out.
+fn texts(directory: &Path, found: &mut Vec<String>) {
+    for entry in std::fs::read_dir(directory).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        if path.is_dir() {
+            if !name.starts_with('.') && name != "target" {
+                texts(&path, found);
+            }
+        } else if name.ends_with(".md") && name != "bibliography.md" {
+            found.push(std::fs::read_to_string(&path).unwrap());
+        } else if name.ends_with(".rs") {
+            let text = std::fs::read_to_string(&path).unwrap();
+            let comments = text.lines().filter_map(|l| l.trim_start().strip_prefix("//"));
+            found.push(comments.collect::<Vec<_>>().join("\n"));
+        }
+    }
+}
+
+#[test]
+fn citations_and_bibliography_agree() {
+    let mut found = Vec::new();
+    for directory in ["crates", "docs"] {
+        texts(&workspace().join(directory), &mut found);
+    }
+    found.push(std::fs::read_to_string(workspace().join("README.md")).unwrap());
+    let cited: BTreeSet<String> = found.iter().flat_map(|t| keys_cited(t)).collect();
+    let list = std::fs::read_to_string(workspace().join("docs/bibliography.md")).unwrap();
+    let rows = list
+        .lines()
+        .filter_map(|l| l.strip_prefix("| ")?.split_once(" |"));
+    let entries: BTreeSet<String> = rows
+        .map(|(key, _)| key.to_owned())
+        .filter(|k| k != "key" && k != "---")
+        .collect();
+    let unknown: Vec<_> = cited.difference(&entries).collect();
+    let unused: Vec<_> = entries.difference(&cited).collect();
+    assert!(
+        unknown.is_empty(),
+        "cited, but not in docs/bibliography.md: {unknown:?}"
+    );
+    assert!(
+        unused.is_empty(),
+        "in docs/bibliography.md, but cited nowhere: {unused:?}"
+    );
+    assert!(cited.len() > 20, "{cited:?}");
+}

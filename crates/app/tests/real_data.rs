@@ -58,7 +58,9 @@ fn head_is_fitted_within_its_tolerance_and_sampled_back() {
     assert!(number(&check, "max") <= number(&fit, "bound"), "{check} {fit}");
 
     // Sampled at the voxels and measured against the volume by other code than `check`'s.
-    bench.json(&format!("sample head.iclay --like {head} -o again.nii.gz"));
+    bench.json(&format!(
+        "sample head.iclay --like {head} -o again.nii.gz --store float32"
+    ));
     let limits = formats::ReadLimits::default();
     let truth = formats::volumes::read(head.as_ref(), &Default::default(), &limits).unwrap();
     let again = formats::volumes::read(&bench.path("again.nii.gz"), &Default::default(), &limits).unwrap();

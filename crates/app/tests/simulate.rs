@@ -197,7 +197,7 @@ fn frames_show_the_motion() {
     ball.0.write("scene.toml", SCENE);
     let run = ball
         .0
-        .run("simulate scene.toml -o moved.iclay --frames frames --every 10");
+        .run("simulate scene.toml -o moved.iclay --frames frames --every 10 --mesh moved.glb");
     assert_eq!(run.code, 0, "{}", run.stderr);
     assert!(
         run.stdout.contains("steps") && run.stdout.contains("awake"),
@@ -211,6 +211,7 @@ fn frames_show_the_motion() {
     assert!((height(0) - 1.0).abs() < 1e-3);
     assert!(height(10) > height(0) + 0.02 && height(20) > height(0) + 0.02);
     assert_eq!(std::fs::read_dir(ball.0.path("frames")).unwrap().count(), 3);
+    assert!(number(&ball.0.json("info moved.glb"), "faces") > 1000.0);
 }
 
 #[test]

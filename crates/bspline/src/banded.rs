@@ -37,7 +37,7 @@ impl<T: Real> BandedRows<T> {
     }
 
     /// Derivatives of order `derivative <= 3` of all functions of `knots` at `positions`, in the order given: the
-    /// spline with coefficients `c` takes the values `A c` there (the `A` of DIS eq. 5, one axis of it).
+    /// spline with coefficients `c` takes the values `A c` there (one axis of the `A` of [Hua04 eq. 5]).
     pub fn collocation(
         knots: &KnotVector,
         positions: impl IntoIterator<Item = f64>,

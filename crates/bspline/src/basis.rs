@@ -10,7 +10,7 @@ const ORDER: usize = MAX_DEGREE + 1;
 
 /// Values and derivatives of the `p + 1` functions `first() ..= span` at one parameter.
 ///
-/// `N_{i,p}^{(k)}(t)` [DIS eq. 1's `B`, `C`, `D`; The NURBS Book eqs. 2.5 and 2.9], per unit of the parameter.
+/// `N_{i,p}^{(k)}(t)` [Hua04 eq. 1's `B`, `C`, `D`; Piegl97 eqs. 2.5 and 2.9], per unit of the parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Basis<T> {
     span: usize,
@@ -75,7 +75,7 @@ impl<T: Real> Basis<T> {
     }
 }
 
-/// The triangle of all lower degrees, The NURBS Book A2.2: `ndu[r][j]` is function `r` of degree `j`, and
+/// The triangle of all lower degrees, [Piegl97 A2.2]: `ndu[r][j]` is function `r` of degree `j`, and
 /// `ndu[j][r]`, `r < j`, the knot difference that stands under it.
 struct Table {
     ndu: [[f64; ORDER]; ORDER],
@@ -103,7 +103,7 @@ impl Table {
         Self { ndu }
     }
 
-    /// Derivatives `1 ..= order <= p`, The NURBS Book A2.3.
+    /// Derivatives `1 ..= order <= p`, [Piegl97 A2.3].
     fn derivatives(&self, p: usize, order: usize) -> [[f64; ORDER]; MAX_DERIVATIVE + 1] {
         let ndu = &self.ndu;
         let mut out = [[0.0; ORDER]; MAX_DERIVATIVE + 1];

@@ -1,7 +1,7 @@
 //! Knot insertion: the same spline on more knots, and on a part of its domain.
 //!
-//! One knot by Boehm's rule [Boehm 1980, *Inserting new knots into B-spline curves*], many at once by the Oslo
-//! algorithm 1 [Cohen, Lyche & Riesenfeld 1980, *Discrete B-splines and subdivision techniques*]. Every new
+//! One knot by Boehm's rule \[Boehm80\], many at once by the Oslo
+//! algorithm 1 \[Cohen80\]. Every new
 //! coefficient is a convex combination of at most `p + 1` old ones, whose weights are sums of non-negative products
 //! and so right to a few units in the last place each.
 
@@ -141,7 +141,7 @@ fn occurrences(knots: &[f64], u: f64) -> usize {
 /// Inserts `u` once: the new knots, and the matrix from old to new coefficients.
 ///
 /// `Q_i = α_i P_i + (1 - α_i) P_{i-1}`, `α_i = (u - u_i)/(u_{i+p} - u_i)` between `k-p+1` and `k-s`, where
-/// `u_k <= u < u_{k+1}` and `u` occurs `s` times already [Boehm 1980; The NURBS Book eq. 5.15].
+/// `u_k <= u < u_{k+1}` and `u` occurs `s` times already [Boehm80; Piegl97 eq. 5.15].
 ///
 /// # Errors
 /// [`InsertionError::Outside`], [`InsertionError::Multiplicity`], [`InsertionError::TooMany`].
@@ -219,7 +219,7 @@ pub(crate) fn restriction_rows<T: Real>(knots: &KnotVector, a: f64, b: f64) -> (
 /// the domain, opened by one unit in the last place, so that at a knot the limits from both sides are among them.
 ///
 /// The derivative has the coefficients `p(c_{i+1} - c_i)/(u_{i+p+1} - u_{i+1})` on the knots without the first and the
-/// last, and one degree less [The NURBS Book eq. 3.8].
+/// last, and one degree less [Piegl97 eq. 3.8].
 pub(crate) fn derivative_rows<T: Real>(knots: &KnotVector, a: f64, b: f64) -> BandedRows<T> {
     let [start, end] = knots.domain();
     let (a, b) = (a.next_down().max(start), b.next_up().min(end));
@@ -249,7 +249,7 @@ pub(crate) fn derivative_rows<T: Real>(knots: &KnotVector, a: f64, b: f64) -> Ba
 ///
 /// `α_{i,1}(j) = 1` where `t_i <= τ_j < t_{i+1}`,
 /// `α_{i,k+1}(j) = (τ_{j+k} - t_i)/(t_{i+k} - t_i) α_{i,k}(j) + (t_{i+k+1} - τ_{j+k})/(t_{i+k+1} - t_{i+1}) α_{i+1,k}(j)`
-/// [Cohen, Lyche & Riesenfeld 1980, eq. 3.10; Oslo algorithm 1]. Where a factor would be negative or divide by zero,
+/// [Cohen80 eq. 3.10; Oslo algorithm 1]. Where a factor would be negative or divide by zero,
 /// the `α` beside it is exactly zero.
 fn discrete_splines<T: Real>(p: usize, t: &[f64], tau: &[f64]) -> BandedRows<T> {
     let count = tau.len() - p - 1;

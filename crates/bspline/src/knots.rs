@@ -179,7 +179,7 @@ impl KnotVector {
     /// The span `k`, `p <= k < n`, with `u_k <= t < u_{k+1}`; its functions are `k-p ..= k`.
     ///
     /// The last span includes the end of the domain. A parameter outside belongs to the nearest span, so that
-    /// evaluation continues the polynomial there; NaN to the first one. [The NURBS Book, A2.1]
+    /// evaluation continues the polynomial there; NaN to the first one. [Piegl97 A2.1]
     pub fn span(&self, t: f64) -> usize {
         let [start, end] = self.domain();
         // At the end, and beyond it, the last knot below the end opens the last span that has a length.

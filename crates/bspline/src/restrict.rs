@@ -3,7 +3,7 @@
 //! A spline lies within the hull of its control coefficients, but the coefficients of a whole cell say little
 //! about a small box inside it. Restriction writes the same function on `[a, b]` as a clamped spline with the
 //! knots `a a a a, k₁ … k_m, b b b b` (`kᵢ` the integers strictly between), whose coefficients are the blossom
-//! at consecutive triples of knots [Ramshaw 1987; The NURBS Book §5.2]. Their hull exceeds the range of the
+//! at consecutive triples of knots [Ramshaw87; Piegl97 §5.2]. Their hull exceeds the range of the
 //! function by a share that falls with the square of the box, and is exact for linear functions.
 
 use crate::Real;

@@ -1,6 +1,6 @@
 //! Seconds of processor time of one step, by size, sampling and material.
 //!
-//! `cargo bench -p dynamics --bench step`. The rows of Table 2 of Hua and Qin (2004), whose times, 1.0, 6.9, 15.8, 38.2
+//! `cargo bench -p dynamics --bench step`. The rows of [Hua04 table 2], whose times, 1.0, 6.9, 15.8, 38.2
 //! and 74.9 ms, hold the graphical update too. Painted is a stiff ball at a contrast of 100; steps are 30 times the
 //! explicit limit of the uniform material.
 

@@ -5,7 +5,7 @@
 //! [matter](matter::Matter) is given per volume. The state is the change `p` of the free control coefficients and its
 //! rate; with the collocation matrix `A`, `d = d₀ + A p` are the densities, and
 //!
-//! `M̃ p̈ + D̃ ṗ = Aᵀ(f_ext + f_int(d))`, `M̃ = AᵀMA`, `D̃ = AᵀDA` [DIS eq. 8 with forces relative to rest]
+//! `M̃ p̈ + D̃ ṗ = Aᵀ(f_ext + f_int(d))`, `M̃ = AᵀMA`, `D̃ = AᵀDA` [Hua04 eq. 8 with forces relative to rest]
 //!
 //! is integrated by [`step`](patch::Patch::step). Implicit steps solve for the *increment*, `AᵀSA x = Aᵀg` with a
 //! matrix `S` on the samples ([`solve`]), and judge convergence against the impulse `Aᵀg`.
@@ -29,8 +29,7 @@
 //! assert!(report.work > 0.0 && report.solve.iteration.iterations <= 8);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
-//!
-//! Sources: J. Hua and H. Qin, *Haptics-Based Dynamic Implicit Solid Modeling*, 2004 (DIS).
+//! The sources that are cited by keys such as [Hua04 eq. 8] stand in `docs/bibliography.md`.
 //!
 //! A [`Region`](region::Region) cuts a patch out of a hierarchical field and bakes its change back; a
 //! [`TensorRegion`](region::TensorRegion) moves a whole patch on knots of its own.
@@ -42,6 +41,7 @@ pub mod integrators;
 pub mod lattice;
 pub mod matter;
 pub mod patch;
+mod patch_error;
 pub mod region;
 mod rest;
 pub mod solve;

@@ -2,133 +2,13 @@
 
 use bspline::Real;
 
-use crate::constraints::{ConstraintError, Held};
+use crate::constraints::Held;
 use crate::lattice::{Lattice, TensorWorkspace};
-use crate::matter::{Matter, MatterError, Quantity, ScaledMatter};
-use crate::solve::{SolveError, SolverOptions, StepSolver};
+use crate::matter::{Matter, Quantity, ScaledMatter};
+pub use crate::patch_error::PatchError;
+use crate::solve::{SolverOptions, StepSolver};
 use crate::springs::{Law, Neighbours, Plasticity, SpringNetwork, SpringWeights, StepMatrix, Weights};
 use crate::units::largest;
-
-/// Why a patch cannot be made or moved.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum PatchError {
-    /// The matter is refused.
-    #[error(transparent)]
-    Matter(#[from] MatterError),
-    /// The step cannot be solved.
-    #[error(transparent)]
-    Solve(#[from] SolveError),
-    /// Constraints are refused.
-    #[error(transparent)]
-    Constraint(#[from] ConstraintError),
-    /// A list that does not fit the lattice.
-    #[error("{found} {what} were given; the patch needs {needed}")]
-    Length {
-        /// Of what.
-        what: &'static str,
-        /// How many were given.
-        found: usize,
-        /// How many are needed.
-        needed: usize,
-    },
-    /// A number that is not finite.
-    #[error("{what} {index} is {value}; it has to be finite")]
-    NotFinite {
-        /// Which list.
-        what: &'static str,
-        /// Place in it.
-        index: usize,
-        /// The value.
-        value: f64,
-    },
-    /// A length per density that is not positive and finite.
-    #[error(
-        "the scale of densities is {scale}; it has to be positive and finite (1 over the usual slope of the field at its \
-         surface is a good one)"
-    )]
-    Scale {
-        /// Length per density.
-        scale: f64,
-    },
-    /// A step after which a number is not finite.
-    #[error(
-        "{what} {index} would become {value}: the motion leaves the range of {precision}; take back the forces or the \
-         material that drive it, or use double precision"
-    )]
-    Overflow {
-        /// Which list of the state.
-        what: &'static str,
-        /// Place in it.
-        index: usize,
-        /// The number.
-        value: f64,
-        /// Name of the precision.
-        precision: &'static str,
-    },
-    /// Springs of other directions than those of the patch.
-    #[error("springs along {found:?}; the patch needs {needed:?}, in this order")]
-    Directions {
-        /// Steps of the springs given.
-        found: Vec<[isize; 3]>,
-        /// Steps of the springs needed.
-        needed: Vec<[isize; 3]>,
-    },
-    /// Options of adaptive steps that cannot be kept.
-    #[error("adaptive steps: {what} is {value}; it has to be {needed}")]
-    Adaptive {
-        /// Which option.
-        what: &'static str,
-        /// Its value.
-        value: f64,
-        /// What it may be.
-        needed: String,
-    },
-    /// Springs across diagonals on a lattice that is not cubic.
-    #[error(
-        "the samples lie {spacing:?} apart; springs across diagonals need the same distance on all axes: \
-         choose other sample counts, or six neighbours"
-    )]
-    NotCubic {
-        /// Spacing along x, y and z.
-        spacing: [f64; 3],
-    },
-    /// A rate of relaxation that is negative or not finite.
-    #[error(
-        "rest lengths cannot follow at a rate of {rate} per second; the rate has to be finite and 0 or above (0 keeps \
-         the solid elastic)"
-    )]
-    Rate {
-        /// The rate.
-        rate: f64,
-    },
-    /// A weight that does not lie between 0 and 1.
-    #[error(
-        "the weight of sample {index} is {value}; it has to lie between 0 (keeps its rest) and 1 (follows fully)"
-    )]
-    Weight {
-        /// Which sample.
-        index: usize,
-        /// Its weight.
-        value: f64,
-    },
-    /// A time step that is not positive and finite.
-    #[error("the time step is {dt} s; it has to be positive and finite")]
-    TimeStep {
-        /// The step in seconds.
-        dt: f64,
-    },
-    /// An explicit step beyond its bound.
-    #[error(
-        "an explicit step of {dt:.3e} s is unstable beyond {limit:.3e} s; use shorter steps, or an implicit scheme such as \
-         tr-bdf2"
-    )]
-    Unstable {
-        /// The step asked for.
-        dt: f64,
-        /// The largest stable one.
-        limit: f64,
-    },
-}
 
 /// Energies of a state.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

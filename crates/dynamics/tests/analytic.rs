@@ -192,7 +192,7 @@ impl Pull {
 }
 
 /// A half-space `x < 0` drawn towards `target`, by the force `α∫(c - s)dc` per length of what is left of the path from
-/// the surface at `s` [DIS §6.1]: where it comes to rest, and the change.
+/// the surface at `s` [Hua04 §6.1]: where it comes to rest, and the change.
 fn drawn(n: usize, effective: f64, r: f64, target: f64, alpha: f64) -> (f64, Pull) {
     let at = |s: f64| pull(n, effective, r, [s, target], 0.5 * alpha * (target - s).powi(2));
     let (mut low, mut high) = (0.0, target);

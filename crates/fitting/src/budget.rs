@@ -62,6 +62,15 @@ impl Control {
         Ok(())
     }
 
+    /// The same cancel and ceiling for a part of the work whose progress nobody sees.
+    pub fn quiet(&self) -> Self {
+        Self {
+            on_progress: Box::new(|_| ()),
+            cancel: self.cancel.clone(),
+            memory_limit: self.memory_limit,
+        }
+    }
+
     /// Refuses work that would hold more than the ceiling.
     ///
     /// # Errors

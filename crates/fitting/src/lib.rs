@@ -8,6 +8,7 @@
 mod budget;
 mod components;
 mod error;
+mod leaf_index;
 mod lines;
 pub mod mesh;
 pub mod orient;
@@ -20,4 +21,5 @@ pub mod volume;
 pub use budget::{Cancel, Control, Progress};
 pub use components::{UnsupportedComponent, unsupported_components};
 pub use error::FitError;
+pub use leaf_index::LeafIndex;
 pub use report::{FitReport, Leaf, SignReport, StopReason};

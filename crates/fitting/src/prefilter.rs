@@ -1,6 +1,6 @@
 //! The interpolating prefilter: cubic B-spline coefficients that pass through given samples.
 //!
-//! Along one line the conditions are `(c[k-1] + 4 c[k] + c[k+1]) / 6 = d[k]` ([Unser 1999], [Thévenaz 2000]).
+//! Along one line the conditions are `(c[k-1] + 4 c[k] + c[k+1]) / 6 = d[k]` [Unser99; Thevenaz00].
 //! The recursion here is the exact factorization of that tridiagonal matrix; its pivots converge within a dozen
 //! rows to those of the usual recursive filter with pole `√3 - 2`, so it costs the same and needs no
 //! truncated start. A three-dimensional prefilter is the recursion along x, y and z in turn.

@@ -22,6 +22,8 @@ pub enum StopReason {
     /// The surface has an edge there, which a smooth field can only round off: going on would cost more than it
     /// brings.
     Crease = 7,
+    /// The smoothing that was asked for leaves more than the tolerance.
+    Smoothing = 8,
 }
 
 /// A dyadic cell that was not split, with its own error.
@@ -39,6 +41,13 @@ pub struct Leaf {
     pub max: f32,
     /// Why the cell was not split.
     pub reason: StopReason,
+}
+
+impl Leaf {
+    /// Whether its rms residual is above `tolerance`.
+    pub fn is_above(&self, tolerance: f64) -> bool {
+        f64::from(self.rms) > tolerance
+    }
 }
 
 /// How the normals of a cloud that had none were found.
@@ -78,7 +87,7 @@ pub struct FitReport {
     pub p95: f64,
     /// Largest absolute residual.
     pub max: f64,
-    /// Sound bound on `|f(x_k) - d_k|` over all samples: residual plus the rounding of its evaluation.
+    /// Sound bound on `|f(x_k) - d_k|` over all samples: residual plus the rounding of its evaluation. Never below `max`.
     pub bound: f64,
     /// Estimated standard deviation of the noise, if any was found; same unit as `rms`.
     pub noise: Option<f64>,
@@ -86,6 +95,8 @@ pub struct FitReport {
     pub tolerance: f64,
     /// Smoothing weight used (see `docs/fitting.md`).
     pub smoothing: f64,
+    /// Of the samples given those that no figure counts, by their numbers, ascending: unusable ones and outliers.
+    pub left_out: Vec<u32>,
     /// Leaves in a fixed order.
     pub leaves: Vec<Leaf>,
     /// Of a cloud that came without normals.

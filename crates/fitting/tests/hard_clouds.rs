@@ -79,6 +79,30 @@ fn dense_noise_is_averaged_in_cells_no_larger_than_itself() {
     assert!(pieces.iter().all(|p| p.cells.len() <= 1), "{}", pieces.len());
 }
 
+/// Where a patch of normals leans away from its middle, the fit continues it as a tube, to the corner of the box if nothing
+/// ends it.
+#[test]
+fn leaning_normals_grow_no_horn() {
+    let options = CloudOptions {
+        count: 3000,
+        ..CloudOptions::default()
+    };
+    let mut samples = cloud(Solid::Sphere, &options);
+    let middle = DVec3::ONE.normalize();
+    for n in &mut samples.normals {
+        if n.dot(middle) > 25f64.to_radians().cos() {
+            *n = (*n - 1.2 * n.dot(middle) * middle).normalize();
+        }
+    }
+    let (field, report) = fit::<f32>(&samples, &PointOptions::default()).expect("a ball");
+    assert!(says(&report, "turned over"), "{:?}", report.notes);
+    // Half a radius of the patch and a cell or two are left of it; it went on to 1.98.
+    for i in 0..10 {
+        let at = middle * (1.7 + 0.03 * f64::from(i));
+        assert!(field.value(at) < 0.0, "solid at {at}");
+    }
+}
+
 #[test]
 fn outliers_over_the_whole_box_leave_no_trace_in_a_robust_fit() {
     let truth = Solid::Torus.field();

@@ -2,11 +2,14 @@
 
 mod common;
 
+use std::collections::BTreeSet;
+use std::sync::{Arc, Mutex};
+
 use bspline::Field;
 use common::{cloud, fit, oriented, to_depth};
-use fitting::phantoms::{CloudOptions, SampledCloud, Solid};
-use fitting::points::{PointOptions, fit_points};
-use fitting::{Control, FitError, StopReason};
+use fitting::phantoms::{CloudOptions, SampledCloud, Solid, SplitMix64};
+use fitting::points::{LEAST_COEFFICIENTS, PointOptions, fit_points};
+use fitting::{Cancel, Control, FitError, StopReason};
 use glam::DVec3;
 
 /// A ball of 4000 points in which something is wrong.
@@ -185,14 +188,158 @@ fn a_memory_ceiling_stops_the_refinement_or_refuses() {
     assert!(matches!(under(1 << 20), Err(FitError::MemoryLimit { .. })));
 }
 
+/// Budgets just above the least, between levels and on them: never exceeded, and mostly used.
 #[test]
-fn a_budget_of_coefficients_stops_the_refinement() {
-    let samples = cloud(Solid::Torus, &CloudOptions::default());
-    let options = PointOptions {
-        coefficients: Some(60_000),
-        tolerance: Some(1e-7),
-        ..PointOptions::default()
+fn a_budget_of_coefficients_is_kept_and_spent() {
+    let all = [
+        (Solid::Torus, 0.0, &[LEAST_COEFFICIENTS, 43_000, 60_000][..]),
+        (Solid::Gyroid, 0.02, &[47_123]),
+    ];
+    for (solid, noise, budgets) in all {
+        let options = CloudOptions {
+            noise,
+            count: 6000,
+            ..CloudOptions::default()
+        };
+        let samples = cloud(solid, &options);
+        for &budget in budgets {
+            let options = PointOptions {
+                coefficients: Some(budget),
+                tolerance: Some(1e-7),
+                ..PointOptions::default()
+            };
+            let (field, report) = fit::<f32>(&samples, &options).expect("a budget above the least");
+            assert_eq!(field.coefficient_count(), report.coefficients);
+            assert!(
+                report.coefficients <= budget,
+                "{} of {budget}",
+                report.coefficients
+            );
+            if report.leaves.iter().any(|l| l.reason == StopReason::Budget) {
+                assert!(
+                    report.coefficients + 64 > budget,
+                    "only {} of {budget}",
+                    report.coefficients
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn limits_below_the_first_grid_are_refused_by_name() {
+    let samples = spoiled(|_| ());
+    for (name, options) in [
+        (
+            "coefficients",
+            PointOptions {
+                coefficients: Some(LEAST_COEFFICIENTS - 1),
+                ..PointOptions::default()
+            },
+        ),
+        ("max_depth", to_depth(5)),
+        ("max_depth", to_depth(17)),
+    ] {
+        let error = fit::<f32>(&samples, &options).expect_err("out of range");
+        assert!(
+            matches!(error, FitError::Option { option, .. } if option == name),
+            "{error:?}"
+        );
+        let least = if name == "coefficients" {
+            "42875"
+        } else {
+            "from 6 to 16"
+        };
+        assert!(error.to_string().contains(least), "{error}");
+    }
+    assert_eq!(LEAST_COEFFICIENTS, 42_875);
+}
+
+/// The flag is looked at in every stage, also in the fits inside of others, which show no progress of their own.
+#[test]
+fn a_cancel_is_heard_in_every_stage() {
+    let samples = cloud(
+        Solid::Cup,
+        &CloudOptions {
+            count: 6000,
+            noise: 0.02,
+            ..CloudOptions::default()
+        },
+    );
+    for robust in [false, true] {
+        let options = PointOptions {
+            robust,
+            ..PointOptions::default()
+        };
+        let stages = Arc::new(Mutex::new(BTreeSet::new()));
+        let seen = Arc::clone(&stages);
+        let mut control = Control {
+            on_progress: Box::new(move |p| {
+                seen.lock().unwrap().insert(p.stage);
+            }),
+            ..Control::default()
+        };
+        fit_points::<f32>(&oriented(&samples), &options, &mut control).expect("nobody cancels");
+        let stages: Vec<&str> = stages.lock().unwrap().iter().copied().collect();
+        assert!(stages.contains(&"choosing the smoothing"), "{stages:?}");
+        for stage in stages {
+            let cancel = Cancel::new();
+            let (flag, after) = (cancel.clone(), Arc::new(Mutex::new(0)));
+            let steps = Arc::clone(&after);
+            let mut control = Control {
+                on_progress: Box::new(move |p| {
+                    if p.stage == stage {
+                        flag.cancel();
+                    }
+                    if flag.is_cancelled() {
+                        *steps.lock().unwrap() += 1;
+                    }
+                }),
+                cancel,
+                memory_limit: None,
+            };
+            let outcome = fit_points::<f32>(&oriented(&samples), &options, &mut control);
+            if stage != "measuring" {
+                assert_eq!(outcome.err(), Some(FitError::Cancelled), "{stage}");
+            }
+            assert_eq!(*after.lock().unwrap(), 1, "{stage}: the work went on");
+        }
+    }
+}
+
+/// A robust fit of points that no neighbour speaks for ends with all of them, and says so.
+#[test]
+fn a_robust_fit_survives_points_that_all_contradict_each_other() {
+    let golden = (1.0 + 5f64.sqrt()) / 2.0;
+    let corner = |i: usize| {
+        let (a, b) = ([1.0, -1.0][i & 1], golden * [1.0, -1.0][i >> 1 & 1]);
+        [
+            DVec3::new(0.0, a, b),
+            DVec3::new(a, b, 0.0),
+            DVec3::new(b, 0.0, a),
+        ][i / 4]
     };
-    let (_, report) = fit::<f32>(&samples, &options).expect("a clean cloud");
-    assert!(report.leaves.iter().any(|l| l.reason == StopReason::Budget));
+    let icosahedron: Vec<DVec3> = (0..12).map(corner).collect();
+    let mut random = SplitMix64::new(3);
+    let dust: Vec<DVec3> = (0..3000).map(|_| random.uniform3()).collect();
+    let mut anyhow = |n: usize| (0..n).map(|_| random.normal3()).collect::<Vec<_>>();
+    let clouds = [
+        (icosahedron.clone(), icosahedron.clone()),
+        (icosahedron, anyhow(12)),
+        (dust, anyhow(3000)),
+    ];
+    for (positions, normals) in clouds {
+        let samples = SampledCloud {
+            positions,
+            normals,
+            holes: Vec::new(),
+        };
+        let options = PointOptions {
+            robust: true,
+            ..to_depth(6)
+        };
+        let (field, report) = fit::<f32>(&samples, &options).expect("weights that stay");
+        assert!(field.value(DVec3::splat(0.4)).is_finite() && report.rms.is_finite());
+        assert!(report.used_count >= 10, "{}", report.used_count);
+    }
 }

@@ -330,6 +330,46 @@ fn thread_count_does_not_change_a_bit() {
     }
 }
 
+/// To a tolerance, too, smoothing costs no coefficients: what it takes away is not asked for again.
+#[test]
+fn smoothing_of_a_fit_to_a_tolerance_takes_coefficients_away() {
+    let dims = [40, 40, 40];
+    for seed in 0..4 {
+        let values = head(dims, 0.05, seed);
+        let mut last = (usize::MAX, f64::INFINITY, 0.0);
+        for smoothing in [None, Some(0.1), Some(0.5), Some(2.0)] {
+            let options = VolumeOptions {
+                tolerance: Some(0.03),
+                smoothing,
+                ..Default::default()
+            };
+            let (field, report) = fit::<f32>(dims, &values, options).unwrap();
+            // Differences of second order between voxels, of the field as it is evaluated.
+            let bend: f64 = (1..dims[0] - 1)
+                .flat_map(|x| (0..dims[1]).map(move |y| (x, y)))
+                .map(|(x, y)| {
+                    let at = |x: usize| {
+                        field.value(oblique().transform_point3(DVec3::new(x as f64, y as f64, 20.0)))
+                    };
+                    (at(x - 1) - 2.0 * at(x) + at(x + 1)).powi(2)
+                })
+                .sum();
+            let now = (report.coefficients, bend, report.rms);
+            assert!(
+                now.0 < last.0 && now.1 < last.1 && now.2 > last.2,
+                "seed {seed}, {smoothing:?}: {now:?} after {last:?}"
+            );
+            let over = report.leaves.iter().filter(|l| f64::from(l.rms) > 0.03);
+            assert!(over.clone().all(|l| l.reason == StopReason::Smoothing));
+            assert_eq!(
+                over.count() > 0,
+                report.notes.iter().any(|n| n.contains("above the tolerance"))
+            );
+            last = now;
+        }
+    }
+}
+
 #[test]
 fn smoothing_shrinks_detail() {
     let dims = [40, 40, 40];

@@ -2,17 +2,70 @@
 //!
 //! The bytes go to a temporary file in the directory of the target, are brought to the disk, and take the
 //! target's name in one step. Whatever fails before that step (a full disk at any byte, an error of the writer, a
-//! panic) leaves the old file as it was and removes the temporary one. Only a kill or a power cut can leave a
-//! temporary file `.NAME.*.tmp` behind; the old file survives these too.
+//! panic) leaves the old file as it was and removes the temporary one, and so does [`abandon`]. Only a kill or a power
+//! cut can leave a temporary file `.NAME.*.tmp` behind; the old file survives these too.
 
 use std::fs::{self, File, OpenOptions, Permissions};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use tempfile::TempPath;
 
 use crate::{Fault, FormatError};
 
 /// Bytes gathered before they go to the system.
 const BUFFER: usize = 1 << 17;
+
+/// Temporary files that have not taken their target's name yet.
+static UNDER_WAY: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+fn under_way() -> MutexGuard<'static, Vec<PathBuf>> {
+    UNDER_WAY.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes the temporary files of all writes under way, on any thread, and lets none begin or end any more: for a
+/// program that is about to exit. A write that has ended stays whole; one that meets this call waits for ever.
+pub fn abandon() {
+    let files = under_way();
+    for file in files.iter() {
+        // Whoever exits can do no more about a file that stays.
+        let _ = fs::remove_file(file);
+    }
+    std::mem::forget(files);
+}
+
+/// A temporary file on the list, off it and gone when dropped.
+struct Temporary {
+    /// `None` once it has its target's name.
+    path: Option<TempPath>,
+}
+
+impl Temporary {
+    fn new(target: &Path, old: Option<Permissions>) -> io::Result<(File, Self)> {
+        let mut files = under_way();
+        let (file, path) = temporary_in(target, old)?.into_parts();
+        files.push(path.to_path_buf());
+        Ok((file, Self { path: Some(path) }))
+    }
+
+    fn persist(mut self, target: &Path) -> io::Result<()> {
+        let Some(path) = self.path.take() else {
+            return Ok(());
+        };
+        let mut files = under_way();
+        files.retain(|f| **f != *path);
+        path.persist(target).map_err(|e| e.error)
+    }
+}
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        if let Some(path) = self.path.take() {
+            under_way().retain(|f| **f != *path);
+        }
+    }
+}
 
 /// Writes `path` through `body`.
 ///
@@ -46,14 +99,12 @@ pub(crate) fn replace_through<W: Write>(
         }
         _ => {}
     }
-    let temporary =
-        temporary_in(&target, old.map(|m| m.permissions())).map_err(fail("creating the output"))?;
-    let (file, name) = temporary.into_parts();
+    let (file, temporary) =
+        Temporary::new(&target, old.map(|m| m.permissions())).map_err(fail("creating the output"))?;
     let sync = file.try_clone().map_err(fail("creating the output"))?;
     write_all(through(file), body).map_err(fail("writing"))?;
     sync.sync_all().map_err(fail("writing"))?;
-    name.persist(&target)
-        .map_err(|e| fail("renaming the output")(e.error))?;
+    temporary.persist(&target).map_err(fail("renaming the output"))?;
     // The rename itself reaches the disk with its directory; where that cannot be asked for, it comes later.
     if let Ok(directory) = File::open(directory_of(&target)) {
         let _ = directory.sync_all();

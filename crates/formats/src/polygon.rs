@@ -9,6 +9,10 @@ use glam::{DVec2, DVec3};
 /// polygon of 500 corners, half of them reflex, needs some 130.
 const TESTS_PER_CORNER: usize = 1000;
 
+/// What cutting a polygon holds for each of its corners, lists that have doubled included.
+pub(crate) const BYTES_PER_CORNER: usize =
+    2 * size_of::<DVec2>() + 2 * size_of::<[u32; 2]>() + 2 * size_of::<[u32; 3]>() + size_of::<u32>() * 2;
+
 /// Cuts polygons, with its scratch space.
 #[derive(Debug, Default)]
 pub(crate) struct Cutter {

@@ -48,6 +48,8 @@ pub(crate) struct Faces {
     pub triangles: Counted<[u32; 3]>,
     /// First triangle of each face of more than three corners, and how many it has.
     polygons: Counted<(u32, u32)>,
+    /// Corners of the longest face so far: what cutting it will hold is booked.
+    longest: usize,
     pub count: usize,
     pub short: usize,
 }
@@ -57,6 +59,7 @@ impl Faces {
         Self {
             triangles: Counted::new("triangles of the faces"),
             polygons: Counted::new("polygons"),
+            longest: 3,
             count: 0,
             short: 0,
         }
@@ -80,6 +83,10 @@ impl Faces {
                 });
             };
             self.polygons.push((first, triangles), budget)?;
+            if let Some(more) = corners.len().checked_sub(self.longest) {
+                budget.reserve("the corners of a face", more as u64, polygon::BYTES_PER_CORNER)?;
+                self.longest = corners.len();
+            }
         }
         let mut fan = [0; 3];
         for (i, corner) in corners.enumerate() {

@@ -41,7 +41,7 @@ const ROW: i32 = 24;
 /// Points lower than this share of the highest press all others together.
 pub const DEPTH: f64 = 1e-5;
 
-/// Colours that the colour-blind tell apart (Okabe & Ito 2008).
+/// Colours that the colour-blind tell apart \[Okabe08\].
 const COLORS: [RGBColor; 8] = [
     RGBColor(0, 114, 178),
     RGBColor(230, 120, 0),

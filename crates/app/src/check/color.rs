@@ -1,4 +1,4 @@
-/// Colour of `t` in `[0, 1]` on the scale viridis (Smith & van der Walt 2015), from nine of its entries.
+/// Colour of `t` in `[0, 1]` on the scale viridis \[Smith15\], from nine of its entries.
 pub fn viridis(t: f64) -> [u8; 3] {
     const STOPS: [[f64; 3]; 9] = [
         [68.0, 1.0, 84.0],

@@ -1,4 +1,4 @@
-//! Errors of a field measured again, without anything the fit knew of itself.
+//! Errors of a field measured again from the field and the input alone, by the definitions that the fit goes by.
 
 mod against_mesh;
 mod boxes;
@@ -10,6 +10,5 @@ mod residual;
 pub use against_mesh::{AgainstMesh, against_mesh};
 pub use boxes::write_boxes;
 pub use color::viridis;
-pub use leaves::{LeafAudit, LeafIndex, audit_leaves};
-pub use projection::project_points;
+pub use leaves::{LeafAudit, audit_leaves, centers, corners};
 pub use residual::{ErrorStatistics, voxel_residuals};

@@ -1,12 +1,13 @@
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use fitting::{Cancel, FitError};
 
+use super::charts::publish;
 use super::cost::cpu_seconds;
 use super::failure::{Failure, OrFail, Outcome};
-use super::input::writing;
 use super::progress::Bar;
+use super::staged::StagedFiles;
 use crate::charts::{Chart, DynamicsError, Extent, Line, Run, cost, sampling, sweep};
 
 /// Arguments of `isoclay charts dynamics`.
@@ -15,22 +16,20 @@ pub struct Args {
     /// Directory for the charts dynamics-NAME.svg; made if missing
     #[arg(short, long, value_name = "DIR", default_value = "docs/charts")]
     output: PathBuf,
-    /// Small patches alone, in seconds
+    /// Small patches only: takes seconds
     #[arg(long, conflicts_with = "all")]
     quick: bool,
     /// All sizes up to 32 coefficients an axis, all patterns, contrasts and steps: takes hours
     #[arg(long)]
     all: bool,
-    /// Print one JSON object a configuration
+    /// Print one JSON object for each configuration
     #[arg(long)]
-    json: bool,
+    pub json: bool,
 }
 
 /// Measures steps, sampling and cost, and draws them.
 pub fn run(args: &Args, cancel: &Cancel) -> Outcome {
-    std::fs::create_dir_all(&args.output)
-        .map_err(|e| anyhow::anyhow!("-o {}: cannot be made ({e})", args.output.display()))
-        .or_limit()?;
+    let mut staged = StagedFiles::new("-o", &args.output)?;
     let extent = match (args.quick, args.all) {
         (true, _) => Extent::Quick,
         (_, true) => Extent::All,
@@ -66,22 +65,10 @@ pub fn run(args: &Args, cancel: &Cancel) -> Outcome {
     charts.extend(Chart::of_sampling(&profiles));
     charts.push(("cost".into(), Chart::of_cost(&costs)));
     for (name, chart) in charts {
-        write(
-            &chart,
-            &args.output.join(format!("dynamics-{name}.svg")),
-            args.json,
-        )?;
+        let svg = chart.svg().map_err(Failure::limit)?;
+        staged.write_text(&format!("dynamics-{name}.svg"), &svg)?;
     }
-    Ok(())
-}
-
-fn write(chart: &Chart, target: &Path, quiet: bool) -> Outcome {
-    let svg = chart.svg().map_err(Failure::limit)?;
-    formats::atomic::replace(target, |out| out.write_all(svg.as_bytes())).map_err(writing)?;
-    if !quiet {
-        writeln!(io::stdout().lock(), "written  {}", target.display()).or_limit()?;
-    }
-    Ok(())
+    publish(staged, args.json)
 }
 
 fn failed(e: DynamicsError) -> Failure {

@@ -8,8 +8,9 @@ use glam::DVec3;
 
 use super::cost::cpu_seconds;
 use super::failure::{Failure, OrFail, Outcome};
-use super::input::{reading, writing};
 use super::interrupt;
+use super::source::{POINTS, Source};
+use super::staged::StagedFiles;
 use crate::charts::{Chart, Oriented};
 
 /// Arguments of `isoclay charts orient`.
@@ -27,9 +28,7 @@ pub struct Args {
 
 /// Orients every cloud on both routes, prints a line of CSV each, and draws them and what was measured before.
 pub fn run(args: &Args, cancel: &Cancel) -> Outcome {
-    std::fs::create_dir_all(&args.output)
-        .map_err(|e| anyhow::anyhow!("-o {}: cannot be made ({e})", args.output.display()))
-        .or_limit()?;
+    let mut staged = StagedFiles::new("-o", &args.output)?;
     let mut runs = Vec::new();
     if !args.inputs.is_empty() {
         writeln!(io::stdout().lock(), "{}", Oriented::COLUMNS).or_limit()?;
@@ -43,17 +42,18 @@ pub fn run(args: &Args, cancel: &Cancel) -> Outcome {
         }
     }
     for path in &args.measured {
-        let bad = |e: String| Failure::input(format!("{}: {e}", path.display()));
-        let text = std::fs::read_to_string(path).map_err(|e| bad(e.to_string()))?;
+        let bad = |e: String| Failure::input(format!("--measured {}: {e}", path.display()));
+        let text = std::fs::read_to_string(path).map_err(|e| bad(format!("{e}; check the path")))?;
         runs.extend(Oriented::read_csv(&text).map_err(bad)?);
     }
     let svg = Chart::of_orientation(&runs).svg().map_err(Failure::limit)?;
-    let target = args.output.join("orient.svg");
-    formats::atomic::replace(&target, |out| out.write_all(svg.as_bytes())).map_err(writing)
+    staged.write_text("orient.svg", &svg)?;
+    staged.publish().map(drop)
 }
 
 fn measure(path: &Path, route: Route, cancel: &Cancel) -> Outcome<Oriented> {
-    let cloud = formats::points::read(path, &ReadLimits::default()).map_err(reading)?;
+    let source = Source::open(path, None, POINTS, cancel)?;
+    let cloud = formats::points::read(path, &ReadLimits::default()).map_err(|e| source.reading(e))?;
     let Some(truth) = &cloud.normals else {
         return Err(Failure::input(format!(
             "{}: has no normals to compare with; give a cloud with true ones",

@@ -3,15 +3,20 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use clap::ValueEnum;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use fitting::Cancel;
+use fitting::phantoms::Solid;
 use formats::Kind;
 use serde_json::{Map, Value};
 
 use super::failure::{Failure, OrFail, Outcome};
-use super::input::{reading, writing};
 use super::interrupt;
 use super::phantom::Name;
 use super::progress::Bar;
+use super::quantity::between;
+use super::source::{SAMPLES, Source};
+use super::staged::StagedFiles;
 use super::{chart_dynamics, chart_orient};
 use crate::charts::{Chart, Configuration, Input, Measurement, Scene, noise, outliers, sweeps};
 
@@ -26,7 +31,7 @@ pub struct Args {
 enum Subject {
     /// Error of fits against their time and memory, over tolerance, depth, smoothing and precision
     Fit(FitArgs),
-    /// Wrong normals of clouds without any against the time of their estimation
+    /// How many normals are estimated wrongly, against the time that their estimation takes
     Orient(chart_orient::Args),
     /// Error of a step's increment against its time, over solvers, laws, schemes and steps; sampling; cost by size
     Dynamics(chart_dynamics::Args),
@@ -36,12 +41,22 @@ enum Subject {
 
 #[derive(clap::Args)]
 struct HardArgs {
-    /// Phantom to spoil
-    #[arg(value_enum, default_value = "gyroid")]
-    solid: Name,
+    /// Phantom to add noise and outliers to
+    #[arg(default_value = "gyroid", value_parser = solids())]
+    solid: Solid,
     /// Directory for the charts noise-NAME.svg and outliers-NAME.svg; made if missing
     #[arg(short, long, value_name = "DIR", default_value = "docs/charts")]
     output: PathBuf,
+}
+
+/// Names of solids, as clouds are made of them.
+fn solids() -> impl TypedValueParser<Value = Solid> {
+    PossibleValuesParser::new(Solid::ALL.map(Solid::name)).try_map(|name| {
+        Solid::ALL
+            .into_iter()
+            .find(|s| s.name() == name)
+            .ok_or("no solid")
+    })
 }
 
 #[derive(clap::Args)]
@@ -54,17 +69,27 @@ struct FitArgs {
     #[arg(short, long, value_name = "DIR", default_value = "docs/charts")]
     output: PathBuf,
     /// Runs of each configuration, of which the median time is shown
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u8).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = between::<u8>(1, 255))]
     runs: u8,
-    /// Print one JSON object a configuration
+    /// Print one JSON object for each configuration
     #[arg(long)]
     json: bool,
 }
 
+impl Args {
+    /// Whether figures are printed as JSON.
+    pub fn json(&self) -> bool {
+        match &self.subject {
+            Subject::Fit(a) => a.json,
+            Subject::Dynamics(a) => a.json,
+            Subject::Orient(_) | Subject::Hard(_) => false,
+        }
+    }
+}
+
 /// Runs the sweeps and draws the charts.
 pub fn run(args: &Args) -> Outcome {
-    let cancel = Cancel::new();
-    interrupt::cancel_on_interrupt(&cancel)?;
+    let cancel = interrupt::cancel();
     match &args.subject {
         Subject::Fit(args) => fits(args, &cancel),
         Subject::Orient(args) => chart_orient::run(args, &cancel),
@@ -73,18 +98,20 @@ pub fn run(args: &Args) -> Outcome {
     }
 }
 
-fn make(directory: &Path) -> Outcome {
-    std::fs::create_dir_all(directory)
-        .map_err(|e| anyhow::anyhow!("-o {}: cannot be made ({e})", directory.display()))
-        .or_limit()
+/// Gives charts their names and tells them.
+pub fn publish(staged: StagedFiles, quiet: bool) -> Outcome {
+    for path in staged.publish()? {
+        if !quiet {
+            writeln!(io::stdout().lock(), "written  {}", path.display()).or_limit()?;
+        }
+    }
+    Ok(())
 }
 
 /// Draws what noise and outliers do to a phantom.
 fn hard(args: &HardArgs, cancel: &Cancel) -> Outcome {
-    make(&args.output)?;
-    let Name::Solid(solid) = args.solid else {
-        return Err(Failure::usage("charts hard: the head is a volume; name a solid"));
-    };
+    let mut staged = StagedFiles::new("-o", &args.output)?;
+    let solid = args.solid;
     let scene = Scene::new(solid).ok_or_else(|| Failure::input("the phantom has no surface"))?;
     let bar = Bar::new();
     let show = |fraction| bar.show("fitting", fraction);
@@ -94,18 +121,16 @@ fn hard(args: &HardArgs, cancel: &Cancel) -> Outcome {
     ] {
         interrupt::check(cancel)?;
         let svg = chart?.svg().map_err(Failure::limit)?;
-        let target = args.output.join(format!("{kind}-{}.svg", solid.name()));
-        formats::atomic::replace(&target, |out| out.write_all(svg.as_bytes())).map_err(writing)?;
+        staged.write_text(&format!("{kind}-{}.svg", solid.name()), &svg)?;
         bar.clear();
-        writeln!(io::stdout().lock(), "written  {}", target.display()).or_limit()?;
     }
-    Ok(())
+    publish(staged, false)
 }
 
 fn fits(args: &FitArgs, cancel: &Cancel) -> Outcome {
-    make(&args.output)?;
     let scratch = tempfile::tempdir().or_limit()?;
     for input in &args.inputs {
+        let mut staged = StagedFiles::new("-o", &args.output)?;
         let subject = match input.strip_prefix("phantom:") {
             Some(phantom) => Prepared::phantom(phantom, scratch.path())?,
             None => Prepared::file(Path::new(input))?,
@@ -140,12 +165,9 @@ fn fits(args: &FitArgs, cancel: &Cancel) -> Outcome {
             let title = format!("{}: {}", subject.name, subject.title);
             let chart = Chart::of_fit(title, x_title, key, unit, subject.y_title.clone(), &measured);
             let svg = chart.svg().map_err(Failure::limit)?;
-            let target = args.output.join(format!("fit-{}-{suffix}.svg", subject.name));
-            formats::atomic::replace(&target, |out| out.write_all(svg.as_bytes())).map_err(writing)?;
-            if !args.json {
-                writeln!(io::stdout().lock(), "written  {}", target.display()).or_limit()?;
-            }
+            staged.write_text(&format!("fit-{}-{suffix}.svg", subject.name), &svg)?;
         }
+        publish(staged, args.json)?;
     }
     Ok(())
 }
@@ -167,6 +189,17 @@ impl Prepared {
             .split_once(':')
             .map_or((phantom, None), |(name, noise)| (name, Some(noise)));
         let (fitted, measured) = (scratch.join("fitted.ply"), scratch.join("measured.ply"));
+        if Name::from_str(name, false).is_err() {
+            let names: Vec<String> = Name::value_variants()
+                .iter()
+                .filter_map(|n| Some(n.to_possible_value()?.get_name().to_string()))
+                .filter(|n| n != "head")
+                .collect();
+            return Err(Failure::usage(format!(
+                "phantom:{phantom}: is no phantom; write phantom:NAME or phantom:NAME:NOISE, NAME one of {}",
+                names.join(", ")
+            )));
+        }
         let make = |path: &Path, options: &[&str]| {
             let fixed = [name, "--count", "50000", "-o"].map(OsString::from).into_iter();
             ask(
@@ -200,7 +233,9 @@ impl Prepared {
             .map(|n| n.to_string_lossy().into_owned())
             .unwrap_or_default();
         let name = file.split('.').next().unwrap_or("input").to_string();
-        if let Kind::Volume(_) = formats::detect(path).map_err(reading)? {
+        let source = Source::open(path, None, SAMPLES, &Cancel::new())?;
+        let kind = formats::detect(path).map_err(|e| source.reading(e))?;
+        if let Kind::Volume(_) = kind {
             return Ok(Self {
                 kind: Input::Volume,
                 name,

@@ -1,52 +1,63 @@
 use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use fitting::mesh::MeshDistance;
-use fitting::{Cancel, StopReason, UnsupportedComponent, unsupported_components};
-use formats::field::SourceKind;
+use fitting::points::measure_points;
+use fitting::volume::VolumeView;
+use fitting::{LeafIndex, StopReason, UnsupportedComponent, unsupported_components};
+use formats::field::{AnyField, SourceKind};
 use formats::meshes::TriangleMesh;
-use formats::points::PointCloud;
 use formats::volumes::Volume;
 use glam::DVec3;
 use serde_json::json;
 
 use super::cost::Cost;
-use super::failure::{Failure, OrFail, Outcome};
-use super::field::OpenField;
-use super::input::{self, Input, Shape, writing};
+use super::failure::{Failure, Outcome};
+use super::field::{OpenField, either};
+use super::input::{self, Input, Shape};
+use super::quantity::{human_number, threads};
 use super::sample::voxel_frame;
+use super::source::{FIELDS, SAMPLES, Source, input_formats};
+use super::staged::StagedFiles;
 use super::summary::Summary;
 use super::volume_choice::VolumeChoice;
-use super::{interrupt, set_threads};
+use super::{belongs, interrupt, set_threads};
 use crate::check::{
-    AgainstMesh, ErrorStatistics, LeafAudit, LeafIndex, against_mesh, audit_leaves, project_points, viridis,
+    AgainstMesh, ErrorStatistics, LeafAudit, against_mesh, audit_leaves, centers, corners, viridis,
     voxel_residuals, write_boxes,
 };
 
 /// Arguments of `isoclay check`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Field (.iclay)
+    /// Field (.iclay); - reads standard input
     field: PathBuf,
-    /// What it was fitted to
+    /// What it was fitted to; - reads standard input
     input: PathBuf,
     /// What to take a file with faces for [default: cloud for PLY and OBJ, mesh for files that hold nothing else]
     #[arg(long = "as", value_enum, value_name = "KIND")]
     shape: Option<Shape>,
+    /// Measure also what the field was not fitted to
+    #[arg(long)]
+    anyway: bool,
+    /// Format of the input where neither its content nor its name tells it
+    #[arg(long, value_name = "FORMAT", value_parser = input_formats())]
+    format: Option<String>,
     /// Directory for error.ply, octree.ply and report.json; made if missing
     #[arg(short, long, value_name = "REPORT_DIR")]
     output: Option<PathBuf>,
     /// Threads to work with [default: all cores]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = threads)]
     threads: Option<NonZeroUsize>,
     /// Print one JSON object instead of a table
     #[arg(long)]
-    json: bool,
+    pub json: bool,
     #[command(flatten)]
     volume: VolumeChoice,
 }
 
 /// Samples with their errors, and what their leaves make of them.
+#[derive(Default)]
 struct Measured {
     /// Where samples lie; of a volume, those of the worst voxels.
     positions: Vec<DVec3>,
@@ -54,7 +65,11 @@ struct Measured {
     errors: Vec<f64>,
     statistics: ErrorStatistics,
     audit: LeafAudit,
+    /// Samples given, and those that count.
     count: usize,
+    used: usize,
+    /// Sound bound on all errors, where one was measured.
+    bound: Option<f64>,
     unprojected: Option<usize>,
     /// Pieces of the solid or of its complement without a sample, larger than a cell.
     unsupported: Vec<UnsupportedComponent>,
@@ -67,31 +82,37 @@ struct Measured {
 pub fn run(args: &Args) -> Outcome {
     let cost = Cost::start();
     set_threads(args.threads)?;
-    let cancel = Cancel::new();
-    interrupt::cancel_on_interrupt(&cancel)?;
-    if let Some(d) = args.output.as_ref().filter(|d| d.exists() && !d.is_dir()) {
-        return Err(Failure::usage(format!(
-            "-o {}: is no directory; name another",
-            d.display()
-        )));
-    }
-    let open = OpenField::load(&args.field)?;
+    let cancel = interrupt::cancel();
+    let report = (args.output.as_ref())
+        .map(|directory| StagedFiles::new("-o", directory))
+        .transpose()?;
+    let field = Source::open(&args.field, None, FIELDS, &cancel)?;
+    let source = Source::open(&args.input, args.format.as_deref(), SAMPLES, &cancel)?;
+    let open = OpenField::load(&field)?;
     let leaves = &open.report().leaves;
-    let index = LeafIndex::new(open.lattice(), leaves);
-    let measured = match input::read(&args.input, args.shape, &args.volume.options(None)?, None)? {
-        Input::Cloud(cloud) => measure_cloud(&open, &index, &cloud),
-        Input::Mesh(mesh) => measure_mesh(&open, &index, &mesh)?,
-        Input::Volume(volume) => measure_volume(&open, &index, &volume),
+    let input = input::read(&source, args.shape, &args.volume, None, None)?;
+    let own = belongs::check(&open, field.name(), &input, source.name());
+    let is_own = own.is_ok();
+    if !args.anyway {
+        own?;
+    }
+    let measured = match &input {
+        Input::Cloud(cloud) => {
+            let left_out = if is_own { &open.report().left_out[..] } else { &[] };
+            measure_cloud(&open, &cloud.positions, left_out)
+        }
+        Input::Mesh(mesh) => measure_mesh(&open, mesh)?,
+        Input::Volume(volume) => measure_volume(&open, volume, args.output.is_some())?,
     };
     interrupt::check(&cancel)?;
     if measured.count == 0 {
         return Err(Failure::input(format!(
             "{}: there is no sample to measure at",
-            args.input.display()
+            source.name()
         )));
     }
-    if let Some(directory) = &args.output {
-        write_report(directory, args, &open, &index, &measured)?;
+    if let Some(staged) = report {
+        write_report(staged, [field.name(), source.name()], &open, &measured)?;
     }
     let (s, audit) = (&measured.statistics, &measured.audit);
     // An interpolating fit aims at none.
@@ -116,9 +137,9 @@ pub fn run(args: &Args) -> Outcome {
             "cavity"
         };
         format!(
-            "a {what} of {} cells of 1/{COMPONENT_CELLS} round {} holds no sample",
+            "a {what} of {} cells (of {COMPONENT_CELLS} along the box) around ({}) holds no sample",
             c.cells.len(),
-            c.at
+            c.at.to_array().map(human_number).join(", ")
         )
     }));
     Summary {
@@ -130,6 +151,8 @@ pub fn run(args: &Args) -> Outcome {
         rms: Some(s.rms),
         p95: Some(s.p95),
         max: Some(s.max),
+        used_count: Some(measured.used),
+        bound: measured.bound,
         unprojected: measured.unprojected,
         back_p95: measured.against_mesh.as_ref().map(|m| m.back.p95),
         back_max: measured.against_mesh.as_ref().map(|m| m.back.max),
@@ -147,52 +170,58 @@ pub fn run(args: &Args) -> Outcome {
     .print(args.json)
 }
 
-fn measure_cloud(open: &OpenField, index: &LeafIndex, cloud: &PointCloud) -> Measured {
-    // A point without a usable normal took no part in the fit; it is measured all the same.
-    let spacing = open.lattice().spacing(open.level_count() - 1).min_element();
-    let projected = project_points(open.field(), &cloud.positions, spacing);
-    let errors: Vec<f64> = projected.iter().map(|p| p.distance).collect();
-    let lattice_from_world = open.lattice().world_from_lattice.inverse();
-    let samples = cloud
-        .positions
-        .iter()
-        .map(|&p| lattice_from_world.transform_point3(p))
-        .zip(errors.iter().copied());
-    let audit = audit_leaves(index, samples, open.report().tolerance);
+/// Measures all points but those `left_out`, which no figure of the fit counts either.
+fn measure_cloud(open: &OpenField, positions: &[DVec3], left_out: &[u32]) -> Measured {
+    let leaves = &open.report().leaves;
+    let index = LeafIndex::new(open.lattice(), leaves);
+    let mut counts = vec![true; positions.len()];
+    for &i in left_out {
+        if let Some(slot) = counts.get_mut(i as usize) {
+            *slot = false;
+        }
+    }
+    let in_leaf = |i: usize| index.find(positions[i]);
+    let errors = either!(&open.loaded().field, f => measure_points(f, positions, |i| counts[i], in_leaf, leaves.len()));
+    let of_leaves = errors.leaves.iter().map(|l| (l.count, l.rms));
+    let audit = audit_leaves(leaves, of_leaves, open.report().tolerance);
+    let counted = (0..positions.len()).filter(|&i| counts[i]);
+    let (positions, distances): (Vec<DVec3>, Vec<f64>) =
+        counted.map(|i| (positions[i], errors.distances[i])).unzip();
     Measured {
-        statistics: ErrorStatistics::of(&mut errors.clone()),
+        statistics: ErrorStatistics {
+            rms: errors.rms,
+            p95: errors.p95,
+            max: errors.max,
+            ..ErrorStatistics::of(&mut distances.clone())
+        },
         audit,
-        count: errors.len(),
-        unprojected: Some(projected.iter().filter(|p| !p.converged).count()),
-        unsupported: unsupported(open, &cloud.positions),
+        count: counts.len(),
+        used: errors.count,
+        bound: Some(errors.bound),
+        unprojected: Some(errors.unprojected),
+        unsupported: unsupported(open, &positions),
         against_mesh: None,
         unit: open.unit().to_string(),
-        positions: cloud.positions.clone(),
-        errors,
+        positions,
+        errors: distances,
     }
 }
 
 /// Points of the mesh that are measured.
 const MESH_SAMPLES: usize = 100_000;
 
-fn measure_mesh(open: &OpenField, index: &LeafIndex, mesh: &TriangleMesh) -> Outcome<Measured> {
+fn measure_mesh(open: &OpenField, mesh: &TriangleMesh) -> Outcome<Measured> {
     let (solid, _) = MeshDistance::new(&mesh.vertices, &mesh.triangles)?;
-    let positions = solid.surface_samples(MESH_SAMPLES);
-    let cloud = PointCloud {
-        positions,
-        unit: mesh.unit,
-        ..Default::default()
-    };
     let spacing = open.lattice().spacing(open.level_count() - 1).min_element();
     Ok(Measured {
         against_mesh: Some(against_mesh(
             open.field(),
             &solid,
-            index.centers(),
+            centers(open.lattice(), &open.report().leaves),
             spacing,
             open.report().tolerance,
         )),
-        ..measure_cloud(open, index, &cloud)
+        ..measure_cloud(open, &solid.surface_samples(MESH_SAMPLES), &[])
     })
 }
 
@@ -216,17 +245,63 @@ fn unsupported(open: &OpenField, samples: &[DVec3]) -> Vec<UnsupportedComponent>
 /// Voxels shown in the error map of a volume: the worst ones.
 const SHOWN_VOXELS: usize = 200_000;
 
-fn measure_volume(open: &OpenField, index: &LeafIndex, volume: &Volume) -> Measured {
+/// Measures as the fit did, where the field stands on the grid of the volume; otherwise, and for `pictures`, the
+/// difference at each voxel.
+fn measure_volume(open: &OpenField, volume: &Volume, pictures: bool) -> Outcome<Measured> {
+    let header = &volume.header;
+    let view = VolumeView {
+        dims: header.dims,
+        values: &volume.values,
+        world_from_voxel: header.world_from_voxel,
+    };
+    let own = either!(&open.loaded().field, f => fitting::volume::measure_volume(f, &view))?;
+    let mut measured = if own.is_none() || pictures {
+        measure_voxels(open, volume)
+    } else {
+        Measured {
+            count: volume.values.len(),
+            used: volume.values.len(),
+            unit: "density".into(),
+            ..Default::default()
+        }
+    };
+    if let Some(own) = own {
+        measured.statistics = ErrorStatistics {
+            rms: own.rms,
+            p95: own.p95,
+            max: own.max,
+            ..measured.statistics
+        };
+        measured.bound = Some(own.bound);
+        let leaves = &open.report().leaves;
+        let of_leaves = leaves
+            .iter()
+            .zip(own.leaf_rms)
+            .map(|(l, rms)| (l.sample_count, rms));
+        measured.audit = audit_leaves(leaves, of_leaves, open.report().tolerance);
+    }
+    Ok(measured)
+}
+
+fn measure_voxels(open: &OpenField, volume: &Volume) -> Measured {
     let header = &volume.header;
     let errors = voxel_residuals(open.field(), &voxel_frame(header), header.dims, &volume.values);
     let [nx, ny, _] = header.dims;
     let lattice_from_voxel = open.lattice().world_from_lattice.inverse() * header.world_from_voxel;
     let voxel = |i: usize| DVec3::new((i % nx) as f64, (i / nx % ny) as f64, (i / nx / ny) as f64);
-    let samples = errors
+    let leaves = &open.report().leaves;
+    let index = LeafIndex::new(open.lattice(), leaves);
+    let mut sums = vec![(0u32, 0.0f64); leaves.len()];
+    for (i, error) in errors.iter().enumerate() {
+        if let Some(leaf) = index.find_on_lattice(lattice_from_voxel.transform_point3(voxel(i))) {
+            sums[leaf].0 += 1;
+            sums[leaf].1 += error * error;
+        }
+    }
+    let of_leaves = sums
         .iter()
-        .enumerate()
-        .map(|(i, &e)| (lattice_from_voxel.transform_point3(voxel(i)), e));
-    let audit = audit_leaves(index, samples, open.report().tolerance);
+        .map(|&(n, sum)| (n, (sum / f64::from(n.max(1))).sqrt()));
+    let audit = audit_leaves(leaves, of_leaves, open.report().tolerance);
     let mut worst: Vec<usize> = (0..errors.len()).collect();
     let kept = SHOWN_VOXELS.min(worst.len());
     if kept < worst.len() {
@@ -241,59 +316,45 @@ fn measure_volume(open: &OpenField, index: &LeafIndex, volume: &Volume) -> Measu
             .map(|&i| header.world_from_voxel.transform_point3(voxel(i)))
             .collect(),
         count: errors.len(),
-        unprojected: None,
-        unsupported: Vec::new(),
-        against_mesh: None,
+        used: errors.len(),
         unit: "density".into(),
         audit,
         errors: worst.iter().map(|&i| errors[i].abs()).collect(),
         statistics: ErrorStatistics::of(&mut errors.clone()),
+        ..Default::default()
     }
 }
 
 /// Writes the two pictures and the figures.
 fn write_report(
-    directory: &Path,
-    args: &Args,
+    mut staged: StagedFiles,
+    [field, input]: [&str; 2],
     open: &OpenField,
-    index: &LeafIndex,
     measured: &Measured,
 ) -> Outcome {
-    std::fs::create_dir_all(directory)
-        .map_err(|e| anyhow::anyhow!("-o {}: cannot be made ({e})", directory.display()))
-        .or_limit()?;
     let full_scale = measured.statistics.p99.max(f64::MIN_POSITIVE);
     let colors: Vec<[u8; 3]> = measured.errors.iter().map(|e| viridis(e / full_scale)).collect();
-    formats::meshes::save_points(
-        &directory.join("error.ply"),
-        &measured.positions,
-        None,
-        Some(&colors),
-    )
-    .map_err(writing)?;
+    staged.write("error.ply", |path| {
+        formats::meshes::save_points(path, &measured.positions, None, Some(&colors))
+    })?;
 
     let (report, audit) = (open.report(), &measured.audit);
     let finest = report.leaves.iter().map(|l| l.level).max().unwrap_or(0).max(1);
-    let boxes = report
-        .leaves
-        .iter()
-        .zip(&audit.rms)
-        .enumerate()
-        .filter_map(|(i, (leaf, &rms))| {
-            let refused = rms > report.tolerance && leaf.reason == StopReason::NoData;
-            let color = if refused {
-                [230, 0, 0]
-            } else {
-                viridis(f64::from(leaf.level) / f64::from(finest))
-            };
-            (leaf.sample_count > 0 || refused).then(|| (index.corners(i), color))
-        });
-    write_boxes(&directory.join("octree.ply"), boxes).map_err(writing)?;
+    let boxes = report.leaves.iter().zip(&audit.rms).filter_map(|(leaf, &rms)| {
+        let refused = rms > report.tolerance && leaf.reason == StopReason::NoData;
+        let color = if refused {
+            [230, 0, 0]
+        } else {
+            viridis(f64::from(leaf.level) / f64::from(finest))
+        };
+        (leaf.sample_count > 0 || refused).then(|| (corners(open.lattice(), leaf), color))
+    });
+    staged.write("octree.ply", |path| write_boxes(path, boxes))?;
 
     let text = json!({
-        "field": args.field.display().to_string(),
+        "field": field,
         "field_sha256": open.sha256(),
-        "input": args.input.display().to_string(),
+        "input": input,
         "samples": measured.count,
         "unit": measured.unit,
         "tolerance": report.tolerance,
@@ -309,9 +370,7 @@ fn write_report(
         "octree_ply": { "boxes": "edges of the leaves with samples, violet coarse to yellow fine; red: above the \
                                   tolerance and not split for lack of data" },
     });
-    formats::atomic::replace(&directory.join("report.json"), |out| {
-        serde_json::to_writer_pretty(&mut *out, &text)?;
-        out.write_all(b"\n")
-    })
-    .map_err(writing)
+    staged.write_text("report.json", &format!("{text:#}\n"))?;
+    staged.publish()?;
+    Ok(())
 }

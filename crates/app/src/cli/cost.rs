@@ -37,6 +37,11 @@ pub fn rss_bytes() -> Option<u64> {
     status_bytes("VmRSS:")
 }
 
+/// Writable memory of this process that the system has promised, resident or not; `None` where it does not tell.
+pub fn data_bytes() -> Option<u64> {
+    status_bytes("VmData:")
+}
+
 /// Reads one size line of `/proc/self/status`, which counts in KiB.
 fn status_bytes(name: &str) -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;

@@ -1,25 +1,31 @@
-use std::io::{self, Read, Write};
+use std::io::{self, Write};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
+use fitting::Cancel;
 use formats::points::PointCloud;
 use rayon::prelude::*;
 
 use super::failure::{Failure, OrFail, Outcome};
 use super::field::OpenField;
-use super::input::{limits, reading};
+use super::input::limits;
+use super::quantity::threads;
 use super::set_threads;
+use super::source::{FIELDS, POINTS, Source, point_formats};
 
 /// Arguments of `isoclay eval`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Field (.iclay)
+    /// Field (.iclay); - reads standard input
     field: PathBuf,
-    /// Points, one a line or as a cloud; - reads lines from standard input
+    /// Points: lines of x y z, or a point cloud; - reads standard input
     #[arg(long, value_name = "F")]
     points: PathBuf,
+    /// Format of the points where neither their content nor their name tells it [default for -: xyz]
+    #[arg(long, value_name = "FORMAT", value_parser = point_formats())]
+    format: Option<String>,
     /// Threads to work with [default: all cores]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = threads)]
     threads: Option<NonZeroUsize>,
 }
 
@@ -31,8 +37,12 @@ const PART: usize = 1 << 12;
 /// Prints `x,y,z,value,gx,gy,gz`, one line a point, in order.
 pub fn run(args: &Args) -> Outcome {
     set_threads(args.threads)?;
-    let open = OpenField::load(&args.field)?;
-    let cloud = read_points(&args.points)?;
+    let cancel = Cancel::new();
+    let open = OpenField::load(&Source::open(&args.field, None, FIELDS, &cancel)?)?;
+    // Lines of numbers are what people type.
+    let lines = (args.points == Path::new("-")).then_some("xyz");
+    let format = args.format.as_deref().or(lines);
+    let cloud = read_points(&Source::open(&args.points, format, POINTS, &cancel)?.under("--points"))?;
     let mut out = io::stdout().lock();
     out.write_all(b"x,y,z,value,gx,gy,gz\n").or_limit()?;
     for batch in cloud.positions.chunks(BATCH) {
@@ -61,26 +71,14 @@ pub fn run(args: &Args) -> Outcome {
     out.flush().or_limit()
 }
 
-/// All points of a file or of standard input; one that cannot be used is an error, since lines are counted.
-fn read_points(path: &Path) -> Outcome<PointCloud> {
-    let cloud = if path == Path::new("-") {
-        let mut bytes = Vec::new();
-        let ceiling = limits(None);
-        io::stdin()
-            .lock()
-            .take(ceiling.max_bytes)
-            .read_to_end(&mut bytes)
-            .or_input()?;
-        formats::points::parse_xyz(&bytes, &ceiling)
-            .map_err(|fault| Failure::input(format!("standard input: {fault}")))?
-    } else {
-        formats::points::read(path, &limits(None)).map_err(reading)?
-    };
+/// All points; one that cannot be used is an error, since lines are counted.
+fn read_points(source: &Source) -> Outcome<PointCloud> {
+    let cloud = formats::points::read(source.path(), &limits(None)).map_err(|e| source.reading(e))?;
     if cloud.positions.len() != cloud.file_count {
         return Err(Failure::input(format!(
             "{}: {} of {} points cannot be used (not finite, or corners of no face); give finite points without \
              faces, so that each line of the answer belongs to one point",
-            path.display(),
+            source.name(),
             cloud.file_count - cloud.positions.len(),
             cloud.file_count
         )));

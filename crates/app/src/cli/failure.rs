@@ -70,6 +70,12 @@ impl Failure {
             .any(|e| e.kind() == io::ErrorKind::BrokenPipe)
     }
 
+    /// One line of JSON: the exit code, the message, and the part of it that says what would help.
+    pub fn json(&self) -> String {
+        let message = self.to_string();
+        error_object(self.code(), &message, remedy(&message))
+    }
+
     /// Puts `subject` (a file, mostly) before the message.
     pub fn about(self, subject: impl fmt::Display) -> Self {
         Self {
@@ -84,6 +90,16 @@ impl fmt::Display for Failure {
         // The whole chain of contexts on one line.
         write!(f, "{:#}", self.error)
     }
+}
+
+/// An error as `--json` prints it.
+pub fn error_object(code: u8, message: &str, remedy: Option<&str>) -> String {
+    serde_json::json!({ "exit_code": code, "message": message, "remedy": remedy }).to_string()
+}
+
+/// What would help: messages have it behind their last semicolon.
+fn remedy(message: &str) -> Option<&str> {
+    message.rsplit_once("; ").map(|(_, remedy)| remedy)
 }
 
 /// Sorts an error under an exit code.
@@ -111,6 +127,15 @@ impl<T, E: Into<anyhow::Error>> OrFail<T> for Result<T, E> {
 
 impl From<FitError> for Failure {
     fn from(e: FitError) -> Self {
+        if let FitError::Option {
+            option,
+            value,
+            requirement,
+        } = e
+        {
+            let option = option.trim_start_matches("--").replace('_', "-");
+            return Self::usage(format!("--{option} {value}: {requirement}"));
+        }
         let cause = match e {
             FitError::Cancelled | FitError::MemoryLimit { .. } => Cause::Limit,
             FitError::NotEnoughSamples { .. } | FitError::Degenerate(_) => Cause::Input,
@@ -152,6 +177,16 @@ mod tests {
             .unwrap_err();
         assert!(e.about("standard output").is_broken_pipe());
         assert!(!Failure::input("broken pipe").is_broken_pipe());
+    }
+
+    #[test]
+    fn an_error_as_json_has_its_code_and_its_remedy() {
+        let object: serde_json::Value =
+            serde_json::from_str(&Failure::input("a.ply: is empty; was \"it\" copied?").json()).unwrap();
+        assert_eq!(object["exit_code"], 3);
+        assert_eq!(object["message"], "a.ply: is empty; was \"it\" copied?");
+        assert_eq!(object["remedy"], "was \"it\" copied?");
+        assert!(Failure::input("no").json().contains("null"));
     }
 
     #[test]

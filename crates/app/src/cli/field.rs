@@ -1,15 +1,17 @@
-use std::path::Path;
+use std::sync::Arc;
 
 use bspline::hierarchical::Lattice;
 use bspline::{Field, Frame, HierarchicalSpline, Real};
 use fitting::orient::Route;
 use fitting::{FitReport, Leaf, SignReport, StopReason};
-use formats::Unit;
 use formats::field::{AnyField, FieldMeta, LeafRecord, LoadedField, SourceKind};
+use formats::{Fault, FormatError, Kind, Unit};
 use serde::{Deserialize, Serialize};
 
 use super::failure::{Failure, Outcome};
-use super::input::{limits, reading, writing};
+use super::input::limits;
+use super::output::Output;
+use super::source::Source;
 use super::summary::hex;
 
 /// A field file that was read.
@@ -31,6 +33,9 @@ struct StoredReport {
     noise: Option<f64>,
     tolerance: f64,
     smoothing: f64,
+    /// [`FitReport::left_out`], each less the one before.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    left_out: Vec<u32>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     signs: Option<StoredSigns>,
 }
@@ -56,12 +61,12 @@ pub(super) use either;
 
 impl OpenField {
     /// Reads a field file.
-    pub fn load(path: &Path) -> Outcome<Self> {
-        let loaded = formats::field::load(path, &limits(None)).map_err(reading)?;
+    pub fn load(source: &Source) -> Outcome<Self> {
+        let loaded = formats::field::load(source.path(), &limits(None)).map_err(|e| not_loaded(source, e))?;
         let stored: StoredReport = serde_json::from_str(&loaded.meta.report).map_err(|e| {
             Failure::input(format!(
                 "{}: its fit report cannot be read ({e}); fit the input again",
-                path.display()
+                source.name()
             ))
         })?;
         let leaves = loaded
@@ -73,7 +78,7 @@ impl OpenField {
             .ok_or_else(|| {
                 Failure::input(format!(
                     "{}: a leaf stopped for a reason that this program does not know; use a newer isoclay",
-                    path.display()
+                    source.name()
                 ))
             })?;
         let report = FitReport {
@@ -88,6 +93,14 @@ impl OpenField {
             noise: stored.noise,
             tolerance: stored.tolerance,
             smoothing: stored.smoothing,
+            left_out: stored
+                .left_out
+                .iter()
+                .scan(0u32, |at, step| {
+                    *at = at.saturating_add(*step);
+                    Some(*at)
+                })
+                .collect(),
             signs: stored.signs.map(|s| signs(s, &loaded.meta.sign_confidence)),
             leaves,
             notes: loaded.meta.notes.clone(),
@@ -103,6 +116,11 @@ impl OpenField {
     /// The field, to be asked.
     pub fn field(&self) -> &dyn Field {
         self.loaded.field.as_field()
+    }
+
+    /// The field, to be part of others; its bricks are shared.
+    pub fn shared_field(&self) -> Arc<dyn Field> {
+        either!(&self.loaded.field, f => Arc::new(f.clone()))
     }
 
     /// What the fit said of itself.
@@ -174,12 +192,12 @@ impl OpenField {
     ///
     /// # Errors
     /// If there is neither.
-    pub fn iso_or(&self, asked: Option<f64>, path: &Path) -> Outcome<f64> {
+    pub fn iso_or(&self, asked: Option<f64>, source: &Source) -> Outcome<f64> {
         asked.or(self.iso()).ok_or_else(|| {
             let range = self.field().bounds(&self.lattice().world_box());
             Failure::input(format!(
                 "{}: the field names no surface of its own; choose one with --iso, between {:.6} and {:.6}",
-                path.display(),
+                source.name(),
                 range.lo,
                 range.hi
             ))
@@ -226,20 +244,38 @@ impl OpenField {
     }
 
     /// The failure of a surface that is not there.
-    pub fn no_surface(&self, path: &Path, iso: f64) -> Failure {
+    pub fn no_surface(&self, source: &Source, iso: f64) -> Failure {
         let range = self.field().bounds(&self.lattice().world_box());
         Failure::input(format!(
             "{}: the surface f = {iso} does not meet the box, in which f stays between {:.6} and {:.6}; choose \
              another --iso",
-            path.display(),
+            source.name(),
             range.lo,
             range.hi
         ))
     }
 }
 
+/// What is wrong with a file that is no field: one of another kind has to be fitted first.
+fn not_loaded(source: &Source, e: FormatError) -> Failure {
+    match formats::detect(source.path()) {
+        Ok(kind @ (Kind::Cloud(_) | Kind::Mesh(_) | Kind::Volume(_))) => Failure::input(format!(
+            "{0}: is a {kind}, where a fitted field is needed; fit it first: isoclay fit {0} -o FIELD.iclay",
+            source.name()
+        )),
+        Err(FormatError {
+            fault: Fault::UnknownKind { .. },
+            ..
+        }) => Failure::input(format!(
+            "{}: is no fitted field; give a file .iclay, as isoclay fit writes it",
+            source.name()
+        )),
+        _ => source.reading(e),
+    }
+}
+
 /// Writes a fitted field; returns its SHA-256.
-pub fn save(path: &Path, field: &AnyField, report: &FitReport, meta: FieldMeta) -> Outcome<String> {
+pub fn save(output: &Output, field: &AnyField, report: &FitReport, meta: FieldMeta) -> Outcome<String> {
     let stored = StoredReport {
         input_count: report.input_count,
         used_count: report.used_count,
@@ -251,6 +287,10 @@ pub fn save(path: &Path, field: &AnyField, report: &FitReport, meta: FieldMeta) 
         noise: report.noise,
         tolerance: report.tolerance,
         smoothing: report.smoothing,
+        left_out: {
+            let before = [0].iter().chain(&report.left_out);
+            report.left_out.iter().zip(before).map(|(i, b)| i - b).collect()
+        },
         signs: report.signs.as_ref().map(|s| StoredSigns {
             route: s.route.name().into(),
             outlier_count: s.outlier_count,
@@ -267,15 +307,16 @@ pub fn save(path: &Path, field: &AnyField, report: &FitReport, meta: FieldMeta) 
         notes: report.notes.clone(),
         ..meta
     };
-    either!(field, f => save_as(path, f, &meta))
+    either!(field, f => save_as(output, f, &meta))
 }
 
-fn save_as<T: formats::field::Stored>(
-    path: &Path,
+/// Writes a spline; returns its SHA-256.
+pub fn save_as<T: formats::field::Stored>(
+    output: &Output,
     field: &HierarchicalSpline<T>,
     meta: &FieldMeta,
 ) -> Outcome<String> {
-    formats::field::save(path, field, meta).map_err(writing)?;
+    formats::field::save(output.path(), field, meta).map_err(|e| output.writing(e))?;
     Ok(hex(&field.sha256()))
 }
 
@@ -305,7 +346,7 @@ fn signs(stored: StoredSigns, leaf_confidence: &[f32]) -> SignReport {
 fn leaf(r: &LeafRecord) -> Option<Leaf> {
     use StopReason::*;
     let reason = [
-        Tolerance, Depth, NoData, Noise, Budget, Memory, Neighbours, Crease,
+        Tolerance, Depth, NoData, Noise, Budget, Memory, Neighbours, Crease, Smoothing,
     ]
     .into_iter()
     .find(|s| *s as u8 == r.reason)?;

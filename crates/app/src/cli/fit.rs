@@ -5,7 +5,7 @@ use clap::ValueEnum;
 use fitting::mesh::{MeshDefects, MeshOptions, fit_mesh};
 use fitting::points::{NormalForm, OrientedPoints, PointOptions, fit_points};
 use fitting::volume::{VolumeMethod, VolumeOptions, VolumeView, fit_volume, otsu_threshold};
-use fitting::{Cancel, Control, FitError, FitReport, StopReason};
+use fitting::{Control, FitError, FitReport, StopReason};
 use formats::Unit;
 use formats::field::{AnyField, FieldMeta, SourceKind, Stored};
 use formats::meshes::TriangleMesh;
@@ -15,37 +15,43 @@ use formats::volumes::Volume;
 use super::cost::Cost;
 use super::failure::{Failure, Outcome, explain};
 use super::field::{self, either};
-use super::input::{self, Input, Shape, bounding_box, check_output, remaining};
+use super::input::{self, Input, Shape, bounding_box};
+use super::output::Output;
 use super::progress::Bar;
-use super::quantity::{Memory, Tolerance, positive};
+use super::quantity::{Memory, Tolerance, between, count, human_number, positive, threads};
+use super::source::{SAMPLES, Source, input_formats};
 use super::summary::Summary;
 use super::unoriented::{Oriented, Unoriented};
 use super::volume_choice::VolumeChoice;
-use super::{flags, interrupt, set_threads};
+use super::{belongs, ceiling, flags, interrupt, set_threads};
 
 /// Arguments of `isoclay fit`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Point cloud with normals or faces (.ply, .obj, .xyz), mesh (.stl and others, see --as) or volume (.nii), each also gzipped (.gz)
+    /// Point cloud (.ply .obj .pcd .las .laz .e57 .xyz), mesh (.stl .gltf .glb .3mf .wrl, see --as) or volume (.nii .nrrd
+    /// .mha .tif), also gzipped; a directory of DICOM or TIFF slices; - reads standard input
     input: PathBuf,
-    /// Field to write (.iclay)
+    /// Field to write (.iclay); - writes to standard output
     #[arg(short, long, value_name = "FIELD")]
-    output: PathBuf,
+    pub output: PathBuf,
     /// What to fit of a file with faces. Meshes become the solid that their triangles bound [default: cloud for PLY
     /// and OBJ, mesh for files that hold nothing else]
     #[arg(long = "as", value_enum, value_name = "KIND")]
     shape: Option<Shape>,
+    /// Format of the input where neither its content nor its name tells it
+    #[arg(long, value_name = "FORMAT", value_parser = input_formats())]
+    format: Option<String>,
     #[command(flatten)]
     choice: Choice,
     /// Memory that the process may hold, such as 2GiB
     #[arg(long, value_name = "SIZE")]
     memory: Option<Memory>,
     /// Threads to work with [default: all cores]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = threads)]
     threads: Option<NonZeroUsize>,
     /// Print one JSON object instead of a table
     #[arg(long)]
-    json: bool,
+    pub json: bool,
     #[command(flatten)]
     volume: VolumeChoice,
 }
@@ -53,34 +59,34 @@ pub struct Args {
 /// What the user may choose of a fit; the rest is chosen from the data.
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub struct Choice {
-    /// Rms residual that each leaf stays below, or says why not. Clouds: a distance in the file's unit, in mm,
+    /// Root mean square of the residuals that no leaf of the octree exceeds, unless its report says why. Clouds: a distance in the file's unit, in mm,
     /// or in per cent of the diagonal. Volumes: a density, or per cent of the range between the 1st and the 99th
     /// percentile [default: what the noise justifies; for clean data 0.01% of the diagonal, 0.5% of the range]
-    #[arg(long, value_name = "T[mm|%]")]
+    #[arg(long, value_name = "T[mm|%]", allow_hyphen_values = true)]
     pub tolerance: Option<Tolerance>,
-    /// Meshes: half the width of the band round the surface in which no error is above the tolerance, a length like
-    /// it [default: eight tolerances]
-    #[arg(long, value_name = "L[mm|%]")]
+    /// Meshes: distance from the surface up to which no error is above the tolerance, written like it [default: eight
+    /// tolerances]
+    #[arg(long, value_name = "L[mm|%]", allow_hyphen_values = true)]
     pub band: Option<Tolerance>,
     /// Coefficients to spend
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = count)]
     pub coefficients: Option<NonZeroUsize>,
     /// Finest level allowed. Clouds: 2^N cells along the box, 6 to 16. Volumes: 0 is a knot every four voxels, 2 one
     /// at every voxel
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=16))]
+    #[arg(long, value_name = "N", value_parser = between::<u8>(0, 16))]
     pub max_depth: Option<u8>,
     /// How to fit: a volume adaptively or by interpolation, a cloud by gradients or by offset pairs [default:
     /// adaptive; gradient]
     #[arg(long, value_enum)]
     pub method: Option<Method>,
     /// Weight of the bending energy [default: chosen from the data]
-    #[arg(long, value_name = "μ", value_parser = positive)]
+    #[arg(long, value_name = "μ", value_parser = positive, allow_hyphen_values = true)]
     pub smoothing: Option<f64>,
     /// Estimate the normals of a cloud that has none (or not those of its file), and how to tell inside from outside
     #[arg(long, value_enum, value_name = "ROUTE", num_args = 0..=1, require_equals = true,
           default_missing_value = "winding")]
     pub unoriented: Option<Unoriented>,
-    /// Take away the weight of points that the others contradict: for clouds with outliers
+    /// Take no notice of points that contradict the others: for clouds with outliers
     #[arg(long)]
     pub robust: bool,
     /// Unit of the coordinates, where the file does not tell: mm, cm or m
@@ -139,65 +145,92 @@ pub struct Fitted {
 /// Fits a file and writes the field.
 pub fn run(args: &Args) -> Outcome {
     let cost = Cost::start();
-    check_output(&args.output, &["iclay"])?;
+    let cancel = interrupt::cancel();
+    let source = Source::open(&args.input, args.format.as_deref(), SAMPLES, &cancel)?;
+    let output = Output::check("-o", &args.output, &["iclay"], None, &[&source])?;
     set_threads(args.threads)?;
-    let cancel = Cancel::new();
-    interrupt::cancel_on_interrupt(&cancel)?;
     let bar = Bar::new();
     bar.show("reading", 0.0);
-    let input = input::read(
-        &args.input,
-        args.shape,
-        &args.volume.options(args.choice.unit)?,
-        args.memory,
-    )?;
+    let input = input::read(&source, args.shape, &args.volume, args.choice.unit, args.memory)?;
     interrupt::check(&cancel)?;
     let shown = bar.clone();
     let mut control = Control {
         on_progress: Box::new(move |p| shown.show(p.stage, p.fraction)),
         cancel,
-        memory_limit: args.memory.map(remaining),
+        memory_limit: args
+            .memory
+            .or_else(ceiling::limit)
+            .map(|m| m.0.saturating_sub(ceiling::PROGRAM + input.bytes())),
     };
-    let fitted = fit(&input, &args.choice, &mut control).map_err(|f| {
-        if f.code() == 3 {
-            f.about(args.input.display())
-        } else {
-            f
-        }
-    })?;
+    let fitted = fit(&input, &args.choice, &mut control)
+        .map_err(|f| if f.code() == 3 { f.about(source.name()) } else { f })?;
     interrupt::check(&control.cancel)?;
     bar.show("writing", 0.99);
     let meta = FieldMeta {
         source: fitted.source,
         unit: fitted.unit,
         iso: fitted.iso,
-        provenance: provenance(args),
+        provenance: belongs::provenance(
+            &input,
+            args.input.file_name().map(|n| n.to_string_lossy().into_owned()),
+        ),
         ..Default::default()
     };
-    let sha256 = field::save(&args.output, &fitted.field, &fitted.report, meta)?;
+    let sha256 = field::save(&output, &fitted.field, &fitted.report, meta)?;
     bar.clear();
     Summary {
         field_sha256: Some(sha256),
-        output: Some(args.output.display().to_string()),
         ..fitted.summary(&input)
     }
     .with_cost(&cost)
-    .print(args.json)
-}
-
-/// Where the field comes from, for the file: enough to make it again.
-fn provenance(args: &Args) -> String {
-    let options: Vec<String> = std::env::args().skip(1).collect();
-    serde_json::json!({
-        "program": concat!("isoclay ", env!("CARGO_PKG_VERSION")),
-        "input": args.input.file_name().map(|n| n.to_string_lossy()),
-        "arguments": options,
-    })
-    .to_string()
+    .print_after(&output, args.json)
 }
 
 /// Fits an input as chosen.
 pub fn fit(input: &Input, choice: &Choice, control: &mut Control) -> Outcome<Fitted> {
+    let mut fitted = fit_as(input, choice, control)?;
+    let notes = limits_met(&fitted.report);
+    fitted.report.notes.extend(notes);
+    Ok(fitted)
+}
+
+/// What the user's limits left undone.
+fn limits_met(report: &FitReport) -> impl Iterator<Item = String> + use<> {
+    let limits = [
+        ("--memory", StopReason::Memory),
+        ("--coefficients", StopReason::Budget),
+    ];
+    let total = report.leaves.len();
+    let counts = limits.map(|(option, reason)| {
+        let stopped = report.leaves.iter().filter(|l| l.reason == reason).count();
+        (option, stopped)
+    });
+    counts.into_iter().filter(|c| c.1 > 0).map(move |(option, stopped)| {
+        format!("{stopped} of {total} leaves are coarser than the tolerance asks for: {option} leaves no room for more")
+    })
+}
+
+/// A doubt about a tolerance that the user gave, on an object of this `size` whose numbers are as large as `magnitude`.
+fn tolerance_doubt(choice: &Choice, tolerance: f64, size: f64, magnitude: f64) -> Option<String> {
+    choice.tolerance?;
+    let finest = magnitude * f64::from(f32::EPSILON) / 2.0;
+    if tolerance >= size {
+        let (t, s) = (human_number(tolerance), human_number(size));
+        Some(format!(
+            "--tolerance {t} is larger than the object itself ({s}): the field may miss it altogether"
+        ))
+    } else if tolerance < finest && choice.precision == Precision::F32 {
+        Some(format!(
+            "--tolerance {} is finer than 32-bit coefficients can be ({}): use --precision f64",
+            human_number(tolerance),
+            human_number(finest)
+        ))
+    } else {
+        None
+    }
+}
+
+fn fit_as(input: &Input, choice: &Choice, control: &mut Control) -> Outcome<Fitted> {
     match (input, choice.precision) {
         (Input::Cloud(cloud), Precision::F32) => fit_cloud::<f32>(cloud, choice, control),
         (Input::Cloud(cloud), Precision::F64) => fit_cloud::<f64>(cloud, choice, control),
@@ -214,14 +247,18 @@ fn fit_cloud<T: Stored>(cloud: &PointCloud, choice: &Choice, control: &mut Contr
         Some(Method::OffsetPairs) => NormalForm::OffsetPairs,
         Some(Method::Adaptive | Method::Interpolate) => {
             return Err(Failure::usage(
-                "--method adaptive and interpolate are for volumes; a point cloud takes gradient or offset-pairs",
+                "--method adaptive and --method interpolate are for volumes; a point cloud takes gradient or offset-pairs",
             ));
         }
     };
+    refuse_band(choice)?;
     if cloud.positions.is_empty() {
         return Err(FitError::NotEnoughSamples { found: 0, needed: 10 }.into());
     }
     let oriented = Oriented::new(cloud, choice.unoriented, control)?;
+    if let Some(limit) = &mut control.memory_limit {
+        *limit = limit.saturating_sub(oriented.bytes());
+    }
     let unit = stated_unit(cloud.unit, choice.unit)?;
     let points = OrientedPoints {
         positions: oriented.positions(),
@@ -244,6 +281,9 @@ fn fit_cloud<T: Stored>(cloud: &PointCloud, choice: &Choice, control: &mut Contr
     let (field, mut report) = fit_points::<T>(&points, &options, control).map_err(|e| explain(e, control))?;
     oriented.complete(&mut report, field.lattice());
     report.notes.splice(0..0, cloud.notes.iter().cloned());
+    report
+        .notes
+        .extend(tolerance_doubt(choice, report.tolerance, diagonal, diagonal));
     Ok(Fitted {
         field: T::any(field),
         report,
@@ -255,10 +295,16 @@ fn fit_cloud<T: Stored>(cloud: &PointCloud, choice: &Choice, control: &mut Contr
 }
 
 fn fit_triangles<T: Stored>(mesh: &TriangleMesh, choice: &Choice, control: &mut Control) -> Outcome<Fitted> {
-    if choice.method.is_some() {
-        return Err(Failure::usage(
-            "--method is for point clouds and volumes; leave it out for a mesh",
-        ));
+    for (option, is_given) in [
+        ("--method", choice.method.is_some()),
+        ("--unoriented", choice.unoriented.is_some()),
+        ("--robust", choice.robust),
+    ] {
+        if is_given {
+            return Err(Failure::usage(format!(
+                "{option}: is for other inputs than meshes; leave it out"
+            )));
+        }
     }
     if choice.smoothing.is_some() {
         return Err(Failure::usage(
@@ -302,7 +348,7 @@ fn fit_voxels<T: Stored>(volume: &Volume, choice: &Choice, control: &mut Control
         Some(Method::Interpolate) => VolumeMethod::Interpolate,
         Some(Method::Gradient | Method::OffsetPairs) => {
             return Err(Failure::usage(
-                "--method gradient and offset-pairs are for point clouds; a volume takes adaptive or interpolate",
+                "--method gradient and --method offset-pairs are for point clouds; a volume takes adaptive or interpolate",
             ));
         }
     };
@@ -311,6 +357,7 @@ fn fit_voxels<T: Stored>(volume: &Volume, choice: &Choice, control: &mut Control
             "--robust is for point clouds; leave it out for a volume",
         ));
     }
+    refuse_band(choice)?;
     let header = &volume.header;
     let unit = stated_unit(header.unit, choice.unit)?;
     let view = VolumeView {
@@ -347,6 +394,17 @@ fn fit_voxels<T: Stored>(volume: &Volume, choice: &Choice, control: &mut Control
     })
 }
 
+/// Refuses a band where it would do nothing.
+fn refuse_band(choice: &Choice) -> Outcome {
+    match choice.band {
+        Some(_) => Err(Failure::usage(
+            "--band: is for meshes, whose distance is fitted round the surface; leave it out, or take the faces by --as \
+             mesh",
+        )),
+        None => Ok(()),
+    }
+}
+
 /// The unit of a file whose header says `known`, of which the user says `stated`.
 fn stated_unit(known: Unit, stated: Option<Unit>) -> Outcome<Unit> {
     match (known, stated) {
@@ -363,7 +421,7 @@ impl Fitted {
     /// The fit's part of a summary.
     pub fn summary(&self, input: &Input) -> Summary {
         let r = &self.report;
-        let over = |l: &&fitting::Leaf| f64::from(l.rms) > r.tolerance;
+        let over = |l: &&fitting::Leaf| l.is_above(r.tolerance);
         // An interpolating fit aims at none.
         let has_tolerance = r.tolerance > 0.0;
         Summary {

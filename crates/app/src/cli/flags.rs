@@ -1,6 +1,6 @@
 //! The libraries say in words what would help; here the words get the options of this program.
 
-use formats::Choice;
+use formats::{Choice, Fault};
 
 /// The option that a choice of the readers is made by.
 pub fn of(choice: Choice) -> &'static str {
@@ -8,6 +8,29 @@ pub fn of(choice: Choice) -> &'static str {
         Choice::Series => "--series NUMBER|UID",
         Choice::Uneven => "--uneven resample",
         Choice::Volume => "--volume N",
+    }
+}
+
+/// What of a volume the user chose, as its reader calls it, and the option for it.
+const CHOSEN: [(&str, &str); 4] = [
+    ("the region", "--region"),
+    ("the stride", "--stride"),
+    ("the stated spacing", "--spacing"),
+    ("the number of the volume", "--volume"),
+];
+
+/// What is wrong with a file, with the option behind a choice that does not suit it.
+pub fn fault(fault: &Fault) -> String {
+    if let Some(choice) = fault.choice() {
+        return format!("{fault} ({})", of(choice));
+    }
+    let chosen = match fault {
+        Fault::Value { what, .. } => CHOSEN.iter().find(|c| c.0 == *what),
+        _ => None,
+    };
+    match chosen {
+        Some((_, option)) => format!("{option}: {fault}"),
+        None => fault.to_string(),
     }
 }
 

@@ -1,6 +1,7 @@
 use std::io::{self, Write};
 use std::path::PathBuf;
 
+use fitting::Cancel;
 use formats::Kind;
 use formats::points::{NormalSource, PointCloud};
 use formats::volumes::{VolumeHeader, VolumeOptions};
@@ -8,16 +9,20 @@ use serde_json::{Map, Value, json};
 
 use super::failure::{OrFail, Outcome};
 use super::field::OpenField;
-use super::input::{self, bounding_box, limits, reading};
+use super::input::{self, bounding_box, limits};
 use super::quantity::{Memory, human_bytes, human_count, human_number};
+use super::source::{ANYTHING, Source, input_formats};
 use super::summary::table;
 use super::volume_choice::VolumeChoice;
 
 /// Arguments of `isoclay info`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Cloud, volume or field
+    /// Cloud, mesh, volume or field; - reads standard input
     file: PathBuf,
+    /// Format of the file where neither its content nor its name tells it
+    #[arg(long, value_name = "FORMAT", value_parser = input_formats())]
+    format: Option<String>,
     /// Of a volume only what its header tells, without a look at the voxels
     #[arg(long)]
     header: bool,
@@ -26,7 +31,7 @@ pub struct Args {
     memory: Option<Memory>,
     /// Print one JSON object instead of a table
     #[arg(long)]
-    json: bool,
+    pub json: bool,
     #[command(flatten)]
     volume: VolumeChoice,
 }
@@ -55,22 +60,24 @@ fn count(key: &'static str, label: &'static str, n: usize) -> Entry {
 /// Describes a file.
 pub fn run(args: &Args) -> Outcome {
     let part = args.volume.options(None)?;
-    let kind = input::kind(&args.file, &part)?;
+    let source = Source::open(&args.file, args.format.as_deref(), ANYTHING, &Cancel::new())?;
+    let kind = input::kind(&source, &args.volume, &part)?;
     let (entries, notes) = match kind {
         Kind::Cloud(_) | Kind::Mesh(_) => {
-            let cloud = formats::points::read(&args.file, &limits(args.memory)).map_err(reading)?;
+            let cloud =
+                formats::points::read(source.path(), &limits(args.memory)).map_err(|e| source.reading(e))?;
             (of_cloud(&cloud), cloud.notes)
         }
-        Kind::Volume(_) => of_volume(args, &part)?,
+        Kind::Volume(_) => of_volume(&source, args, &part)?,
         Kind::Field => {
-            let open = OpenField::load(&args.file)?;
+            let open = OpenField::load(&source)?;
             (of_field(&open), open.report().notes.clone())
         }
     };
     let mut out = io::stdout().lock();
     if args.json {
         let mut object = Map::new();
-        object.insert("file".into(), args.file.display().to_string().into());
+        object.insert("file".into(), source.name().into());
         object.insert("kind".into(), kind.to_string().into());
         object.extend(entries.into_iter().map(|e| (e.key.to_string(), e.value)));
         object.insert("notes".into(), notes.into());
@@ -166,8 +173,8 @@ fn of_header(h: &VolumeHeader) -> Vec<Entry> {
 }
 
 /// The header, then the values in one pass that holds a slice at a time.
-fn of_volume(args: &Args, part: &VolumeOptions) -> Outcome<(Vec<Entry>, Vec<String>)> {
-    let preview = formats::volumes::peek(&args.file, part).map_err(reading)?;
+fn of_volume(source: &Source, args: &Args, part: &VolumeOptions) -> Outcome<(Vec<Entry>, Vec<String>)> {
+    let preview = formats::volumes::peek(source.path(), part).map_err(|e| source.reading(e))?;
     let mut entries = of_header(&preview.header);
     if preview.file_dims != preview.header.dims {
         entries.insert(
@@ -187,7 +194,8 @@ fn of_volume(args: &Args, part: &VolumeOptions) -> Outcome<(Vec<Entry>, Vec<Stri
         preview.read_bytes,
     ));
     if !args.header {
-        let range = formats::volumes::range(&args.file, part, &limits(args.memory)).map_err(reading)?;
+        let range = formats::volumes::range(source.path(), part, &limits(args.memory))
+            .map_err(|e| source.reading(e))?;
         let ends = [range.min, range.max].map(f64::from);
         entries.push(entry(
             "range",
@@ -263,8 +271,19 @@ fn of_field(open: &OpenField) -> Vec<Entry> {
         entry("rms", "error rms", human_number(report.rms), report.rms),
         entry("p95", "error p95", human_number(report.p95), report.p95),
         entry("max", "error max", human_number(report.max), report.max),
+        entry(
+            "bound",
+            "bound on |residual|",
+            human_number(report.bound),
+            report.bound,
+        ),
         count("leaves", "leaves", report.leaves.len()),
     ];
+    // An interpolating fit aims at none.
+    if report.tolerance > 0.0 {
+        let above = report.leaves.iter().filter(|l| l.is_above(report.tolerance));
+        entries.push(count("leaves_over_tolerance", "  over tolerance", above.count()));
+    }
     entries.push(entry(
         "field_sha256",
         "field sha256",

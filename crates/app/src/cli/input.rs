@@ -1,17 +1,16 @@
-use std::path::Path;
-
 use bspline::Aabb;
 use clap::ValueEnum;
 use formats::meshes::TriangleMesh;
 use formats::points::PointCloud;
 use formats::volumes::{Volume, VolumeFormat, VolumeOptions};
-use formats::{Fault, FormatError, Kind, ReadLimits};
+use formats::{Fault, FormatError, Kind, ReadLimits, Unit};
 use glam::DVec3;
 
-use super::cost;
 use super::failure::{Failure, Outcome};
-use super::flags;
-use super::quantity::{Memory, human_bytes};
+use super::quantity::Memory;
+use super::source::Source;
+use super::volume_choice::VolumeChoice;
+use super::{ceiling, cost};
 
 /// Something that can be fitted.
 pub enum Input {
@@ -23,6 +22,22 @@ pub enum Input {
     Volume(Volume),
 }
 
+impl Input {
+    /// Bytes that it holds.
+    pub fn bytes(&self) -> u64 {
+        let bytes = match self {
+            Self::Cloud(c) => (1 + usize::from(c.normals.is_some())) * size_of_val(&c.positions[..]),
+            Self::Mesh(m) => {
+                size_of_val(&m.vertices[..])
+                    + size_of_val(&m.triangles[..])
+                    + m.colors.as_deref().map_or(0, size_of_val)
+            }
+            Self::Volume(v) => size_of_val(&v.values[..]),
+        };
+        bytes as u64
+    }
+}
+
 /// What to take a file with vertices and faces for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Shape {
@@ -32,31 +47,45 @@ pub enum Shape {
     Mesh,
 }
 
-/// Reads something that can be fitted, of a volume what `part` asks for, holding no more than `memory` in the whole
+impl Shape {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Cloud => "cloud",
+            Self::Mesh => "mesh",
+        }
+    }
+}
+
+/// Reads something that can be fitted, of a volume what `choice` asks for, holding no more than `memory` in the whole
 /// process. `shape` is the user's word for files with faces; by itself a file that can hold points alone is a cloud.
 pub fn read(
-    path: &Path,
+    source: &Source,
     shape: Option<Shape>,
-    part: &VolumeOptions,
+    choice: &VolumeChoice,
+    unit: Option<Unit>,
     memory: Option<Memory>,
 ) -> Outcome<Input> {
     let limits = limits(memory);
-    let kind = kind(path, part)?;
+    let part = &choice.options(unit)?;
+    let kind = kind(source, choice, part)?;
+    let path = source.path();
+    let reading = |e| source.reading(e);
     let shape = match (kind, shape) {
         (Kind::Volume(_), None) => {
             let volume = formats::volumes::read(path, part, &limits).map_err(reading)?;
             return Ok(Input::Volume(volume));
         }
-        (Kind::Volume(_), Some(_)) => {
+        (Kind::Volume(_), Some(shape)) => {
             return Err(Failure::usage(format!(
-                "{}: is a {kind}, and --as is for files with faces; leave it out",
-                path.display()
+                "--as {}: {} is a {kind}, and only files with faces can be taken for one or the other; leave it out",
+                shape.name(),
+                source.name()
             )));
         }
         (Kind::Field, _) => {
             return Err(Failure::input(format!(
-                "{}: is a fitted field, where a point cloud, a mesh or a volume is needed",
-                path.display()
+                "{}: is a fitted field already; give the point cloud, the mesh or the volume that it was fitted to",
+                source.name()
             )));
         }
         (Kind::Mesh(_), shape) => shape.unwrap_or(Shape::Mesh),
@@ -70,45 +99,33 @@ pub fn read(
 }
 
 /// What a file is: without a header that is the user's word.
-pub fn kind(path: &Path, part: &VolumeOptions) -> Outcome<Kind> {
+pub fn kind(source: &Source, choice: &VolumeChoice, part: &VolumeOptions) -> Outcome<Kind> {
     if part.raw.is_some() {
         return Ok(Kind::Volume(VolumeFormat::Raw));
     }
-    let kind = formats::detect(path).map_err(reading)?;
+    let kind = formats::detect(source.path()).map_err(|e| source.reading(e))?;
     if !matches!(kind, Kind::Volume(_)) && *part != VolumeOptions::default() {
         return Err(Failure::usage(format!(
-            "{}: is a {kind}, and options under «Reading volumes» are for volumes; leave them out",
-            path.display()
+            "{}: is a {kind}, and the options under «Reading volumes» are for volumes; leave them out",
+            source.name()
         )));
     }
+    choice.suits(kind)?;
     Ok(kind)
 }
 
 /// What reading may hold: the ceiling of the user less what the process holds already.
 pub fn limits(memory: Option<Memory>) -> ReadLimits {
-    memory.map_or_else(ReadLimits::default, |m| ReadLimits {
-        max_bytes: remaining(m),
-    })
+    memory
+        .or_else(ceiling::limit)
+        .map_or_else(ReadLimits::default, |m| ReadLimits {
+            max_bytes: remaining(m),
+        })
 }
 
 /// Bytes of the user's ceiling that are still free.
 pub fn remaining(memory: Memory) -> u64 {
     memory.0.saturating_sub(cost::rss_bytes().unwrap_or(0))
-}
-
-/// An error of reading: bad input, unless a limit stopped it.
-pub fn reading(e: FormatError) -> Failure {
-    match &e.fault {
-        Fault::Limit { what, needed, .. } => Failure::limit(format!(
-            "{}: {what} would need {}, more than the memory ceiling leaves; raise --memory if the file is trusted",
-            e.path.display(),
-            human_bytes(*needed)
-        )),
-        fault => match fault.choice() {
-            Some(choice) => Failure::input(format!("{e} ({})", flags::of(choice))),
-            None => Failure::input(e),
-        },
-    }
 }
 
 /// An error of writing: a name that no format fits is wrong usage, all else a limit of the machine.
@@ -117,40 +134,6 @@ pub fn writing(e: FormatError) -> Failure {
         Fault::UnknownKind { .. } | Fault::Directory => Failure::usage(e),
         _ => Failure::limit(e),
     }
-}
-
-/// Refuses an output that cannot be written before hours of work are spent on it.
-pub fn check_output(path: &Path, extensions: &[&str]) -> Outcome {
-    let name = path
-        .file_name()
-        .map(|n| n.to_string_lossy().to_ascii_lowercase())
-        .unwrap_or_default();
-    let is_device = path.metadata().is_ok_and(|m| !m.is_file() && !m.is_dir());
-    if path.is_dir() {
-        return Err(Failure::usage(format!(
-            "-o {}: is a directory; name a file in it",
-            path.display()
-        )));
-    }
-    if !is_device && !extensions.iter().any(|e| name.ends_with(&format!(".{e}"))) {
-        return Err(Failure::usage(format!(
-            "-o {}: the name has to end in .{}",
-            path.display(),
-            extensions.join(" or .")
-        )));
-    }
-    let directory = match path.parent() {
-        Some(p) if !p.as_os_str().is_empty() => p,
-        _ => Path::new("."),
-    };
-    if !directory.is_dir() {
-        return Err(Failure::usage(format!(
-            "-o {}: there is no directory {}; make it first",
-            path.display(),
-            directory.display()
-        )));
-    }
-    Ok(())
 }
 
 /// Smallest box round `points`, which are not empty.

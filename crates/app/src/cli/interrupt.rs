@@ -1,21 +1,32 @@
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::LazyLock;
+use std::time::Duration;
 
 use fitting::Cancel;
 
 use super::failure::{Failure, Outcome};
 
-/// Lets Ctrl-C (and SIGTERM) raise `cancel`, so that the work ends in order and leaves nothing half-written.
-/// A second Ctrl-C ends the program at once, with the same exit code.
-pub fn cancel_on_interrupt(cancel: &Cancel) -> Outcome {
-    static ASKED: AtomicBool = AtomicBool::new(false);
-    let cancel = cancel.clone();
-    ctrlc::set_handler(move || {
-        cancel.cancel();
-        if ASKED.swap(true, Ordering::Relaxed) {
-            std::process::exit(4);
-        }
+/// Raised by the first Ctrl-C or SIGTERM.
+static ASKED: LazyLock<Cancel> = LazyLock::new(Cancel::new);
+
+/// Time that work under way has to end in order after it was asked to; then the program ends wherever it is.
+const GRACE: Duration = Duration::from_millis(150);
+
+/// Lets Ctrl-C (and SIGTERM) end the program with exit code 4: in order where the work looks at [`cancel`], and after
+/// [`GRACE`] in any case. No half-written file is left.
+pub fn listen() -> Outcome {
+    ctrlc::set_handler(|| {
+        ASKED.cancel();
+        std::thread::sleep(GRACE);
+        formats::atomic::abandon();
+        eprintln!("isoclay: {}", Failure::from(fitting::FitError::Cancelled));
+        std::process::exit(4);
     })
     .map_err(|e| Failure::limit(format!("cannot listen for Ctrl-C: {e}")))
+}
+
+/// The flag that Ctrl-C raises.
+pub fn cancel() -> Cancel {
+    ASKED.clone()
 }
 
 /// Gives way to a cancel between two stages of work.

@@ -12,28 +12,30 @@ use rayon::prelude::*;
 use super::cost::Cost;
 use super::failure::{Failure, Outcome};
 use super::field::OpenField;
-use super::input::{check_output, writing};
+use super::mesh_output::{MESHES, MeshOutput};
+use super::output::Output;
 use super::progress::Bar;
-use super::quantity::{Tolerance, finite, human_number};
+use super::quantity::{Tolerance, between, finite, human_number, threads};
+use super::source::{FIELDS, Source};
 use super::summary::Summary;
 use super::trim::{self, Sampled};
-use super::{interrupt, set_threads};
+use super::{ceiling, interrupt, set_threads};
 
 /// Arguments of `isoclay mesh`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Field (.iclay)
+    /// Field (.iclay); - reads standard input
     field: PathBuf,
-    /// Mesh to write: .ply, .stl, .obj, .glb, .gltf, .3mf or .wrl
+    /// Mesh to write: .ply, .stl, .obj, .glb, .gltf, .3mf or .wrl; - writes to standard output
     #[arg(short, long, value_name = "OUT")]
-    output: PathBuf,
+    pub output: PathBuf,
     /// Cells along the longest side of the box [default: two cells per knot interval of the finest level that a
     /// tenth of the surface lies on]
-    #[arg(long, value_name = "N", conflicts_with = "tolerance", value_parser = clap::value_parser!(u32).range(1..=65535))]
+    #[arg(long, value_name = "N", conflicts_with = "tolerance", value_parser = between::<u32>(1, 65535))]
     resolution: Option<u32>,
     /// Distance from the surface that 99 % of the triangles keep at their centres: in the field's unit, in mm,
     /// or in per cent of the solid's diagonal
-    #[arg(long, value_name = "T[mm|%]")]
+    #[arg(long, value_name = "T[mm|%]", allow_hyphen_values = true)]
     tolerance: Option<Tolerance>,
     /// Density of the surface [default: 0 for clouds, for volumes what the file suggests]
     #[arg(long, value_name = "V", value_parser = finite, allow_negative_numbers = true)]
@@ -43,14 +45,16 @@ pub struct Args {
     open: bool,
     /// Leave out what is invented: triangles farther than this from every cell with points, in the field's unit, in mm,
     /// or in per cent of the solid's diagonal [default of the distance: 4 times the mean spacing of the points]
-    #[arg(long, value_name = "DISTANCE[mm|%]", num_args = 0..=1)]
+    #[arg(long, value_name = "DISTANCE[mm|%]", num_args = 0..=1, allow_negative_numbers = true)]
     trim: Option<Option<Tolerance>>,
     /// Threads to work with [default: all cores]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = threads)]
     threads: Option<NonZeroUsize>,
     /// Print one JSON object instead of a table
     #[arg(long)]
-    json: bool,
+    pub json: bool,
+    #[command(flatten)]
+    written: MeshOutput,
 }
 
 /// Triangles that make a user think of a smaller mesh.
@@ -59,13 +63,14 @@ const MANY: usize = 4_000_000;
 /// Meshes a field file.
 pub fn run(args: &Args) -> Outcome {
     let cost = Cost::start();
-    check_output(&args.output, &["ply", "stl", "obj"])?;
+    let cancel = interrupt::cancel();
+    let format = args.written.format.as_deref();
+    let field = Source::open(&args.field, None, FIELDS, &cancel)?;
+    let output = Output::check("-o", &args.output, &MESHES, format, &[&field])?;
     set_threads(args.threads)?;
-    let cancel = Cancel::new();
-    interrupt::cancel_on_interrupt(&cancel)?;
-    let open = OpenField::load(&args.field)?;
+    let open = OpenField::load(&field)?;
     let options = PolygonizeOptions {
-        iso: open.iso_or(args.iso, &args.field)?,
+        iso: open.iso_or(args.iso, &field)?,
         open: args.open,
         ..Default::default()
     };
@@ -94,35 +99,31 @@ pub fn run(args: &Args) -> Outcome {
         })?,
     };
     if mesh.triangles.is_empty() {
-        return Err(open.no_surface(&args.field, options.iso));
+        return Err(open.no_surface(&field, options.iso));
     }
     interrupt::check(&cancel)?;
+    let left_out = args.written.keep(&mut mesh, open.unit(), &mut notes)?;
     trim(&mut mesh, &open, args.trim, &mut notes)?;
     bar.show("writing", 0.99);
-    let written = formats::meshes::Mesh {
-        vertices: &mesh.positions,
-        triangles: &mesh.triangles,
-        colors: None,
-        unit: open.unit(),
-    };
-    notes.extend(formats::meshes::save(&args.output, &written).map_err(writing)?);
+    let (vertices, triangles) = (mesh.positions.len(), mesh.triangles.len());
+    let unit = args.written.write(mesh, open.unit(), &output, &mut notes)?;
     bar.clear();
     notes.extend(doubts(&report));
-    if args.resolution.is_none() && args.tolerance.is_none() && mesh.triangles.len() > MANY {
+    if args.resolution.is_none() && args.tolerance.is_none() && triangles > MANY {
         notes.push("--resolution or --tolerance give a smaller mesh".into());
     }
     Summary {
-        vertices: Some(mesh.positions.len()),
-        triangles: Some(mesh.triangles.len()),
+        vertices: Some(vertices),
+        triangles: Some(triangles),
+        left_out,
         cells: Some(frame.cells),
-        unit: Some(open.unit().to_string()),
+        unit: Some(unit.to_string()),
         field_sha256: Some(open.sha256()),
-        output: Some(args.output.display().to_string()),
         notes,
         ..Default::default()
     }
     .with_cost(&cost)
-    .print(args.json)
+    .print_after(&output, args.json)
 }
 
 /// Mean spacings of the points from the next cell with points at which the surface counts as invented.
@@ -215,9 +216,11 @@ impl Mesher<'_> {
     /// Meshes the cells of `frame`.
     pub fn on(&mut self, frame: Frame) -> Outcome<(Mesh, MeshReport, Frame)> {
         let (cancel, bar) = (self.cancel, self.bar);
+        let mut is_over = false;
         let mut progress = |fraction| {
             bar.show("meshing", fraction);
-            if cancel.is_cancelled() {
+            is_over = ceiling::is_exceeded();
+            if cancel.is_cancelled() || is_over {
                 ControlFlow::Break(())
             } else {
                 ControlFlow::Continue(())
@@ -225,6 +228,9 @@ impl Mesher<'_> {
         };
         let (mesh, report) =
             polygonize_with(self.field, &frame, &self.options, &mut progress).map_err(|e| match e {
+                PolygonizeError::Cancelled if is_over => Failure::limit(
+                    "the mesh takes more than --memory allows; raise it, or lower --resolution",
+                ),
                 PolygonizeError::Cancelled => fitting::FitError::Cancelled.into(),
                 PolygonizeError::TooManyBlocks { .. } | PolygonizeError::TooManyVertices { .. } => {
                     Failure::limit(format!("{e}: lower --resolution or raise --tolerance"))

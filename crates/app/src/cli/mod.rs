@@ -2,6 +2,8 @@
 //!
 //! Exit codes: 0 done, 2 wrong usage, 3 bad input, 4 a limit was reached or the work was cancelled.
 
+mod belongs;
+mod ceiling;
 mod chart_dynamics;
 mod chart_orient;
 mod charts;
@@ -16,24 +18,34 @@ mod flags;
 mod info;
 mod input;
 mod interrupt;
+mod keep;
 mod mesh;
+mod mesh_output;
+mod output;
+mod overwrite;
 mod phantom;
 mod picture;
 mod progress;
 mod quantity;
 mod sample;
 mod simulate;
+mod source;
+mod staged;
+mod store;
 mod summary;
 mod trim;
 mod unoriented;
 mod volume_choice;
 
+use std::io::{self, Write};
 use std::num::NonZeroUsize;
+use std::path::Path;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
-use failure::{Failure, OrFail, Outcome};
+use failure::{Failure, OrFail, Outcome, error_object};
+use quantity::Memory;
 
 /// Turns scans into elastic clay: point clouds and volumes become implicit B-spline solids and watertight
 /// meshes.
@@ -42,6 +54,9 @@ use failure::{Failure, OrFail, Outcome};
 struct Cli {
     #[command(subcommand)]
     command: Command,
+    /// Memory that the process may hold, such as 2GiB
+    #[arg(long, global = true, value_name = "SIZE")]
+    memory: Option<Memory>,
 }
 
 const EXIT_CODES: &str =
@@ -49,7 +64,7 @@ const EXIT_CODES: &str =
 
 #[derive(Subcommand)]
 enum Command {
-    /// Fit a field to a point cloud with normals or to a volume
+    /// Fit a field to a point cloud, a mesh or a volume
     Fit(fit::Args),
     /// Turn a field into a closed triangle mesh
     Mesh(mesh::Args),
@@ -57,7 +72,7 @@ enum Command {
     Sample(sample::Args),
     /// Print value and gradient of the field at given points
     Eval(eval::Args),
-    /// Describe a cloud, a volume or a field
+    /// Describe a cloud, a mesh, a volume or a field
     Info(info::Args),
     /// Measure the errors of a field against its input again, and draw them
     Check(check::Args),
@@ -73,17 +88,29 @@ enum Command {
     Charts(charts::Args),
 }
 
+/// The tree of commands. Where a shared option means something else in one of them, its help says so there.
+fn command() -> clap::Command {
+    Cli::command().mut_subcommand("sample", |sample| {
+        sample.mut_arg("spacing", |a| {
+            a.help(
+                "Voxels of this size in place of those of VOLUME, in its unit: the box stays the same and holds a whole \
+                 number of them. One number, or three. With --shape: the spacing of that file in mm",
+            )
+        })
+    })
+}
+
 /// Reads the command line, does what it says, and turns the outcome into an exit code.
 pub fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+    let cli = match command()
+        .try_get_matches()
+        .and_then(|m| Cli::from_arg_matches(&m))
+    {
         Ok(cli) => cli,
-        Err(e) => {
-            // Help and version are no errors; a closed pipe is nobody's loss.
-            let _ = e.print();
-            return ExitCode::from(e.exit_code() as u8);
-        }
+        Err(e) => return refuse(&e),
     };
-    let outcome = match &cli.command {
+    let ready = interrupt::listen().and_then(|()| cli.memory.map_or(Ok(()), ceiling::hold));
+    let outcome = ready.and_then(|()| match &cli.command {
         Command::Fit(a) => fit::run(a),
         Command::Mesh(a) => mesh::run(a),
         Command::Sample(a) => sample::run(a),
@@ -95,13 +122,69 @@ pub fn main() -> ExitCode {
         Command::Picture(a) => picture::run(a),
         Command::Simulate(a) => simulate::run(a),
         Command::Charts(a) => charts::run(a),
-    };
+    });
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(f) if f.is_broken_pipe() => ExitCode::SUCCESS,
         Err(f) => {
             eprintln!("isoclay: {f}");
+            let (json, data_on_stdout) = cli.command.stdout();
+            match (json, data_on_stdout) {
+                (true, false) => print_quietly(io::stdout(), &f.json()),
+                (true, true) => print_quietly(io::stderr(), &f.json()),
+                (false, _) => {}
+            }
             ExitCode::from(f.code())
+        }
+    }
+}
+
+/// Prints what is wrong with the command line itself, or the help that was asked for.
+fn refuse(e: &clap::Error) -> ExitCode {
+    // Help and version are no errors; a closed pipe is nobody's loss.
+    let _ = e.print();
+    let code = e.exit_code() as u8;
+    let json = std::env::args_os()
+        .skip(1)
+        .take_while(|a| a != "--")
+        .any(|a| a == "--json");
+    if code != 0 && json {
+        let text = e.render().to_string();
+        let (message, rest) = text.split_once("\n\n").unwrap_or((&text, ""));
+        let message = message
+            .trim_start_matches("error: ")
+            .split_whitespace()
+            .collect::<Vec<_>>()
+            .join(" ");
+        let remedy = rest
+            .lines()
+            .map(str::trim)
+            .find(|l| l.starts_with("tip:") || l.starts_with("Usage:"));
+        print_quietly(io::stdout(), &error_object(code, &message, remedy));
+    }
+    ExitCode::from(code)
+}
+
+fn print_quietly(mut out: impl Write, line: &str) {
+    let _ = writeln!(out, "{line}").and_then(|()| out.flush());
+}
+
+impl Command {
+    /// Whether `--json` was given, and whether standard output is taken by data.
+    fn stdout(&self) -> (bool, bool) {
+        let is_stdout = |path: &Path| path == Path::new("-");
+        match self {
+            Self::Fit(a) => (a.json, is_stdout(&a.output)),
+            Self::Mesh(a) => (a.json, is_stdout(&a.output)),
+            Self::Sample(a) => (a.json, is_stdout(&a.output)),
+            Self::Eval(_) => (false, true),
+            Self::Info(a) => (a.json, false),
+            Self::Check(a) => (a.json, false),
+            Self::Convert(a) => (a.json, is_stdout(&a.output)),
+            Self::Phantom(a) => (a.json, is_stdout(&a.output)),
+            Self::Picture(a) => (a.json, is_stdout(&a.output)),
+            Self::Simulate(a) => (a.json, is_stdout(&a.output)),
+            Self::Charts(a) => (a.json(), false),
         }
     }
 }
@@ -119,11 +202,84 @@ fn set_threads(threads: Option<NonZeroUsize>) -> Outcome<usize> {
 }
 
 #[cfg(test)]
+#[path = "../../tests/common/wrong_values.rs"]
+#[allow(dead_code, reason = "the rows alone are looked at here")]
+mod wrong_values;
+
+#[cfg(test)]
 mod tests {
-    use clap::CommandFactory;
+    use super::wrong_values::ROWS;
+
+    /// Leaves of the tree of commands under names such as `charts_fit`.
+    fn leaves(command: &clap::Command, name: &str, found: &mut Vec<(String, clap::Command)>) {
+        for sub in command.get_subcommands().filter(|s| s.get_name() != "help") {
+            let name = if name.is_empty() {
+                sub.get_name().to_string()
+            } else {
+                format!("{name}_{}", sub.get_name())
+            };
+            match sub.has_subcommands() {
+                true => leaves(sub, &name, found),
+                false => found.push((name, sub.clone())),
+            }
+        }
+    }
+
+    /// A new option needs a row in `tests/common/wrong_values.rs`, which the test
+    /// `a_wrong_value_is_named_with_its_option_and_its_remedy` types in.
+    #[test]
+    fn every_option_has_a_wrong_value_in_the_table() {
+        let mut commands = Vec::new();
+        let mut root = super::command();
+        root.build();
+        leaves(&root, "", &mut commands);
+        assert!(commands.len() > 10);
+        let mut missing = Vec::new();
+        for (name, command) in &commands {
+            // What clap itself looks for in debug builds alone: two arguments of one name, of which one is deaf.
+            let mut ids: Vec<_> = command.get_arguments().map(|a| a.get_id().as_str()).collect();
+            ids.sort_unstable();
+            assert!(ids.windows(2).all(|w| w[0] != w[1]), "{name}: {ids:?}");
+            for argument in command.get_arguments() {
+                let option = match argument.get_long() {
+                    Some("help" | "version") => continue,
+                    Some(long) => format!("--{long}"),
+                    None => argument.get_id().to_string(),
+                };
+                let has_row = ROWS.iter().any(|(commands, options, ..)| {
+                    commands.split(' ').any(|c| c == name) && options.split(' ').any(|o| o == option)
+                });
+                if argument.get_action().takes_values() {
+                    if !has_row {
+                        missing.push(format!("{name} {option}"));
+                    }
+                    continue;
+                }
+                // A switch takes no value, and says so.
+                let typed = name
+                    .split('_')
+                    .map(String::from)
+                    .chain([format!("{option}=maybe")]);
+                let refused = root
+                    .clone()
+                    .try_get_matches_from(["isoclay".into()].into_iter().chain(typed));
+                let said = refused.unwrap_err().to_string();
+                assert!(
+                    said.contains(&option) && said.contains("maybe"),
+                    "{name} {option}: {said}"
+                );
+            }
+        }
+        assert!(missing.is_empty(), "no wrong value for {missing:?}");
+        for (rows, ..) in ROWS {
+            for name in rows.split(' ') {
+                assert!(commands.iter().any(|(c, _)| c == name), "{name} is no command");
+            }
+        }
+    }
 
     #[test]
     fn command_line_is_consistent() {
-        super::Cli::command().debug_assert();
+        super::command().debug_assert();
     }
 }

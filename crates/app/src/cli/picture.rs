@@ -1,35 +1,35 @@
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use bspline::polygonize::PolygonizeOptions;
+use bspline::polygonize::{Mesh, Placement, PolygonizeOptions};
 use clap::ValueEnum;
-use fitting::Cancel;
 use glam::DVec3;
 
 use super::cost::Cost;
-use super::failure::Outcome;
+use super::failure::{Failure, OrFail, Outcome};
 use super::field::OpenField;
-use super::input::{check_output, writing};
 use super::mesh::Mesher;
+use super::output::Output;
 use super::progress::Bar;
-use super::quantity::finite;
+use super::quantity::{between, finite, human_number, positive, threads};
+use super::source::{FIELDS, Source};
 use super::summary::Summary;
 use super::{interrupt, set_threads};
-use crate::picture::{Scene, View, draw};
+use crate::picture::{Part, Scene, Surface, View, draw};
 
 /// Arguments of `isoclay picture`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Field (.iclay)
+    /// Field (.iclay); - reads standard input
     field: PathBuf,
-    /// Picture to write (.png)
+    /// Picture to write (.png); - writes to standard output
     #[arg(short, long, value_name = "OUT")]
-    output: PathBuf,
+    pub output: PathBuf,
     /// Density of the surface [default: as for mesh]
     #[arg(long, value_name = "V", value_parser = finite, allow_negative_numbers = true)]
     iso: Option<f64>,
-    /// Cells along the longest side of the box [default: two cells per knot interval of the finest level that a tenth of the surface lies on]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65535))]
+    /// Cells along the longest side of the box [default: as many as the picture shows, at most eight in a knot interval]
+    #[arg(long, value_name = "N", value_parser = between::<u32>(1, 65535))]
     resolution: Option<u32>,
     /// Width and height in pixels
     #[arg(long, value_name = "WxH", default_value = "1200x900", value_parser = size)]
@@ -43,12 +43,18 @@ pub struct Args {
     /// Axis that points up
     #[arg(long, value_enum, default_value_t = Axis::Y)]
     up: Axis,
+    /// How many times larger than a picture of the whole solid
+    #[arg(long, value_name = "Z", default_value_t = 1.0, value_parser = zoom, allow_negative_numbers = true)]
+    zoom: f64,
+    /// Point in the middle of the picture, in the field's coordinates [default: the middle of the solid]
+    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
+    at: Option<DVec3>,
     /// Threads to work with [default: all cores]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = threads)]
     threads: Option<NonZeroUsize>,
     /// Print one JSON object instead of a table
     #[arg(long)]
-    json: bool,
+    pub json: bool,
 }
 
 /// A world axis.
@@ -71,64 +77,95 @@ fn size(s: &str) -> Result<[usize; 2], String> {
         .ok_or_else(|| "write width x height, each 16 to 8192: 1200x900".into())
 }
 
+fn zoom(s: &str) -> Result<f64, String> {
+    match positive(s) {
+        Ok(z) if (0.01..=10_000.0).contains(&z) => Ok(z),
+        _ => Err("write a number from 0.01 to 10000".into()),
+    }
+}
+
+fn point(s: &str) -> Result<DVec3, String> {
+    let numbers: Result<Vec<f64>, String> = s.split(',').map(|n| finite(n.trim())).collect();
+    match numbers.as_deref() {
+        Ok(&[x, y, z]) => Ok(DVec3::new(x, y, z)),
+        Ok(_) => Err("write three numbers with commas between: 1.5,0,-2".into()),
+        Err(e) => Err(format!("{e}; write three numbers with commas between: 1.5,0,-2")),
+    }
+}
+
 /// Draws a field file.
 pub fn run(args: &Args) -> Outcome {
     let cost = Cost::start();
-    check_output(&args.output, &["png"])?;
+    let cancel = interrupt::cancel();
+    let source = Source::open(&args.field, None, FIELDS, &cancel)?;
+    let output = Output::check("-o", &args.output, &["png"], None, &[&source])?;
     set_threads(args.threads)?;
-    let cancel = Cancel::new();
-    interrupt::cancel_on_interrupt(&cancel)?;
-    let open = OpenField::load(&args.field)?;
+    let open = OpenField::load(&source)?;
     let bar = Bar::new();
     let options = PolygonizeOptions {
-        iso: open.iso_or(args.iso, &args.field)?,
+        iso: open.iso_or(args.iso, &source)?,
+        // Colours come from the normals of the field; a tenth of a cell is a quarter of a pixel.
+        placement: Placement::RootFinding { tolerance: 0.1 },
         ..Default::default()
     };
-    let frame = match args.resolution {
-        Some(n) => open.frame_of_resolution(n),
-        None => open.frame_of_surface(options.iso).0,
-    };
-    let (mesh, _, frame) = Mesher {
+    let mut mesher = Mesher {
         field: open.field(),
         options,
         cancel: &cancel,
         bar: &bar,
+    };
+    let (whole, ..) = mesher.on(open.frame_of_resolution(SHADING_CELLS))?;
+    if whole.triangles.is_empty() {
+        return Err(open.no_surface(&source, options.iso));
     }
-    .on(frame)?;
+    let view = args.view(&whole);
+    let cells = args.resolution.unwrap_or_else(|| cells_for(&open, &view));
+    let frame = open.frame_of_resolution(cells);
+    let part = Part::new(&view, &whole, frame.world_from_grid.matrix3.x_axis.length());
+    let (mesh, _, frame) = if args.zoom == 1.0 && args.at.is_none() {
+        mesher.on(frame)?
+    } else {
+        let frame = part.within(&frame).ok_or_else(|| args.nothing_there(&whole))?;
+        let cut = part.cut(open.shared_field(), options.iso).or_input()?;
+        Mesher {
+            field: &cut,
+            ..mesher
+        }
+        .on(frame)?
+    };
     if mesh.triangles.is_empty() {
-        return Err(open.no_surface(&args.field, options.iso));
+        return Err(args.nothing_there(&whole));
     }
     bar.show("drawing", 0.5);
     let scene = Scene {
         field: open.field(),
-        positions: &mesh.positions,
-        triangles: &mesh.triangles,
+        seen: surface_of(&mesh),
+        shading: surface_of(&whole),
     };
-    let pixels = draw(&scene, &args.view());
+    let pixels = draw(&scene, &view);
     interrupt::check(&cancel)?;
     let [width, height] = args.size.map(|n| n as u32);
-    formats::atomic::replace(&args.output, |out| {
+    formats::atomic::replace(output.path(), |out| {
         let mut encoder = png::Encoder::new(out, width, height);
         encoder.set_color(png::ColorType::Rgb);
         let mut writer = encoder.write_header()?;
         Ok(writer.write_image_data(&pixels)?)
     })
-    .map_err(writing)?;
+    .map_err(|e| output.writing(e))?;
     bar.clear();
     Summary {
         vertices: Some(mesh.positions.len()),
         triangles: Some(mesh.triangles.len()),
         cells: Some(frame.cells),
         field_sha256: Some(open.sha256()),
-        output: Some(args.output.display().to_string()),
         ..Default::default()
     }
     .with_cost(&cost)
-    .print(args.json)
+    .print_after(&output, args.json)
 }
 
 impl Args {
-    fn view(&self) -> View {
+    fn view(&self, whole: &Mesh) -> View {
         let (up, front, side) = match self.up {
             Axis::X => (DVec3::X, DVec3::Y, DVec3::Z),
             Axis::Y => (DVec3::Y, DVec3::Z, DVec3::X),
@@ -136,10 +173,44 @@ impl Args {
         };
         let (a, e) = (self.azimuth.to_radians(), self.elevation.to_radians());
         let toward_eye = (front * a.cos() + side * a.sin()) * e.cos() + up * e.sin();
+        let fitting = View::of(&surface_of(whole), self.size, toward_eye, up);
         View {
-            size: self.size,
-            up,
-            toward_eye,
+            center: self.at.unwrap_or(fitting.center),
+            pixels_per_length: fitting.pixels_per_length * self.zoom,
+            ..fitting
         }
+    }
+
+    fn nothing_there(&self, whole: &Mesh) -> Failure {
+        let corners = whole.bounding_box().map(|b| [b.min, b.max]).unwrap_or_default();
+        let [low, high] = corners.map(|p| p.to_array().map(human_number).join(", "));
+        let at = self
+            .at
+            .map_or(String::new(), |p| format!("--at {},{},{} ", p.x, p.y, p.z));
+        Failure::usage(format!(
+            "{at}--zoom {}: no part of the solid is in the picture; it lies between ({low}) and ({high}); choose another point or a \
+             smaller zoom",
+            self.zoom
+        ))
+    }
+}
+
+/// Cells along the longest side of the box of the mesh that casts shadows.
+const SHADING_CELLS: u32 = 128;
+/// Side of a cell in pixels: an arc of a radius of ten of them is left by a twelfth of a pixel.
+const CELL_PIXELS: f64 = 2.5;
+
+/// Cells along the longest side of the box that the picture can show.
+fn cells_for(open: &OpenField, view: &View) -> u32 {
+    let sides = open.lattice().spacing(0) * open.lattice().extent();
+    let shown = (sides.max_element() * view.pixels_per_length / CELL_PIXELS).ceil();
+    let finest = open.frame_of_subdivision(8).cells.into_iter().max().unwrap_or(1);
+    (shown as u32).clamp(16, finest.clamp(16, 65535))
+}
+
+fn surface_of(mesh: &Mesh) -> Surface<'_> {
+    Surface {
+        positions: &mesh.positions,
+        triangles: &mesh.triangles,
     }
 }

@@ -1,3 +1,5 @@
+use std::fmt;
+use std::num::NonZeroUsize;
 use std::str::FromStr;
 
 use formats::Unit;
@@ -77,6 +79,37 @@ pub fn positive(s: &str) -> Result<f64, String> {
     }
 }
 
+/// A number of threads.
+///
+/// # Errors
+/// A sentence, if it is none or too many.
+pub fn threads(s: &str) -> Result<NonZeroUsize, String> {
+    match s.parse::<NonZeroUsize>() {
+        Ok(n) if n.get() <= 1024 => Ok(n),
+        _ => Err("write a whole number from 1 to 1024".into()),
+    }
+}
+
+/// A parser of whole numbers from `low` to `high`.
+pub fn between<T>(low: T, high: T) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static
+where
+    T: FromStr + PartialOrd + fmt::Display + Copy + Send + Sync + 'static,
+{
+    move |s| match s.parse::<T>() {
+        Ok(n) if low <= n && n <= high => Ok(n),
+        _ => Err(format!("write a whole number from {low} to {high}")),
+    }
+}
+
+/// A whole number above zero.
+///
+/// # Errors
+/// A sentence, if it is something else.
+pub fn count(s: &str) -> Result<NonZeroUsize, String> {
+    s.parse()
+        .map_err(|_| "write a whole number above zero, in digits".into())
+}
+
 /// A finite number.
 ///
 /// # Errors
@@ -117,9 +150,7 @@ impl FromStr for Memory {
             .map_err(|e| format!("{e}; write a size such as 2GiB, 512MiB, 1.5GB or a number of bytes"))?
             * scale;
         if !(1.0..1e18).contains(&bytes) {
-            return Err(format!(
-                "{s} is no size that a memory can have; write a size such as 2GiB"
-            ));
+            return Err(format!("{s} is out of range; write a size such as 2GiB"));
         }
         Ok(Self(bytes as u64))
     }

@@ -1,32 +1,36 @@
-use std::io::{self, Write};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-use bspline::polygonize::PolygonizeOptions;
+use bspline::polygonize::{Mesh, PolygonizeOptions};
 use bspline::{Field, Frame, HierarchicalSpline, Real};
 use fitting::Cancel;
+use formats::Unit;
 use formats::field::{AnyField, FieldMeta, Stored};
 use serde::Serialize;
 
 use super::cost::Cost;
-use super::failure::{Failure, OrFail, Outcome};
-use super::field::{OpenField, either};
-use super::input::{check_output, writing};
+use super::failure::{Failure, Outcome};
+use super::field::{self, OpenField, either};
 use super::mesh::Mesher;
+use super::mesh_output::MESHES;
+use super::output::Output;
+use super::overwrite::refuse_own_input;
 use super::progress::Bar;
-use super::quantity::{human_count, human_number};
-use super::summary::{Summary, hex, table};
+use super::quantity::{count, human_count, human_number, threads};
+use super::source::{FIELDS, Source};
+use super::staged::StagedFiles;
+use super::summary::{self, Summary, table};
 use super::{interrupt, set_threads};
 use crate::simulate::{Scene, SimulateError, Simulation, StepLine};
 
 /// Arguments of `isoclay simulate`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Scene (.toml); the guide lists what it may say
+    /// Scene (.toml), - reads standard input; docs/guide.md lists what it may say
     scene: PathBuf,
-    /// Field to write (.iclay)
+    /// Field to write (.iclay); - writes to standard output
     #[arg(short, long, value_name = "FIELD")]
-    output: PathBuf,
+    pub output: PathBuf,
     /// Field to move in place of the one that the scene names
     #[arg(long, value_name = "FIELD")]
     field: Option<PathBuf>,
@@ -37,14 +41,14 @@ pub struct Args {
     #[arg(long, value_name = "DIR")]
     frames: Option<PathBuf>,
     /// Steps from one frame to the next
-    #[arg(long, value_name = "N", requires = "frames", default_value = "10")]
+    #[arg(long, value_name = "N", requires = "frames", default_value = "10", value_parser = count)]
     every: NonZeroUsize,
     /// Threads to work with [default: all cores]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = threads)]
     threads: Option<NonZeroUsize>,
-    /// Print one JSON object a step, and one at the end
+    /// Print one JSON object for each step, and one at the end
     #[arg(long)]
-    json: bool,
+    pub json: bool,
 }
 
 /// What all steps did.
@@ -67,24 +71,37 @@ struct Total {
 /// Runs a scene and writes the field that it leaves.
 pub fn run(args: &Args) -> Outcome {
     let cost = Cost::start();
-    check_output(&args.output, &["iclay"])?;
-    if let Some(mesh) = &args.mesh {
-        check_output(mesh, &["ply", "stl", "obj"])?;
+    let cancel = interrupt::cancel();
+    let script = Source::open(&args.scene, Some("toml"), "scenes .toml", &cancel)?;
+    let output = Output::check("-o", &args.output, &["iclay"], None, &[&script])?;
+    let mesh = (args.mesh.as_ref())
+        .map(|mesh| Output::check("--mesh", mesh, &MESHES, None, &[&script]))
+        .transpose()?;
+    if output.is_stdout() && mesh.as_ref().is_some_and(Output::is_stdout) {
+        return Err(Failure::usage(
+            "--mesh -: standard output takes the field already (-o -); name a file for one of them",
+        ));
     }
-    if let Some(frames) = &args.frames {
-        std::fs::create_dir_all(frames)
-            .map_err(|e| anyhow::anyhow!("--frames {}: cannot be made ({e})", frames.display()))
-            .or_limit()?;
-    }
+    let frames = (args.frames.as_ref())
+        .map(|frames| StagedFiles::new("--frames", frames))
+        .transpose()?;
+    let scene = read(&script)?;
+    let field = match &args.field {
+        Some(field) => Source::open(field, None, FIELDS, &cancel)?.under("--field"),
+        None => {
+            let directory = args.scene.parent().unwrap_or(Path::new(""));
+            Source::open(&directory.join(&scene.field), None, FIELDS, &cancel)?
+        }
+    };
+    refuse_own_input("-o", &field, &args.output)?;
     set_threads(args.threads)?;
-    let cancel = Cancel::new();
-    interrupt::cancel_on_interrupt(&cancel)?;
-    let scene = read(&args.scene)?;
-    let directory = args.scene.parent().unwrap_or(Path::new(""));
-    let named = directory.join(&scene.field);
-    let open = OpenField::load(args.field.as_ref().unwrap_or(&named))?;
-    let stage = Stage {
+    let open = OpenField::load(&field)?;
+    let mut stage = Stage {
         args,
+        name: script.name(),
+        output: &output,
+        mesh: mesh.as_ref(),
+        frames,
         scene: &scene,
         open: &open,
         iso: scene.iso.map(|i| i.0).or(open.iso()),
@@ -93,20 +110,33 @@ pub fn run(args: &Args) -> Outcome {
     };
     let total = either!(&open.loaded().field, f => stage.play(f.clone()))?;
     stage.bar.clear();
+    if let Some(mesh) = &mesh {
+        mesh.finish()?;
+    }
+    output.finish()?;
     let total = Total {
-        summary: total.summary.with_cost(&cost),
+        summary: Summary {
+            output: Some(output.name()),
+            ..total.summary.with_cost(&cost)
+        },
         ..total
     };
-    print(&total, args.json)
+    let is_taken = output.is_stdout() || mesh.as_ref().is_some_and(Output::is_stdout);
+    summary::print(&total.text(args.json), is_taken)
 }
 
 /// Reads a scene; what is wrong is told with its line.
-fn read(path: &Path) -> Outcome<Scene> {
+fn read(script: &Source) -> Outcome<Scene> {
     const LARGEST: u64 = 16 << 20;
-    let about = |why: String| Failure::input(format!("{}: {why}", path.display()));
-    let size = std::fs::metadata(path).map_err(|e| about(e.to_string()))?.len();
+    let path = script.path();
+    let about = |why: String| Failure::input(format!("{}: {why}", script.name()));
+    let size = std::fs::metadata(path)
+        .map_err(|e| about(format!("{e}; check the path")))?
+        .len();
     if size > LARGEST {
-        return Err(about(format!("has {size} bytes; a scene has at most {LARGEST}")));
+        return Err(about(format!(
+            "has {size} bytes, and a scene at most {LARGEST}; is this the right file?"
+        )));
     }
     let text = std::fs::read_to_string(path).map_err(|e| about(e.to_string()))?;
     toml::from_str(&text).map_err(|e| about(e.to_string().trim_end().into()))
@@ -115,6 +145,11 @@ fn read(path: &Path) -> Outcome<Scene> {
 /// A scene with all that its run needs.
 struct Stage<'a> {
     args: &'a Args,
+    /// What the user calls the scene.
+    name: &'a str,
+    output: &'a Output,
+    mesh: Option<&'a Output>,
+    frames: Option<StagedFiles>,
     scene: &'a Scene,
     open: &'a OpenField,
     iso: Option<f64>,
@@ -123,8 +158,9 @@ struct Stage<'a> {
 }
 
 impl Stage<'_> {
-    fn play<T: Stored>(&self, field: HierarchicalSpline<T>) -> Outcome<Total> {
-        let failed = |e: SimulateError| Failure::input(format!("{}: {e}", self.args.scene.display()));
+    fn play<T: Stored>(&mut self, field: HierarchicalSpline<T>) -> Outcome<Total> {
+        let name = self.name;
+        let failed = |e: SimulateError| Failure::input(format!("{name}: {e}"));
         let mut simulation = Simulation::new(self.scene, field, self.iso).map_err(failed)?;
         let lattice = simulation.region().patch().lattice();
         let mut total = Total {
@@ -138,7 +174,8 @@ impl Stage<'_> {
             let line = simulation.step().map_err(failed)?;
             if self.args.json {
                 let text = serde_json::to_string(&line).expect("a struct of plain fields is always JSON");
-                writeln!(io::stdout().lock(), "{text}").or_limit()?;
+                let is_taken = self.output.is_stdout() || self.mesh.is_some_and(Output::is_stdout);
+                summary::print(&text, is_taken)?;
             }
             total.add(&line);
             self.frame(&simulation, line.step)?;
@@ -146,31 +183,38 @@ impl Stage<'_> {
         }
         let baked = simulation.baked().map_err(failed)?;
         total.summary.notes = simulation.notes().to_vec();
-        if let Some(path) = &self.args.mesh {
-            self.mesh(&baked, simulation.region().cells().level, path)?;
+        if let Some(frames) = self.frames.take() {
+            frames.publish()?;
+        }
+        if let Some(output) = self.mesh {
+            let mesh = self.surface(&baked, simulation.region().cells().level)?;
+            formats::meshes::save(output.path(), &written(&mesh, self.open.unit()))
+                .map_err(|e| output.writing(e))?;
         }
         interrupt::check(self.cancel)?;
         self.bar.show("writing", 0.99);
         total.summary.field_sha256 = Some(self.save(&baked)?);
-        total.summary.output = Some(self.args.output.display().to_string());
         Ok(total)
     }
 
     /// Writes a frame if one is due.
-    fn frame<T: Real>(&self, simulation: &Simulation<T>, step: usize) -> Outcome {
-        let Some(directory) = &self.args.frames else {
-            return Ok(());
-        };
-        if !step.is_multiple_of(self.args.every.get()) {
+    fn frame<T: Real>(&mut self, simulation: &Simulation<T>, step: usize) -> Outcome {
+        if self.frames.is_none() || !step.is_multiple_of(self.args.every.get()) {
             return Ok(());
         }
         let baked = simulation.baked().map_err(Failure::input)?;
-        let path = directory.join(format!("frame-{step:05}.ply"));
-        self.mesh(&baked, simulation.region().cells().level, &path)
+        let mesh = self.surface(&baked, simulation.region().cells().level)?;
+        let unit = self.open.unit();
+        if let Some(frames) = &mut self.frames {
+            frames.write(&format!("frame-{step:05}.ply"), |path| {
+                formats::meshes::save(path, &written(&mesh, unit))
+            })?;
+        }
+        Ok(())
     }
 
     /// Meshes a field, with two cells in every knot interval of the surface's level or the region's.
-    fn mesh(&self, field: &dyn Field, level: usize, path: &Path) -> Outcome {
+    fn surface(&self, field: &dyn Field, level: usize) -> Outcome<Mesh> {
         let Some(iso) = self.iso else {
             return Err(Failure::usage(
                 "a mesh needs the density of the surface; write iso above all tables of the scene",
@@ -188,15 +232,7 @@ impl Stage<'_> {
             cancel: self.cancel,
             bar: &self.bar,
         };
-        let (mesh, ..) = mesher.on(frame)?;
-        let written = formats::meshes::Mesh {
-            vertices: &mesh.positions,
-            triangles: &mesh.triangles,
-            colors: None,
-            unit: self.open.unit(),
-        };
-        formats::meshes::save(path, &written).map_err(writing)?;
-        Ok(())
+        Ok(mesher.on(frame)?.0)
     }
 
     /// Writes the field with what is known of the one it was made from; returns its SHA-256.
@@ -217,8 +253,16 @@ impl Stage<'_> {
             .to_string(),
             ..before.clone()
         };
-        formats::field::save(&self.args.output, field, &meta).map_err(writing)?;
-        Ok(hex(&field.sha256()))
+        field::save_as(self.output, field, &meta)
+    }
+}
+
+fn written(mesh: &Mesh, unit: Unit) -> formats::meshes::Mesh<'_> {
+    formats::meshes::Mesh {
+        vertices: &mesh.positions,
+        triangles: &mesh.triangles,
+        colors: None,
+        unit,
     }
 }
 
@@ -233,12 +277,12 @@ impl Total {
         self.work = line.work;
         self.max_change = line.max_change;
     }
-}
 
-fn print(total: &Total, json: bool) -> Outcome {
-    let text = if json {
-        serde_json::to_string(total).expect("a struct of plain fields is always JSON")
-    } else {
+    fn text(&self, json: bool) -> String {
+        let total = self;
+        if json {
+            return serde_json::to_string(total).expect("a struct of plain fields is always JSON");
+        }
         let rows = [
             (
                 "simulated",
@@ -255,7 +299,5 @@ fn print(total: &Total, json: bool) -> Outcome {
             ("density changed by", human_number(total.max_change)),
         ];
         table(rows.into_iter().chain(total.summary.rows()), &total.summary.notes)
-    };
-    let mut out = io::stdout().lock();
-    writeln!(out, "{text}").and_then(|()| out.flush()).or_limit()
+    }
 }

@@ -4,6 +4,8 @@ use serde::Serialize;
 
 use super::cost::{self, Cost};
 use super::failure::{OrFail, Outcome};
+use super::keep::LeftOut;
+use super::output::Output;
 use super::quantity::{human_bytes, human_count, human_number};
 
 /// What a subcommand tells when it is done: one JSON object, or a table. Fields that do not apply stay `None` and
@@ -98,6 +100,9 @@ pub struct Summary {
     /// Triangles of the mesh.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub triangles: Option<usize>,
+    /// What was left out of the mesh as small pieces.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub left_out: Option<LeftOut>,
     /// Cells of the meshing grid on each axis.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cells: Option<[u32; 3]>,
@@ -136,9 +141,18 @@ impl Summary {
 
     /// Writes the object or the table to stdout.
     pub fn print(&self, json: bool) -> Outcome {
-        let text = if json { self.json() } else { self.table() };
-        let mut out = io::stdout().lock();
-        writeln!(out, "{text}").and_then(|()| out.flush()).or_limit()
+        print(&self.text(json), false)
+    }
+
+    /// Hands the output on, then writes the object or the table: to stderr where stdout holds the data.
+    pub fn print_after(mut self, output: &Output, json: bool) -> Outcome {
+        output.finish()?;
+        self.output = Some(output.name());
+        print(&self.text(json), output.is_stdout())
+    }
+
+    fn text(&self, json: bool) -> String {
+        if json { self.json() } else { self.table() }
     }
 
     /// One line of JSON.
@@ -205,6 +219,16 @@ impl Summary {
         rows.into_iter()
             .filter_map(|(label, value)| Some((label, value?)))
     }
+}
+
+/// Writes lines to stdout, or to stderr where stdout is taken.
+pub fn print(text: &str, is_taken: bool) -> Outcome {
+    let mut out: Box<dyn Write> = if is_taken {
+        Box::new(io::stderr().lock())
+    } else {
+        Box::new(io::stdout().lock())
+    };
+    writeln!(out, "{text}").and_then(|()| out.flush()).or_limit()
 }
 
 /// Two columns, then the notes.

@@ -10,9 +10,9 @@ use super::failure::{Failure, Outcome, explain};
 /// How to tell inside from outside where a cloud has no normals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Unoriented {
-    /// Consistency of the winding number with the normals.
+    /// By the winding number of the points: takes noise, holes and outliers.
     Winding,
-    /// Exterior tagged from outside; needs closed surfaces.
+    /// By flooding the space outside; needs closed surfaces.
     Tagging,
 }
 
@@ -67,6 +67,14 @@ impl<'a> Oriented<'a> {
         })
     }
 
+    /// Bytes held beside the cloud.
+    pub fn bytes(&self) -> u64 {
+        let per_point = 2 * size_of::<DVec3>() + size_of::<f32>();
+        let estimated = size_of::<DVec3>() + 2 * size_of::<f32>() + 1;
+        let kept = |k: &Kept| k.positions.len() * per_point + k.orientation.normals.len() * estimated;
+        self.kept.as_ref().map_or(0, kept) as u64
+    }
+
     /// Positions of the points to fit.
     pub fn positions(&self) -> &[DVec3] {
         self.kept.as_ref().map_or(&self.cloud.positions, |k| &k.positions)
@@ -94,6 +102,16 @@ impl<'a> Oriented<'a> {
             return;
         };
         report.input_count = self.cloud.positions.len();
+        // Counted among all points of the cloud.
+        let on_surface: Vec<u32> = (0..)
+            .zip(&orientation.outlier)
+            .filter(|p| !p.1)
+            .map(|p| p.0)
+            .collect();
+        let outliers = (0..).zip(&orientation.outlier).filter(|p| *p.1).map(|p| p.0);
+        let unused = report.left_out.iter().map(|&i| on_surface[i as usize]);
+        report.left_out = unused.chain(outliers).collect();
+        report.left_out.sort_unstable();
         let confidence = orientation.on_surface(&orientation.confidence);
         report.signs = Some(SignReport {
             route: orientation.route,

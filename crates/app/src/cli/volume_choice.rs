@@ -1,10 +1,11 @@
 use std::str::FromStr;
 
 use clap::ValueEnum;
-use formats::Unit;
-use formats::volumes::{DicomOptions, RawLayout, Tilt, Uneven, VolumeOptions, VoxelType};
+use formats::volumes::{DicomOptions, RawLayout, Tilt, Uneven, VolumeFormat, VolumeOptions, VoxelType};
+use formats::{Kind, Unit};
 
 use super::failure::{Failure, Outcome};
+use super::quantity::{count, positive};
 
 /// Which part of a volume to read, and what its file does not tell.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -14,25 +15,25 @@ pub struct VolumeChoice {
     #[arg(long, value_name = "X0:X1,Y0:Y1,Z0:Z1")]
     region: Option<Triple<Range>>,
     /// Read every so many voxels along each axis: one number, or three
-    #[arg(long, value_name = "N|X,Y,Z")]
-    stride: Option<OneOrThree<usize>>,
+    #[arg(long, value_name = "N|X,Y,Z", allow_hyphen_values = true)]
+    stride: Option<OneOrThree<Step>>,
     /// Distances between neighbouring voxels in mm, in place of those in the file: one number, or three
-    #[arg(long, value_name = "N|X,Y,Z")]
-    spacing: Option<OneOrThree<f64>>,
+    #[arg(long, value_name = "N|X,Y,Z", allow_hyphen_values = true)]
+    spacing: Option<OneOrThree<Spacing>>,
     /// Which volume of a time series, of echoes or channels to read, counted from 0
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = whole::<usize>, allow_negative_numbers = true)]
     volume: Option<usize>,
     /// The file has no header: voxels along x (fastest), y and z
-    #[arg(long, value_name = "X,Y,Z", requires = "voxel")]
-    shape: Option<Triple<usize>>,
+    #[arg(long = "shape", value_name = "X,Y,Z", requires = "voxel")]
+    dims: Option<Triple<usize>>,
     /// The file has no header: type of its voxels, such as uint16 or float32
-    #[arg(long, value_name = "TYPE", requires = "shape")]
+    #[arg(long, value_name = "TYPE", requires = "dims")]
     voxel: Option<VoxelType>,
     /// The file has no header: its voxels have their high byte first
-    #[arg(long, requires = "shape")]
+    #[arg(long, requires = "dims")]
     big_endian: bool,
     /// The file has no header: bytes before the first voxel
-    #[arg(long, value_name = "BYTES", requires = "shape", default_value_t = 0)]
+    #[arg(long, value_name = "BYTES", requires = "dims", default_value_t = 0, value_parser = whole::<u64>, allow_negative_numbers = true)]
     offset: u64,
     /// DICOM: the series to read, by its number or its identifier, where there are several
     #[arg(long, value_name = "NUMBER|UID")]
@@ -66,11 +67,42 @@ enum TiltChoice {
 }
 
 impl VolumeChoice {
+    /// Refuses choices for DICOM series where the volume is none.
+    pub fn suits(&self, kind: Kind) -> Outcome {
+        let (option, value) = if let Some(series) = &self.series {
+            ("--series", series.clone())
+        } else if self.uneven != UnevenChoice::Refuse {
+            ("--uneven", "resample".into())
+        } else if self.tilt != TiltChoice::Keep {
+            ("--tilt", "resample".into())
+        } else {
+            return Ok(());
+        };
+        match kind {
+            Kind::Volume(VolumeFormat::Dicom) => Ok(()),
+            kind => Err(Failure::usage(format!(
+                "{option} {value}: is for DICOM series, and this is a {kind}; leave it out"
+            ))),
+        }
+    }
+
+    /// Takes away `--spacing` where it is not that of a file without a header.
+    pub fn take_spacing_of_other(&mut self) -> Option<[f64; 3]> {
+        if self.dims.is_some() {
+            return None;
+        }
+        self.spacing.take().map(|s| s.0.map(|Spacing(s)| s))
+    }
+
+    fn spacing(&self) -> Option<[f64; 3]> {
+        self.spacing.as_ref().map(|s| s.0.map(|Spacing(s)| s))
+    }
+
     /// The options of the reader; `unit` is what the user says of the file.
     pub fn options(&self, unit: Option<Unit>) -> Outcome<VolumeOptions> {
-        let raw = match (&self.shape, self.voxel) {
+        let raw = match (&self.dims, self.voxel) {
             (Some(Triple(dims)), Some(voxel)) => {
-                let spacing = self.spacing.as_ref().map(|s| s.0);
+                let spacing = self.spacing();
                 if spacing.is_none() && unit.is_some() {
                     return Err(Failure::usage(
                         "--unit of a file without a header needs --spacing, in mm; give it and leave --unit out",
@@ -98,12 +130,8 @@ impl VolumeChoice {
                 .region
                 .as_ref()
                 .map(|r| r.0.map(|Range(from, to)| [from, to])),
-            stride: self.stride.as_ref().map_or([1; 3], |s| s.0),
-            spacing_mm: if raw.is_some() {
-                None
-            } else {
-                self.spacing.as_ref().map(|s| s.0)
-            },
+            stride: self.stride.as_ref().map_or([1; 3], |s| s.0.map(|Step(n)| n)),
+            spacing_mm: if raw.is_some() { None } else { self.spacing() },
             volume: self.volume,
             raw,
             dicom: DicomOptions {
@@ -121,6 +149,11 @@ impl VolumeChoice {
     }
 }
 
+fn whole<T: FromStr>(s: &str) -> Result<T, String> {
+    s.parse()
+        .map_err(|_| "write a whole number in digits, 0 or more".into())
+}
+
 /// Three values with commas between.
 #[derive(Clone, Debug, PartialEq)]
 struct Triple<T>([T; 3]);
@@ -129,35 +162,61 @@ struct Triple<T>([T; 3]);
 #[derive(Clone, Debug, PartialEq)]
 struct OneOrThree<T>([T; 3]);
 
+/// A length above zero.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Spacing(f64);
+
+impl FromStr for Spacing {
+    type Err = String;
+    fn from_str(s: &str) -> Result<Self, String> {
+        positive(s).map(Self)
+    }
+}
+
+/// A whole number above zero.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Step(usize);
+
+impl FromStr for Step {
+    type Err = String;
+    fn from_str(s: &str) -> Result<Self, String> {
+        count(s).map(|n| Self(n.get()))
+    }
+}
+
 /// `from:to`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Range(usize, usize);
 
-fn parts<T: FromStr>(s: &str) -> Result<Vec<T>, String> {
+fn parts<T: FromStr<Err: ToString>>(s: &str) -> Result<Vec<T>, String> {
     s.split(',')
-        .map(|p| p.trim().parse().map_err(|_| format!("{p:?} cannot be read")))
+        .map(|p| {
+            p.trim()
+                .parse()
+                .map_err(|e: T::Err| format!("{p:?}: {}", e.to_string()))
+        })
         .collect()
 }
 
-impl<T: FromStr> FromStr for Triple<T> {
+impl<T: FromStr<Err: ToString>> FromStr for Triple<T> {
     type Err = String;
     fn from_str(s: &str) -> Result<Self, String> {
         let all = parts(s)?;
         let n = all.len();
         all.try_into()
             .map(Self)
-            .map_err(|_| format!("{n} given; write three with commas between"))
+            .map_err(|_| format!("{n} of three values given; write all three with commas between"))
     }
 }
 
-impl<T: FromStr + Copy> FromStr for OneOrThree<T> {
+impl<T: FromStr<Err: ToString> + Copy> FromStr for OneOrThree<T> {
     type Err = String;
     fn from_str(s: &str) -> Result<Self, String> {
         match parts(s)?.as_slice() {
             &[one] => Ok(Self([one; 3])),
             &[x, y, z] => Ok(Self([x, y, z])),
             other => Err(format!(
-                "{} given; write one, or three with commas between",
+                "{} values given; write one, or three with commas between",
                 other.len()
             )),
         }
@@ -187,14 +246,20 @@ mod tests {
             "1:5, 2:6,0:9".parse(),
             Ok(Triple([Range(1, 5), Range(2, 6), Range(0, 9)]))
         );
-        assert_eq!("2".parse(), Ok(OneOrThree([2usize; 3])));
-        assert_eq!("0.5,1,2".parse(), Ok(OneOrThree([0.5, 1.0, 2.0])));
+        assert_eq!("2".parse(), Ok(OneOrThree([Step(2); 3])));
+        assert_eq!("0.5,1,2".parse(), Ok(OneOrThree([0.5, 1.0, 2.0].map(Spacing))));
+        assert!(
+            "1,0,1"
+                .parse::<OneOrThree<Spacing>>()
+                .unwrap_err()
+                .contains("above zero")
+        );
         for bad in ["", "1:2", "1:2,3:4", "1-2,3:4,5:6", "a:b,1:2,3:4", "-1:2,3:4,5:6"] {
             assert!(bad.parse::<Triple<Range>>().is_err(), "{bad:?}");
         }
         assert!(
             "1,2"
-                .parse::<OneOrThree<usize>>()
+                .parse::<OneOrThree<Step>>()
                 .unwrap_err()
                 .contains("one, or three")
         );

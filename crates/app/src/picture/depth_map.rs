@@ -1,13 +1,13 @@
 use glam::{DMat3, DVec3};
 
-use super::Scene;
+use super::Surface;
 
 /// The nearest triangle and its depth in each pixel, seen from far away.
 pub struct DepthMap {
     /// Rows: right, up, toward the eye.
     pub axes: DMat3,
     center: DVec3,
-    pixels_per_length: f64,
+    pub pixels_per_length: f64,
     /// Columns and rows.
     pub size: [usize; 2],
     /// Largest coordinate toward the eye, relative to the centre.
@@ -17,27 +17,30 @@ pub struct DepthMap {
 }
 
 impl DepthMap {
-    /// Looks at the scene along the third row of `axes`; the scene fills the map.
-    pub fn draw(scene: &Scene, axes: DMat3, size: [usize; 2]) -> Self {
-        let mut seen: Vec<DVec3> = scene.positions.iter().map(|&p| axes * p).collect();
-        let (lo, hi) = seen
-            .iter()
-            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), q| {
-                (l.min(*q), h.max(*q))
-            });
-        let extent = (hi - lo).max(DVec3::splat(f64::MIN_POSITIVE));
-        let scale = (0.92 * size[0] as f64 / extent.x).min(0.92 * size[1] as f64 / extent.y);
+    /// Looks at a surface along the third row of `axes`; the surface fills the map.
+    pub fn filled(surface: &Surface, axes: DMat3, size: [usize; 2]) -> Self {
+        let (center, pixels_per_length) = fill([surface], axes, size);
+        Self::draw(surface, axes, size, center, pixels_per_length)
+    }
+
+    /// Looks at the point `center`, which comes to the middle of the map.
+    pub fn draw(
+        surface: &Surface,
+        axes: DMat3,
+        size: [usize; 2],
+        center: DVec3,
+        pixels_per_length: f64,
+    ) -> Self {
         let mut map = Self {
             axes,
-            center: axes.transpose() * ((lo + hi) * 0.5),
-            pixels_per_length: scale,
+            center,
+            pixels_per_length,
             size,
             depth: vec![f32::NEG_INFINITY; size[0] * size[1]],
             triangle: vec![u32::MAX; size[0] * size[1]],
         };
-        let middle = (lo + hi) * 0.5;
-        seen.iter_mut().for_each(|q| *q = map.pixel_of(*q - middle));
-        for (t, corners) in (0..).zip(scene.triangles) {
+        let seen: Vec<DVec3> = surface.positions.iter().map(|&p| map.pixel(p)).collect();
+        for (t, corners) in (0..).zip(surface.triangles) {
             map.add(t, corners.map(|v| seen[v as usize]));
         }
         map
@@ -45,11 +48,7 @@ impl DepthMap {
 
     /// Column, row and depth of a point; pixel centres are whole numbers.
     fn pixel(&self, p: DVec3) -> DVec3 {
-        self.pixel_of(self.axes * (p - self.center))
-    }
-
-    /// The same of a point given along the axes, from the centre.
-    fn pixel_of(&self, q: DVec3) -> DVec3 {
+        let q = self.axes * (p - self.center);
         let middle = DVec3::new(self.size[0] as f64, self.size[1] as f64, 1.0) * 0.5 - 0.5;
         middle + DVec3::new(q.x * self.pixels_per_length, -q.y * self.pixels_per_length, q.z)
     }
@@ -68,15 +67,20 @@ impl DepthMap {
 
     fn add(&mut self, t: u32, [a, b, c]: [DVec3; 3]) {
         let area = (b - a).truncate().perp_dot((c - a).truncate());
-        if area == 0.0 {
+        // Rows run downwards. Of a closed surface no far side is ever seen.
+        if area >= 0.0 {
             return;
         }
         let (lo, hi) = (a.min(b).min(c), a.max(b).max(c));
-        for y in lo.y.ceil().max(0.0) as usize..(hi.y.floor() + 1.0).clamp(0.0, self.size[1] as f64) as usize
-        {
-            for x in
-                lo.x.ceil().max(0.0) as usize..(hi.x.floor() + 1.0).clamp(0.0, self.size[0] as f64) as usize
-            {
+        // Whole numbers from `lo` to `hi`; casts cut off and saturate, and cost less than `ceil`.
+        let range = |lo: f64, hi: f64, n: usize| {
+            let first = lo.max(0.0) as usize;
+            let end = if hi < 0.0 { 0 } else { n.min(hi as usize + 1) };
+            first + usize::from((first as f64) < lo)..end
+        };
+        let columns = range(lo.x, hi.x, self.size[0]);
+        for y in range(lo.y, hi.y, self.size[1]) {
+            for x in columns.clone() {
                 let p = DVec3::new(x as f64, y as f64, 0.0);
                 let u = (b - p).truncate().perp_dot((c - p).truncate()) / area;
                 let v = (c - p).truncate().perp_dot((a - p).truncate()) / area;
@@ -92,10 +96,23 @@ impl DepthMap {
         }
     }
 
+    /// Whether nothing lies before `p`, whose normal is `normal`.
+    pub fn is_visible(&self, p: DVec3, normal: DVec3) -> bool {
+        let q = self.off_surface(p, normal) + 0.5;
+        // Casts cut off towards 0: what is left of the map or above it counts as its first column or row.
+        let (x, y) = (q.x as usize, q.y as usize);
+        let is_outside = x >= self.size[0] || y >= self.size[1];
+        is_outside || (q.z - 0.5) as f32 >= self.depth[y * self.size[0] + x]
+    }
+
+    /// Pixel of a point a step off the surface, so that it does not shade itself.
+    fn off_surface(&self, p: DVec3, normal: DVec3) -> DVec3 {
+        self.pixel(p + normal * (2.5 / self.pixels_per_length))
+    }
+
     /// Share of the pixels round `p`'s own, `reach` on each side, in which nothing lies before it.
     pub fn visible(&self, p: DVec3, normal: DVec3, reach: i64) -> f64 {
-        // A step off the surface, so that it does not shade itself.
-        let q = self.pixel(p + normal * (2.5 / self.pixels_per_length));
+        let q = self.off_surface(p, normal);
         let (x, y) = (q.x.round() as i64, q.y.round() as i64);
         let mut seen = 0;
         for (i, j) in (-reach..=reach).flat_map(|i| (-reach..=reach).map(move |j| (x + i, y + j))) {
@@ -104,4 +121,22 @@ impl DepthMap {
         }
         seen as f64 / ((2 * reach + 1) * (2 * reach + 1)) as f64
     }
+}
+
+/// The point in the middle and the pixels in a length with which surfaces fill a map of `size`.
+pub fn fill<'a>(
+    surfaces: impl IntoIterator<Item = &'a Surface<'a>>,
+    axes: DMat3,
+    size: [usize; 2],
+) -> (DVec3, f64) {
+    let (lo, hi) = surfaces
+        .into_iter()
+        .flat_map(|s| s.positions)
+        .map(|&p| axes * p)
+        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), q| {
+            (l.min(q), h.max(q))
+        });
+    let extent = (hi - lo).max(DVec3::splat(f64::MIN_POSITIVE));
+    let scale = (0.92 * size[0] as f64 / extent.x).min(0.92 * size[1] as f64 / extent.y);
+    (axes.transpose() * ((lo + hi) * 0.5), scale)
 }

@@ -1,10 +1,11 @@
 //! Pictures without a graphics card: depth maps of the triangles, shaded with the normals of the field.
 //!
 //! Light comes from a bright sun and from a sky that is brighter above. What blocks either is found with the
-//! depth map of the same triangles seen from that light, so that creases darken and shadows fall where they
-//! would.
+//! depth map of triangles seen from that light, so that creases darken and shadows fall where they would. These
+//! triangles may be coarser than those that are seen: what a shadow needs is its outline.
 
 mod depth_map;
+mod part;
 
 use std::f64::consts::PI;
 
@@ -12,40 +13,77 @@ use bspline::Field;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-use depth_map::DepthMap;
+use depth_map::{DepthMap, fill};
+pub use part::Part;
+
+/// A closed triangle mesh, counter-clockwise from outside.
+pub struct Surface<'a> {
+    /// Vertices, world coordinates.
+    pub positions: &'a [DVec3],
+    /// Triangles.
+    pub triangles: &'a [[u32; 3]],
+}
 
 /// What to draw.
 pub struct Scene<'a> {
     /// The field whose gradient gives the normals.
     pub field: &'a dyn Field,
-    /// Vertices, world coordinates.
-    pub positions: &'a [DVec3],
-    /// Triangles, counter-clockwise from outside.
-    pub triangles: &'a [[u32; 3]],
+    /// What is seen.
+    pub seen: Surface<'a>,
+    /// What casts shadows.
+    pub shading: Surface<'a>,
 }
 
 /// From where.
+#[derive(Clone, Copy, Debug)]
 pub struct View {
     /// Width and height of the picture in pixels.
     pub size: [usize; 2],
-    /// Direction that points up in the picture.
-    pub up: DVec3,
-    /// Direction from the object to the eye.
-    pub toward_eye: DVec3,
+    /// Rows: right, up, toward the eye.
+    pub axes: DMat3,
+    /// The point in the middle of the picture.
+    pub center: DVec3,
+    /// Scale.
+    pub pixels_per_length: f64,
 }
 
 /// Samples of a pixel along one side.
 const SAMPLES: usize = 2;
-/// Directions of the sky; each sample of a pixel sees every `SAMPLES²`-th of them.
-const SKY: usize = 96;
+/// Directions of the sky.
+const SKY: usize = 64;
+/// Cosine between the triangles of a pixel's samples above which one colour will do for them all.
+const SMOOTH: f64 = 0.95;
+/// The same for their depths: the most that they differ, in sides of a sample.
+const LEVEL: f64 = 8.0;
 const CLAY: DVec3 = DVec3::new(0.80, 0.56, 0.42);
 const PAPER: DVec3 = DVec3::new(0.93, 0.94, 0.95);
+
+impl View {
+    /// Looks from `toward_eye`, with `up` pointing up, at the whole of a surface.
+    pub fn of(surface: &Surface, size: [usize; 2], toward_eye: DVec3, up: DVec3) -> Self {
+        let axes = axes(toward_eye, up);
+        let (center, pixels_per_length) = fill([surface], axes, size);
+        Self {
+            size,
+            axes,
+            center,
+            pixels_per_length,
+        }
+    }
+}
 
 /// Draws the scene; RGB bytes, rows from the top.
 pub fn draw(scene: &Scene, view: &View) -> Vec<u8> {
     let [w, h] = view.size;
-    let axes = axes(view.toward_eye, view.up);
-    let camera = DepthMap::draw(scene, axes, [w * SAMPLES, h * SAMPLES]);
+    let scale = view.pixels_per_length * SAMPLES as f64;
+    let camera = DepthMap::draw(
+        &scene.seen,
+        view.axes,
+        [w * SAMPLES, h * SAMPLES],
+        view.center,
+        scale,
+    );
+    let up = view.axes.row(1);
     let sky: Vec<DepthMap> = (0..SKY)
         .into_par_iter()
         .map(|i| {
@@ -53,74 +91,122 @@ pub fn draw(scene: &Scene, view: &View) -> Vec<u8> {
             let z = 1.0 - (2 * i + 1) as f64 / SKY as f64;
             let angle = PI * (3.0 - 5f64.sqrt()) * i as f64;
             let r = (1.0 - z * z).sqrt();
-            let d = axes.transpose() * DVec3::new(r * angle.cos(), z, r * angle.sin());
-            DepthMap::draw(scene, self::axes(d, view.up), [384, 384])
+            let d = view.axes.transpose() * DVec3::new(r * angle.cos(), z, r * angle.sin());
+            DepthMap::filled(&scene.shading, axes(d, up), [288, 288])
         })
         .collect();
-    let sun_direction = axes.transpose() * DVec3::new(-0.45, 0.65, 0.62);
-    let sun = DepthMap::draw(scene, self::axes(sun_direction, view.up), [1536, 1536]);
-
-    let rows: Vec<Vec<DVec3>> = (0..h * SAMPLES)
+    let sun_direction = view.axes.transpose() * DVec3::new(-0.45, 0.65, 0.62);
+    let sun = DepthMap::filled(&scene.shading, axes(sun_direction, up), [1024, 1024]);
+    let lights = Lights {
+        sky: &sky,
+        sun: &sun,
+        up,
+    };
+    let rows: Vec<Vec<u8>> = (0..h)
         .into_par_iter()
-        .map(|y| shade_row(scene, &camera, &sun, &sky, axes.row(1), y))
+        .map(|y| draw_row(scene, &camera, &lights, y))
         .collect();
-    let mut bytes = Vec::with_capacity(3 * w * h);
-    for y in 0..h {
-        for x in 0..w {
-            let mut sum = DVec3::ZERO;
-            for s in 0..SAMPLES * SAMPLES {
-                sum += rows[y * SAMPLES + s / SAMPLES][x * SAMPLES + s % SAMPLES];
+    rows.concat()
+}
+
+struct Lights<'a> {
+    sky: &'a [DepthMap],
+    sun: &'a DepthMap,
+    up: DVec3,
+}
+
+/// A point that is shaded, and where its colour goes.
+struct Shaded {
+    pixel: usize,
+    /// Samples that it stands for.
+    samples: usize,
+    flat: DVec3,
+}
+
+/// RGB bytes of one row of pixels.
+fn draw_row(scene: &Scene, camera: &DepthMap, lights: &Lights, y: usize) -> Vec<u8> {
+    let width = camera.size[0] / SAMPLES;
+    let (mut points, mut shaded) = (Vec::new(), Vec::new());
+    let fade = 1.0 - 0.25 * y as f64 * SAMPLES as f64 / camera.size[1] as f64;
+    let mut row = vec![(PAPER * fade).powf(2.2) * (SAMPLES * SAMPLES) as f64; width];
+    for (pixel, sum) in row.iter_mut().enumerate() {
+        let mut hits = [(DVec3::ZERO, DVec3::ZERO); SAMPLES * SAMPLES];
+        let mut count = 0;
+        for s in 0..SAMPLES * SAMPLES {
+            let (i, j) = (pixel * SAMPLES + s % SAMPLES, y * SAMPLES + s / SAMPLES);
+            let triangle = camera.triangle[j * camera.size[0] + i];
+            if triangle != u32::MAX {
+                hits[count] = (camera.point(i, j), scene.seen.normal(triangle));
+                count += 1;
             }
-            let linear = sum / (SAMPLES * SAMPLES) as f64;
-            bytes.extend(
-                linear
-                    .to_array()
-                    .map(|c| (c.clamp(0.0, 1.0).powf(1.0 / 2.2) * 255.0 + 0.5) as u8),
-            );
         }
+        let hits = &hits[..count];
+        *sum *= 1.0 - count as f64 / (SAMPLES * SAMPLES) as f64;
+        let is_even = count == SAMPLES * SAMPLES && {
+            let (first, flat) = hits[0];
+            let reach = LEVEL / camera.pixels_per_length;
+            hits.iter()
+                .all(|(p, n)| n.dot(flat) > SMOOTH && (*p - first).dot(camera.axes.row(2)).abs() < reach)
+        };
+        if is_even {
+            points.push(hits.iter().map(|h| h.0).sum::<DVec3>() / count as f64);
+            shaded.push(Shaded {
+                pixel,
+                samples: count,
+                flat: hits[0].1,
+            });
+        } else {
+            points.extend(hits.iter().map(|h| h.0));
+            shaded.extend(hits.iter().map(|h| Shaded {
+                pixel,
+                samples: 1,
+                flat: h.1,
+            }));
+        }
+    }
+    let mut jets = vec![(0.0, DVec3::ZERO); points.len()];
+    scene.field.values_gradients(&points, &mut jets);
+    for ((s, &p), (_, gradient)) in shaded.iter().zip(&points).zip(&jets) {
+        let smooth = (-*gradient).normalize_or_zero();
+        // Where the solid was cut at its box, the field's normal is not that of the cut.
+        let n = if smooth.dot(s.flat) > 0.5 { smooth } else { s.flat };
+        let n = if n.dot(camera.axes.row(2)) < -0.2 { -n } else { n };
+        row[s.pixel] += lights.color(p, n) * s.samples as f64;
+    }
+    let mut bytes = Vec::with_capacity(3 * width);
+    for sum in row {
+        let linear = sum / (SAMPLES * SAMPLES) as f64;
+        bytes.extend(
+            linear
+                .to_array()
+                .map(|c| (c.clamp(0.0, 1.0).powf(1.0 / 2.2) * 255.0 + 0.5) as u8),
+        );
     }
     bytes
 }
 
-/// Linear colours of one row of samples.
-fn shade_row(
-    s: &Scene,
-    camera: &DepthMap,
-    sun: &DepthMap,
-    sky: &[DepthMap],
-    up: DVec3,
-    y: usize,
-) -> Vec<DVec3> {
-    let width = camera.size[0];
-    let hits: Vec<usize> = (0..width)
-        .filter(|x| camera.triangle[y * width + x] != u32::MAX)
-        .collect();
-    let points: Vec<DVec3> = hits.iter().map(|&x| camera.point(x, y)).collect();
-    let mut jets = vec![(0.0, DVec3::ZERO); points.len()];
-    s.field.values_gradients(&points, &mut jets);
-    let fade = 1.0 - 0.25 * y as f64 / camera.size[1] as f64;
-    let mut row = vec![(PAPER * fade).powf(2.2); width];
-    for ((&x, &p), (_, gradient)) in hits.iter().zip(&points).zip(&jets) {
-        let flat = s.triangle_normal(camera.triangle[y * width + x]);
-        let smooth = (-*gradient).normalize_or_zero();
-        // Where the solid was cut at its box, the field's normal is not that of the cut.
-        let n = if smooth.dot(flat) > 0.5 { smooth } else { flat };
-        let n = if n.dot(camera.axes.row(2)) < -0.2 { -n } else { n };
+impl Lights<'_> {
+    /// Linear colour of clay at `p` with normal `n`.
+    fn color(&self, p: DVec3, n: DVec3) -> DVec3 {
         let (mut light, mut all) = (0.0, 0.0);
-        for d in sky
-            .iter()
-            .skip((x % SAMPLES) * SAMPLES + y % SAMPLES)
-            .step_by(SAMPLES * SAMPLES)
-        {
+        for d in self.sky {
             let toward = d.axes.row(2);
-            let weight = n.dot(toward).max(0.0);
-            all += weight;
-            light += weight * (0.55 + 0.45 * toward.dot(up)) * d.visible(p, n, 0);
+            let weight = n.dot(toward);
+            if weight > 0.0 {
+                all += weight;
+                if d.is_visible(p, n) {
+                    light += weight * (0.55 + 0.45 * toward.dot(self.up));
+                }
+            }
         }
-        let direct = n.dot(sun.axes.row(2)).max(0.0) * sun.visible(p, n, 2);
-        row[x] = CLAY.powf(2.2) * (0.05 + light / all.max(1e-9) + 0.95 * direct);
+        let facing = n.dot(self.sun.axes.row(2));
+        let direct = if facing > 0.0 {
+            facing * self.sun.visible(p, n, 2)
+        } else {
+            0.0
+        };
+        CLAY.powf(2.2) * (0.05 + light / all.max(1e-9) + 0.95 * direct)
     }
-    row
 }
 
 /// Rows: right, up, toward the eye.
@@ -135,13 +221,9 @@ fn axes(toward: DVec3, up: DVec3) -> DMat3 {
     DMat3::from_cols(right, back.cross(right), back).transpose()
 }
 
-impl Scene<'_> {
-    fn corners(&self, t: u32) -> [DVec3; 3] {
-        self.triangles[t as usize].map(|v| self.positions[v as usize])
-    }
-
-    fn triangle_normal(&self, t: u32) -> DVec3 {
-        let [a, b, c] = self.corners(t);
+impl Surface<'_> {
+    fn normal(&self, t: u32) -> DVec3 {
+        let [a, b, c] = self.triangles[t as usize].map(|v| self.positions[v as usize]);
         (b - a).cross(c - a).normalize_or_zero()
     }
 }

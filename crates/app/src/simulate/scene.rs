@@ -180,7 +180,7 @@ pub struct Time {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Scheme {
-    /// DIS eq. 12.
+    /// The paper's own [Hua04 eq. 12].
     Paper,
     /// Explicit, first order.
     Symplectic,

@@ -1,8 +1,9 @@
 //! Runs the program as a user would, in a directory of its own.
 #![allow(dead_code, reason = "each test file uses its part")]
 
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
 use bspline::polygonize::Mesh;
 use glam::DVec3;
@@ -62,6 +63,26 @@ impl Bench {
             .into()
     }
 
+    /// Runs the program with `input` on its standard input; what it says, and the bytes on its standard output.
+    pub fn pipe(&self, arguments: &str, input: &[u8]) -> (Run, Vec<u8>) {
+        let mut child = self
+            .command()
+            .args(arguments.split_whitespace())
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut stdin = child.stdin.take().unwrap();
+        let input = input.to_vec();
+        // A program that refuses its arguments does not read.
+        let writer = std::thread::spawn(move || stdin.write_all(&input));
+        let mut out = child.wait_with_output().unwrap();
+        let _ = writer.join().unwrap();
+        let bytes = std::mem::take(&mut out.stdout);
+        (out.into(), bytes)
+    }
+
     pub fn json(&self, arguments: &str) -> Value {
         self.run(&format!("{arguments} --json")).json()
     }
@@ -83,6 +104,18 @@ impl Bench {
         names.sort();
         names
     }
+}
+
+/// `x y z nx ny nz` lines of `count` points on a sphere, on a spiral.
+pub fn sphere_text(center: [f64; 3], radius: f64, count: usize) -> String {
+    let line = |i: usize| {
+        let z = 1.0 - (2 * i + 1) as f64 / count as f64;
+        let (a, r) = (2.399963229728653 * i as f64, (1.0 - z * z).sqrt());
+        let n = [r * a.cos(), r * a.sin(), z];
+        let [x, y, z]: [f64; 3] = std::array::from_fn(|k| center[k] + radius * n[k]);
+        format!("{x} {y} {z} {} {} {}\n", n[0], n[1], n[2])
+    };
+    (0..count).map(line).collect()
 }
 
 /// A file of the repository's `data`.

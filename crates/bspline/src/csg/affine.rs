@@ -5,7 +5,7 @@ use glam::{DAffine3, DVec3};
 use super::CsgError;
 use crate::{Aabb, Field, Frame, Interval, Jet, vectors};
 
-/// `f(x) = g(T⁻¹x)` for an invertible affine `T`, the `s_i(T_i(x))` of DIS eqs. 3 and 4.
+/// `f(x) = g(T⁻¹x)` for an invertible affine `T`, the `s_i(T_i(x))` of [Hua04 eqs. 3 and 4].
 ///
 /// Values are carried unchanged: a distance stays one only under rigid maps.
 #[derive(Clone)]

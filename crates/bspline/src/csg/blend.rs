@@ -13,8 +13,7 @@ pub enum Rounding {
     /// crease; among distances whose surfaces meet at a right angle the fillet begins `k` from it.
     ///
     /// `0 < k`, in the unit of the field: for a distance the world's, else a length times the local `|∇f|`.
-    /// [The cubic one of the polynomial smooth maxima, Quilez 2013; blends limited in range: Pasko, Pasko & Kunii
-    /// 2005, *Bounded blending for function-based shape modeling*]
+    /// [Quilez13, the cubic one of the polynomial smooth maxima; Pasko05 on blends limited in range]
     Bounded {
         /// `k`.
         range: f64,
@@ -26,8 +25,7 @@ pub enum Rounding {
     ///
     /// The gradient on a surface away from the crease is that of its branch, but elsewhere values are not those of the
     /// branches: up to `2 + √2` times as large inside both, down to `2 - √2` outside.
-    /// [Rvachev 1982; Pasko, Adzhiev, Sourin & Savchenko 1995, *Function representation in geometric modeling*, eq. 4;
-    /// Shapiro 2007, *Semi-analytic geometry with R-functions*]
+    /// [Rvachev82; Pasko95 eq. 4; Shapiro07]
     Rvachev {
         /// `ε >= 0`, in the unit of the field.
         rounding: f64,

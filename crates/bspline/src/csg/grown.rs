@@ -7,8 +7,7 @@ use crate::{Aabb, Field, Frame, Interval, Jet, vectors};
 
 /// `F = f + h·|∇f|`: the solid grown by the length `h` (shrunk, if negative), to first order for any field.
 ///
-/// `-f/|∇f|` is the distance to the surface to first order [Taubin 1994, *Distance approximations for rasterizing
-/// implicit curves*], so the new surface lies where it is `h`: off by at most `h²` times the bending of the field over
+/// `-f/|∇f|` is the distance to the surface to first order \[Taubin94\], so the new surface lies where it is `h`: off by at most `h²` times the bending of the field over
 /// twice its slope, and exact for distances. C¹ where `f` is C² and `∇f` does not vanish; where it does, the gradient
 /// is that of `f`.
 #[derive(Clone)]

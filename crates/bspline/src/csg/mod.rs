@@ -1,7 +1,7 @@
 //! Trees of fields: Boolean operations, affine placement, weighted sums.
 //!
-//! With `f > c` inside, union is the larger value and intersection the smaller (DIS eq. 4, `Ω`); the hierarchy
-//! of patches is a sum of affine nodes (DIS eq. 3). These results are sharp: along a crease the gradient jumps; the
+//! With `f > c` inside, union is the larger value and intersection the smaller [Hua04 eq. 4, `Ω`]; the hierarchy
+//! of patches is a sum of affine nodes [Hua04 eq. 3]. These results are sharp: along a crease the gradient jumps; the
 //! smooth operations round it ([`Rounding`]). Every
 //! node passes blocks of grid nodes and batches of points on to its branches, so that theirs are as fast as
 //! alone, and leaves out those branches that their bounds prove irrelevant. Leaving out never changes a bit.

@@ -1,4 +1,4 @@
-//! One block of B-splines on three knot vectors of its own, anywhere in space (DIS eqs. 1 and 3).
+//! One block of B-splines on three knot vectors of its own, anywhere in space [Hua04 eqs. 1 and 3].
 //!
 //! ```
 //! use bspline::{Field, KnotVector, TensorSpline};

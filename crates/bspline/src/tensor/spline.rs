@@ -5,11 +5,11 @@ use glam::{DAffine3, DVec3};
 use crate::placed_box::PlacedBox;
 use crate::{Aabb, KnotVector, Real};
 
-/// `f(x) = Σᵢⱼₖ Bᵢ(u) Cⱼ(v) Dₖ(w) pᵢⱼₖ` with `(u, v, w) = T x` [DIS eqs. 1 and 3].
+/// `f(x) = Σᵢⱼₖ Bᵢ(u) Cⱼ(v) Dₖ(w) pᵢⱼₖ` with `(u, v, w) = T x` [Hua04 eqs. 1 and 3].
 ///
 /// Each axis has a knot vector and a degree (1 to 5) of its own; a knot of multiplicity `m` leaves `p - m` continuous
 /// derivatives. Outside the box of the three domains `f(clamp x) - g·|x - clamp x|`, clamped in parameters, distance in
-/// the world, `g` the [slope](Self::slope): with zero outer coefficients and `g = 0`, nothing, as DIS eq. 3 needs it.
+/// the world, `g` the [slope](Self::slope): with zero outer coefficients and `g = 0`, nothing, as [Hua04 eq. 3] needs it.
 /// A clone shares the coefficients.
 #[derive(Clone, Debug)]
 pub struct TensorSpline<T> {

@@ -12,7 +12,7 @@ pub enum On {
         /// Density there of the field that the patch was cut from.
         field: f64,
     },
-    /// A weighted sum of the densities of samples: a row of `L` [DIS eq. 14].
+    /// A weighted sum of the densities of samples: a row of `L` [Hua04 eq. 14].
     Samples(Vec<(usize, f64)>),
 }
 

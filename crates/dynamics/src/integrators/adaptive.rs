@@ -16,7 +16,7 @@ pub struct AdaptiveOptions {
     /// Share of the energy that a step may create: what it holds more than before, less the work, with at least what its
     /// damping took (`ΔdᵀDΔd/Δt`, which no path of the same ends goes below).
     pub energy_gain: f64,
-    /// Acceleration of a density beyond which the next step is half as long as this one [DIS §7]; `None` leaves it to the
+    /// Acceleration of a density beyond which the next step is half as long as this one [Hua04 §7]; `None` leaves it to the
     /// error.
     pub acceleration: Option<f64>,
 }

@@ -148,7 +148,7 @@ impl<T: Real> Patch<T> {
         self.matrix.refresh();
     }
 
-    /// [DIS eq. 12] in displacement and velocity: with `p_{i-1} = p_i - Δt v` it reads
+    /// [Hua04 eq. 12] in displacement and velocity: with `p_{i-1} = p_i - Δt v` it reads
     /// `(M̃ + ½Δt D̃ + Δt² K̃) Δp = Δt M̃v - ½Δt² D̃v + Δt² Aᵀ(f_ext + f_int)`.
     pub(super) fn paper_step(&mut self, dt: f64) -> Result<Moved, PatchError> {
         let (a, b) = (0.5 * dt, dt * dt);
@@ -242,7 +242,7 @@ impl<T: Real> Patch<T> {
     }
 
     /// Velocities and positions after the second stage, and the error: the difference to the third-order companion
-    /// [M. E. Hosea and L. F. Shampine, *Analysis and implementation of TR-BDF2*, 1996], root mean square over the
+    /// \[Hosea96\], root mean square over the
     /// samples.
     fn tr_bdf2_finish(&mut self, dt: f64, gamma: f64, beta: f64, c: f64) -> f64 {
         let w = std::f64::consts::SQRT_2 / 4.0;

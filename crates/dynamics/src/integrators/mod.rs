@@ -8,7 +8,6 @@ mod implicit;
 
 pub use adaptive::{AdaptiveOptions, AdaptiveReport};
 pub use auto::Choice;
-pub(crate) use auto::Operations;
 pub(crate) use explicit::largest_frequency;
 
 use bspline::Real;
@@ -19,7 +18,7 @@ use crate::solve::SolveReport;
 /// How a step is made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Integrator {
-    /// Implicit Euler in displacements with the damping in the middle [DIS eq. 12], first order.
+    /// Implicit Euler in displacements with the damping in the middle [Hua04 eq. 12], first order.
     Paper,
     /// The velocity from the present forces, then the position from the new velocity; only the damping is implicit.
     /// First order, symplectic where nothing damps, stable up to a bound.
@@ -27,8 +26,7 @@ pub enum Integrator {
     /// Velocity Verlet: half a kick by the forces, the drift, half a kick; the damping is that of the mean velocity of
     /// each kick. Second order, symplectic where nothing damps, two solves, stable up to the bound of `Symplectic`.
     Verlet,
-    /// Trapezoidal rule to `2 - √2` of the step, then backward differences: second order, L-stable [R. E. Bank et
-    /// al., *Transient simulation of silicon devices and circuits*, 1985].
+    /// Trapezoidal rule to `2 - √2` of the step, then backward differences: second order, L-stable \[Bank85\].
     TrBdf2,
     /// `Verlet` in sub-steps within its bound where these cost less than a step of `TrBdf2`, which is no more accurate;
     /// else `TrBdf2`. See [`Patch::choose`].

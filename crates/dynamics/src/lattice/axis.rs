@@ -124,9 +124,18 @@ impl Axis {
         Ok(out)
     }
 
-    /// Refuses collocation matrices whose columns are dependent to within a few units of rounding.
+    /// Refuses collocation matrices whose columns are dependent, exactly or to within a few units of rounding.
     fn check_rank(&self, axis: usize) -> Result<(), LatticeError> {
         let a = self.collocation().to_dense();
+        // Each function needs a sample of its own, in order, where it does not vanish [Schoenberg53]. Elimination alone
+        // may find a last pivot of rounding.
+        let mut free = 0..a.nrows();
+        for index in 0..a.ncols() {
+            if !free.any(|s| a[(s, index)] > 1e-9) {
+                let pivot = 0.0;
+                return Err(LatticeError::Undetermined { axis, index, pivot });
+            }
+        }
         let mut gram = transposed_product(&a, &a);
         let n = gram.nrows();
         let diagonal: Vec<f64> = (0..n).map(|i| gram[(i, i)]).collect();
@@ -193,7 +202,7 @@ impl Axis {
         }
     }
 
-    /// The collocation matrix: sample `s` is `Σ_c row_s[c] p_c` over the free coefficients [DIS eq. 5, one axis].
+    /// The collocation matrix: sample `s` is `Σ_c row_s[c] p_c` over the free coefficients [Hua04 eq. 5, one axis].
     pub fn collocation(&self) -> Banded<f64> {
         let (first, n) = (self.first_free(), self.free_count());
         let rows = (0..self.samples).map(|s| {

@@ -4,7 +4,7 @@ use bspline::{KnotVector, Real};
 
 use super::Region;
 use super::sleep::solves;
-use crate::integrators::{Integrator, Operations, StepReport};
+use crate::integrators::{Integrator, StepReport};
 use crate::lattice::{Axis, Lattice, LatticeError, Rim};
 use crate::matter::{Matter, Quantity};
 use crate::patch::{Patch, PatchError};
@@ -111,7 +111,7 @@ impl Window {
         })
     }
 
-    /// Whether sample `z` of the row `x`, `y` lies in it.
+    /// Whether a sample lies in it.
     fn has_sample(&self, at: [usize; 3]) -> bool {
         (0..3).all(|k| (self.first_sample[k]..self.first_sample[k] + self.samples[k]).contains(&at[k]))
     }
@@ -195,7 +195,7 @@ impl<T: Real> Region<T> {
             self.parts.steps_to_look = LOOK << self.parts.misses;
         }
         self.parts.steps_to_look -= 1;
-        let saved = self.whole_operations().solve;
+        let saved = self.patch.operations().solve;
         let Some(part) = &mut self.part else {
             return self.step_whole(integrator, dt);
         };
@@ -228,16 +228,12 @@ impl<T: Real> Region<T> {
     fn step_whole(&mut self, integrator: Integrator, dt: f64) -> Result<StepReport, PatchError> {
         let ready = self.patch.has_solver();
         let report = self.patch.step(integrator, dt)?;
-        let taken = self.whole_operations();
+        let taken = self.patch.operations();
         self.parts.operations += solves(integrator) as f64 * taken.solve;
         if !ready {
             self.parts.operations += taken.preparation;
         }
         Ok(report)
-    }
-
-    fn whole_operations(&self) -> Operations {
-        self.patch.operations()
     }
 
     /// Sets the forces of the part too. Those beside it are looked at before the next step if they may wake something.
@@ -270,7 +266,7 @@ impl<T: Real> Region<T> {
     /// Chooses what is awake: all coefficients that move, or are off their balance, by more than the thresholds.
     fn look(&mut self, solves: f64) -> Result<(), PatchError> {
         let moving = self.moving();
-        let whole = self.whole_operations();
+        let whole = self.patch.operations();
         self.parts.operations += whole.look;
         let all = self.patch.lattice().coefficient_dims();
         let kept = match (&self.part, moving) {

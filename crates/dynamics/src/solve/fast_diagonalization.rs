@@ -1,5 +1,4 @@
-//! Fast diagonalization: the exact inverse of a constant material on a tensor-product lattice [R. E. Lynch,
-//! J. R. Rice and D. H. Thomas, *Direct solution of partial difference equations by tensor product methods*, 1964].
+//! Fast diagonalization: the exact inverse of a constant material on a tensor-product lattice \[Lynch64\].
 
 use bspline::Real;
 use bspline::vectorized;

@@ -1,60 +1,20 @@
-//! Which method solves a step, and the methods behind one interface.
+//! The methods that solve a step, behind one interface.
 
 use bspline::Real;
 
 use super::background::Background;
-use super::band_cholesky::{BandCholesky, NotPositive};
+use super::band_cholesky::BandCholesky;
 use super::border::Border;
 use super::dot::dot;
 use super::fast_diagonalization::FastDiagonalization;
 use super::galerkin::Galerkin;
 use super::pcg::{CoefficientSystem, ConjugateGradients, PcgReport, Preconditioner, System, add_scaled};
+use super::report::{ITERATED, Method, SolveError, SolveReport, SolverOptions};
 use super::sample_multigrid::SampleMultigrid;
-use super::v_cycle::{VCycle, VCycleOptions};
+use super::v_cycle::VCycle;
 use crate::lattice::{Lattice, TensorProduct, TensorWorkspace};
 use crate::springs::StepMatrix;
 use crate::units::{binary_unit, largest};
-
-/// Limits of a solve.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SolverOptions {
-    /// Most iterations of conjugate gradients.
-    pub iterations: usize,
-    /// Residual, relative to the impulse, that ends them earlier. `None`: what the precision can reach where a solve is
-    /// exact but for rounding, [`ITERATED`] where it is iterated.
-    pub tolerance: Option<f64>,
-    /// Free coefficients up to which the matrix is factorized; four times as many on lattices with as many samples, whose
-    /// band is a quarter as wide.
-    pub direct_limit: usize,
-    /// Free coefficients up to which a factor is made beside the steps, a V-cycle solving them until it is done: 5832
-    /// take 33 MB in single precision, which is read twice a step.
-    pub background_limit: usize,
-    /// Of the V-cycle for more.
-    pub v_cycle: VCycleOptions,
-}
-
-impl Default for SolverOptions {
-    fn default() -> Self {
-        Self {
-            iterations: 8,
-            tolerance: None,
-            direct_limit: 1000,
-            background_limit: 6000,
-            v_cycle: VCycleOptions::default(),
-        }
-    }
-}
-
-impl SolverOptions {
-    /// Free coefficients up to which the matrix of a lattice with as many samples is factorized.
-    pub fn sample_direct_limit(&self) -> usize {
-        4 * self.direct_limit
-    }
-}
-
-/// Residual, relative to the impulse, at which the V-cycle and the multigrid stop by default. The increment is then
-/// wrong by about as much, far less than the 0.3 % asked of a step; halving it costs one iteration.
-pub const ITERATED: f64 = 1e-3;
 
 /// Residual, in units of rounding of single precision, at which solves by a factor stop.
 const EXACT: f64 = 64.0;
@@ -66,90 +26,6 @@ const DIAGONALIZED: f64 = 4096.0;
 
 /// Impulses whose squares, and those of their residuals, are far from the ends of the range of single precision.
 const ORDINARY: std::ops::Range<f64> = 1e-6..1e12;
-
-/// How a step was solved.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Method {
-    /// Fast diagonalization: constant material.
-    FastDiagonalization,
-    /// Banded Cholesky factor: few coefficients.
-    Direct,
-    /// V-cycle on every other knot: many coefficients.
-    VCycle,
-    /// Banded Cholesky factor on the samples: few, and as many coefficients as samples.
-    SampleDirect,
-    /// Multigrid on the samples: as many coefficients as samples.
-    SampleMultigrid,
-}
-
-impl Method {
-    /// Name in reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::FastDiagonalization => "fast-diagonalization",
-            Self::Direct => "direct",
-            Self::VCycle => "v-cycle",
-            Self::SampleDirect => "sample-direct",
-            Self::SampleMultigrid => "sample-multigrid",
-        }
-    }
-}
-
-/// What a solve did.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SolveReport {
-    /// The method.
-    pub method: Method,
-    /// Iterations, residual and curvature.
-    pub iteration: PcgReport,
-}
-
-impl SolveReport {
-    /// The worst of this solve and a later one.
-    pub(crate) fn and(self, later: Self) -> Self {
-        let (a, b) = (self.iteration, later.iteration);
-        Self {
-            method: later.method,
-            iteration: PcgReport {
-                iterations: a.iterations.max(b.iterations),
-                // Not a number is worst of all, and no number is below it.
-                residual: if a.residual.is_nan() {
-                    a.residual
-                } else {
-                    b.residual.max(a.residual)
-                },
-                negative_curvature: a.negative_curvature.or(b.negative_curvature),
-            },
-        }
-    }
-
-    /// Refuses a solve that did not begin.
-    pub(crate) fn checked(self) -> Result<Self, SolveError> {
-        match self.iteration.negative_curvature {
-            Some(curvature) if self.iteration.iterations == 0 || curvature.is_nan() => {
-                Err(SolveError::Indefinite { curvature })
-            }
-            _ => Ok(self),
-        }
-    }
-}
-
-/// Why a matrix cannot be solved.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum SolveError {
-    /// A solve that met no positive curvature where it began.
-    #[error(
-        "the curvature along the first direction is {curvature:.3e}; the matrix of the step is not positive definite in \
-         this precision, so take less contrast of stiffness and mass, or double precision"
-    )]
-    Indefinite {
-        /// The curvature.
-        curvature: f64,
-    },
-    /// Not positive definite.
-    #[error(transparent)]
-    NotPositive(#[from] NotPositive),
-}
 
 /// Solves `AᵀSA x = Aᵀg` on one lattice, by the method that its size, its sampling and the material ask for:
 ///

@@ -16,7 +16,7 @@ pub enum Law {
         /// Length per density.
         scale: f64,
     },
-    /// `½k(L - L₀)²` with `L = √(h² + Δ²)` [DIS §5.1].
+    /// `½k(L - L₀)²` with `L = √(h² + Δ²)` [Hua04 §5.1].
     FourD {
         /// Length per density.
         scale: f64,

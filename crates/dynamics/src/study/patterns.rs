@@ -86,7 +86,7 @@ impl Pattern {
     }
 }
 
-/// A number in `[0, 1)` from a seed [Steele, Lea and Flood, *Fast splittable pseudorandom number generators*, 2014].
+/// A number in `[0, 1)` from a seed \[Steele14\].
 pub(crate) fn unit_random(seed: u64) -> f64 {
     let mut z = seed
         .wrapping_mul(0x9E37_79B9_7F4A_7C15)

@@ -3,6 +3,7 @@
 mod baking;
 mod cutting;
 mod parts;
+mod random_events;
 mod sleep;
 
 use std::collections::BTreeMap;

@@ -258,7 +258,11 @@ fn play<T: Real>(seed: u64) -> Result<Outcome, String> {
         (_, Law::Linear { .. }) => 1.0,
         _ => f64::INFINITY,
     };
-    if gained > allowed * largest && !clay {
+    // In single precision springs are stretched by the rounding of their densities too.
+    let stiffest = (0..count).fold(0.0_f64, |m, i| m.max(p.matter().stiffness.at(i)));
+    let dense = p.state().d.iter().fold(0.0_f64, |m, d| m.max(d.as_f64().abs()));
+    let rounding = count as f64 * stiffest * spacing * (scale * T::UNIT_ROUND_OFF * dense).powi(2);
+    if gained > allowed * largest && largest > 1e5 * rounding && !clay {
         return Err(format!(
             "{:.2e} of {largest:.2e} gained; {told}",
             gained / largest
@@ -271,7 +275,8 @@ fn play<T: Real>(seed: u64) -> Result<Outcome, String> {
 }
 
 /// What is wrong with the scenes of some seeds, each in the precision that its number says.
-fn failures(seeds: std::ops::Range<u64>) -> Vec<String> {
+fn failures(seeds: impl Iterator<Item = u64>) -> Vec<String> {
+    let seeds: Vec<u64> = seeds.collect();
     let run = |seed: u64| {
         if seed.is_multiple_of(2) {
             play::<f32>(seed)
@@ -279,9 +284,9 @@ fn failures(seeds: std::ops::Range<u64>) -> Vec<String> {
             play::<f64>(seed)
         }
     };
-    let alone: Vec<_> = seeds.clone().map(run).collect();
+    let alone: Vec<_> = seeds.iter().map(|s| run(*s)).collect();
     let mut wrong: Vec<String> = Vec::new();
-    for (seed, outcome) in seeds.clone().zip(&alone) {
+    for (seed, outcome) in seeds.iter().zip(&alone) {
         match outcome {
             Err(e) => wrong.push(format!("{seed}: {e}")),
             Ok(o) => o.refused.iter().for_each(|e| println!("{seed}: {e}")),
@@ -294,15 +299,12 @@ fn failures(seeds: std::ops::Range<u64>) -> Vec<String> {
             .unwrap();
         let again: Vec<_> = pool.install(|| {
             use rayon::prelude::*;
-            let some: Vec<u64> = seeds.clone().step_by(5).collect();
+            let some: Vec<u64> = seeds.iter().copied().step_by(5).collect();
             some.into_par_iter().map(run).collect()
         });
         for (k, outcome) in again.iter().enumerate() {
             if *outcome != alone[5 * k] {
-                wrong.push(format!(
-                    "{}: other bits on {threads} threads",
-                    seeds.start + 5 * k as u64
-                ));
+                wrong.push(format!("{}: other bits on {threads} threads", seeds[5 * k]));
             }
         }
     }
@@ -311,7 +313,9 @@ fn failures(seeds: std::ops::Range<u64>) -> Vec<String> {
 
 #[test]
 fn random_scenes_stay_finite_and_gain_nothing() {
-    let wrong = failures(0..150);
+    // Some were wrong once: among them lattices of no rank, whose factors failed.
+    let once = [1291, 1404, 1724, 3039, 3162, 4150, 4880, 5292, 6291, 6902];
+    let wrong = failures((0..150).chain(once));
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 

@@ -19,8 +19,7 @@ pub(crate) struct Base {
 pub(crate) const KNOTS: usize = (1 << BASE_DEPTH) + 5;
 const BLOCKS: usize = KNOTS.div_ceil(2);
 
-/// The cubic quasi-interpolant `c = d - (1/6) Σ_a δ_aa d`, which reproduces cubics (de Boor & Fix, *Spline
-/// approximation by quasiinterpolants*, 1973) and, unlike an interpolant, carries no crease of the distance farther
+/// The cubic quasi-interpolant `c = d - (1/6) Σ_a δ_aa d`, which reproduces cubics \[Boor73\] and, unlike an interpolant, carries no crease of the distance farther
 /// than two cells.
 pub(crate) fn base(mesh: &MeshDistance) -> Base {
     let h = 1.0 / (1u64 << BASE_DEPTH) as f64;

@@ -26,7 +26,7 @@ use glam::DVec3;
 pub use defects::MeshDefects;
 pub use distance::MeshDistance;
 
-use crate::points::{BASE_DEPTH, MAX_DEPTH};
+use crate::points::check_limits;
 use crate::{Control, FitError, FitReport};
 
 /// What the caller may choose; `None` is chosen from the data.
@@ -35,9 +35,10 @@ pub struct MeshOptions {
     /// Root mean square distance from the surface to the zero set that each leaf stays below, or says why not; world
     /// units, 1e-4 of the diagonal if not given.
     pub tolerance: Option<f64>,
-    /// So many coefficients are not exceeded; 400 000 if neither they nor a tolerance are given.
+    /// Largest number of coefficients, at least [`LEAST_COEFFICIENTS`](crate::points::LEAST_COEFFICIENTS); 400 000 if
+    /// neither they nor a tolerance are given.
     pub coefficients: Option<usize>,
-    /// Deepest level: `2^max_depth` cells along the box; 10 if not given.
+    /// Deepest level: `2^max_depth` cells along the box, from 6 to 16; 10 if not given.
     pub max_depth: Option<usize>,
     /// Half the width of a band round the surface in which the error of the signed distance counts like distances of
     /// the zero set, world units; none if not given. Beyond it the error may grow by a quarter of the way out.
@@ -48,8 +49,6 @@ pub struct MeshOptions {
 const DEFAULT_DEPTH: usize = 10;
 /// Coefficients when the caller names neither them nor a tolerance: about two seconds of one core, and 250 MiB.
 const DEFAULT_COEFFICIENTS: usize = 400_000;
-/// Coefficients of the coarsest level, which fills the box.
-const COARSEST: usize = ((1 << BASE_DEPTH) + 3usize).pow(3);
 /// Tolerance when the caller gives none, in diagonals.
 const DEFAULT_TOLERANCE: f64 = 1e-4;
 
@@ -94,13 +93,7 @@ pub fn fit_mesh<T: Real>(
             });
         }
     }
-    if let Some(least) = options.coefficients.filter(|&c| c < COARSEST) {
-        return Err(FitError::Option {
-            option: "coefficients",
-            value: least as f64,
-            requirement: "a mesh takes at least the 42875 of the coarsest level",
-        });
-    }
+    check_limits(options.coefficients, options.max_depth)?;
     control.step("sorting triangles", 0.0)?;
     control.reserve(levels::bytes::<T>(0, 0, 0, triangles.len(), vertices.len()))?;
     let (mesh, defects) = MeshDistance::new(vertices, triangles)?;
@@ -108,10 +101,7 @@ pub fn fit_mesh<T: Real>(
     let plan = Plan {
         tolerance,
         band: options.band.map_or(0.0, |b| b / mesh.scale),
-        max_depth: options
-            .max_depth
-            .unwrap_or(DEFAULT_DEPTH)
-            .clamp(BASE_DEPTH + 1, MAX_DEPTH),
+        max_depth: options.max_depth.unwrap_or(DEFAULT_DEPTH),
         coefficients: options
             .coefficients
             .or_else(|| options.tolerance.is_none().then_some(DEFAULT_COEFFICIENTS)),

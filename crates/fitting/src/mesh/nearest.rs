@@ -83,8 +83,7 @@ impl TriangleTree {
     }
 }
 
-/// Nearest point of a triangle, by the seven regions of its plane (Ericson, *Real-Time Collision Detection*, 2005,
-/// §5.1.5), and where on it that is.
+/// Nearest point of a triangle, by the seven regions of its plane [Ericson05 §5.1.5], and where on it that is.
 #[inline]
 pub(crate) fn closest_point(p: DVec3, &[a, b, c]: &[DVec3; 3]) -> (DVec3, Feature) {
     let (ab, ac, ap) = (b - a, c - a, p - a);

@@ -1,7 +1,5 @@
 //! Generalized winding number of oriented triangles: `w(q) = Σ Ω_t(q) / 4π`, the solid angles of all triangles
-//! (Jacobson, Kavan & Sorkine-Hornung, *Robust inside-outside segmentation using generalized winding numbers*, ACM
-//! TOG 2013). Near triangles count exactly; far boxes by the first three terms of a Taylor expansion (Barill, Dickson,
-//! Schmidt, Levin & Jacobson, *Fast winding numbers for soups and clouds*, ACM TOG 2018).
+//! \[Jacobson13\]. Near triangles count exactly; far boxes by the first three terms of a Taylor expansion \[Barill18\].
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -122,7 +120,7 @@ impl WindingTree {
 }
 
 /// A complex number whose argument is half the signed solid angle of a triangle seen from `q`, positive from behind
-/// (van Oosterom & Strackee, *The solid angle of a plane triangle*, 1983, eq. 8).
+/// [Oosterom83 eq. 8].
 #[inline]
 fn half_solid_angle(q: DVec3, corners: &[DVec3; 3]) -> (f64, f64) {
     let [a, b, c] = corners.map(|p| p - q);

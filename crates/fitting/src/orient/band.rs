@@ -5,7 +5,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 /// Points and margin fit in the unit box of the octree like this.
 const MARGIN: f64 = 0.15;
-/// Rounds of eight sweeps; two suffice on a uniform grid (Zhao 2005), jumps of the cell size ask for more.
+/// Rounds of eight sweeps; two suffice on a uniform grid \[Zhao05\], jumps of the cell size ask for more.
 const ROUNDS: usize = 4;
 /// Nothing was found yet.
 const NONE: u32 = u32::MAX;
@@ -119,7 +119,7 @@ impl Band {
         self.neighbours = pairs.into_iter().map(|p| p.1).collect();
     }
 
-    /// Gauss–Seidel in alternating orders (Zhao 2005), each leaf taking over the nearest point that a neighbour knows.
+    /// Gauss–Seidel in alternating orders \[Zhao05\], each leaf taking over the nearest point that a neighbour knows.
     fn sweep(&mut self, placed: &[DVec3]) {
         let centres: Vec<DVec3> = self.cells.iter().map(centre).collect();
         let mut nearest = vec![NONE; self.cells.len()];

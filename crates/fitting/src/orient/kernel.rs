@@ -2,7 +2,7 @@
 //!
 //! With `d = y − x`, `ρ² = |d|² + ε²` and `m = a n` the area-weighted normal of a point `y`,
 //!
-//! - `w(x) = (1/4π) Σ d·m / ρ³` is 1 inside and 0 outside a closed surface (Barill et al. 2018, Eq. 4, at ε = 0),
+//! - `w(x) = (1/4π) Σ d·m / ρ³` is 1 inside and 0 outside a closed surface [Barill18 eq. 4, at ε = 0],
 //! - `−∇w(x) = (1/4π) Σ m/ρ³ − 3 (d·m) d/ρ⁵`, along the outward normal on it,
 //! - `(1/4π) Σ s (x − y)/ρ³`, gathered at `x`, is the adjoint of the first.
 

@@ -7,13 +7,13 @@
 mod band;
 mod cloud;
 mod confidence;
-mod kernel;
+pub(crate) mod kernel;
 mod local;
 mod outliers;
 mod sampling;
 mod surface;
 mod tagging;
-mod tree;
+pub(crate) mod tree;
 mod winding;
 
 use glam::DVec3;
@@ -29,10 +29,10 @@ use winding::Widths;
 /// How inside is told from outside.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Route {
-    /// Consistency of the winding number with the normals (Lin, Shi & Liu 2024).
+    /// Consistency of the winding number with the normals \[Lin24\].
     #[default]
     WindingNumber,
-    /// Unsigned distance on an octree, the exterior tagged from outside (Zhao, Osher & Fedkiw 2001).
+    /// Unsigned distance on an octree, the exterior tagged from outside \[Zhao01\].
     Tagging,
 }
 

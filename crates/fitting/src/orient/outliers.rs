@@ -29,12 +29,11 @@ struct View {
     near: [u32; COUNT],
     /// Root of the mean square distance to them.
     distance: f64,
-    /// Surface variation (Pauly, Gross & Kobbelt 2002).
+    /// Surface variation \[Pauly02\].
     variation: f64,
 }
 
-/// Which points stand alone: far from their neighbours compared with how near these are to theirs (Breunig et al.
-/// 2000), or far compared with the cloud and with neighbours that lie on no surface. Repeated without them until
+/// Which points stand alone: far from their neighbours compared with how near these are to theirs \[Breunig00\], or far compared with the cloud and with neighbours that lie on no surface. Repeated without them until
 /// no more are found.
 pub(crate) fn lone(positions: &[DVec3]) -> Vec<bool> {
     let stale = View {

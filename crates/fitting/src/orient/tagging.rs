@@ -1,4 +1,4 @@
-//! The exterior by tagging from outside (Zhao, Osher & Fedkiw 2001, §5), and normals from it.
+//! The exterior by tagging from outside [Zhao01 §5], and normals from it.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;

@@ -1,4 +1,4 @@
-//! Octree over points in Morton order, for sums over all points at once (Barnes & Hut 1986).
+//! Octree over points in Morton order, for sums over all points at once \[Barnes86\].
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! Orientation by consistency of the winding number with the normals (Lin, Shi & Liu 2024).
+//! Orientation by consistency of the winding number with the normals \[Lin24\].
 
 use std::ops::Range;
 

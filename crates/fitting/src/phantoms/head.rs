@@ -1,7 +1,7 @@
 use super::SplitMix64;
 
 /// Ellipsoids of the modified Shepp–Logan head in three dimensions: density added, half axes, centre in the cube
-/// `[-1, 1]³`, turn about z in degrees ([Shepp 1974], contrasts of [Toft 1996], third axis of [Schabel 2006]).
+/// `[-1, 1]³`, turn about z in degrees [Shepp74; contrasts Toft96; third axis Schabel06].
 const ELLIPSOIDS: [(f64, [f64; 3], [f64; 3], f64); 10] = [
     (1.0, [0.69, 0.92, 0.81], [0.0, 0.0, 0.0], 0.0),
     (-0.8, [0.6624, 0.874, 0.78], [0.0, -0.0184, 0.0], 0.0),

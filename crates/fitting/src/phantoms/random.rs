@@ -1,6 +1,6 @@
 use glam::DVec3;
 
-/// The generator SplitMix64 of Steele, Lea & Flood (2014): 64 bits of state, every seed as good as another, the
+/// The generator SplitMix64 \[Steele14\]: 64 bits of state, every seed as good as another, the
 /// same numbers on every machine.
 #[derive(Clone, Debug)]
 pub struct SplitMix64(u64);

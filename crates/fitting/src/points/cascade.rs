@@ -8,7 +8,7 @@ use bspline::hierarchical::{BRICK, BrickKey, HALO};
 use super::NormalForm;
 use super::band::{Band, Coarser, REACH, bricks_near};
 use super::band_solve::{BandProblem, BandSample, BrickSamples, SolveReport};
-use super::cells::{Cell, LeafCell, cell_quality, children, judge, root_cells};
+use super::cells::{Cell, LeafCell, cell_quality, children, judge, keep_within, root_cells};
 use super::full_grid::FullGrid;
 use super::plan::Plan;
 use super::samples::{BASE_DEPTH, Samples};
@@ -32,8 +32,8 @@ pub(crate) struct Level<T> {
     pub x: Vec<T>,
 }
 
-/// Runs the cascade from the full level `base` down. No level is begun that the memory ceiling or the budget of
-/// coefficients has no room for; the cells that would have been split say so. Progress is told from `span.start` to
+/// Runs the cascade from the full level `base` down. No level is begun that the memory ceiling has no room for, and no
+/// more cells are split than the budget of coefficients allows, the worst first; the others say so. Progress is told from `span.start` to
 /// `span.end`.
 ///
 /// # Errors
@@ -51,9 +51,15 @@ pub(crate) fn run<T: Real>(
         solves: Vec::new(),
     };
     let mut split = root_cells(samples);
+    let mut worth: Vec<f64> = split.iter().map(|(c, _)| f64::from(c.end - c.start)).collect();
     let mut coarser: Option<Band<T>> = None;
     let mut coefficients = base.values.len();
     for depth in BASE_DEPTH + 1..=plan.max_depth {
+        if let Some(limit) = plan.coefficients {
+            let room = limit.saturating_sub(coefficients);
+            let left_out = keep_within(room, samples, &mut split, &worth, depth);
+            out.leaves.extend(left_out);
+        }
         let cells = children(samples, &split, depth);
         let refined: Vec<[u32; 3]> = cells
             .iter()
@@ -63,7 +69,7 @@ pub(crate) fn run<T: Real>(
         if refined.is_empty() {
             break;
         }
-        if let Some(reason) = no_room::<T>(depth, &refined, samples, plan, coefficients, control) {
+        if let Some(reason) = no_room::<T>(depth, &refined, samples, control) {
             let kept = split
                 .iter()
                 .filter(|s| s.1)
@@ -89,9 +95,11 @@ pub(crate) fn run<T: Real>(
         out.solves.push(report);
         let quality = cell_quality(&band, &list, &bricks, &owners, cells.len());
         split.clear();
+        worth.clear();
         for (cell, q) in cells.iter().zip(&quality) {
             let verdict = judge(cell, q, plan, depth);
             split.push((*cell, cell.refined && verdict.is_ok()));
+            worth.push(q.worth());
             if let (true, Err(reason)) = (cell.refined, verdict) {
                 out.leaves.push(cell.leaf(depth, reason));
             }
@@ -111,13 +119,8 @@ fn no_room<T: Real>(
     depth: usize,
     refined: &[[u32; 3]],
     samples: &Samples,
-    plan: &Plan,
-    coefficients: usize,
     control: &Control,
 ) -> Option<StopReason> {
-    if plan.coefficients.is_some_and(|limit| coefficients >= limit) {
-        return Some(StopReason::Budget);
-    }
     // The bricks are counted only where someone asks.
     control.memory_limit?;
     let (keys, _) = bricks_near(depth, refined, REACH);

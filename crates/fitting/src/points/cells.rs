@@ -2,6 +2,7 @@
 
 use bspline::Real;
 use bspline::hierarchical::HALO;
+use rustc_hash::FxHashSet;
 
 use super::band::Band;
 use super::band_solve::{BandSample, BrickSamples};
@@ -102,6 +103,38 @@ pub(crate) fn children(samples: &Samples, above: &[(Cell, bool)], depth: usize) 
     cells
 }
 
+/// Of the cells to be split keeps the best (largest `worth`) whose children add no more than `room` functions to the
+/// level of `depth`; the others become leaves of the level above.
+pub(crate) fn keep_within(
+    room: usize,
+    samples: &Samples,
+    split: &mut [(Cell, bool)],
+    worth: &[f64],
+    depth: usize,
+) -> Vec<LeafCell> {
+    let mut order: Vec<usize> = (0..split.len()).filter(|&i| split[i].1).collect();
+    order.sort_by(|&a, &b| worth[b].total_cmp(&worth[a]));
+    // The central functions of a cell stand at its corners.
+    let mut corners: FxHashSet<[u32; 3]> = FxHashSet::default();
+    let mut left_out = Vec::new();
+    for i in order {
+        let refined = children(samples, &split[i..=i], depth);
+        let fresh: FxHashSet<[u32; 3]> = refined
+            .iter()
+            .filter(|c| c.is_live)
+            .flat_map(|c| (0..8u32).map(|o| std::array::from_fn(|a| c.at[a] + (o >> a & 1))))
+            .filter(|corner| !corners.contains(corner))
+            .collect();
+        if left_out.is_empty() && corners.len() + fresh.len() <= room {
+            corners.extend(fresh);
+        } else {
+            split[i].1 = false;
+            left_out.push(split[i].0.leaf(depth - 1, StopReason::Budget));
+        }
+    }
+    left_out
+}
+
 /// Whether a cell is split, or why not.
 pub(crate) fn judge(cell: &Cell, q: &Quality, plan: &Plan, depth: usize) -> Result<(), StopReason> {
     if !cell.is_live {
@@ -132,6 +165,10 @@ pub(crate) struct Quality {
 }
 
 impl Quality {
+    /// What refining the cell may gain: the sum of its squared distances.
+    pub fn worth(&self) -> f64 {
+        self.distance
+    }
     /// Rms of `|f|/|∇f|`, unit box.
     fn distance(&self) -> f64 {
         (self.distance / self.weight.max(1e-300)).sqrt()

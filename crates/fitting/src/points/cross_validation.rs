@@ -50,7 +50,7 @@ pub(crate) fn choose<T: Real>(
             smoothing: Smoothing::Halving(start * 2f64.powi(exponent)),
             ..plan.clone()
         };
-        let gcv = score::<T>(samples, base, &plan, noise)?;
+        let gcv = score::<T>(samples, base, &plan, noise, control)?;
         tried.push((exponent, gcv));
         Ok(gcv)
     };
@@ -81,8 +81,14 @@ fn lowest_of_parabola(a: f64, b: f64, c: f64) -> f64 {
     }
 }
 
-fn score<T: Real>(samples: &Samples, base: &FullGrid<f64>, plan: &Plan, noise: f64) -> Result<f64, FitError> {
-    let quiet = &mut Control::default();
+fn score<T: Real>(
+    samples: &Samples,
+    base: &FullGrid<f64>,
+    plan: &Plan,
+    noise: f64,
+    control: &Control,
+) -> Result<f64, FitError> {
+    let quiet = &mut control.quiet();
     let n = samples.positions.len();
     let any_moved = (0..n).any(|i| samples.is_moved(i));
     let judged: Vec<usize> = (0..n)

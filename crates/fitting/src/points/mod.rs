@@ -15,10 +15,13 @@ pub(crate) mod full_grid;
 mod invented;
 #[cfg(test)]
 mod iteration_growth;
+mod measure;
 pub(crate) mod noise;
 mod pairs;
+mod pieces;
 mod plan;
 mod residual;
+pub use measure::{LeafError, PointError, PointErrors, crossing, measure_points, point_error};
 pub use residual::newton_distance;
 mod robust;
 pub(crate) mod samples;
@@ -38,9 +41,9 @@ pub(crate) use samples::{BASE_DEPTH, MAX_DEPTH};
 pub struct PointOptions {
     /// Rms distance per leaf, world units.
     pub tolerance: Option<f64>,
-    /// No level is begun once so many coefficients are spent.
+    /// Largest number of coefficients, at least [`LEAST_COEFFICIENTS`]. They are spent where the error is largest.
     pub coefficients: Option<usize>,
-    /// Deepest level: `2^max_depth` cells along the box.
+    /// Deepest level: `2^max_depth` cells along the box, from 6 to 16.
     pub max_depth: Option<usize>,
     /// Weight `μ` of the bending energy on the finest level.
     pub smoothing: Option<f64>,
@@ -60,6 +63,30 @@ pub enum NormalForm {
     OffsetPairs,
 }
 
+/// Coefficients of the grid of 32³ cells that every field of points or of a mesh begins with.
+pub const LEAST_COEFFICIENTS: usize = ((1 << BASE_DEPTH) + 3usize).pow(3);
+
+/// Refuses a number of coefficients or a depth that the first grid alone exceeds.
+pub(crate) fn check_limits(coefficients: Option<usize>, max_depth: Option<usize>) -> Result<(), FitError> {
+    if let Some(n) = coefficients.filter(|&n| n < LEAST_COEFFICIENTS) {
+        return Err(FitError::Option {
+            option: "coefficients",
+            value: n as f64,
+            requirement: "the first grid of a cloud or a mesh alone has 42875; give at least as many",
+        });
+    }
+    if let Some(depth) = max_depth.filter(|d| !(BASE_DEPTH + 1..=MAX_DEPTH).contains(d)) {
+        return Err(FitError::Option {
+            option: "max_depth",
+            value: depth as f64,
+            requirement: "a cloud or a mesh takes a finest level from 6 to 16",
+        });
+    }
+    Ok(())
+}
+
+/// Points that a fit needs.
+const LEAST_POINTS: usize = 10;
 /// Rounds of conditions against pieces that no sample speaks for.
 const REPAIR_ROUNDS: i32 = 3;
 
@@ -72,6 +99,7 @@ pub fn fit_points<T: Real>(
     options: &PointOptions,
     control: &mut Control,
 ) -> Result<(HierarchicalSpline<T>, FitReport), FitError> {
+    check_limits(options.coefficients, options.max_depth)?;
     control.step("sorting points", 0.0)?;
     control.reserve(cascade::level_bytes::<T>(0, cloud.positions.len()))?;
     let mut samples = Samples::prepare(*cloud)?;
@@ -95,7 +123,7 @@ pub fn fit_points<T: Real>(
         directions::refine::<T>(&mut samples, &plan, control)?;
     }
     control.step("fitting coarse levels", 0.05)?;
-    let base = if options.robust {
+    let mut base = if options.robust {
         robust::reweigh::<T>(&mut samples, &plan, control)?
     } else {
         coarse::solve(&samples, plan.beta, false)
@@ -103,10 +131,21 @@ pub fn fit_points<T: Real>(
     if options.robust {
         samples.notes.push(robust::account(&samples));
     }
+    let turned = far_field::settle(&mut base, &samples);
+    if turned > 0 {
+        samples.notes.push(format!(
+            "the sign of {turned} coefficients far from all points was turned over: the winding number of the points \
+             contradicts them"
+        ));
+    }
     if let (Some(sigma), Some(beta)) = (noise, plan.second_beta) {
         let first = cascade::run::<T>(&samples, &base, &plan, 0.09..0.1, control)?;
         let field = assemble::assemble(&samples, &base, &first.levels);
-        samples = feet::on_feet(&samples, &field, sigma);
+        let on_feet = feet::on_feet(&samples, &field, sigma);
+        if on_feet.live_points().count() >= LEAST_POINTS {
+            samples = on_feet;
+            plan.beta = beta;
+        }
         let without = samples.weights.iter().filter(|w| **w == 0.0).count();
         if without > 0 && !options.robust {
             samples.notes.push(format!(
@@ -114,7 +153,6 @@ pub fn fit_points<T: Real>(
                 samples.positions.len()
             ));
         }
-        plan.beta = beta;
     }
     if let Some(sigma) = noise {
         let start = plan.smoothing.at(plan.max_depth, plan.max_depth);
@@ -137,7 +175,7 @@ pub fn fit_points<T: Real>(
         let end = 0.9 - 0.3 * 0.5f64.powi(rounds);
         let cascade = cascade::run::<T>(&samples, &base, &plan, begin..end, control)?;
         let field = assemble::assemble(&samples, &base, &cascade.levels);
-        let conditions = far_field::conditions(&field, &samples);
+        let conditions = pieces::conditions(&field, &samples);
         if conditions.is_empty() || rounds == REPAIR_ROUNDS {
             break (cascade, field);
         }
@@ -149,6 +187,6 @@ pub fn fit_points<T: Real>(
         ));
     };
     control.step("measuring", 0.95)?;
-    let report = residual::report(&field, &samples, &cascade, cloud.positions.len(), &plan, noise);
+    let report = residual::report(&field, &samples, &cascade, cloud.positions, &plan, noise);
     Ok((field, report))
 }

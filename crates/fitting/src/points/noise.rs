@@ -11,8 +11,17 @@ use super::support::{self, Tree};
 
 /// Points at which a quadric is fitted.
 const QUERIES: usize = 256;
-/// Neighbourhoods tried, each twice the one before.
-const NEIGHBOURS: [usize; 5] = [30, 60, 120, 240, 480];
+/// The first neighbourhood; each further one is twice as large.
+const NEIGHBOURS: usize = 30;
+/// Largest neighbourhood of a surface. Beyond, the shape is seen, unless the points fill a volume: where the cloud is
+/// dense even the neighbourhoods that reach across the noise hold thousands.
+const OF_A_SURFACE: usize = 480;
+/// Points that a quadric is fitted to; of more they are taken at equal steps of their order by distance.
+const FITTED: usize = OF_A_SURFACE;
+/// Reach of a neighbourhood in standard deviations: noise has to be seen from so far ...
+const REACH: f64 = 3.0;
+/// ... and below this reach points fill a volume.
+const THICK: f64 = 4.0;
 /// Growth of the residual from one neighbourhood to the next that still counts as level. On clean scans the
 /// residual is the shape's own third order and grows by 1.4 to 2; with noise of 0.5 % it grows by 1.06 to 1.16
 /// once the neighbourhood spans the noise.
@@ -56,10 +65,9 @@ fn quadrics(
 ) -> Option<f64> {
     let stride = points.len().div_ceil(QUERIES);
     let mut previous: Option<f64> = None;
-    for k in NEIGHBOURS {
-        if 4 * k > points.len() {
-            return None;
-        }
+    let mut fills_volume = false;
+    let mut k = NEIGHBOURS;
+    while 4 * k <= points.len() && (k <= OF_A_SURFACE || fills_volume) {
         let count = NonZero::new(k).expect("not zero");
         let mut found: Vec<(f64, f64)> = (0..points.len())
             .step_by(stride)
@@ -72,6 +80,7 @@ fn quadrics(
                 let reach = f64::sqrt(near.last()?.distance);
                 let around: Vec<DVec3> = near
                     .iter()
+                    .step_by(k.div_ceil(FITTED))
                     .map(|n| n.item as usize)
                     .filter(|&j| same_wall.as_ref().is_none_or(|same| same(i, j)))
                     .map(|j| points[j])
@@ -97,9 +106,11 @@ fn quadrics(
         }
         match previous.map(|p| sigma / p) {
             Some(growth) if growth > SHAPE => return None,
-            Some(growth) if growth < LEVEL && reach >= 3.0 * sigma => return Some(sigma),
+            Some(growth) if growth < LEVEL && reach >= REACH * sigma => return Some(sigma),
             _ => previous = Some(sigma),
         }
+        fills_volume = reach < THICK * sigma;
+        k *= 2;
     }
     None
 }
@@ -143,4 +154,31 @@ fn quadric_residual(points: &[DVec3]) -> Option<(f64, f64)> {
 
 fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::phantoms::SplitMix64;
+
+    /// Points over a bent patch of 1 × 1, so many that 480 neighbours lie within two standard deviations.
+    fn patch(noise: f64) -> Vec<DVec3> {
+        let mut random = SplitMix64::new(7);
+        (0..60_000)
+            .map(|_| {
+                let p = random.uniform3();
+                DVec3::new(p.x, p.y, 0.2 * p.x * p.x) + noise * random.normal3()
+            })
+            .collect()
+    }
+
+    #[test]
+    fn noise_is_found_however_dense_the_cloud_and_none_where_there_is_none() {
+        let all = Some(|_: usize, _: usize| true);
+        for noise in [0.003, 0.01, 0.03] {
+            let found = of_positions(&patch(noise), all, 1e-4).expect("noise");
+            assert!((found / noise - 1.0).abs() < 0.2, "{found} for {noise}");
+        }
+        assert_eq!(of_positions(&patch(0.0), all, 1e-4), None);
+    }
 }

@@ -8,7 +8,7 @@ use glam::DVec3;
 use kiddo::SquaredEuclidean;
 use rayon::prelude::*;
 
-use super::samples::{Entry, Samples};
+use super::samples::{ADDED, Entry, Samples};
 use super::support::Tree;
 
 /// Offsets tried, each half the one before; the first is the mean spacing of the samples.
@@ -65,6 +65,7 @@ pub(crate) fn with_offset_pairs(samples: &Samples, tree: &Tree, spacing: f64) ->
                 target: own.target - *d as f32,
                 weight: own.weight,
                 certainty: 1.0,
+                source: ADDED,
             });
         }
     }

@@ -14,7 +14,7 @@ pub(crate) struct Plan {
     pub max_depth: usize,
     /// Whether every occupied cell is split down to `max_depth`, whatever its residual.
     pub uniform: bool,
-    /// Active functions after which no further level is begun.
+    /// Largest number of active functions.
     pub coefficients: Option<usize>,
     /// `β` of the finest level, unit box.
     pub beta: f64,
@@ -80,7 +80,7 @@ impl Plan {
     /// `tolerance` and `noise` in the unit box.
     pub fn new(samples: &Samples, options: &PointOptions, tolerance: f64, noise: Option<f64>) -> Self {
         let spacing = samples.mean_spacing(0.0);
-        let asked = options.max_depth.map(|d| d.clamp(BASE_DEPTH + 1, MAX_DEPTH));
+        let asked = options.max_depth;
         let clean = Self {
             tolerance,
             max_depth: asked.unwrap_or(depth_of(FINEST_SPACING * spacing).min(DEFAULT_DEPTH)),

@@ -1,13 +1,15 @@
 //! The fit's own account of its error: Newton distances of the samples to the zero set.
 
+use std::cell::OnceCell;
+
 use bspline::{Field, HierarchicalSpline, Real};
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::cascade::Cascade;
+use super::measure::measure_points;
 use super::plan::{Plan, Smoothing};
-use super::samples::Samples;
-use crate::{FitReport, Leaf, StopReason};
+use super::samples::{ADDED, Samples};
+use crate::{FitReport, Leaf, LeafIndex, StopReason};
 
 /// Steps of the projection.
 const NEWTON_STEPS: usize = 5;
@@ -46,42 +48,28 @@ fn newton(field: &dyn Field, p: DVec3) -> (DVec3, DVec3, f64) {
     (x, gradient, first)
 }
 
+/// The fit's account of `field`, measured at the points of the cloud as they were given.
 pub(crate) fn report<T: Real>(
     field: &HierarchicalSpline<T>,
     samples: &Samples,
     cascade: &Cascade<T>,
-    input_count: usize,
+    positions: &[DVec3],
     plan: &Plan,
     noise: Option<f64>,
 ) -> FitReport {
-    // Outliers are no part of the surface whose error this is.
-    let is_counted = |i: usize| !samples.is_sign_condition(i) && (!plan.robust || samples.weights[i] > 0.0);
-    let measured: Vec<Option<(f64, f64)>> = (0..samples.positions.len())
-        .into_par_iter()
-        .with_min_len(4096)
-        .map(|i| is_counted(i).then(|| newton_distance(field, samples.world(i))))
-        .collect();
-    let leaves = cascade.leaves.iter().map(|leaf| {
-        let part = measured[leaf.start as usize..leaf.end as usize].iter().flatten();
-        let (count, square, max) = part.fold((0u32, 0.0, 0.0f64), |(n, s, m), d| {
-            (n + 1, s + d.0 * d.0, m.max(d.0))
-        });
-        let rms = (square / f64::from(count.max(1))).sqrt();
-        let moved = leaf.reason == StopReason::Tolerance && rms > plan.tolerance * samples.scale;
-        Leaf {
+    let tolerance = plan.tolerance * samples.scale;
+    let mut leaves: Vec<Leaf> = cascade
+        .leaves
+        .iter()
+        .map(|leaf| Leaf {
             level: (leaf.depth - super::samples::BASE_DEPTH) as u8,
             cell: leaf.at,
-            sample_count: count,
-            rms: rms as f32,
-            max: max as f32,
-            reason: if moved {
-                StopReason::Neighbours
-            } else {
-                leaf.reason
-            },
-        }
-    });
-    let mut leaves: Vec<Leaf> = leaves.collect();
+            sample_count: 0,
+            rms: 0.0,
+            max: 0.0,
+            reason: leaf.reason,
+        })
+        .collect();
     let mut notes = samples.notes.clone();
     let invented = super::invented::leaves(field, samples, &leaves);
     if !invented.is_empty() {
@@ -92,30 +80,79 @@ pub(crate) fn report<T: Real>(
         ));
         leaves.extend(invented);
     }
-    let mut distances: Vec<f64> = measured.iter().flatten().map(|m| m.0).collect();
-    let count = distances.len();
-    let rms = (distances.iter().map(|d| d * d).sum::<f64>() / count as f64).sqrt();
-    let max = distances.iter().copied().fold(0.0, f64::max);
-    let p95 = *distances
-        .select_nth_unstable_by((count - 1) * 95 / 100, f64::total_cmp)
-        .1;
+    let leaf_of = leaves_of_points(field, samples, cascade, &leaves, plan.robust, positions);
+    let counts = |i: usize| leaf_of[i] != LEFT_OUT;
+    let in_leaf = |i: usize| Some(leaf_of[i] as usize).filter(|l| *l < leaves.len());
+    let errors = measure_points(field, positions, counts, in_leaf, leaves.len());
+    for (leaf, error) in leaves.iter_mut().zip(&errors.leaves) {
+        leaf.sample_count = error.count;
+        (leaf.rms, leaf.max) = (error.rms as f32, error.max as f32);
+        if leaf.reason == StopReason::Tolerance && leaf.is_above(tolerance) {
+            leaf.reason = StopReason::Neighbours;
+        }
+    }
     FitReport {
-        input_count,
-        used_count: count,
+        input_count: positions.len(),
+        used_count: errors.count,
         coefficients: field.coefficient_count(),
         depth: super::samples::BASE_DEPTH + field.level_count() - 1,
-        rms,
-        p95,
-        max,
-        bound: measured.iter().flatten().map(|m| m.1).fold(0.0, f64::max) + field.rounding_bound(),
+        rms: errors.rms,
+        p95: errors.p95,
+        max: errors.max,
+        bound: errors.bound,
         noise: noise.map(|sigma| sigma * samples.scale),
-        tolerance: plan.tolerance * samples.scale,
+        tolerance,
         smoothing: match plan.smoothing {
             Smoothing::Steps { finest, .. } => finest,
             Smoothing::Halving(mu) => mu,
         },
+        left_out: (0..positions.len())
+            .filter(|&i| !counts(i))
+            .map(|i| i as u32)
+            .collect(),
         leaves,
         signs: None,
         notes,
     }
+}
+
+/// A point that no figure counts.
+const LEFT_OUT: u32 = u32::MAX;
+/// A point that counts, but lies in no leaf: noise carried it out of the cells of the surface.
+const NO_LEAF: u32 = u32::MAX - 1;
+
+/// The leaf of each point given, by where it was measured, or why it has none.
+fn leaves_of_points<T: Real>(
+    field: &HierarchicalSpline<T>,
+    samples: &Samples,
+    cascade: &Cascade<T>,
+    leaves: &[Leaf],
+    robust: bool,
+    positions: &[DVec3],
+) -> Vec<u32> {
+    let mut leaf_of = vec![LEFT_OUT; positions.len()];
+    // Made only where points were moved: the others are sorted into their leaves already.
+    let index = OnceCell::new();
+    for (i, &source) in samples.source.iter().enumerate() {
+        // Outliers are no part of the surface whose error this is.
+        if source == ADDED || robust && samples.weights[i] == 0.0 {
+            continue;
+        }
+        leaf_of[source as usize] = NO_LEAF;
+        if samples.is_moved(i) {
+            let index = index.get_or_init(|| LeafIndex::new(field.lattice(), leaves));
+            if let Some(leaf) = index.find(positions[source as usize]) {
+                leaf_of[source as usize] = leaf as u32;
+            }
+        }
+    }
+    for (number, leaf) in cascade.leaves.iter().enumerate() {
+        for i in leaf.start as usize..leaf.end as usize {
+            let source = samples.source[i];
+            if source != ADDED && !samples.is_moved(i) && leaf_of[source as usize] == NO_LEAF {
+                leaf_of[source as usize] = number as u32;
+            }
+        }
+    }
+    leaf_of
 }

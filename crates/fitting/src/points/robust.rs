@@ -15,7 +15,7 @@ use super::plan::Plan;
 use super::residual::newton_foot;
 use super::samples::{BASE_DEPTH, Samples};
 use super::support::{self, Tree};
-use super::{assemble, cascade, coarse};
+use super::{LEAST_POINTS, assemble, cascade, coarse};
 use crate::{Control, FitError};
 
 /// Rounds after the one on the full levels, each one level deeper.
@@ -29,9 +29,24 @@ const LEAST_CUT: f64 = 0.5;
 /// Cosine between a point's normal and the field's from which the normal costs no weight.
 const FACING: f64 = 0.5;
 
-/// The samples with weight only where their neighbours speak for them.
+/// The samples with weight only where their neighbours speak for them; all as they were, with a note, where hardly any
+/// neighbours do. Points in no order have no surface to lie off, and a dozen points no neighbourhoods.
 pub(crate) fn weigh_by_support(samples: &mut Samples, tree: &Tree) {
-    samples.weights = support::weights(samples, tree);
+    let weights = support::weights(samples, tree);
+    if live_count(&weights) >= LEAST_POINTS {
+        samples.weights = weights;
+    } else {
+        samples.notes.push(format!(
+            "the neighbours of all but {} of {} points contradict them, so none could be told for an outlier: all keep \
+             their weight",
+            live_count(&weights),
+            weights.len()
+        ));
+    }
+}
+
+fn live_count(weights: &[f32]) -> usize {
+    weights.iter().filter(|w| **w > 0.0).count()
 }
 
 /// Re-weighs `samples` by fits of growing depth. Returns the last coarse solution.
@@ -57,7 +72,7 @@ pub(crate) fn reweigh<T: Real>(
             max_depth: depth,
             ..plan.clone()
         };
-        let quiet = &mut Control::default();
+        let quiet = &mut control.quiet();
         let fit = cascade::run::<T>(samples, &base, &shallow, 0.0..1.0, quiet)?;
         let field = assemble::assemble(samples, &base, &fit.levels);
         weigh(samples, &field, 0.5f64.powi(depth as i32));
@@ -66,7 +81,8 @@ pub(crate) fn reweigh<T: Real>(
     Ok(base)
 }
 
-/// Biweights of all points, from their distances to the zero set of `field`; `h` is its finest cell, unit box.
+/// Biweights of all points, from their distances to the zero set of `field`; `h` is its finest cell, unit box. A field
+/// that passes nearly all points by, or faces the other way, is no judge of them: the weights stay.
 fn weigh(samples: &mut Samples, field: &dyn Field, h: f64) {
     let found: Vec<(f64, f64)> = (0..samples.positions.len())
         .into_par_iter()
@@ -91,9 +107,13 @@ fn weigh(samples: &mut Samples, field: &dyn Field, h: f64) {
     let middle = live.len() / 2;
     let deviation = *live.select_nth_unstable_by(middle, f64::total_cmp).1;
     let cut = (TUKEY * FROM_MAD * deviation).max(LEAST_CUT * h);
-    for (w, (distance, facing)) in samples.weights.iter_mut().zip(found) {
+    let weight = |(distance, facing): &(f64, f64)| {
         let share = (1.0 - (distance / cut).powi(2)).max(0.0).powi(2);
-        *w = (share * (facing / FACING).clamp(0.0, 1.0)) as f32;
+        (share * (facing / FACING).clamp(0.0, 1.0)) as f32
+    };
+    let weights: Vec<f32> = found.iter().map(weight).collect();
+    if live_count(&weights) >= LEAST_POINTS {
+        samples.weights = weights;
     }
 }
 

@@ -3,6 +3,7 @@
 use bspline::hierarchical::Lattice;
 use glam::{DAffine3, DMat3, DVec3};
 
+use super::LEAST_POINTS;
 use crate::FitError;
 
 /// Points with normals, as given. Normals point outward and need no unit length.
@@ -58,7 +59,12 @@ pub(crate) struct Entry {
     pub weight: f32,
     /// Share of the part of the gradient across the normal.
     pub certainty: f32,
+    /// Which of the points given it is; [`ADDED`] for a condition.
+    pub source: u32,
 }
+
+/// Source of a condition that is no point of the cloud.
+pub(crate) const ADDED: u32 = u32::MAX;
 
 /// The usable samples in Morton order of their position.
 #[derive(Debug)]
@@ -73,6 +79,8 @@ pub(crate) struct Samples {
     pub weights: Vec<f32>,
     /// Of that, the share of the part of the gradient across the normal, `0..=1`.
     pub certainty: Vec<f32>,
+    /// Which of the points given each is; [`ADDED`] for a condition.
+    pub source: Vec<u32>,
     /// Where the points were measured, unit box, if they were moved from there.
     measured: Option<Vec<DVec3>>,
     /// Edge of the (cubic) box in world units.
@@ -122,10 +130,10 @@ impl Samples {
             with_normal - kept.len(),
             "farther than ten extents from the bulk of the points",
         );
-        if kept.len() < 10 {
+        if kept.len() < LEAST_POINTS {
             return Err(FitError::NotEnoughSamples {
                 found: kept.len(),
-                needed: 10,
+                needed: LEAST_POINTS,
             });
         }
         let (min, max) = extent(cloud.positions, &kept);
@@ -166,6 +174,7 @@ impl Samples {
             targets,
             weights: vec![1.0; keyed.len()],
             certainty,
+            source: keyed.iter().map(|k| k.1).collect(),
             measured: None,
             scale,
             origin,
@@ -211,6 +220,7 @@ impl Samples {
             target: self.targets[index],
             weight: self.weights[index],
             certainty: self.certainty[index],
+            source: self.source[index],
         }
     }
 
@@ -226,6 +236,7 @@ impl Samples {
             targets: sorted().map(|e| e.target).collect(),
             weights: sorted().map(|e| e.weight).collect(),
             certainty: sorted().map(|e| e.certainty).collect(),
+            source: sorted().map(|e| e.source).collect(),
             measured: is_moved.then(|| sorted().map(|e| e.measured).collect()),
             notes: self.notes.clone(),
             ..*self
@@ -242,6 +253,7 @@ impl Samples {
             target,
             weight: 1.0,
             certainty: 1.0,
+            source: ADDED,
         }));
         self.with_entries(entries)
     }

@@ -50,16 +50,10 @@ pub fn fit_volume<T: Real>(
     control.step("looking at the volume", 0.0)?;
     let overview = view.check()?;
     let levels = level_count(view.dims, options)?;
-    // A power of two changes no mantissa: only squares of huge and tiny densities need it.
-    let exponent = if overview.magnitude() > 0.0 {
-        overview.magnitude().log2().floor() as i32 + 1
-    } else {
-        0
-    };
     let samples = Samples {
         values: view.values,
         dims: view.dims,
-        scale: T::from_f64(2.0_f64.powi(-exponent)),
+        scale: T::from_f64(2.0_f64.powi(-exponent_of(&overview))),
     };
     reserve_fixed::<T>(view.dims, levels, options, control)?;
     let domain = Domain::<T>::new(view.dims, levels);
@@ -95,7 +89,7 @@ fn interpolate<T: Real>(
     drop((active, stored));
     control.step("totals", 0.8)?;
     let spline = HierarchicalSpline::from_corrections(
-        lattice(view, domain),
+        lattice(view, domain.axes[0].spacing(0)),
         view.typical_slope(overview),
         corrections,
     );
@@ -167,7 +161,7 @@ fn adapt<T: Real>(
     let count = active.iter().map(ActiveSet::len).sum();
     drop((active, coefficients));
     let spline = HierarchicalSpline::from_corrections(
-        lattice(view, domain),
+        lattice(view, domain.axes[0].spacing(0)),
         view.typical_slope(overview),
         trimmed(corrections, used_depth),
     );
@@ -178,6 +172,7 @@ fn adapt<T: Real>(
             _ if rms <= goal.tolerance && by_noise && rms > clean => StopReason::Noise,
             _ if rms <= goal.tolerance => StopReason::Tolerance,
             Outcome::BudgetSpent => budget_reason,
+            Outcome::Smoothed => StopReason::Smoothing,
             _ => StopReason::Depth,
         }
     });
@@ -228,11 +223,21 @@ fn trimmed<T>(mut levels: Vec<LevelCorrections<T>>, depth: usize) -> Vec<LevelCo
     levels
 }
 
-fn lattice<T: Real>(view: &VolumeView, domain: &Domain<T>) -> Lattice {
-    let spacing = domain.axes[0].spacing(0) as f64;
+/// Samples are divided by two to this power. A power of two changes no mantissa: only squares of huge and tiny densities
+/// need it.
+pub(crate) fn exponent_of(overview: &Overview) -> i32 {
+    if overview.magnitude() > 0.0 {
+        overview.magnitude().log2().floor() as i32 + 1
+    } else {
+        0
+    }
+}
+
+/// The grids of a field whose coarsest has a knot every `spacing` voxels.
+pub(crate) fn lattice(view: &VolumeView, spacing: usize) -> Lattice {
     Lattice {
-        world_from_lattice: view.world_from_voxel * DAffine3::from_scale(DVec3::splat(spacing)),
-        cells: domain.axes.map(|a| a.cells as u32),
+        world_from_lattice: view.world_from_voxel * DAffine3::from_scale(DVec3::splat(spacing as f64)),
+        cells: view.dims.map(|n| (n - 1).div_ceil(spacing).max(1) as u32),
     }
 }
 

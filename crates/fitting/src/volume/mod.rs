@@ -15,6 +15,7 @@
 
 mod active;
 mod adaptive;
+mod again;
 mod assemble;
 mod axis;
 mod banded;
@@ -36,6 +37,7 @@ mod select;
 mod tolerance;
 mod view;
 
+pub use again::{VolumeErrors, measure_volume};
 pub use fit::fit_volume;
 pub(crate) use interpolate::interpolate_voxels;
 pub use otsu::otsu_threshold;

@@ -6,7 +6,7 @@ const BINS: usize = 256;
 /// The density that parts a volume into two classes of least variance, such as air and tissue: a first guess at
 /// where a surface should lie.
 ///
-/// Maximizes the variance between the classes, `w₀ w₁ (μ₀ - μ₁)²` [Otsu 1979, eq. 14], over 256 thresholds between
+/// Maximizes the variance between the classes, `w₀ w₁ (μ₀ - μ₁)²` [Otsu79 eq. 14], over 256 thresholds between
 /// the 1st and the 99th percentile; densities beyond them count as the nearer end. `None` where these
 /// percentiles coincide: there is one class.
 ///

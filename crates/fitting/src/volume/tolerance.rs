@@ -43,11 +43,16 @@ pub(crate) enum Outcome {
     BudgetSpent,
     /// No function of the allowed levels is left to add where it is missed.
     Exhausted,
+    /// What is above it is what the smoothing took away.
+    Smoothed,
 }
 
 impl<T: Real> Adaptive<'_, T> {
     /// Adds functions until every leaf's rms residual is at most `tolerance` (in the samples' scale) or
     /// `budget` functions are active.
+    ///
+    /// With smoothing `μ` a function is taken only if `1/(1 + μ)` of its score, which is what the ridge leaves of it,
+    /// exceeds the threshold, and leaves above the tolerance get no more: that would take the smoothing back.
     pub fn meet(
         &mut self,
         tolerance: f64,
@@ -56,7 +61,9 @@ impl<T: Real> Adaptive<'_, T> {
         control: &mut Control,
     ) -> Result<Outcome, FitError> {
         let span = |share: f64| SPAN.0 + (SPAN.1 - SPAN.0) * share;
-        let threshold = (FIRST_THRESHOLD * tolerance).max(floor);
+        let smoothing = self.problem.ridge;
+        let clean_threshold = FIRST_THRESHOLD * tolerance * (1.0 + smoothing);
+        let threshold = clean_threshold.max(floor);
         for level in 1..=self.depth() {
             control.step(
                 "choosing functions",
@@ -76,10 +83,10 @@ impl<T: Real> Adaptive<'_, T> {
         self.solve(first, control, (span(0.05), span(0.2)))?;
         if self.depth() > 0 {
             let mut scores = self.scores();
-            if threshold > FIRST_THRESHOLD * tolerance {
+            if threshold > clean_threshold {
                 self.silence_below(&mut scores, threshold, tolerance);
             }
-            let cutoff = Cutoff::above(FIRST_THRESHOLD * tolerance);
+            let cutoff = Cutoff::above(clean_threshold);
             let lists: Vec<&[T]> = scores.levels.iter().map(Vec::as_slice).collect();
             if self.fit.active[0].len() + count_kept(&lists, cutoff) > budget {
                 self.discard(scores);
@@ -88,7 +95,7 @@ impl<T: Real> Adaptive<'_, T> {
             self.activate(scores, cutoff);
             self.solve(second, control, (span(0.2), span(0.4)))?;
         }
-        for round in 0..ROUNDS {
+        for round in 0..if smoothing > 0.0 { 0 } else { ROUNDS } {
             // Most of the time falls to the first rounds.
             let at = |r: usize| span(1.0 - 0.6 * 0.7_f64.powi(r as i32));
             control.step("leaves above the tolerance", at(round))?;
@@ -123,7 +130,11 @@ impl<T: Real> Adaptive<'_, T> {
         }
         let (_, leaves) = self.leaf_residuals();
         let met = leaves.iter().all(|l| l.rms() <= MARGIN * tolerance);
-        Ok(if met { Outcome::Met } else { Outcome::Exhausted })
+        Ok(match met {
+            true => Outcome::Met,
+            false if smoothing > 0.0 => Outcome::Smoothed,
+            false => Outcome::Exhausted,
+        })
     }
 
     /// The tolerance asks for more than the budget: starts over and spends it where it helps most.

@@ -44,7 +44,8 @@ pub struct VolumeOptions {
     /// fewer.
     pub max_depth: Option<usize>,
     /// Weight `μ >= 0` of the ridge `μ Σ c²‖B‖²` on functions above level 0, against 1 for a voxel; 0 if not given.
-    /// It shrinks detail; dense voxels do not need it.
+    /// It shrinks detail to about `1/(1 + μ)` and leaves out what falls below the tolerance by that; dense voxels do not
+    /// need it.
     pub smoothing: Option<f64>,
 }
 

@@ -3,6 +3,7 @@
 use super::header::{Element, Encoding, Header, Scalar, Shape};
 use crate::Fault;
 use crate::error::{Place, excerpt};
+use crate::limits::{Budget, Counted};
 use crate::text::{Words, integer, number};
 
 /// Numbers one after the other. Each fits an `f64` exactly.
@@ -113,22 +114,17 @@ impl<const BIG: bool> Values for Binary<'_, BIG> {
 }
 
 impl Values for Words<'_> {
-    fn next(&mut self, kind: Scalar) -> Result<f64, Fault> {
+    fn next(&mut self, _: Scalar) -> Result<f64, Fault> {
         let word = Words::next(self).ok_or_else(|| Fault::Truncated {
             what: format!("the row at line {}", self.line),
             needed: 1,
             found: 0,
         })?;
-        let value = match integer(word) {
-            Some(n) => n as f64,
-            None => number(word, self.line)?,
-        };
-        // As the binary forms would round it.
-        Ok(if kind == Scalar::F32 {
-            value as f32 as f64
-        } else {
-            value
-        })
+        // All digits, also where the header says `float`: coordinates of a survey need more than its 24 bits.
+        match integer(word) {
+            Some(n) => Ok(n as f64),
+            None => number(word, self.line),
+        }
     }
 
     fn length(&mut self, kind: Scalar) -> Result<u64, Fault> {
@@ -167,20 +163,21 @@ pub(super) fn check_count(element: &Element, header: &Header, left: usize) -> Re
     Ok(())
 }
 
-/// Walks the rows of any element: `scalar(slot, value)` for the properties with a slot, `list(row, entries)` for
-/// the list at `wanted`.
+/// Walks the rows of any element: `row_done` gets its number, the values of the properties with a slot, and the entries
+/// of the list at `wanted`, which are booked in `budget`.
 pub(super) fn walk<V: Values>(
     values: &mut V,
     element: &Element,
     slots: &[Option<usize>],
     wanted: Option<usize>,
-    mut row_done: impl FnMut(u64, &[f64; 9], &[f64]) -> Result<(), Fault>,
+    budget: &mut Budget,
+    mut row_done: impl FnMut(u64, &[f64; 9], &[f64], &mut Budget) -> Result<(), Fault>,
 ) -> Result<(), Fault> {
     if element.properties.is_empty() {
         return Ok(());
     }
     let mut row_values = [0.0; 9];
-    let mut entries = Vec::new();
+    let mut entries = Counted::new("the entries of a list");
     for row in 0..element.count {
         for (p, property) in element.properties.iter().enumerate() {
             match property.shape {
@@ -191,9 +188,9 @@ pub(super) fn walk<V: Values>(
                 Shape::List { count, item } => {
                     let length = values.length(count)?;
                     if wanted == Some(p) {
-                        entries.clear();
+                        entries.items.clear();
                         for _ in 0..length {
-                            entries.push(values.next(item)?);
+                            entries.push(values.next(item)?, budget)?;
                         }
                     } else {
                         values.skip(item, length)?;
@@ -201,7 +198,7 @@ pub(super) fn walk<V: Values>(
                 }
             }
         }
-        row_done(row, &row_values, &entries)?;
+        row_done(row, &row_values, &entries.items, budget)?;
     }
     Ok(())
 }

@@ -118,16 +118,23 @@ fn read_elements<V: Values>(
                     (Some(gather), Some(stride)) if !columns.has_colors => {
                         gather(&mut values, element, &columns, stride, &mut raw)
                     }
-                    _ => walk(&mut values, element, &columns.slots, None, |_, v, _| {
-                        raw.positions.push(DVec3::new(v[0], v[1], v[2]));
-                        if let Some(n) = &mut raw.normals {
-                            n.push(DVec3::new(v[3], v[4], v[5]));
-                        }
-                        if let Some(c) = &mut raw.colors {
-                            c.push([v[6], v[7], v[8]].map(|x| (x * columns.color_scale).round() as u8));
-                        }
-                        Ok(())
-                    })?,
+                    _ => walk(
+                        &mut values,
+                        element,
+                        &columns.slots,
+                        None,
+                        budget,
+                        |_, v, _, _| {
+                            raw.positions.push(DVec3::new(v[0], v[1], v[2]));
+                            if let Some(n) = &mut raw.normals {
+                                n.push(DVec3::new(v[3], v[4], v[5]));
+                            }
+                            if let Some(c) = &mut raw.colors {
+                                c.push([v[6], v[7], v[8]].map(|x| (x * columns.color_scale).round() as u8));
+                            }
+                            Ok(())
+                        },
+                    )?,
                 }
             }
             "face" => {
@@ -140,38 +147,52 @@ fn read_elements<V: Values>(
                         "the element \"face\" has no list \"vertex_indices\"; faces were not used".into(),
                     );
                 }
-                walk(&mut values, element, &none, list, |row, _, corners| {
-                    if list.is_some() {
-                        check_corners(corners, vertex.count, "face", row)?;
-                        faces.push(corners.iter().map(|v| *v as u32), budget)?;
-                    }
-                    Ok(())
-                })?;
+                walk(
+                    &mut values,
+                    element,
+                    &none,
+                    list,
+                    budget,
+                    |row, _, corners, budget| {
+                        if list.is_some() {
+                            check_corners(corners, vertex.count, "face", row)?;
+                            faces.push(corners.iter().map(|v| *v as u32), budget)?;
+                        }
+                        Ok(())
+                    },
+                )?;
             }
             "tristrips" => {
                 let list = ["vertex_indices", "vertex_index"]
                     .iter()
                     .find_map(|n| element.find(n));
-                walk(&mut values, element, &none, list, |row, _, strip| {
-                    for run in strip.split(|v| *v == -1.0) {
-                        check_corners(run, vertex.count, "tristrips", row)?;
-                        for i in 2..run.len() {
-                            let (a, b) = if i % 2 == 0 {
-                                (i - 2, i - 1)
-                            } else {
-                                (i - 1, i - 2)
-                            };
-                            let tri = [run[a], run[b], run[i]].map(|v| v as u32);
-                            // A repeated corner is how a strip turns, not a broken face.
-                            if tri[0] != tri[1] && tri[1] != tri[2] && tri[2] != tri[0] {
-                                faces.push(tri.into_iter(), budget)?;
+                walk(
+                    &mut values,
+                    element,
+                    &none,
+                    list,
+                    budget,
+                    |row, _, strip, budget| {
+                        for run in strip.split(|v| *v == -1.0) {
+                            check_corners(run, vertex.count, "tristrips", row)?;
+                            for i in 2..run.len() {
+                                let (a, b) = if i % 2 == 0 {
+                                    (i - 2, i - 1)
+                                } else {
+                                    (i - 1, i - 2)
+                                };
+                                let tri = [run[a], run[b], run[i]].map(|v| v as u32);
+                                // A repeated corner is how a strip turns, not a broken face.
+                                if tri[0] != tri[1] && tri[1] != tri[2] && tri[2] != tri[0] {
+                                    faces.push(tri.into_iter(), budget)?;
+                                }
                             }
                         }
-                    }
-                    Ok(())
-                })?;
+                        Ok(())
+                    },
+                )?;
             }
-            _ => walk(&mut values, element, &none, None, |_, _, _| Ok(()))?,
+            _ => walk(&mut values, element, &none, None, budget, |_, _, _, _| Ok(()))?,
         }
     }
     faces.finish(&mut raw);

@@ -245,3 +245,38 @@ fn the_ceiling_holds_for_points_and_for_faces() {
         })
     ));
 }
+
+/// Coordinates of a survey: `float` in a header of text is no reason to throw digits away.
+#[test]
+fn ascii_keeps_the_digits_of_a_float() {
+    let file = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n\
+                5400000.123 3500000.456 -0.001\n";
+    let cloud = read(file.as_bytes()).unwrap();
+    assert_eq!(cloud.positions, [DVec3::new(5400000.123, 3500000.456, -0.001)]);
+}
+
+/// One face of so many corners that reading and cutting it holds many times the file: booked before it is held.
+#[test]
+fn a_list_without_end_is_booked_before_it_is_held() {
+    let corners = 300_000u32;
+    let mut file = b"ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+         element face 1\nproperty list uint uchar vertex_indices\nend_header\n"
+    .to_vec();
+    for v in [0f32, 0., 0., 1., 0., 0., 0., 1., 0.] {
+        file.extend(v.to_le_bytes());
+    }
+    file.extend(corners.to_le_bytes());
+    file.extend((0..corners).map(|i| (i % 3) as u8));
+    let under = |max_bytes: usize| {
+        parse_ply(
+            &file,
+            &ReadLimits {
+                max_bytes: max_bytes as u64,
+            },
+        )
+    };
+    // Beside the triangles the entries of the list and the scratch of the cut: 12 + 8 + 72 bytes a corner, doubled lists.
+    assert!(matches!(under(60 * corners as usize), Err(Fault::Limit { .. })));
+    let plenty = under(200 * corners as usize);
+    assert!(!matches!(plenty, Err(Fault::Limit { .. })), "{plenty:?}");
+}

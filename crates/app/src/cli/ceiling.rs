@@ -1,0 +1,75 @@
+//! The user's ceiling on memory.
+//!
+//! Fits and readers estimate what they need before they take it, and say what is missing. What no estimate foresees, the
+//! system refuses: beyond the ceiling it gives no more memory, and the program ends with exit code 4.
+
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, OnceLock};
+
+use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
+
+use super::cost::{data_bytes, rss_bytes};
+use super::failure::{Failure, OrFail, Outcome};
+use super::quantity::{Memory, human_bytes};
+
+static CEILING: OnceLock<Memory> = OnceLock::new();
+
+/// What the process may hold above the ceiling, in all: pages of the program itself, stacks, and room that the allocator
+/// cannot give back.
+const SLACK: u64 = 10 << 20;
+/// Share of the ceiling that may be lost between blocks.
+const LOST: f64 = 0.05;
+/// What the program holds before it has read anything.
+pub const PROGRAM: u64 = 12 << 20;
+/// Addresses of a thread's stack, of which it holds hardly any memory.
+const STACK: u64 = 2 << 20;
+
+/// Has the system refuse memory beyond `ceiling`, and names it to [`limit`]. To be called before any thread of the pool
+/// runs.
+///
+/// # Errors
+/// Exit code 4 if the program alone holds more, or the system sets no such limit.
+pub fn hold(ceiling: Memory) -> Outcome {
+    let (Some(data), Some(resident)) = (data_bytes(), rss_bytes()) else {
+        return Err(Failure::limit(
+            "--memory: this system does not tell what a process holds",
+        ));
+    };
+    let total = (ceiling.0 as f64 * (1.0 + LOST)) as u64 + SLACK;
+    let Some(left) = total.checked_sub(resident) else {
+        return Err(Failure::limit(format!(
+            "--memory {}: the program alone holds {}; raise it",
+            human_bytes(ceiling.0),
+            human_bytes(resident)
+        )));
+    };
+    let threads = std::thread::available_parallelism().map_or(1, |n| n.get() as u64);
+    let old = getrlimit(Resource::Data);
+    let limit = Rlimit {
+        current: Some((data + left + threads * STACK).min(old.maximum.unwrap_or(u64::MAX))),
+        maximum: old.maximum,
+    };
+    setrlimit(Resource::Data, limit)
+        .map_err(|e| anyhow::anyhow!("--memory: the system refuses the limit ({e})"))
+        .or_limit()?;
+    // An allocation that the system refuses ends the program by this signal.
+    let always = Arc::new(AtomicBool::new(true));
+    signal_hook::flag::register_conditional_shutdown(signal_hook::consts::SIGABRT, 4, always)
+        .map_err(|e| anyhow::anyhow!("--memory: cannot listen for a refused allocation ({e})"))
+        .or_limit()?;
+    let _ = CEILING.set(ceiling);
+    Ok(())
+}
+
+/// The ceiling of the whole process, if the user gave one.
+pub fn limit() -> Option<Memory> {
+    CEILING.get().copied()
+}
+
+/// Whether the process holds more than it may: for work that looks up now and then and can say what it was.
+pub fn is_exceeded() -> bool {
+    match (limit(), rss_bytes()) {
+        (Some(Memory(limit)), Some(resident)) => resident > limit,
+        _ => false,
+    }
+}

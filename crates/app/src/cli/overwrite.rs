@@ -1,0 +1,129 @@
+//! Whether an output is a file that is being read, under whatever name.
+
+use std::fs::File;
+use std::io::Read;
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+
+use formats::Kind;
+use formats::volumes::VolumeFormat;
+
+use super::failure::{Failure, Outcome};
+use super::source::Source;
+
+/// Bytes of a header in which names of other files are looked for.
+const HEADER: u64 = 1 << 24;
+/// Longer words are data, not names.
+const LONGEST_NAME: usize = 4096;
+
+/// Refuses to write over an input: the same file by another spelling or a link, a slice in the directory that is read,
+/// a file of voxels or of a buffer that the input's header names.
+pub fn refuse_own_input(option: &str, input: &Source, output: &Path) -> Outcome {
+    let Ok(target) = output.canonicalize() else {
+        return Ok(()); // Nothing is there yet.
+    };
+    let own = if is_same(input.path(), &target) {
+        format!("is {} itself", input.name())
+    } else if is_slice(input.path(), &target) {
+        format!("is one of the files of {}", input.name())
+    } else if is_named(input.path(), &target) {
+        format!("holds data of {}", input.name())
+    } else {
+        return Ok(());
+    };
+    Err(Failure::usage(format!(
+        "{option} {}: {own}, which is read here and must not be overwritten; name another file",
+        output.display()
+    )))
+}
+
+/// One file, also under two hard links.
+fn is_same(a: &Path, b: &Path) -> bool {
+    match (a.metadata(), b.metadata()) {
+        (Ok(a), Ok(b)) => a.is_file() && (a.dev(), a.ino()) == (b.dev(), b.ino()),
+        _ => false,
+    }
+}
+
+/// A file of the same kind of slices in the directory that is read, or beside a file that stands for its series.
+fn is_slice(input: &Path, target: &Path) -> bool {
+    let directory = if input.is_dir() {
+        input
+    } else {
+        input.parent().unwrap_or(Path::new(""))
+    };
+    let slices = match formats::detect(input) {
+        Ok(Kind::Volume(VolumeFormat::Dicom)) => VolumeFormat::Dicom,
+        Ok(Kind::Volume(VolumeFormat::TiffFolder)) => VolumeFormat::Tiff,
+        _ => return false,
+    };
+    // Links in the directory lead to slices too, so that files are compared, not names.
+    formats::detect(target).is_ok_and(|k| k == Kind::Volume(slices)) && holds(directory, target, 8)
+}
+
+/// Whether `target` is in the directory or, up to `depth` levels, below it.
+fn holds(directory: &Path, target: &Path, depth: usize) -> bool {
+    files_of(directory).any(|path| {
+        if path.is_dir() {
+            depth > 0 && holds(&path, target, depth - 1)
+        } else {
+            is_same(&path, target)
+        }
+    })
+}
+
+/// A file that the input's header names: the other half of a NIfTI pair, voxels of NRRD and MetaImage, a buffer of glTF.
+fn is_named(input: &Path, target: &Path) -> bool {
+    let directory = input.parent().unwrap_or(Path::new(""));
+    let name = input.to_string_lossy().to_ascii_lowercase();
+    let ends_in = |e: &&str| name.ends_with(*e);
+    if let Some(ending) = [".hdr", ".img", ".hdr.gz", ".img.gz"].iter().find(|e| ends_in(e)) {
+        let whole = input.to_string_lossy();
+        let stem = &whole[..whole.len() - ending.len()];
+        return ["hdr", "img", "hdr.gz", "img.gz"]
+            .iter()
+            .any(|e| is_same(Path::new(&format!("{stem}.{e}")), target));
+    }
+    if ![".nhdr", ".nhdr.gz", ".mhd", ".gltf"].iter().any(ends_in) {
+        return false;
+    }
+    let mut header = Vec::new();
+    let read = File::open(input).and_then(|f| f.take(HEADER).read_to_end(&mut header));
+    if read.is_err() {
+        return false;
+    }
+    let text = String::from_utf8_lossy(&header);
+    // Whole lines, what stands behind their key, and single words: names may hold blanks.
+    let lines = text.lines().flat_map(|line| {
+        let value = line.split_once([':', '=']).map_or("", |(_, v)| v);
+        [line.trim(), value.trim()]
+    });
+    let words = text.split(|c: char| c.is_whitespace() || c == '"');
+    lines
+        .chain(words)
+        .filter(|name| !name.is_empty() && name.len() < LONGEST_NAME)
+        .any(|name| match name.split_once('%') {
+            None => is_same(&directory.join(name), target),
+            // A pattern such as slice%03d.raw, or an escaped character of a URI: all files that start like it.
+            Some((head, _)) => {
+                let (folder, start) = head.rsplit_once('/').unwrap_or(("", head));
+                files_of(&directory.join(folder))
+                    .filter(|f| {
+                        f.file_name()
+                            .is_some_and(|n| n.to_string_lossy().starts_with(start))
+                    })
+                    .any(|f| is_same(&f, target))
+            }
+        })
+}
+
+fn files_of(directory: &Path) -> impl Iterator<Item = PathBuf> + use<> {
+    // The directory of a bare name has the empty path.
+    Path::new(".")
+        .join(directory)
+        .read_dir()
+        .into_iter()
+        .flatten()
+        .flatten()
+        .map(|e| e.path())
+}

@@ -1,0 +1,46 @@
+//! Pieces of solid or cavity away from all samples: found on the finished field, and asked away.
+
+use bspline::{Frame, HierarchicalSpline, Real};
+use glam::{DAffine3, DVec3};
+
+use super::samples::{BASE_DEPTH, Samples};
+use crate::unsupported_components;
+
+/// Finest grid on which signs are looked at: 128 cells along the box.
+const DEPTH: usize = 7;
+/// Components of one cell are left: on thin parts a cell's centre may be inside while the samples of its walls lie
+/// in the cells beside it.
+const CELLS_TO_ACT: usize = 2;
+/// Nor is anything larger than this share of the box: a flat sheet along a plane of cells has all its samples on one
+/// side of it, and the other side is no mistake.
+const LARGEST_SHARE: f64 = 0.1;
+
+/// Conditions of the opposite sign, one cell deep, at the cells of every component that holds no sample: position
+/// and value in the unit box.
+pub(crate) fn conditions<T: Real>(field: &HierarchicalSpline<T>, samples: &Samples) -> Vec<(DVec3, f32)> {
+    let depth = DEPTH.min(BASE_DEPTH + field.level_count() - 1);
+    let n = 1u32 << depth;
+    let h = 1.0 / f64::from(n);
+    let cell = DVec3::splat(samples.scale * h);
+    let frame = Frame {
+        world_from_grid: DAffine3::from_scale_rotation_translation(
+            cell,
+            glam::DQuat::IDENTITY,
+            samples.origin,
+        ),
+        cells: [n; 3],
+    };
+    let most = (LARGEST_SHARE * f64::from(n).powi(3)) as usize;
+    let points = samples.live_points().map(|i| samples.world(i));
+    unsupported_components(field, 0.0, &frame, points)
+        .iter()
+        .filter(|c| c.cells.len() >= CELLS_TO_ACT && c.cells.len() <= most)
+        .flat_map(|c| {
+            let target = if c.is_inside { -h } else { h } as f32;
+            c.cells.iter().map(move |at| {
+                let centre = DVec3::from_array(at.map(f64::from)) + 0.5;
+                (centre * h, target)
+            })
+        })
+        .collect()
+}
