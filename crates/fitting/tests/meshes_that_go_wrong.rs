@@ -333,9 +333,9 @@ fn facets_of_a_coarse_torus_are_not_chased_below_the_tolerance() {
 
 #[test]
 fn what_leaves_an_edge_as_it_is_keeps_thin_parts() {
-    // Plates a five-hundredth of their width apart and thick, of which edges are most of what is seen of them.
-    let plate = |z: f64| cuboid(DVec3::new(-1.0, -1.0, z), DVec3::new(1.0, 1.0, z + 0.004));
-    let mesh = plate(0.0).with(&plate(0.008));
+    // Plates a hundredth of their width apart and thick, of which edges are most of what is seen of them.
+    let plate = |z: f64| cuboid(DVec3::new(-1.0, -1.0, z), DVec3::new(1.0, 1.0, z + 0.02));
+    let mesh = plate(0.0).with(&plate(0.04));
     let (field, ..) = fit_mesh::<f32>(
         &mesh.vertices,
         &mesh.triangles,
@@ -345,11 +345,11 @@ fn what_leaves_an_edge_as_it_is_keeps_thin_parts() {
     .expect("two plates");
     for p in points(2000, 0.98).map(|p| p.truncate()) {
         for (z, inside) in [
-            (0.002, true),
-            (0.006, false),
-            (0.010, true),
-            (-0.002, false),
-            (0.014, false),
+            (0.01, true),
+            (0.03, false),
+            (0.05, true),
+            (-0.01, false),
+            (0.07, false),
         ] {
             assert_eq!(field.value(p.extend(z)) > 0.0, inside, "{p} {z}");
         }

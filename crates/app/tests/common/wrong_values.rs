@@ -65,6 +65,8 @@ pub const ROWS: &[Row] = &[
     ("fit check convert", "--as", "@cloud --as *solid", "mesh"),
     ("fit check", "--as", "@volume --as *mesh", "leave it out"),
     // How a fit is made.
+    ("mesh", "--triangles", "field.iclay -o out.ply --triangles *3", "whole number"),
+    ("mesh", "--triangles", "field.iclay -o out.ply --triangles *1e5", "whole number"),
     ("fit mesh", "--tolerance", "@cloud --tolerance *1cm", "0.2mm"),
     ("fit mesh", "--tolerance", "@cloud --tolerance *0", "above zero"),
     ("fit", "--tolerance", "@volume --tolerance *1mm", "density"),

@@ -35,7 +35,7 @@ pub struct MeshOptions {
     /// Root mean square distance from the surface to the zero set that each leaf stays below, or says why not; world
     /// units, 1e-4 of the diagonal if not given.
     pub tolerance: Option<f64>,
-    /// So many coefficients are not exceeded, at least [`LEAST_COEFFICIENTS`](crate::points::LEAST_COEFFICIENTS); 400 000 if
+    /// Largest number of coefficients, at least [`LEAST_COEFFICIENTS`](crate::points::LEAST_COEFFICIENTS); 400 000 if
     /// neither they nor a tolerance are given.
     pub coefficients: Option<usize>,
     /// Deepest level: `2^max_depth` cells along the box, from 6 to 16; 10 if not given.

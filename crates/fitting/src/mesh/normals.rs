@@ -1,7 +1,7 @@
 //! Normals at the edges and corners of a surface, which tell its two sides.
 //!
 //! Where the nearest point is on an edge or a corner, the angle-weighted mean of the normals there tells inside from
-//! outside (Bærentzen & Aanæs, *Signed distance computation using the angle weighted pseudonormal*, IEEE TVCG 2005).
+//! outside \[Baerentzen05\].
 
 use glam::DVec3;
 
