@@ -17,7 +17,6 @@ mod resample;
 mod scan;
 mod series;
 mod stack;
-mod start;
 mod stream;
 mod syntax;
 mod value;
@@ -25,8 +24,8 @@ mod value;
 use std::path::Path;
 use std::sync::Arc;
 
+pub(crate) use dataset::looks_like_dicom;
 pub(crate) use scan::holds_dicom;
-pub(crate) use start::looks_like_dicom;
 
 use super::options::{DicomOptions, Tilt, Uneven};
 use super::slices;

@@ -6,8 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::DicomOptions;
-use super::dataset::{self, Broken, DataSet, SeriesId};
-use super::start::{LOOK, looks_like_dicom};
+use super::dataset::{self, Broken, DataSet, LOOK, SeriesId, looks_like_dicom};
 use super::stream::Location;
 use crate::input::io_fault;
 use crate::limits::Budget;
