@@ -4,8 +4,8 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use bspline::polygonize::{
-    AdaptiveBlockMesh, AdaptiveMesh, AdaptiveMesher, AdaptiveOptions, AdaptiveReport, Mesh, PolygonizeError,
-    MeshCheck, PolygonizeOptions, check_mesh, polygonize,
+    AdaptiveBlockMesh, AdaptiveMesh, AdaptiveMesher, AdaptiveOptions, AdaptiveReport, Mesh, MeshCheck,
+    PolygonizeError, PolygonizeOptions, check_mesh, polygonize,
 };
 use bspline::primitives::{Cuboid, Gyroid, Sphere, Torus};
 use bspline::{Aabb, Csg, Field, Frame};
