@@ -201,7 +201,7 @@ fn a_broken_pipe_is_no_panic() {
 
 /// The tolerance of a mesh is met by fewer triangles the looser it is.
 #[test]
-fn mesh_tolerance_chooses_the_resolution() {
+fn mesh_tolerance_chooses_the_triangles() {
     let bench = Bench::new();
     bench.json("phantom sphere -o cloud.ply");
     bench.json("fit cloud.ply -o field.iclay");
@@ -214,20 +214,52 @@ fn mesh_tolerance_chooses_the_resolution() {
             "{triangles} triangles at {tolerance}, {last} before"
         );
         last = triangles;
-        // On a sphere of radius 1 the distance of a triangle's centre is known without the field.
-        let mesh = common::read_mesh(&bench.path("mesh.ply"));
-        let mut errors: Vec<f64> = (0..mesh.triangles.len())
-            .map(|t| {
-                let [a, b, c] = mesh.corners(t);
-                (((a + b + c) / 3.0).length() - 1.0).abs()
-            })
-            .collect();
-        errors.sort_by(f64::total_cmp);
-        let p99 = errors[errors.len() * 99 / 100];
+        let p95 = chord_error_on_unit_sphere(&bench);
+        // All cells of a sphere are of one size, and one twice as large would err four times as much.
         assert!(
-            p99 < 1.05 * tolerance && p99 > 0.2 * tolerance,
-            "{p99} for {tolerance}"
+            p95 < 1.05 * tolerance && p95 > 0.25 * tolerance,
+            "{p95} for {tolerance}"
         );
+    }
+}
+
+/// 95th percentile over the triangles of the distances of centres and sides from the unit sphere.
+fn chord_error_on_unit_sphere(bench: &Bench) -> f64 {
+    let mesh = common::read_mesh(&bench.path("mesh.ply"));
+    assert!(bspline::polygonize::check_mesh(&mesh).is_closed_manifold());
+    let mut errors: Vec<f64> = (0..mesh.triangles.len())
+        .map(|t| {
+            let [a, b, c] = mesh.corners(t);
+            let points = [(a + b + c) / 3.0, (a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5];
+            points
+                .iter()
+                .map(|p| (p.length() - 1.0).abs())
+                .fold(0.0, f64::max)
+        })
+        .collect();
+    errors.sort_by(f64::total_cmp);
+    errors[errors.len() * 95 / 100]
+}
+
+/// No more triangles than asked for, and at least four fifths of them; without a wish half the fit's tolerance is kept.
+#[test]
+fn mesh_keeps_its_number_of_triangles_and_the_tolerance_of_the_fit() {
+    let bench = Bench::new();
+    bench.json("phantom sphere -o cloud.ply");
+    let fit = bench.json("fit cloud.ply -o field.iclay");
+    bench.json("mesh field.iclay -o mesh.ply");
+    let p95 = chord_error_on_unit_sphere(&bench);
+    // The field itself is off by its own error.
+    let allowed = 0.5 * number(&fit, "tolerance") + number(&fit, "p95");
+    assert!(p95 <= allowed, "{p95} {allowed}");
+    for most in [300, 2_000, 30_000] {
+        let mesh = bench.json(&format!("mesh field.iclay -o mesh.ply --triangles {most}"));
+        let triangles = number(&mesh, "triangles") as usize;
+        assert!(
+            triangles <= most && triangles * 5 >= most * 4,
+            "{triangles} for {most}"
+        );
+        chord_error_on_unit_sphere(&bench);
     }
 }
 

@@ -133,7 +133,7 @@ fn keys_cited(text: &str) -> BTreeSet<String> {
         let letters = word.trim_end_matches(|c: char| c.is_ascii_digit());
         let mut chars = letters.chars();
         letters.len() + 2 == word.len()
-            && letters.len() > 2
+            && letters.len() > 1
             && chars.next().is_some_and(|c| c.is_ascii_uppercase())
             && chars.all(|c| c.is_ascii_lowercase())
     };

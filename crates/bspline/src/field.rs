@@ -122,6 +122,13 @@ pub trait Field: Send + Sync {
         [Interval::EVERYTHING; 3]
     }
 
+    /// A number that `‖∇²f‖` (Frobenius norm, world units) exceeds nowhere in `b`; never too small. Infinite, as here,
+    /// for a field that does not know, and where the gradient jumps somewhere in `b`.
+    fn hessian_bound(&self, b: &Aabb) -> f64 {
+        let _ = b;
+        f64::INFINITY
+    }
+
     /// [`Field::value_gradient`] of many points, in order.
     ///
     /// # Panics
@@ -130,6 +137,17 @@ pub trait Field: Send + Sync {
         assert_eq!(points.len(), out.len(), "one output slot per point");
         for (p, o) in points.iter().zip(out) {
             *o = self.value_gradient(*p);
+        }
+    }
+
+    /// [`Field::jet`] of many points, in order.
+    ///
+    /// # Panics
+    /// If the lengths differ.
+    fn jets(&self, points: &[DVec3], out: &mut [Jet]) {
+        assert_eq!(points.len(), out.len(), "one output slot per point");
+        for (p, o) in points.iter().zip(out) {
+            *o = self.jet(*p);
         }
     }
 

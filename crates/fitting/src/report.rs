@@ -19,6 +19,9 @@ pub enum StopReason {
     /// The residual was below the tolerance when the cell was looked at, and has been moved above it by the
     /// refinement of cells beside it.
     Neighbours = 6,
+    /// The surface has an edge there, which a smooth field can only round off: going on would cost more than it
+    /// brings.
+    Crease = 7,
     /// The smoothing that was asked for leaves more than the tolerance.
     Smoothing = 8,
 }

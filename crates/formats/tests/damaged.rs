@@ -232,7 +232,7 @@ fn volumes_that_cannot_be_used_say_why_and_what_helps() {
         (40, &[0, 0], "number of dimensions is 0"),
         (42, &[0, 0], "a dimension is 0"),
         (44, &[0xff, 0xff], "a dimension is -1"),
-        (40, &[4, 0, 5, 0, 4, 0, 3, 0, 7, 0], "7 (dimension 4)"),
+        (40, &[4, 0, 5, 0, 4, 0, 3, 0, 7, 0], "volumes in the file is 7"),
         (70, &[128, 0], "colour"),
         (70, &[32, 0], "complex"),
         (70, &[99, 0], "99"),

@@ -291,11 +291,7 @@ fn metaimage_headers_that_cannot_be_used_say_why() {
         ("Offset = 0 0 0", "Offset = 0 0 inf", "inf"),
         ("MET_UCHAR", "MET_UCHAR_ARRAY", "MET_UCHAR_ARRAY"),
         ("ElementType = MET_UCHAR\n", "", "ElementType, and missing"),
-        (
-            "NDims = 3",
-            "NDims = 3\nElementNumberOfChannels = 3",
-            "one channel",
-        ),
+        ("NDims = 3", "NDims = 3\nElementNumberOfChannels = 3", "channels"),
         ("NDims = 3", "NDims = 3\nNDims = 3", "second time"),
         ("NDims = 3", "NDims = 3\nnonsense", "has no ="),
         ("NDims = 3", "NDims = 3\nHeaderSize = -5", "HeaderSize"),

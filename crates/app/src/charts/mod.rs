@@ -3,6 +3,7 @@
 mod dynamics;
 mod fit;
 mod hard;
+mod meshes;
 mod noise;
 mod orient;
 mod outliers;
@@ -11,6 +12,7 @@ mod plot;
 pub use dynamics::{DynamicsError, Extent, Line, Run, cost, sampling, sweep};
 pub use fit::{Configuration, Input, Measurement, sweeps};
 pub use hard::Scene;
+pub use meshes::{MeshSubject, MeshTrial};
 pub use noise::noise;
 pub use orient::Oriented;
 pub use outliers::outliers;

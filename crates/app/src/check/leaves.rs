@@ -38,6 +38,8 @@ pub struct LeafAudit {
     pub at_noise: usize,
     /// Of these, leaves that the coefficient or memory budget stopped.
     pub at_budget: usize,
+    /// Of these, leaves at edges of the surface, which a smooth field cannot have.
+    pub at_creases: usize,
     /// Of these, leaves that the smoothing asked for leaves above it.
     pub smoothed: usize,
     /// Moved above the tolerance when cells beside them were refined.
@@ -77,6 +79,7 @@ pub fn audit_leaves(
             StopReason::Noise => &mut audit.at_noise,
             StopReason::Budget | StopReason::Memory => &mut audit.at_budget,
             StopReason::Neighbours => &mut audit.moved,
+            StopReason::Crease => &mut audit.at_creases,
             StopReason::Smoothing => &mut audit.smoothed,
             StopReason::Tolerance => &mut audit.claimed_below,
         } += 1;

@@ -17,7 +17,7 @@ use super::progress::Bar;
 use super::quantity::between;
 use super::source::{SAMPLES, Source};
 use super::staged::StagedFiles;
-use super::{chart_dynamics, chart_orient};
+use super::{chart_dynamics, chart_mesh, chart_orient};
 use crate::charts::{Chart, Configuration, Input, Measurement, Scene, noise, outliers, sweeps};
 
 /// Arguments of `isoclay charts`.
@@ -35,6 +35,8 @@ enum Subject {
     Orient(chart_orient::Args),
     /// Error of a step's increment against its time, over solvers, laws, schemes and steps; sampling; cost by size
     Dynamics(chart_dynamics::Args),
+    /// Distance of meshes from the surface of their field against triangles and time
+    Mesh(chart_mesh::Args),
     /// Noise against the resolution chosen and the error, and outliers against the error with and without --robust
     Hard(HardArgs),
 }
@@ -82,7 +84,7 @@ impl Args {
         match &self.subject {
             Subject::Fit(a) => a.json,
             Subject::Dynamics(a) => a.json,
-            Subject::Orient(_) | Subject::Hard(_) => false,
+            Subject::Orient(_) | Subject::Mesh(_) | Subject::Hard(_) => false,
         }
     }
 }
@@ -94,6 +96,7 @@ pub fn run(args: &Args) -> Outcome {
         Subject::Fit(args) => fits(args, &cancel),
         Subject::Orient(args) => chart_orient::run(args, &cancel),
         Subject::Dynamics(args) => chart_dynamics::run(args, &cancel),
+        Subject::Mesh(args) => chart_mesh::run(args, &cancel),
         Subject::Hard(args) => hard(args, &cancel),
     }
 }

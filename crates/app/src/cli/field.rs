@@ -133,6 +133,11 @@ impl OpenField {
         either!(&self.loaded.field, f => f.lattice())
     }
 
+    /// Median slope of the field, density per world length.
+    pub fn slope(&self) -> f64 {
+        either!(&self.loaded.field, f => f.slope())
+    }
+
     /// Number of levels.
     pub fn level_count(&self) -> usize {
         either!(&self.loaded.field, f => f.level_count())
@@ -210,13 +215,6 @@ impl OpenField {
         self.frame(self.lattice().cells_at(finest).map(|c| c.saturating_mul(n)))
     }
 
-    /// The grid with two cells in every knot interval of the level that holds the surface `{ f = iso }`, and how many finer
-    /// levels there are.
-    pub fn frame_of_surface(&self, iso: f64) -> (Frame, usize) {
-        let level = self.level_of_surface(iso);
-        (self.frame_of_level(level), self.level_count() - 1 - level)
-    }
-
     /// The finest level on which, or on finer ones, at least a tenth of the surface's area lies.
     pub fn level_of_surface(&self, iso: f64) -> usize {
         either!(&self.loaded.field, f => f.level_of_surface(iso, 0.1))
@@ -234,7 +232,8 @@ impl OpenField {
         self.frame((sides / cell).to_array().map(|c| (c.round() as u32).max(1)))
     }
 
-    fn frame(&self, cells: [u32; 3]) -> Frame {
+    /// The grid of so many cells over the lattice's box.
+    pub fn frame(&self, cells: [u32; 3]) -> Frame {
         let lattice = self.lattice();
         let step = lattice.extent() / glam::DVec3::from_array(cells.map(f64::from));
         Frame {
@@ -346,7 +345,7 @@ fn signs(stored: StoredSigns, leaf_confidence: &[f32]) -> SignReport {
 fn leaf(r: &LeafRecord) -> Option<Leaf> {
     use StopReason::*;
     let reason = [
-        Tolerance, Depth, NoData, Noise, Budget, Memory, Neighbours, Smoothing,
+        Tolerance, Depth, NoData, Noise, Budget, Memory, Neighbours, Crease, Smoothing,
     ]
     .into_iter()
     .find(|s| *s as u8 == r.reason)?;

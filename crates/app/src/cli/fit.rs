@@ -64,8 +64,8 @@ pub struct Choice {
     /// percentile [default: what the noise justifies; for clean data 0.01% of the diagonal, 0.5% of the range]
     #[arg(long, value_name = "T[mm|%]", allow_hyphen_values = true)]
     pub tolerance: Option<Tolerance>,
-    /// Meshes: distance from the surface up to which no error is above the tolerance, written like it [default: eight
-    /// tolerances]
+    /// Meshes: distance from the surface up to which the tolerance holds for the signed distance, written like it
+    /// [default: none, it holds for the surface alone]
     #[arg(long, value_name = "L[mm|%]", allow_hyphen_values = true)]
     pub band: Option<Tolerance>,
     /// Coefficients to spend
@@ -444,6 +444,13 @@ impl Fitted {
             bound: Some(r.bound),
             leaves: Some(r.leaves.len()),
             leaves_over_tolerance: has_tolerance.then(|| r.leaves.iter().filter(over).count()),
+            leaves_at_edges: self.defects.is_some().then(|| {
+                r.leaves
+                    .iter()
+                    .filter(over)
+                    .filter(|l| l.reason == StopReason::Crease)
+                    .count()
+            }),
             leaves_without_data: has_tolerance.then(|| {
                 r.leaves
                     .iter()

@@ -5,6 +5,7 @@
 mod belongs;
 mod ceiling;
 mod chart_dynamics;
+mod chart_mesh;
 mod chart_orient;
 mod charts;
 mod check;
@@ -13,6 +14,7 @@ mod cost;
 mod eval;
 mod failure;
 mod field;
+mod fineness;
 mod fit;
 mod flags;
 mod info;

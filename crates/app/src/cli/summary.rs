@@ -61,6 +61,9 @@ pub struct Summary {
     /// Leaves whose rms residual is above the tolerance.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub leaves_over_tolerance: Option<usize>,
+    /// Of a mesh: leaves above the tolerance at edges, which a smooth field can only round off.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub leaves_at_edges: Option<usize>,
     /// Leaves above the tolerance that were not split for lack of data.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub leaves_without_data: Option<usize>,
@@ -201,6 +204,7 @@ impl Summary {
             ("wrong signs", self.wrong_signs.map(count)),
             ("leaves", self.leaves.map(count)),
             ("  over tolerance", self.leaves_over_tolerance.map(count)),
+            ("  at edges of the mesh", self.leaves_at_edges.map(count)),
             ("  refused for lack of data", self.leaves_without_data.map(count)),
             ("coefficients", self.coefficients.map(count)),
             ("bricks", self.bricks.map(count)),

@@ -62,6 +62,15 @@ impl Affine {
         &self.world_from_local
     }
 
+    fn in_world(&self, local: Jet) -> Jet {
+        let m = self.local_from_world.matrix3;
+        Jet {
+            value: local.value,
+            gradient: m.transpose() * local.gradient,
+            hessian: m.transpose() * local.hessian * m,
+        }
+    }
+
     fn local_frame(&self, frame: &Frame) -> Frame {
         Frame {
             world_from_grid: self.local_from_world * frame.world_from_grid,
@@ -83,13 +92,7 @@ impl Field for Affine {
     }
 
     fn jet(&self, p: DVec3) -> Jet {
-        let local = self.field.jet(self.local_from_world.transform_point3(p));
-        let m = self.local_from_world.matrix3;
-        Jet {
-            value: local.value,
-            gradient: m.transpose() * local.gradient,
-            hessian: m.transpose() * local.hessian * m,
-        }
+        self.in_world(self.field.jet(self.local_from_world.transform_point3(p)))
     }
 
     fn bounds(&self, b: &Aabb) -> Interval {
@@ -99,6 +102,27 @@ impl Field for Affine {
     fn gradient_bounds(&self, b: &Aabb) -> [Interval; 3] {
         let local = self.field.gradient_bounds(&b.transformed(&self.local_from_world));
         vectors::transformed(self.local_from_world.matrix3.transpose(), local)
+    }
+
+    fn hessian_bound(&self, b: &Aabb) -> f64 {
+        // `‖Mᵀ H M‖ <= ‖M‖² ‖H‖`.
+        let m = self.local_from_world.matrix3.to_cols_array();
+        let stretch = m.iter().map(|x| x * x).sum::<f64>() * (1.0 + 1e-12);
+        match self.field.hessian_bound(&b.transformed(&self.local_from_world)) {
+            0.0 => 0.0,
+            bound => stretch * bound,
+        }
+    }
+
+    fn jets(&self, points: &[DVec3], out: &mut [Jet]) {
+        let local: Vec<DVec3> = points
+            .iter()
+            .map(|p| self.local_from_world.transform_point3(*p))
+            .collect();
+        self.field.jets(&local, out);
+        for jet in out {
+            *jet = self.in_world(*jet);
+        }
     }
 
     fn values_gradients(&self, points: &[DVec3], out: &mut [(f64, DVec3)]) {

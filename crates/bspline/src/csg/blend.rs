@@ -3,7 +3,7 @@ use std::sync::Arc;
 use glam::{DMat3, DVec3};
 
 use super::{CsgError, Operation};
-use crate::{Aabb, Field, Frame, Interval, Jet};
+use crate::{Aabb, Field, Frame, Interval, Jet, vectors};
 
 /// How a smooth union rounds the crease `f = g` of the sharp one; an intersection is the mirror image.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -343,6 +343,49 @@ impl Field for Blend {
                 Rounding::Rvachev { .. } => sum,
             }
         })
+    }
+
+    /// The formula of [`Field::jet`] with norms; the second derivatives of both roundings have the sign pattern of a
+    /// square, so that `|F_fg| <= √(F_ff F_gg)`.
+    fn hessian_bound(&self, b: &Aabb) -> f64 {
+        let ranges = self.branches.each_ref().map(|branch| branch.bounds(b));
+        if let Some(only) = self.only(ranges) {
+            return only.hessian_bound(b);
+        }
+        let [f, g] = self.counted(ranges);
+        let weights = [self.rounding.weight(f, g), self.rounding.weight(g, f)].map(|w| w.abs().hi);
+        let slopes = self
+            .branches
+            .each_ref()
+            .map(|branch| vectors::length(branch.gradient_bounds(b)).hi);
+        let bend = match self.rounding {
+            Rounding::Bounded { range } => {
+                let apart = (f - g).abs().lo;
+                (1.0 - apart / range).max(0.0) / range
+            }
+            // `∂²/∂f² <= 1/s`, `s² = f² + g² + ε²`.
+            Rounding::Rvachev { rounding } => {
+                1.0 / (f.square() + g.square() + Interval::point(rounding).square())
+                    .sqrt()
+                    .lo
+            }
+        };
+        let branches = self.branches.each_ref().map(|branch| branch.hessian_bound(b));
+        let sum: f64 = (0..2)
+            .map(|i| {
+                if weights[i] == 0.0 {
+                    0.0
+                } else {
+                    weights[i] * branches[i]
+                }
+            })
+            .sum();
+        let crease = if bend == 0.0 {
+            0.0
+        } else {
+            bend * (slopes[0] + slopes[1]).powi(2)
+        };
+        (sum + crease) * (1.0 + 1e-9)
     }
 
     fn values_gradients(&self, points: &[DVec3], out: &mut [(f64, DVec3)]) {

@@ -294,6 +294,15 @@ impl Field for Boolean {
             .expect("a branch lives everywhere")
     }
 
+    /// Infinite where two branches can win: there may be a crease.
+    fn hessian_bound(&self, b: &Aabb) -> f64 {
+        let all: Vec<&Branch> = self.branches.iter().collect();
+        match self.live(&all, |field| field.bounds(b))[..] {
+            [only] => only.field.hessian_bound(b),
+            _ => f64::INFINITY,
+        }
+    }
+
     fn values_gradients(&self, points: &[DVec3], out: &mut [(f64, DVec3)]) {
         assert_eq!(points.len(), out.len(), "one output slot per point");
         let mut term = [(0.0, DVec3::ZERO); CHUNK];

@@ -219,6 +219,12 @@ impl Field for Csg {
     fn gradient_bounds(&self, b: &Aabb) -> [Interval; 3] {
         self.node().gradient_bounds(b)
     }
+    fn hessian_bound(&self, b: &Aabb) -> f64 {
+        self.node().hessian_bound(b)
+    }
+    fn jets(&self, points: &[DVec3], out: &mut [Jet]) {
+        self.node().jets(points, out);
+    }
     fn values_gradients(&self, points: &[DVec3], out: &mut [(f64, DVec3)]) {
         self.node().values_gradients(points, out);
     }

@@ -119,6 +119,14 @@ impl Field for Sum {
             })
     }
 
+    fn hessian_bound(&self, b: &Aabb) -> f64 {
+        let terms = self.terms.iter().filter(|(w, _)| *w != 0.0);
+        terms
+            .map(|(w, field)| w.abs() * field.hessian_bound(b))
+            .sum::<f64>()
+            * (1.0 + 1e-12)
+    }
+
     fn values_gradients(&self, points: &[DVec3], out: &mut [(f64, DVec3)]) {
         assert_eq!(points.len(), out.len(), "one output slot per point");
         out.fill((self.constant, DVec3::ZERO));

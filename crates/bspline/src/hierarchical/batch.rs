@@ -1,11 +1,12 @@
 //! Many points at once: the way down the tree of bricks is saved where the next point lies in the same brick.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 use super::HierarchicalSpline;
 use super::brick::BRICK;
 use super::kernel;
-use crate::Real;
+use super::spline::Place;
+use crate::{Jet, Real};
 
 impl<T: Real> HierarchicalSpline<T> {
     /// The order of `points` by the level, the brick and the cell that evaluate them, as indices into `points`.
@@ -51,4 +52,40 @@ pub(super) fn values_gradients<T: Real>(
             .extend((v.as_f64(), f.world_gradient(at.level, g)), q, beyond);
         last = Some(at);
     }
+}
+
+/// Value, gradient and Hessian of each point, with the bits that the single point would have.
+pub(super) fn jets<T: Real>(f: &HierarchicalSpline<T>, points: &[DVec3], out: &mut [Jet]) {
+    assert_eq!(points.len(), out.len(), "one output slot per point");
+    let mut last = None;
+    for (p, o) in points.iter().zip(out) {
+        let (jet, place) = jet_after(f, last.as_ref(), *p);
+        *o = jet;
+        last = Some(place);
+    }
+}
+
+/// Value, gradient and Hessian of a point, and where it was found.
+#[inline]
+pub(super) fn jet_after<'a, T: Real>(
+    f: &'a HierarchicalSpline<T>,
+    last: Option<&Place<'a, T>>,
+    p: DVec3,
+) -> (Jet, Place<'a, T>) {
+    let (q, beyond) = f.place.clamp(p);
+    let at = f.place_after(last, q);
+    let (value, gradient, second) = kernel::jet(&at.brick.totals, at.cell, at.t);
+    let [xx, yy, zz, xy, xz, yz] = second.map(T::as_f64);
+    let h = DMat3::from_cols(
+        DVec3::new(xx, xy, xz),
+        DVec3::new(xy, yy, yz),
+        DVec3::new(xz, yz, zz),
+    );
+    let m = f.lattice_from_world().matrix3 * (1u64 << at.level) as f64;
+    let inside = Jet {
+        value: value.as_f64(),
+        gradient: f.world_gradient(at.level, gradient),
+        hessian: m.transpose() * h * m,
+    };
+    (f.place.extend_jet(inside, q, beyond), at)
 }

@@ -16,7 +16,7 @@ const ON_KNOT: f64 = 1e-9;
 /// Boxes laid along the knots, as a mesher asks for, miss them by a rounding and would reach slivers of up to 26 more
 /// bricks. In such a sliver of thickness `d` the one function that the cells on this side do not read has the
 /// weight `d³/6 <= 2e-28`; that of the others changes the field by less than `2d` of the largest coefficient.
-fn onto_knots<T: Real>(spline: &HierarchicalSpline<T>, b: &Aabb) -> (Aabb, f64) {
+pub(super) fn onto_knots<T: Real>(spline: &HierarchicalSpline<T>, b: &Aabb) -> (Aabb, f64) {
     let scale = (1u64 << (spline.level_count() - 1)) as f64;
     let mut moved = 0.0;
     let mut snap = |q: f64| {

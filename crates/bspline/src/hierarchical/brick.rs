@@ -1,5 +1,5 @@
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use crate::Real;
 
@@ -87,6 +87,8 @@ pub(crate) struct Brick<T> {
     pub totals: Arc<[T; HALO_LEN]>,
     /// Least and largest coefficient that the evaluation of any point of the brick reads, here or below.
     pub hull: [T; 2],
+    /// Bound of the Hessian over the brick's cells, here or below, once somebody has asked.
+    pub bend: OnceLock<f64>,
     /// Indices of the eight bricks of the next level, octant `4x + 2y + z`; [`NONE`] where there is none.
     pub children: [u32; 8],
 }

@@ -1,4 +1,4 @@
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
@@ -31,6 +31,7 @@ pub(crate) fn build_levels<T: Real>(
                 key: *key,
                 totals,
                 hull,
+                bend: OnceLock::new(),
                 children: [NONE; 8],
             }
         };

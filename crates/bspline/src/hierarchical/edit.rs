@@ -1,7 +1,7 @@
 //! Addition of coefficients, sharing all bricks that it leaves as they were.
 
 use std::collections::BTreeSet;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use rayon::prelude::*;
 
@@ -251,6 +251,7 @@ impl<T: Real> HierarchicalSpline<T> {
             key,
             totals: empty.clone(),
             hull: [T::zero(); 2],
+            bend: OnceLock::new(),
             children: [NONE; 8],
         };
         for existing in old {
@@ -308,14 +309,16 @@ impl<T: Real> HierarchicalSpline<T> {
             .collect()
     }
 
-    /// Hulls of the `dirty` bricks and of all above them, finest first.
+    /// Hulls of the `dirty` bricks and of all above them, finest first; what is known of their Hessians is forgotten.
     fn renew_hulls(&mut self, mut dirty: Vec<BTreeSet<u32>>) {
         for level in (0..self.levels.len()).rev() {
             for &index in &dirty[level] {
                 let brick = &self.levels[level][index as usize];
                 let finer = self.levels.get(level + 1).map_or(&[][..], Vec::as_slice);
                 let hull = gathered_hull(brick, min_max(brick.totals.as_slice()), finer);
-                self.levels[level][index as usize].hull = hull;
+                let brick = &mut self.levels[level][index as usize];
+                brick.hull = hull;
+                brick.bend = OnceLock::new();
             }
             if level > 0 {
                 let parents: Vec<u32> = dirty[level]

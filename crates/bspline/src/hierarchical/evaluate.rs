@@ -1,9 +1,9 @@
 //! The questions of [`Field`], answered by a hierarchical spline.
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
 use super::spline::HierarchicalSpline;
-use super::{batch, bounds, grid, kernel, slopes};
+use super::{batch, bounds, curvature, grid, kernel, slopes};
 use crate::{Aabb, Field, Frame, Interval, Jet, Real};
 
 impl<T: Real> Field for HierarchicalSpline<T> {
@@ -22,22 +22,7 @@ impl<T: Real> Field for HierarchicalSpline<T> {
     }
 
     fn jet(&self, p: DVec3) -> Jet {
-        let (q, beyond) = self.place.clamp(p);
-        let at = self.place(q);
-        let (value, gradient) = kernel::value_gradient(&at.brick.totals, at.cell, at.t);
-        let s = kernel::second(&at.brick.totals, at.cell, at.t).map(T::as_f64);
-        let h = DMat3::from_cols(
-            DVec3::new(s[0], s[3], s[4]),
-            DVec3::new(s[3], s[1], s[5]),
-            DVec3::new(s[4], s[5], s[2]),
-        );
-        let m = self.lattice_from_world().matrix3 * (1u64 << at.level) as f64;
-        let inside = Jet {
-            value: value.as_f64(),
-            gradient: self.world_gradient(at.level, gradient),
-            hessian: m.transpose() * h * m,
-        };
-        self.place.extend_jet(inside, q, beyond)
+        batch::jet_after(self, None, p).0
     }
 
     fn bounds(&self, b: &Aabb) -> Interval {
@@ -48,8 +33,16 @@ impl<T: Real> Field for HierarchicalSpline<T> {
         slopes::over_world_box(self, b)
     }
 
+    fn hessian_bound(&self, b: &Aabb) -> f64 {
+        curvature::over_world_box(self, b)
+    }
+
     fn values_gradients(&self, points: &[DVec3], out: &mut [(f64, DVec3)]) {
         batch::values_gradients(self, points, out);
+    }
+
+    fn jets(&self, points: &[DVec3], out: &mut [Jet]) {
+        batch::jets(self, points, out);
     }
 
     fn frame_values(&self, frame: &Frame, lo: [i64; 3], count: [usize; 3], out: &mut [f64]) {

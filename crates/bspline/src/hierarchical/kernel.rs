@@ -60,28 +60,41 @@ pub(crate) fn value_gradient<T: Real>(totals: &[T; HALO_LEN], cell: [usize; 3], 
     )
 }
 
-/// Second derivatives by cell coordinates: `xx, yy, zz, xy, xz, yz`.
-pub(crate) fn second<T: Real>(totals: &[T; HALO_LEN], cell: [usize; 3], t: [T; 3]) -> [T; 6] {
-    let w = t.map(values);
-    let d = t.map(first);
-    let k = t.map(curvatures);
-    let sum = |wx: &[T; 4], wy: &[T; 4], wz: &[T; 4]| {
-        let mut plane = [T::zero(); 4];
-        for b in 0..4 {
-            let mut line = [T::zero(); 4];
-            for a in 0..4 {
-                add(&mut line, wx[a], row(totals, cell, a, b));
-            }
-            add(&mut plane, wy[b], &line);
+/// Value, gradient and second derivatives (`xx, yy, zz, xy, xz, yz`) by cell coordinates; value and gradient have the
+/// same bits as those of [`value_gradient`].
+#[inline]
+pub(crate) fn jet<T: Real>(totals: &[T; HALO_LEN], cell: [usize; 3], t: [T; 3]) -> (T, [T; 3], [T; 6]) {
+    let [wx, wy, wz] = t.map(values);
+    let [dx, dy, dz] = t.map(first);
+    let [kx, ky, kz] = t.map(curvatures);
+    let zero = [T::zero(); 4];
+    let (mut f, mut fx, mut fy) = (zero, zero, zero);
+    let (mut fxx, mut fyy, mut fxy) = (zero, zero, zero);
+    for b in 0..4 {
+        let (mut line, mut line_dx, mut line_dxx) = (zero, zero, zero);
+        for a in 0..4 {
+            let r = row(totals, cell, a, b);
+            add(&mut line, wx[a], r);
+            add(&mut line_dx, dx[a], r);
+            add(&mut line_dxx, kx[a], r);
         }
-        dot(wz, &plane)
-    };
-    [
-        sum(&k[0], &w[1], &w[2]),
-        sum(&w[0], &k[1], &w[2]),
-        sum(&w[0], &w[1], &k[2]),
-        sum(&d[0], &d[1], &w[2]),
-        sum(&d[0], &w[1], &d[2]),
-        sum(&w[0], &d[1], &d[2]),
-    ]
+        add(&mut f, wy[b], &line);
+        add(&mut fx, wy[b], &line_dx);
+        add(&mut fy, dy[b], &line);
+        add(&mut fxx, wy[b], &line_dxx);
+        add(&mut fyy, ky[b], &line);
+        add(&mut fxy, dy[b], &line_dx);
+    }
+    (
+        dot(&wz, &f),
+        [dot(&wz, &fx), dot(&wz, &fy), dot(&dz, &f)],
+        [
+            dot(&wz, &fxx),
+            dot(&wz, &fyy),
+            dot(&kz, &f),
+            dot(&wz, &fxy),
+            dot(&dz, &fx),
+            dot(&dz, &fy),
+        ],
+    )
 }

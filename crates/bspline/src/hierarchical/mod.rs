@@ -12,6 +12,7 @@ mod batch;
 mod bounds;
 mod brick;
 mod build;
+mod curvature;
 mod edit;
 mod evaluate;
 mod grid;

@@ -41,6 +41,7 @@
 //! # Ok::<(), bspline::polygonize::PolygonizeError>(())
 //! ```
 
+mod adaptive;
 mod block_mesh;
 mod blocks;
 mod check;
@@ -60,6 +61,7 @@ use std::ops::ControlFlow;
 use self::blocks::MAX_CELLS;
 use crate::{Field, Frame};
 
+pub use self::adaptive::{AdaptiveBlockMesh, AdaptiveMesh, AdaptiveMesher, AdaptiveOptions, AdaptiveReport};
 pub use self::block_mesh::{BlockMesh, BlockUpdate};
 pub use self::check::{MeshCheck, check_mesh};
 pub use self::mesh::Mesh;

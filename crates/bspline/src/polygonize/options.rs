@@ -110,6 +110,12 @@ pub enum PolygonizeError {
         /// Tolerance asked for.
         tolerance: f64,
     },
+    /// The chord error of an adaptive mesh is no length.
+    #[error("the chord error must be a finite length above 0, not {error}")]
+    Error {
+        /// Error asked for.
+        error: f64,
+    },
     /// More blocks than allowed may hold surface.
     #[error("more than {limit} blocks of 8x8x8 cells may hold surface; use fewer cells")]
     TooManyBlocks {

@@ -74,7 +74,7 @@ pub(super) const fn edge_place(edge: usize) -> (usize, [usize; 3]) {
 }
 
 /// Edge between two corners that differ in one coordinate.
-fn edge_between(a: usize, b: usize) -> Edge {
+pub(super) fn edge_between(a: usize, b: usize) -> Edge {
     let c = a & b;
     let (x, y, z) = (c >> 2 & 1, c >> 1 & 1, c & 1);
     (match a ^ b {
@@ -86,7 +86,7 @@ fn edge_between(a: usize, b: usize) -> Edge {
 }
 
 /// Corners of the face `2a + side`, counter-clockwise seen from outside the cube.
-fn face_corners(face: usize) -> [usize; 4] {
+pub(super) fn face_corners(face: usize) -> [usize; 4] {
     let (axis, side) = (face / 2, face % 2);
     let bit = |axis: usize, on: usize| on << (2 - axis % 3);
     let corner = |u: usize, v: usize| bit(axis, side) | bit(axis + 1, u) | bit(axis + 2, v);
@@ -100,7 +100,7 @@ fn face_corners(face: usize) -> [usize; 4] {
 
 /// The directed segments of a case on one face: each from the edge where the walk round the face enters a run
 /// of inside corners to the edge where it leaves it.
-fn face_segments(case: usize, face: usize) -> Vec<[Edge; 2]> {
+pub(super) fn face_segments(case: usize, face: usize) -> Vec<[Edge; 2]> {
     let corners = face_corners(face);
     let inside = |i: usize| case >> corners[i % 4] & 1 == 1;
     let edge = |i: usize| edge_between(corners[i % 4], corners[(i + 1) % 4]);
@@ -121,7 +121,7 @@ fn face_segments(case: usize, face: usize) -> Vec<[Edge; 2]> {
 ///
 /// Two faces share each edge and walk along it in opposite directions, so that each crossed edge is the end of
 /// one segment and the start of another.
-fn loops(case: usize) -> Vec<Vec<Edge>> {
+pub(super) fn loops(case: usize) -> Vec<Vec<Edge>> {
     let mut next = [None; 12];
     for face in 0..6 {
         for [from, to] in face_segments(case, face) {

@@ -93,4 +93,9 @@ impl Field for Capsule {
     fn gradient_bounds(&self, _: &Aabb) -> [Interval; 3] {
         unit_gradient()
     }
+
+    /// `√2/d` at the point nearest to the segment.
+    fn hessian_bound(&self, b: &Aabb) -> f64 {
+        std::f64::consts::SQRT_2 / (self.radius - self.bounds(b).hi).max(0.0) * (1.0 + 1e-12)
+    }
 }

@@ -92,4 +92,25 @@ impl Field for Cuboid {
     fn gradient_bounds(&self, _: &Aabb) -> [Interval; 3] {
         unit_gradient()
     }
+
+    /// 0 where one face alone is nearest, `√2/d` outside; infinite about the medial axis and the edges.
+    fn hessian_bound(&self, b: &Aabb) -> f64 {
+        let (low, high) = (b.min - self.center, b.max - self.center);
+        let slack = 1e-12 * (self.center.abs() + self.half_size + b.min.abs().max(b.max.abs())).max_element();
+        let q: [[f64; 2]; 3] = std::array::from_fn(|a| {
+            let [near, far] = absolute([low[a], high[a]]);
+            [near - self.half_size[a] - slack, far - self.half_size[a] + slack]
+        });
+        let rules = |a: usize| {
+            let others = [q[(a + 1) % 3][1], q[(a + 2) % 3][1]];
+            let one_side = low[a] > slack || high[a] < -slack;
+            one_side && others.iter().all(|o| *o < 0.0 && *o < q[a][0])
+        };
+        let out = -self.bounds(b).hi;
+        match (0..3).any(rules) {
+            true => 0.0,
+            false if out > 0.0 => std::f64::consts::SQRT_2 / out * (1.0 + 1e-12),
+            false => f64::INFINITY,
+        }
+    }
 }

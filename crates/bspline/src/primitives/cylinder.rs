@@ -96,4 +96,29 @@ impl Field for Cylinder {
     fn gradient_bounds(&self, _: &Aabb) -> [Interval; 3] {
         unit_gradient()
     }
+
+    /// `1/ρ` where the side alone is nearest, 0 at one cap, `1/ρ` and `1/d` outside; infinite about the medial axis and
+    /// the rims.
+    fn hessian_bound(&self, b: &Aabb) -> f64 {
+        let ([r0, r1], height) = (self.axis.radius_range(b), self.axis.height_range(b));
+        let [s0, s1] = absolute(height);
+        let size = self.axis.size() + self.half_length + self.radius;
+        let slack = 1e-12 * (b.min.abs().max(b.max.abs()).element_sum() + size);
+        let (u, v) = (
+            [r0 - self.radius, r1 - self.radius],
+            [s0 - self.half_length, s1 - self.half_length],
+        );
+        let round = 1.0 / (r0 - slack).max(0.0) * (1.0 + 1e-9);
+        let one_side = height[0] > slack || height[1] < -slack;
+        let out = -self.bounds(b).hi;
+        if v[1] + slack < 0.0 && v[1] + slack < u[0] {
+            round
+        } else if u[1] + slack < 0.0 && u[1] + slack < v[0] && one_side {
+            0.0
+        } else if out > 0.0 {
+            (1.0 / out).hypot(round) * (1.0 + 1e-9)
+        } else {
+            f64::INFINITY
+        }
+    }
 }

@@ -125,6 +125,19 @@ impl Field for Gyroid {
             None => [Interval::EVERYTHING; 3],
         }
     }
+
+    fn hessian_bound(&self, b: &Aabb) -> f64 {
+        let Some(([s, c], rounding)) = self.ranges(b) else {
+            return f64::INFINITY;
+        };
+        let k = 1.0 / self.length();
+        let diagonal = |a: usize, b: usize, z: usize| (s[a] * c[b] + s[z] * c[a]).abs().hi;
+        let mixed = |a: usize, b: usize| (c[a] * s[b]).abs().hi;
+        let on = [diagonal(0, 1, 2), diagonal(1, 2, 0), diagonal(2, 0, 1)];
+        let off = [mixed(0, 1), mixed(1, 2), mixed(2, 0)];
+        let square = |entries: [f64; 3]| entries.iter().map(|e| (e + 2.0 * rounding).powi(2)).sum::<f64>();
+        k * (square(on) + 2.0 * square(off)).sqrt() * (1.0 + 1e-12)
+    }
 }
 
 /// The gradient from sines and cosines.

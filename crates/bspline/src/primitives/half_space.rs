@@ -50,4 +50,8 @@ impl Field for HalfSpace {
     fn gradient_bounds(&self, _: &Aabb) -> [Interval; 3] {
         (-self.normal).to_array().map(Interval::point)
     }
+
+    fn hessian_bound(&self, _: &Aabb) -> f64 {
+        0.0
+    }
 }

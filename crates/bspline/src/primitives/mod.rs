@@ -156,6 +156,9 @@ impl Field for Primitive {
     fn gradient_bounds(&self, b: &Aabb) -> [Interval; 3] {
         self.field().gradient_bounds(b)
     }
+    fn hessian_bound(&self, b: &Aabb) -> f64 {
+        self.field().hessian_bound(b)
+    }
     fn values_gradients(&self, points: &[DVec3], out: &mut [(f64, DVec3)]) {
         self.field().values_gradients(points, out);
     }

@@ -118,6 +118,15 @@ impl Field for PiercedTetrahedron {
         let y2 = y.map(|y| y.square().hi).iter().sum::<f64>() + 5.0;
         slopes(y).map(|g| g.widened(64.0 * f64::EPSILON * y2 * y2))
     }
+
+    /// `‖8yyᵀ + 4wI + 8S‖ <= 8|y|² + 4√3|w| + 8√2|y|`, over 16 sizes.
+    fn hessian_bound(&self, b: &Aabb) -> f64 {
+        let far = (b.min - self.center).abs().max((b.max - self.center).abs()) / self.size;
+        let r = far.length();
+        let w = (r * r - 5.0).max(5.0);
+        let sum = 8.0 * r * r + 4.0 * 3f64.sqrt() * w + 8.0 * std::f64::consts::SQRT_2 * r;
+        sum / (16.0 * self.size) * (1.0 + 1e-9)
+    }
 }
 
 /// The gradient over a box of `y`.

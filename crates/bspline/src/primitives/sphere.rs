@@ -74,4 +74,9 @@ impl Field for Sphere {
         let rest = |a: usize| v[(a + 1) % 3].square() + v[(a + 2) % 3].square();
         std::array::from_fn(|a| -v[a].over_hypot(rest(a)))
     }
+
+    /// `√2/|x - c|` at the point nearest to the centre.
+    fn hessian_bound(&self, b: &Aabb) -> f64 {
+        std::f64::consts::SQRT_2 / (self.radius - self.bounds(b).hi).max(0.0) * (1.0 + 1e-12)
+    }
 }

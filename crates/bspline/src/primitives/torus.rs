@@ -112,4 +112,11 @@ impl Field for Torus {
             exact.intersection(unit[a])
         })
     }
+
+    /// The curvatures of the tube, `1/d` off the ring, and of the ring, at most `1/ρ`.
+    fn hessian_bound(&self, b: &Aabb) -> f64 {
+        let off_ring = (self.minor - self.bounds(b).hi).max(0.0);
+        let off_axis = self.axis.radius_range(b)[0].max(0.0);
+        (1.0 / off_ring).hypot(1.0 / off_axis) * (1.0 + 1e-9)
+    }
 }

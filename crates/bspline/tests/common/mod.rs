@@ -48,6 +48,7 @@ impl Default for Options {
 pub fn field_conformance(name: &str, field: &dyn Field, region: &Aabb, options: &Options) -> [f64; 2] {
     bounds_are_sound(name, field, region, options);
     gradient_bounds_are_sound(name, field, region, options);
+    hessian_bounds_are_sound(name, field, region, options);
     ways_to_ask_agree(name, field, region, options);
     derivatives_match_differences(name, field, region, options);
     batches_equal_single_points(name, field, region, options);
@@ -174,6 +175,43 @@ fn gradient_bounds_are_sound(name: &str, field: &dyn Field, region: &Aabb, optio
             assert!(
                 (0..3).all(|a| bounds[a].contains(gradient[a])),
                 "{name}: {gradient} leaves {bounds:?} over {b:?} at {p}"
+            );
+        }
+    }
+}
+
+/// Where the bound is finite there is no crease either: the gradient changes no faster than it says.
+fn hessian_bounds_are_sound(name: &str, field: &dyn Field, region: &Aabb, options: &Options) {
+    let mut random = Random(options.seed ^ 0x4e55);
+    let reach = region.size() * 0.1;
+    let around = Aabb::new(region.min - reach, region.max + reach);
+    for i in 0..options.sound_boxes / 10 {
+        let mut b = random.small_box(&around);
+        match i % 10 {
+            0 => b.max[i / 10 % 3] = b.min[i / 10 % 3],
+            1 => b.max = b.min,
+            _ => {}
+        }
+        let bound = field.hessian_bound(&b);
+        assert!(bound >= 0.0, "{name}: {bound} over {b:?}");
+        if bound == f64::INFINITY {
+            continue;
+        }
+        let points = [b.min, b.max, random.point(&b), random.point(&b), random.point(&b)];
+        for p in points {
+            let hessian = frobenius(field.jet(p).hessian);
+            assert!(
+                hessian <= bound,
+                "{name}: {hessian} exceeds {bound} over {b:?} at {p}"
+            );
+        }
+        for pair in points.windows(2) {
+            let [g, h] = [0, 1].map(|n| field.value_gradient(pair[n]).1);
+            let (change, way) = ((g - h).length(), (pair[0] - pair[1]).length());
+            let rounding = options.value_tolerance * 1e3 * (g.length() + h.length());
+            assert!(
+                change <= bound * way + rounding,
+                "{name}: the gradient changes by {change} over {way}, bound {bound}, box {b:?}"
             );
         }
     }

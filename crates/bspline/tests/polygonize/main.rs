@@ -1,5 +1,6 @@
 //! Laws of the mesher: what every mesh must be, on fields chosen to break it.
 
+mod adaptive;
 mod fields;
 mod settle;
 

@@ -1,14 +1,13 @@
 //! What the fit asks of a mesh: signed distance and its gradient, anywhere.
 
-use std::f64::consts::PI;
-
 use bspline::Aabb;
 use glam::DVec3;
 use rayon::prelude::*;
 
 use super::MeshDefects;
-use super::nearest::Nearest;
-use super::surface::{Rim, Surface, surface};
+use super::nearest::{Feature, Nearest};
+use super::packet::PLACES;
+use super::surface::{Surface, surface};
 use super::topology::{Faces, area_vector};
 use crate::FitError;
 use crate::phantoms::SplitMix64;
@@ -26,37 +25,82 @@ pub struct MeshDistance {
     surface: Surface,
 }
 
-/// Signed distance at a point of the unit box.
+/// What was found at a point of the unit box.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Distance {
-    /// Positive inside.
-    pub value: f64,
-    /// To the surface, never negative.
-    pub distance: f64,
-    /// Gradient where it is defined: off the surface, and off holes.
-    pub gradient: Option<DVec3>,
-    /// Whether the winding number is neither inside nor outside.
-    pub in_hole: bool,
     /// Nearest point of the surface.
     pub foot: DVec3,
-    /// Triangle of the foot, for searches near by.
-    pub hint: u32,
-    /// How far the winding number is beyond the bounds between which it scales the distance, and how far the rim
-    /// of the nearest hole is, at least.
-    slack: f64,
-    rim: f64,
-}
-
-/// What the winding number says of a point.
-struct Side {
+    /// To the surface, never negative.
+    pub distance: f64,
     /// 1 inside, -1 outside, between them in holes.
-    share: f64,
-    slack: f64,
-    rim: f64,
+    share: f32,
+    /// Triangle of the foot, for searches near by.
+    hint: u32,
+    /// Of a surface with holes: the winding number less that of a closed one, 1 inside and 0 outside, and how wrong
+    /// this may be; how far the rim of the nearest hole is, at least; how fast the winding number may change, at most.
+    stray: f32,
+    doubt: f32,
+    rim: f32,
+    slope: f32,
 }
 
-/// Slack below which the winding number is computed anew: more than its error.
-const LEAST_SLACK: f64 = 0.02;
+/// Points nearer than this share of a distance are on one side of the surface.
+const NEARER: f64 = 1.0 - 1e-9;
+
+impl Distance {
+    /// Without its side.
+    fn to(found: &Nearest) -> Self {
+        Self {
+            foot: found.point,
+            distance: found.distance_squared.sqrt(),
+            hint: found.triangle,
+            share: 0.0,
+            stray: 0.0,
+            doubt: 0.0,
+            rim: 0.0,
+            slope: 0.0,
+        }
+    }
+
+    /// Signed distance, positive inside.
+    pub fn value(&self) -> f64 {
+        f64::from(self.share) * self.distance
+    }
+
+    /// Whether the winding number is neither inside nor outside.
+    pub fn in_hole(&self) -> bool {
+        self.share.abs() < 1.0
+    }
+
+    /// Takes over what the winding number was a little `way` from here.
+    ///
+    /// Off the surface `w = (1/4π) ∫ x·n/|x|³ dA` has by Stokes the gradient of a current loop along the rim, so
+    /// `|∇w| ≤ Σ l/(4πr²)` over its edges of length `l` at distance `r`; through the surface it changes by 1.
+    fn carry(&mut self, way: f64, other: &Self) {
+        let rim = f64::from(other.rim) - way;
+        (self.stray, self.rim) = (other.stray, rim as f32);
+        self.slope = other.slope * (other.rim / self.rim).powi(2);
+        self.doubt = if rim > 0.0 {
+            other.doubt + way as f32 * self.slope
+        } else {
+            f32::INFINITY
+        };
+    }
+
+    /// Whether the winding number is surely beyond the bounds between which it scales the distance.
+    fn is_whole(&self) -> bool {
+        f64::from(self.stray.abs() + self.doubt) < 0.25 - WINDING_ERROR
+    }
+
+    /// Gradient of the signed distance at `p`, the place it was asked for; there is none on the surface and in holes.
+    pub fn gradient(&self, p: DVec3) -> Option<DVec3> {
+        let is_defined = !self.in_hole() && self.distance > 1e-12;
+        is_defined.then(|| (p - self.foot) * (f64::from(self.share) / self.distance))
+    }
+}
+
+/// Error of a winding number that the expansion of far boxes leaves, and some more.
+const WINDING_ERROR: f64 = 0.02;
 
 impl MeshDistance {
     /// Repairs a mesh and makes it ready to be asked. Vertices in world units, triangles counterclockwise seen from
@@ -91,7 +135,7 @@ impl MeshDistance {
     /// Distance to the surface, positive inside, world units. Where the winding number `w` is between 1/4 and 3/4,
     /// which happens in holes alone, it is scaled by `4w - 2`.
     pub fn signed(&self, p: DVec3) -> f64 {
-        self.at(self.to_unit(p), None).value * self.scale
+        self.at(self.to_unit(p), None).value() * self.scale
     }
 
     /// The box that a fit fills: a cube 1.15 times as wide as the longest side of the mesh.
@@ -128,6 +172,16 @@ impl MeshDistance {
         self.surface.rim.is_some() && (4.0 * self.winding_number(p) - 2.0).abs() < 1.0
     }
 
+    /// Area of the surface in the unit box.
+    pub(crate) fn unit_area(&self) -> f64 {
+        self.surface
+            .boundary
+            .corners
+            .iter()
+            .map(|t| area_vector(t).length())
+            .sum()
+    }
+
     /// Diagonal of the box round the mesh, world units.
     pub fn diagonal(&self) -> f64 {
         self.diagonal
@@ -159,86 +213,90 @@ impl MeshDistance {
         self.surface.boundary.nearest(p, 0).distance_squared.sqrt()
     }
 
-    /// Signed distance at `p` of the unit box, given what was found at a point near by.
+    /// Distance at `p` of the unit box, given what was found at a point near by.
     pub(crate) fn at(&self, p: DVec3, near: Option<(DVec3, &Distance)>) -> Distance {
         let found = self.surface.boundary.nearest(p, near.map_or(0, |n| n.1.hint));
-        let distance = found.distance_squared.sqrt();
-        let offset = p - found.point;
-        let Side { share, slack, rim } = match &self.surface.rim {
-            None => Side {
-                share: self.whole_side(p, &found, offset, near),
-                slack: 0.0,
-                rim: 0.0,
-            },
-            Some(edges) => side_kept(p, near, edges).unwrap_or_else(|| self.side(p, edges)),
-        };
-        let is_whole = share.abs() == 1.0 && distance > 1e-12;
-        Distance {
-            value: share * distance,
-            distance,
-            in_hole: share.abs() < 1.0,
-            gradient: is_whole.then(|| offset * (share / distance)),
-            foot: found.point,
-            hint: found.triangle,
-            slack,
-            rim,
-        }
+        self.follow(p, &found, near)
+            .unwrap_or_else(|| self.wind(p, &found))
     }
 
-    /// 1 inside a closed surface, -1 outside.
-    fn whole_side(&self, p: DVec3, found: &Nearest, offset: DVec3, near: Option<(DVec3, &Distance)>) -> f64 {
-        // No surface between the two points: the same side.
-        if let Some((q, other)) = near
-            && p.distance(q) < other.distance * (1.0 - 1e-9)
-        {
-            return other.value.signum();
-        }
-        // The way to the inner of a triangle meets no other.
-        let triangle = found.triangle as usize;
-        if found.on_face && self.surface.certain[triangle] {
-            let height = offset.dot(area_vector(&self.surface.boundary.corners[triangle]));
-            if height != 0.0 {
-                return -height.signum();
+    /// [`MeshDistance::at`] for eight places near each other and near the one that something is known of.
+    pub(crate) fn at_eight(
+        &self,
+        places: &[DVec3; PLACES],
+        near: Option<(DVec3, &Distance)>,
+    ) -> [Distance; PLACES] {
+        let found = self
+            .surface
+            .boundary
+            .nearest_of_eight(places, near.map_or(0, |n| n.1.hint));
+        let mut last: Option<(DVec3, Distance)> = None;
+        std::array::from_fn(|i| {
+            let (p, found) = (places[i], &found[i]);
+            let known = |near| self.follow(p, found, near);
+            if let Some(out) = known(near).or_else(|| known(last.as_ref().map(|(q, d)| (*q, d)))) {
+                return out;
+            }
+            let out = self.wind(p, found);
+            last = Some((p, out));
+            out
+        })
+    }
+
+    /// What is known of `p` without its winding number, if its side is.
+    fn follow(&self, p: DVec3, found: &Nearest, near: Option<(DVec3, &Distance)>) -> Option<Distance> {
+        let mut out = Distance::to(found);
+        if self.surface.rim.is_some() {
+            let (q, other) = near?;
+            let way = p.distance(q);
+            out.carry(way, other);
+            if !out.is_whole() || (self.surface.normals.is_none() && way >= other.distance * NEARER) {
+                return None;
             }
         }
-        if self.surface.winding.at(p) > 0.5 {
-            1.0
+        out.share = self.side(p, found, near)?;
+        Some(out)
+    }
+
+    /// The side of `p` by its winding number.
+    fn wind(&self, p: DVec3, found: &Nearest) -> Distance {
+        let mut out = Distance::to(found);
+        let winding = self.surface.winding.at(p);
+        let side = f64::from(u8::from(winding > 0.5));
+        let Some(edges) = &self.surface.rim else {
+            out.share = 2.0 * side as f32 - 1.0;
+            return out;
+        };
+        out.share = (4.0 * winding - 2.0).clamp(-1.0, 1.0) as f32;
+        out.stray = (winding - side) as f32;
+        if out.is_whole() {
+            let (nearest, slope) = edges.seen_from(p);
+            (out.rim, out.slope) = (nearest as f32, slope as f32);
         } else {
-            -1.0
+            out.doubt = f32::INFINITY;
         }
+        out
     }
 
-    /// The side of a surface with holes.
-    fn side(&self, p: DVec3, rim: &Rim) -> Side {
-        let scaled = 4.0 * self.surface.winding.at(p) - 2.0;
-        let slack = 0.25 * (scaled.abs() - 1.0);
-        Side {
-            share: scaled.clamp(-1.0, 1.0),
-            slack,
-            rim: if slack > LEAST_SLACK {
-                rim.edges.nearest(p, 0).distance_squared.sqrt()
-            } else {
-                0.0
-            },
+    /// 1 inside, -1 outside, off holes, where that can be told without the winding number.
+    fn side(&self, p: DVec3, found: &Nearest, near: Option<(DVec3, &Distance)>) -> Option<f32> {
+        // No surface between the two points: the same side.
+        if let Some((q, other)) = near
+            && other.share.abs() == 1.0
+            && p.distance(q) < other.distance * NEARER
+        {
+            return Some(other.share);
         }
+        let triangle = found.triangle as usize;
+        let outward = match &self.surface.normals {
+            Some(normals) => normals.at(&self.surface.boundary, found.triangle, found.feature)?,
+            // The way to the inner of a triangle meets no other.
+            None if found.feature == Feature::Inner && self.surface.certain[triangle] => {
+                area_vector(&self.surface.boundary.corners[triangle])
+            }
+            None => return None,
+        };
+        let height = (p - found.point).dot(outward);
+        (height != 0.0).then(|| if height < 0.0 { 1.0 } else { -1.0 })
     }
-}
-
-/// The side of a point near by, if no surface lies between and the winding number cannot have changed by its slack.
-///
-/// `w = (1/4π) ∫ x·n/|x|³ dA` has by Stokes the gradient of a current loop along the rim, so `|∇w| ≤ L/(4πR²)` with
-/// the length `L` of the rim and the distance `R` to it.
-fn side_kept(p: DVec3, near: Option<(DVec3, &Distance)>, rim: &Rim) -> Option<Side> {
-    let (q, other) = near?;
-    let way = p.distance(q);
-    let to_rim = other.rim - way;
-    if way >= other.distance * (1.0 - 1e-9) || to_rim <= 0.0 {
-        return None;
-    }
-    let slack = other.slack - way * rim.length / (4.0 * PI * to_rim * to_rim);
-    (slack > LEAST_SLACK).then(|| Side {
-        share: other.value.signum(),
-        slack,
-        rim: to_rim,
-    })
 }

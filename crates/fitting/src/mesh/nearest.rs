@@ -7,6 +7,16 @@ use super::tree::TriangleTree;
 /// Deepest tree: 2³² triangles halved down to four.
 pub(crate) const STACK: usize = 40;
 
+/// Which part of a triangle a point lies on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Feature {
+    /// A corner, by number.
+    Corner(u8),
+    /// The edge from the corner of this number to the next.
+    Edge(u8),
+    Inner,
+}
+
 /// The nearest point found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Nearest {
@@ -15,8 +25,7 @@ pub(crate) struct Nearest {
     pub point: DVec3,
     /// Index in the tree's order.
     pub triangle: u32,
-    /// Whether the point is inside the triangle, not on an edge or a corner.
-    pub on_face: bool,
+    pub feature: Feature,
 }
 
 impl TriangleTree {
@@ -63,49 +72,52 @@ impl TriangleTree {
     }
 
     #[inline]
-    fn candidate(&self, p: DVec3, triangle: u32) -> Nearest {
-        let (point, on_face) = closest_point(p, &self.corners[triangle as usize]);
+    pub fn candidate(&self, p: DVec3, triangle: u32) -> Nearest {
+        let (point, feature) = closest_point(p, &self.corners[triangle as usize]);
         Nearest {
             distance_squared: p.distance_squared(point),
             point,
             triangle,
-            on_face,
+            feature,
         }
     }
 }
 
-/// Nearest point of a triangle, by the seven regions of its plane [Ericson05 §5.1.5], and whether it is inside the triangle.
+/// Nearest point of a triangle, by the seven regions of its plane [Ericson05 §5.1.5], and where on it that is.
 #[inline]
-pub(crate) fn closest_point(p: DVec3, &[a, b, c]: &[DVec3; 3]) -> (DVec3, bool) {
+pub(crate) fn closest_point(p: DVec3, &[a, b, c]: &[DVec3; 3]) -> (DVec3, Feature) {
     let (ab, ac, ap) = (b - a, c - a, p - a);
     let (d1, d2) = (ab.dot(ap), ac.dot(ap));
     if d1 <= 0.0 && d2 <= 0.0 {
-        return (a, false);
+        return (a, Feature::Corner(0));
     }
     let bp = p - b;
     let (d3, d4) = (ab.dot(bp), ac.dot(bp));
     if d3 >= 0.0 && d4 <= d3 {
-        return (b, false);
+        return (b, Feature::Corner(1));
     }
     let vc = d1 * d4 - d3 * d2;
     if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
-        return (a + ab * (d1 / (d1 - d3)), false);
+        return (a + ab * (d1 / (d1 - d3)), Feature::Edge(0));
     }
     let cp = p - c;
     let (d5, d6) = (ab.dot(cp), ac.dot(cp));
     if d6 >= 0.0 && d5 <= d6 {
-        return (c, false);
+        return (c, Feature::Corner(2));
     }
     let vb = d5 * d2 - d1 * d6;
     if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
-        return (a + ac * (d2 / (d2 - d6)), false);
+        return (a + ac * (d2 / (d2 - d6)), Feature::Edge(2));
     }
     let va = d3 * d6 - d5 * d4;
     if va <= 0.0 && d4 >= d3 && d5 >= d6 {
-        return (b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6))), false);
+        return (
+            b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6))),
+            Feature::Edge(1),
+        );
     }
     let share = 1.0 / (va + vb + vc);
-    (a + ab * (vb * share) + ac * (vc * share), true)
+    (a + ab * (vb * share) + ac * (vc * share), Feature::Inner)
 }
 
 #[cfg(test)]

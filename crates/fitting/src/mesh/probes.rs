@@ -1,5 +1,5 @@
-//! Where the signed distance is asked for: in each cell at the centres of its eight parts, at the feet of those, and
-//! on the creases between them.
+//! Where the signed distance is asked for: in each cell at the centres of its eight parts, and at the feet of those on
+//! the surface.
 
 use glam::DVec3;
 
@@ -10,26 +10,20 @@ use super::distance::{Distance, MeshDistance};
 pub(crate) struct Probe {
     /// Unit box.
     pub at: DVec3,
-    pub value: f64,
+    pub value: f32,
     /// Outward unit normal of the level set; zero where the gradient is unknown or not asked for.
     pub normal: [f32; 3],
-    /// Distance to the surface.
-    pub distance: f32,
     /// Edge of the part of space it stands for, unit box.
     pub size: f32,
-    /// Whether it lies in a hole, where what is asked for is a guess.
-    pub in_hole: bool,
 }
 
 impl Probe {
     pub fn new(at: DVec3, found: &Distance, size: f64) -> Self {
         Self {
             at,
-            value: found.value,
-            normal: found.gradient.map_or([0.0; 3], |g| (-g).as_vec3().to_array()),
-            distance: found.distance as f32,
+            value: found.value() as f32,
+            normal: found.gradient(at).map_or([0.0; 3], |g| (-g).as_vec3().to_array()),
             size: size as f32,
-            in_hole: found.in_hole,
         }
     }
 
@@ -39,21 +33,7 @@ impl Probe {
             at,
             value: 0.0,
             normal: [0.0; 3],
-            distance: 0.0,
             size: 0.0,
-            in_hole: false,
-        }
-    }
-
-    /// The foot: a point of the surface.
-    fn foot(found: &Distance, size: f64) -> Self {
-        Self {
-            at: found.foot,
-            value: 0.0,
-            normal: [0.0; 3],
-            distance: 0.0,
-            size: size as f32,
-            in_hole: false,
         }
     }
 }
@@ -63,19 +43,12 @@ impl Probe {
 pub(crate) struct Cell {
     pub at: [u32; 3],
     pub center: Distance,
+    /// Root mean square error on the surface in the cell above, unit box; infinite where nothing is known.
+    pub error_above: f32,
 }
 
-/// What the eight parts of a cell hold.
-pub(crate) struct Octants {
-    /// At the centre of part `4x + 2y + z`.
-    pub found: [Distance; 8],
-    /// On creases of the distance between two of them, where a smooth field errs most.
-    creases: Vec<Probe>,
-}
-
-/// A crease over which the gradient changes by `Δ` costs a smooth field about `0.1 Δ h`. It is looked for where
-/// `Δ h` is above so many tolerances, `h` the distance of the two places.
-const CREASE: f64 = 2.0;
+/// At the centre of part `4x + 2y + z` of a cell.
+pub(crate) type Octants = [Distance; 8];
 
 /// Centre of `cell` on the grid with `2^depth` cells.
 pub(crate) fn center(cell: [u32; 3], depth: usize) -> DVec3 {
@@ -87,53 +60,34 @@ pub(crate) fn child(cell: [u32; 3], octant: usize) -> [u32; 3] {
     std::array::from_fn(|a| 2 * cell[a] + (octant >> (2 - a) & 1) as u32)
 }
 
+/// The cell of the grid with `2^depth` cells that holds `at`.
+pub(crate) fn cell_of(at: DVec3, depth: usize) -> [u32; 3] {
+    let last = (1u32 << depth) - 1;
+    (at * (1u64 << depth) as f64)
+        .to_array()
+        .map(|x| (x as u32).min(last))
+}
+
 impl Cell {
-    pub fn ask(&self, mesh: &MeshDistance, depth: usize, tolerance: f64) -> Octants {
+    pub fn ask(&self, mesh: &MeshDistance, depth: usize) -> Octants {
         let middle = center(self.at, depth);
-        let places: [DVec3; 8] = std::array::from_fn(|o| center(child(self.at, o), depth + 1));
-        let found = places.map(|p| mesh.at(p, Some((middle, &self.center))));
-        let size = 0.5f64.powi(depth as i32 + 1);
-        let mut creases = Vec::new();
-        for (o, bit) in (0..8).flat_map(|o| [1, 2, 4].map(|bit| (o, bit))) {
-            if o & bit != 0 {
-                continue;
-            }
-            let ends = [o, o | bit].map(|o| (places[o], found[o]));
-            if let Some(p) = crease(ends, CREASE * tolerance) {
-                let there = mesh.at(p, Some((ends[0].0, &ends[0].1)));
-                creases.push(Probe {
-                    normal: [0.0; 3],
-                    ..Probe::new(p, &there, size)
-                });
-            }
-        }
-        Octants { found, creases }
+        let places = std::array::from_fn(|o| center(child(self.at, o), depth + 1));
+        mesh.at_eight(&places, Some((middle, &self.center)))
     }
-}
 
-/// Where between two places the planes through their feet are equally far, if they differ by more than `least`.
-fn crease([(p, a), (q, b)]: [(DVec3, Distance); 2], least: f64) -> Option<DVec3> {
-    let (g, k, way) = (a.gradient?, b.gradient?, q - p);
-    if (g - k).length_squared() * way.length_squared() < least * least {
-        return None;
+    /// Feet of the parts that lie in the cell, each once.
+    pub fn feet<'a>(&'a self, octants: &'a Octants, depth: usize) -> impl Iterator<Item = &'a Distance> {
+        octants
+            .iter()
+            .filter(move |found| cell_of(found.foot, depth) == self.at)
     }
-    let t = (b.value - a.value - k.dot(way)) / (g - k).dot(way);
-    (t > 0.0 && t < 1.0).then(|| p + way * t)
-}
 
-impl Octants {
-    /// Conditions of `cell`: its eight parts, its centre, and the feet of the parts within reach of the surface.
-    pub fn probes(&self, cell: &Cell, depth: usize, out: &mut Vec<Probe>) {
-        let size = 0.5f64.powi(depth as i32 + 1);
-        for (o, found) in self.found.iter().enumerate() {
-            out.push(Probe::new(center(child(cell.at, o), depth + 1), found, size));
-        }
-        out.push(Probe::new(center(cell.at, depth), &cell.center, size));
-        out.extend(&self.creases);
-        for found in &self.found {
-            if found.distance < 2.0 * size {
-                out.push(Probe::foot(found, size));
-            }
-        }
+    /// Appends what is asked of the field in the cell: the distance and its gradient in every second of its parts,
+    /// other ones in the cells beside it. All eight cost twice the time and gain nothing.
+    pub fn conditions(&self, octants: &Octants, depth: usize, out: &mut Vec<Probe>) {
+        let size = 0.63 * 0.5f64.powi(depth as i32);
+        let parity = self.at.iter().sum::<u32>() % 2;
+        let parts = (0..8).filter(|o: &usize| o.count_ones() % 2 == parity);
+        out.extend(parts.map(|o| Probe::new(center(child(self.at, o), depth + 1), &octants[o], size)));
     }
 }

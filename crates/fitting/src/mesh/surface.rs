@@ -1,6 +1,7 @@
 //! Which triangles bound the solid `{ w > 1/2 }`, and which way they face.
 
 use std::collections::BTreeMap;
+use std::f64::consts::PI;
 use std::sync::Arc;
 
 use glam::DVec3;
@@ -8,6 +9,7 @@ use rayon::prelude::*;
 
 use super::MeshDefects;
 use super::crossings::crossings;
+use super::normals::Normals;
 use super::pieces::boundary_pieces;
 use super::sides::Sides;
 use super::topology::{Faces, area_vector};
@@ -29,6 +31,9 @@ pub(crate) struct Surface {
     pub boundary: Arc<TriangleTree>,
     /// Whether each triangle of `boundary` is a whole triangle of the mesh that crosses no other.
     pub certain: Vec<bool>,
+    /// Normals of its edges and corners, if it is all triangles: what crosses one of them goes from the outside to the
+    /// inside or back.
+    pub normals: Option<Normals>,
     /// All triangles that count for the winding number.
     pub winding: WindingTree,
     /// The rim of its holes; none if the winding number is a whole number off the surface.
@@ -38,9 +43,10 @@ pub(crate) struct Surface {
 /// Edges at which the surface ends.
 pub(crate) struct Rim {
     /// Edges, as triangles whose last two corners coincide.
-    pub edges: TriangleTree,
-    /// Length of all, each as often as it is passed more one way than the other.
-    pub length: f64,
+    edges: TriangleTree,
+    /// Boxes of the tree that together hold all edges, and the length in each, every edge as often as it is passed
+    /// more one way than the other.
+    parts: Vec<(u32, f64)>,
 }
 
 /// Turns whole sheets the right way out, leaves out what bounds nothing, and finds the boundary of the solid.
@@ -106,31 +112,80 @@ pub(crate) fn surface(faces: &mut Faces, defects: &mut MeshDefects) -> Result<Su
     } else {
         Arc::new(TriangleTree::new(&triangles))
     };
-    let certain = tree.ids.iter().map(|&i| certain[i as usize]).collect();
+    let certain: Vec<bool> = tree.ids.iter().map(|&i| certain[i as usize]).collect();
     Ok(Surface {
         boundary: tree,
         certain,
+        normals: all.then(|| Normals::new(faces, &winding.tree, |id| face_of[id as usize])),
         winding,
         rim,
     })
 }
 
+/// Boxes of the rim that are looked at one by one.
+const RIM_BOXES: usize = 256;
+
+impl Rim {
+    /// Distance to the rim, and `Σ l/(4πr²)` over its edges of length `l` at distance `r`, or more.
+    pub fn seen_from(&self, p: DVec3) -> (f64, f64) {
+        let nearest = self.edges.nearest(p, 0).distance_squared;
+        let sum: f64 = self
+            .parts
+            .iter()
+            .map(|(node, length)| length / self.edges.nodes[*node as usize].distance_squared(p).max(nearest))
+            .sum();
+        (nearest.sqrt(), sum / (4.0 * PI))
+    }
+}
+
 /// Edges passed more often one way than the other, over the sheets in use.
 fn rim(faces: &Faces, idle: &[bool]) -> Option<Rim> {
-    let (mut edges, mut length) = (Vec::new(), 0.0);
+    let (mut edges, mut lengths) = (Vec::new(), Vec::new());
     for edge in faces.sides().chunk_by(|a, b| a.0 == b.0) {
         let used = edge.iter().filter(|s| !idle[faces.sheets[s.1 as usize] as usize]);
         let excess: i32 = used.map(|s| if s.2 { 1 } else { -1 }).sum();
         if excess != 0 {
             let ends = [edge[0].0 >> 32, edge[0].0 & 0xffff_ffff].map(|v| faces.vertices[v as usize]);
             edges.push([ends[0], ends[1], ends[1]]);
-            length += f64::from(excess.abs()) * ends[0].distance(ends[1]);
+            lengths.push(f64::from(excess.abs()) * ends[0].distance(ends[1]));
         }
     }
-    (!edges.is_empty()).then(|| Rim {
-        edges: TriangleTree::new(&edges),
-        length,
-    })
+    if edges.is_empty() {
+        return None;
+    }
+    let edges = TriangleTree::new(&edges);
+    // The first boxes, level by level.
+    let mut open = vec![0u32];
+    loop {
+        let is_inner = |n: &u32| edges.nodes[*n as usize].count == 0;
+        if open.len() >= RIM_BOXES || !open.iter().any(is_inner) {
+            break;
+        }
+        let below = |n: u32| {
+            if is_inner(&n) {
+                vec![n + 1, edges.nodes[n as usize].first]
+            } else {
+                vec![n]
+            }
+        };
+        open = open.into_iter().flat_map(below).collect();
+    }
+    let length_in = |n: u32| -> f64 {
+        let (mut sum, mut stack) = (0.0, vec![n]);
+        while let Some(n) = stack.pop() {
+            let node = &edges.nodes[n as usize];
+            if node.count == 0 {
+                stack.extend([n + 1, node.first]);
+            }
+            let triangles = node.first..node.first + node.count;
+            sum += triangles
+                .map(|t| lengths[edges.ids[t as usize] as usize])
+                .sum::<f64>();
+        }
+        sum
+    };
+    let parts = open.into_iter().map(|n| (n, length_in(n))).collect();
+    Some(Rim { edges, parts })
 }
 
 fn bounds_nothing(defects: &MeshDefects) -> FitError {

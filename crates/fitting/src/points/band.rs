@@ -173,6 +173,20 @@ pub(crate) fn active_slots(mask: &[u64; BRICK]) -> impl Iterator<Item = usize> {
     })
 }
 
+/// Number of different central functions of `cells`.
+pub(crate) fn active_count(cells: &[[u32; 3]]) -> usize {
+    let mut masks: FxHashMap<[u32; 3], [u64; BRICK]> = FxHashMap::default();
+    for cell in cells {
+        for corner in 0..8u32 {
+            let s: [u32; 3] = std::array::from_fn(|a| cell[a] + 1 + (corner >> a & 1));
+            let [x, y, z] = s.map(|s| s as usize % BRICK);
+            masks.entry(s.map(|s| s / BRICK as u32)).or_default()[x] |= 1 << (BRICK * y + z);
+        }
+    }
+    // A sum of whole numbers is the same in any order.
+    masks.values().flatten().map(|w| w.count_ones() as usize).sum()
+}
+
 /// Keys of the bricks that hold a function within `reach` of a central function of a cell, in key order.
 pub(crate) fn bricks_near(
     depth: usize,

@@ -212,7 +212,7 @@ mod tests {
         let all = 0..samples.positions.len() as u32;
         let found = Neighbours::of(&samples, std::iter::once(all));
         assert!(
-            found.between.len() > samples.positions.len(),
+            2 * found.between.len() > 3 * samples.positions.len(),
             "{}",
             found.between.len()
         );

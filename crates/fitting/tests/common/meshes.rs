@@ -90,7 +90,12 @@ pub fn sphere(n: usize) -> Mesh {
 
 /// Torus of radii 1 and 0.4 about z.
 pub fn torus(n: usize) -> Mesh {
-    closed_grid([2 * n, n], false, |u, v| {
+    ring(2 * n, n)
+}
+
+/// [`torus`] of `around` times `across` pairs of triangles.
+pub fn ring(around: usize, across: usize) -> Mesh {
+    closed_grid([around, across], false, |u, v| {
         let (a, b) = (2.0 * PI * u, 2.0 * PI * v);
         let r = 1.0 + 0.4 * b.cos();
         DVec3::new(r * a.cos(), r * a.sin(), 0.4 * b.sin())
@@ -118,4 +123,46 @@ pub fn cuboid(low: DVec3, high: DVec3) -> Mesh {
             .flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]])
             .collect(),
     }
+}
+
+/// Surface of the cubes of edge `2 half/n` whose centres are `inside`, in a box from `-half` to `half`.
+pub fn cubes(n: usize, half: f64, inside: impl Fn(DVec3) -> bool) -> Mesh {
+    let edge = 2.0 * half / n as f64;
+    let is_in = |c: [i64; 3]| {
+        let p = DVec3::from_array(c.map(|x| (x as f64 + 0.5) * edge - half));
+        c.iter().all(|&x| (0..n as i64).contains(&x)) && inside(p)
+    };
+    let mut mesh = Mesh::default();
+    let mut index = std::collections::BTreeMap::new();
+    for i in 0..(n * n * n) as i64 {
+        let side = n as i64;
+        let cell = [i / (side * side), i / side % side, i % side];
+        if !is_in(cell) {
+            continue;
+        }
+        for (axis, step) in (0..3).flat_map(|axis| [(axis, 0), (axis, 1)]) {
+            let mut beside = cell;
+            beside[axis] += 2 * step - 1;
+            if is_in(beside) {
+                continue;
+            }
+            let mut square = [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[u, v]| {
+                let mut corner = cell;
+                corner[axis] += step;
+                corner[(axis + 1) % 3] += u;
+                corner[(axis + 2) % 3] += v;
+                *index.entry(corner).or_insert_with(|| {
+                    mesh.vertices
+                        .push(DVec3::from_array(corner.map(|x| x as f64 * edge - half)));
+                    mesh.vertices.len() as u32 - 1
+                })
+            });
+            if step == 0 {
+                square.reverse();
+            }
+            let [a, b, c, d] = square;
+            mesh.triangles.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    mesh
 }

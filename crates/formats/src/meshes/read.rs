@@ -40,6 +40,10 @@ fn read_faulty(path: &Path, limits: &ReadLimits) -> Result<TriangleMesh, Fault> 
 }
 
 /// Parses a file that can only be a mesh.
+#[cfg_attr(
+    not(feature = "cad"),
+    allow(unused_variables, reason = "only formats of this family name other files")
+)]
 pub(crate) fn parse(
     bytes: &[u8],
     format: MeshFileFormat,

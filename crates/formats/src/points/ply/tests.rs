@@ -240,7 +240,7 @@ fn the_ceiling_holds_for_points_and_for_faces() {
     assert!(matches!(
         parse_ply(&file, &ReadLimits { max_bytes: 20_000 }),
         Err(Fault::Limit {
-            what: "triangles of the faces",
+            what: "the entries of a list",
             ..
         })
     ));

@@ -1,0 +1,354 @@
+//! How fine a mesh is to be, and the search for the octree that makes it so.
+
+use std::ops::ControlFlow;
+
+use bspline::Frame;
+use bspline::polygonize::{
+    AdaptiveMesh, AdaptiveMesher, AdaptiveOptions, AdaptiveReport, Mesh, PolygonizeError,
+};
+use fitting::Cancel;
+use formats::field::SourceKind;
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::ceiling;
+use super::failure::{Failure, Outcome};
+use super::field::OpenField;
+use super::progress::Bar;
+use super::quantity::{Tolerance, human_count, human_number};
+
+/// What bounds the size of the triangles.
+#[derive(Clone, Copy, Debug)]
+pub enum Fineness {
+    /// Half the tolerance of the fit.
+    OfTheFit,
+    /// A chord error.
+    Error(Tolerance),
+    /// A number of triangles.
+    Triangles(usize),
+}
+
+/// Chord error that a cell is divided at over the one that 95 % of the centres and sides of settled triangles keep.
+const SPARE: f64 = 3.2;
+/// Share of the triangles asked for that is aimed at.
+const AIM: f64 = 0.96;
+/// Least share of the triangles asked for.
+const LEAST: f64 = 0.8;
+/// Trials until the best found is taken.
+const TRIALS: usize = 12;
+/// Triangles whose chord error is measured; of larger meshes as many, evenly spread.
+const MEASURED: usize = 1 << 14;
+
+/// A field being meshed as finely as it needs.
+pub struct Adaptive<'a> {
+    mesher: AdaptiveMesher<'a>,
+    open: &'a OpenField,
+    options: AdaptiveOptions,
+    frame: Frame,
+    cancel: &'a Cancel,
+    bar: &'a Bar,
+}
+
+/// A mesh with what is to be told of it.
+pub struct Meshed {
+    pub mesh: Mesh,
+    pub report: AdaptiveReport,
+    /// Chord error that 95 % of the centres and sides of the triangles keep.
+    pub error: f64,
+}
+
+impl<'a> Adaptive<'a> {
+    /// Prepares the surface `{ f = iso }` of an open field.
+    pub fn new(
+        open: &'a OpenField,
+        iso: f64,
+        capped: bool,
+        fineness: Fineness,
+        cancel: &'a Cancel,
+        bar: &'a Bar,
+    ) -> Outcome<Self> {
+        let mut cells = open.lattice().cells;
+        // Larger cells than the lattice's own, where they are whole: the fewest triangles are few.
+        let mut above = 0;
+        while cells.iter().all(|n| n % 2 == 0 && *n >= 8) {
+            cells = cells.map(|n| n / 2);
+            above += 1;
+        }
+        // Voxels lie no closer than the finest knots; a cloud's surface bends within their intervals.
+        let beyond = match (open.source(), fineness) {
+            (SourceKind::Volume, Fineness::OfTheFit) => 0,
+            _ => 2,
+        };
+        let finest = open.level_count() - 1 + above;
+        let longest = cells.into_iter().max().unwrap_or(1);
+        let options = AdaptiveOptions {
+            iso,
+            open: !capped,
+            // Room for cells of half the size.
+            depth: (finest + beyond).min(AdaptiveOptions::most_depth(2 * longest)),
+            detection: finest + 1,
+            ..AdaptiveOptions::default()
+        };
+        let frame = open.frame(cells);
+        let mesher = AdaptiveMesher::new(open.field(), &frame, &options, &mut watch(cancel, bar, 0.0, 0.1));
+        Ok(Self {
+            mesher: mesher.map_err(failed)?,
+            open,
+            options,
+            frame,
+            cancel,
+            bar,
+        })
+    }
+
+    /// Starts again with the coarsest cells `finer` times as fine: what bends evenly all over needs cells of one size,
+    /// and halving alone would leave a factor of four between the numbers of triangles.
+    fn rescale(&mut self, finer: f64) -> Outcome {
+        let cells = self
+            .frame
+            .cells
+            .map(|n| ((f64::from(n) * finer).round() as u32).clamp(1, 2 * n));
+        self.frame = self.open.frame(cells);
+        let progress = &mut watch(self.cancel, self.bar, 0.1, 0.2);
+        self.mesher =
+            AdaptiveMesher::new(self.open.field(), &self.frame, &self.options, progress).map_err(failed)?;
+        Ok(())
+    }
+
+    /// Makes the mesh.
+    pub fn mesh(&mut self, fineness: Fineness, notes: &mut Vec<String>) -> Outcome<Meshed> {
+        let open = self.open;
+        let diagonal = self
+            .frame
+            .world_box([0; 3], self.frame.cells.map(i64::from))
+            .size()
+            .length();
+        match fineness {
+            Fineness::OfTheFit => {
+                let tolerance = open.report().tolerance;
+                let length = match open.source() {
+                    SourceKind::Volume => tolerance / open.slope(),
+                    _ => tolerance,
+                };
+                let wanted = if length > 0.0 {
+                    0.5 * length
+                } else {
+                    1e-4 * diagonal
+                };
+                self.within(wanted, true, notes)
+            }
+            Fineness::Error(tolerance) => {
+                // Per cent are of the solid's own diagonal, which a coarse mesh tells well enough.
+                let around = self.at(1e-3 * diagonal, false)?.mesh.bounding_box();
+                let size = around.map_or(diagonal, |b| b.size().length());
+                let wanted = tolerance.length(size, open.unit()).map_err(Failure::usage)?;
+                self.within(wanted, false, notes)
+            }
+            Fineness::Triangles(most) => self.with_triangles(most, 1e-4 * diagonal, notes),
+        }
+    }
+
+    /// The mesh whose cells keep a chord error.
+    fn at(&mut self, error: f64, settled: bool) -> Outcome<Meshed> {
+        let (cancel, bar) = (self.cancel, self.bar);
+        let made = self
+            .mesher
+            .mesh(error, settled, &mut watch(cancel, bar, 0.1, 0.95));
+        let (AdaptiveMesh { mesh, .. }, report) = made.map_err(failed)?;
+        let error = self.chord_error(&mesh);
+        Ok(Meshed { mesh, report, error })
+    }
+
+    /// The coarsest mesh found of which 95 % keep the error `wanted`; with `any`, the first.
+    fn within(&mut self, wanted: f64, any: bool, notes: &mut Vec<String>) -> Outcome<Meshed> {
+        let mut of_cells = SPARE * wanted;
+        let mut best: Option<Meshed> = None;
+        // Errors of cells that kept what is wanted and that did not.
+        let (mut met, mut missed) = (0.0, f64::INFINITY);
+        let mut is_rescaled = false;
+        for _ in 0..TRIALS {
+            let trial = self.at(of_cells, true)?;
+            let (error, count) = (trial.error, trial.mesh.triangles.len());
+            if count == 0 {
+                return Ok(trial);
+            }
+            let is_met = error <= wanted;
+            // More than 5 % of the cells are as small as they may be and too coarse: smaller ones elsewhere do not help.
+            let report = &trial.report;
+            let exhausted = !is_met && 20 * report.leaves_at_limit > report.crossed_leaves
+                || report.leaves_at_limit > 0 && of_cells < 1e-2 * wanted;
+            let coarser = best.as_ref().is_none_or(|b| count < b.mesh.triangles.len());
+            if (is_met && coarser) || (exhausted && best.is_none()) {
+                best = Some(trial);
+            }
+            if (is_met && (any || error > 0.66 * wanted)) || exhausted {
+                break;
+            }
+            if is_met {
+                met = of_cells;
+            } else {
+                missed = of_cells;
+            }
+            // Errors of the cells and of the triangles rise together.
+            let next = of_cells * (0.85 * wanted / error).clamp(0.1, 4.0);
+            if met > 0.0 && met * 1.3 > missed {
+                let kept = best.as_ref().map_or(wanted, |b| b.error);
+                if is_rescaled || kept > 0.66 * wanted {
+                    break;
+                }
+                self.rescale((kept / (0.8 * wanted)).sqrt())?;
+                is_rescaled = true;
+                (met, missed, of_cells) = (0.0, f64::INFINITY, met);
+                continue;
+            }
+            of_cells = next.clamp(met * 1.15, missed / 1.15);
+        }
+        let best = best.ok_or_else(|| {
+            Failure::limit("the tolerance asked for needs more cells than can be meshed; raise --tolerance")
+        })?;
+        notes.push(format!(
+            "95 % of the centres and sides of the triangles lie within {} of the surface",
+            human_number(best.error)
+        ));
+        if best.error > wanted {
+            notes.push(format!(
+                "{} cells are as small as the knots allow and still coarser than asked; {} was wanted",
+                human_count(best.report.leaves_at_limit as usize),
+                human_number(wanted)
+            ));
+        }
+        Ok(best)
+    }
+
+    /// The finest mesh found of no more than `most` triangles.
+    fn with_triangles(&mut self, most: usize, start: f64, notes: &mut Vec<String>) -> Outcome<Meshed> {
+        let (cancel, bar) = (self.cancel, self.bar);
+        let target = AIM * most as f64;
+        // Errors with too many triangles, and with few enough and how many.
+        let (mut fine, mut coarse): (Option<f64>, Option<(f64, f64)>) = (None, None);
+        let (mut error, mut last) = (start, None);
+        let mut is_rescaled = false;
+        for _ in 0..4 * TRIALS {
+            let count = self
+                .mesher
+                .estimate(error, &mut watch(cancel, bar, 0.1, 0.5))
+                .map_err(failed)? as f64;
+            let share = count / most as f64;
+            if count == 0.0 || (AIM - 0.05..=AIM + 0.03).contains(&share) {
+                coarse = Some((error, count));
+                break;
+            }
+            if count > target {
+                fine = Some(error);
+            } else {
+                coarse = Some((error, count));
+                // Nothing is left to divide.
+                if last == Some(count) && fine.is_none() {
+                    break;
+                }
+            }
+            last = Some(count);
+            error = match (fine, coarse) {
+                (Some(f), Some((c, few))) if c / f < 1.001 => {
+                    if is_rescaled || few > LEAST * most as f64 {
+                        break;
+                    }
+                    self.rescale((target / few).sqrt())?;
+                    is_rescaled = true;
+                    (fine, coarse, last) = (None, None, None);
+                    c
+                }
+                (Some(f), Some((c, _))) => {
+                    (error * (count / target)).clamp(f * (c / f).powf(0.1), f * (c / f).powf(0.9))
+                }
+                _ => error * (count / target).clamp(0.2, 8.0),
+            };
+        }
+        let coarse = coarse.map(|c| c.0);
+        let mut error = coarse.or(fine).unwrap_or(start);
+        for _ in 0..TRIALS {
+            let made = self.at(error, true)?;
+            let count = made.mesh.triangles.len();
+            if count <= most {
+                if (count as f64) < LEAST * most as f64 && count > 0 {
+                    notes.push(format!(
+                        "the surface takes {} triangles, not {}: smaller cells would show no more of it",
+                        human_count(count),
+                        human_count(most)
+                    ));
+                }
+                notes.push(format!(
+                    "95 % of the centres and sides of the triangles lie within {} of the surface",
+                    human_number(made.error)
+                ));
+                return Ok(made);
+            }
+            error *= (1.1 * count as f64 / most as f64).clamp(1.05, 8.0);
+        }
+        Err(Failure::limit(format!(
+            "the surface has no mesh of {} triangles or fewer that keeps all of its parts; raise --triangles",
+            human_count(most)
+        )))
+    }
+
+    /// 95th percentile over the triangles of the distance to the surface, to first order, of their centres and the
+    /// middles of their sides. What lies on the frame's box belongs to the cut and does not count.
+    fn chord_error(&self, mesh: &Mesh) -> f64 {
+        let grid = self.frame.world_from_grid.inverse();
+        let end = DVec3::from_array(self.frame.cells.map(f64::from));
+        let step = mesh.triangles.len().div_ceil(MEASURED).max(1);
+        let mut errors: Vec<f64> = (0..mesh.triangles.len().div_ceil(step))
+            .into_par_iter()
+            .with_min_len(256)
+            .filter_map(|n| {
+                let [a, b, c] = mesh.corners(n * step);
+                let points = [(a + b + c) / 3.0, (a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5];
+                let q = grid.transform_point3(points[0]);
+                if q.min(end - q).min_element() < 1e-6 {
+                    return None;
+                }
+                let mut answers = [(0.0, DVec3::ZERO); 4];
+                self.open.field().values_gradients(&points, &mut answers);
+                Some(answers.map(|(f, g)| (f - self.options.iso).abs() / g.length()))
+            })
+            .flatten_iter()
+            .collect();
+        if errors.is_empty() {
+            return 0.0;
+        }
+        let rank = (errors.len() * 95 / 100).min(errors.len() - 1);
+        *errors.select_nth_unstable_by(rank, f64::total_cmp).1
+    }
+}
+
+/// Shows progress between two shares of the whole and listens for the user's wish to stop.
+pub fn watch<'a>(
+    cancel: &'a Cancel,
+    bar: &'a Bar,
+    from: f64,
+    to: f64,
+) -> impl FnMut(f64) -> ControlFlow<()> + 'a {
+    move |fraction| {
+        bar.show("meshing", from + (to - from) * fraction);
+        if cancel.is_cancelled() || ceiling::is_exceeded() {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    }
+}
+
+/// What a failure of the mesher means to the user.
+pub fn failed(e: PolygonizeError) -> Failure {
+    match e {
+        PolygonizeError::Cancelled if ceiling::is_exceeded() => Failure::limit(
+            "the mesh takes more than --memory allows; raise it, or lower --resolution or --triangles",
+        ),
+        PolygonizeError::Cancelled => fitting::FitError::Cancelled.into(),
+        PolygonizeError::TooManyBlocks { .. } | PolygonizeError::TooManyVertices { .. } => Failure::limit(
+            format!("{e}: lower --resolution or --triangles, or raise --tolerance"),
+        ),
+        PolygonizeError::Cells { .. } => Failure::usage(format!("{e}: lower --resolution")),
+        _ => Failure::input(e),
+    }
+}

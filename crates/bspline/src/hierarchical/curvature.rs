@@ -1,0 +1,220 @@
+//! A sound bound of the Hessian over a box: second differences of control coefficients.
+
+use std::ops::Range;
+
+use glam::{DMat3, DVec3};
+
+use super::bounds::{local_box, onto_knots, shared};
+use super::brick::{BRICK, Brick, HALO, HALO_LEN, NONE};
+use super::spline::HierarchicalSpline;
+use crate::{Aabb, Real, vectorized};
+
+/// Largest magnitudes of `xx, yy, zz, xy, xz, yz`, by lattice coordinates.
+type Second = [f64; 6];
+
+/// Bound of `‖∇²f‖` over a world box; infinite if the box leaves the lattice's own, where the gradient jumps.
+pub(super) fn over_world_box<T: Real>(spline: &HierarchicalSpline<T>, b: &Aabb) -> f64 {
+    let local = b.transformed(spline.lattice_from_world());
+    if !(local.min.is_finite() && local.max.is_finite()) {
+        return f64::INFINITY;
+    }
+    let extent = spline.lattice().extent();
+    // Boxes that end at the lattice's own miss it by a rounding.
+    let slack = 1e-9 * extent;
+    if (local.min + slack).min_element() < 0.0 || !local.max.cmple(extent + slack).all() {
+        return f64::INFINITY;
+    }
+    let inside = Aabb {
+        min: local.min.clamp(DVec3::ZERO, extent),
+        max: local.max.clamp(DVec3::ZERO, extent),
+    };
+    let (snapped, moved) = onto_knots(spline, &inside);
+    let counts = spline.lattice().cells.map(|n| n.div_ceil(BRICK as u32));
+    let range = |a: usize| {
+        let brick = |q: f64| (q as u32 / BRICK as u32).min(counts[a] - 1);
+        brick(snapped.min[a])..=brick(snapped.max[a])
+    };
+    let mut most = 0f64;
+    for x in range(0) {
+        for y in range(1) {
+            for z in range(2) {
+                let root = ((x * counts[1] + y) * counts[2] + z) as usize;
+                most = most.max(over_brick(spline, 0, root, &snapped));
+            }
+        }
+    }
+    // Second derivatives are continuous and, cell by cell, linear along each axis: a move of `d` cells changes them by
+    // at most `4d` of the largest second difference in reach; over a million times what `moved` can be.
+    most * (1.0 + 1e-6 + 4.0 * moved)
+}
+
+/// Frobenius norm of `Mᵀ H M` for the largest that `H` can be.
+fn in_world(m: DMat3, [xx, yy, zz, xy, xz, yz]: Second) -> f64 {
+    let m = DMat3::from_cols(m.x_axis.abs(), m.y_axis.abs(), m.z_axis.abs());
+    let h = DMat3::from_cols(
+        DVec3::new(xx, xy, xz),
+        DVec3::new(xy, yy, yz),
+        DVec3::new(xz, yz, zz),
+    );
+    let world = m.transpose() * h * m;
+    world.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// Bound over the part of `b` in brick `index` of `level`.
+fn over_brick<T: Real>(spline: &HierarchicalSpline<T>, level: usize, index: usize, b: &Aabb) -> f64 {
+    let brick = &spline.levels[level][index];
+    let width = BRICK as f64 / (1u64 << level) as f64;
+    let corner = DVec3::from_array(brick.key.0.map(|k| k as f64 * width));
+    let end = (corner + width).min(spline.lattice().extent());
+    let Some(part) = shared(b, corner, end) else {
+        return 0.0;
+    };
+    if part.min == corner && part.max == end {
+        return *brick
+            .bend
+            .get_or_init(|| over_parts(spline, level, brick, &part, width));
+    }
+    over_parts(spline, level, brick, &part, width)
+}
+
+fn over_parts<T: Real>(
+    spline: &HierarchicalSpline<T>,
+    level: usize,
+    brick: &Brick<T>,
+    part: &Aabb,
+    width: f64,
+) -> f64 {
+    let own = |part: &Aabb| in_world(spline.lattice_from_world().matrix3, of_part(brick, level, part));
+    if !brick.has_children() {
+        return own(part);
+    }
+    let corner = DVec3::from_array(brick.key.0.map(|k| k as f64 * width));
+    let end = (corner + width).min(spline.lattice().extent());
+    let mut most = 0f64;
+    for octant in 0..8usize {
+        let child = brick.children[octant];
+        if child != NONE {
+            most = most.max(over_brick(spline, level + 1, child as usize, part));
+            continue;
+        }
+        let half = |a: usize| (octant >> (2 - a) & 1) as f64 * width / 2.0;
+        let low = corner + DVec3::from_array(std::array::from_fn(half));
+        if let Some(part) = shared(part, low, (low + width / 2.0).min(end)) {
+            most = most.max(own(&part));
+        }
+    }
+    most
+}
+
+/// Second derivatives are convex combinations of the second differences of the coefficients that the box reads.
+fn of_part<T: Real>(brick: &Brick<T>, level: usize, part: &Aabb) -> Second {
+    let [x, y, z] = local_box(brick, level, part).map(|[a, b]| {
+        let first = (a as usize).min(BRICK - 1);
+        first..(b.ceil() as usize).max(first + 1) + 3
+    });
+    let (found, largest) = vectorized(
+        #[inline(always)]
+        || second_differences(brick, &x, &y, &z),
+    );
+    // Rounding of the differences here and of the evaluation, whose weights sum to 4 in magnitude.
+    let rounding = 128.0 * T::UNIT_ROUND_OFF * largest.as_f64();
+    let scale = ((1u64 << level) as f64).powi(2);
+    found.map(|d| (d.as_f64() + rounding) * scale)
+}
+
+/// Lanes of a row: its 11 coefficients, and what follows them, which nobody looks at.
+const LANES: usize = 16;
+
+fn row<T: Real>(totals: &[T; HALO_LEN], i: usize, j: usize) -> [T; LANES] {
+    let start = (i * HALO + j) * HALO;
+    match totals.get(start..start + LANES) {
+        Some(row) => row.try_into().expect("sixteen"),
+        None => {
+            let mut row = [T::zero(); LANES];
+            row[..HALO].copy_from_slice(&totals[start..start + HALO]);
+            row
+        }
+    }
+}
+
+#[inline(always)]
+fn raise<T: Real>(most: &mut [T; LANES], of: impl Fn(usize) -> T) {
+    for k in 0..LANES {
+        let d = of(k).abs();
+        most[k] = if d > most[k] { d } else { most[k] };
+    }
+}
+
+/// Largest second differences, and the largest coefficient, among those of the ranges.
+#[inline(always)]
+fn second_differences<T: Real>(
+    brick: &Brick<T>,
+    x: &Range<usize>,
+    y: &Range<usize>,
+    z: &Range<usize>,
+) -> ([T; 6], T) {
+    let zero = [T::zero(); LANES];
+    // Of each lane; differences along z stand at their first coefficient.
+    let (mut found, mut largest) = ([zero; 6], zero);
+    let step = |r: &[T; LANES]| {
+        let mut d = [T::zero(); LANES];
+        for k in 0..LANES - 1 {
+            d[k] = r[k + 1] - r[k];
+        }
+        d
+    };
+    for j in y.clone() {
+        let beside = j + 1 < y.end;
+        let mut before = [zero; 2];
+        for i in x.clone() {
+            let own = row(&brick.totals, i, j);
+            let along = step(&own);
+            raise(&mut largest, |k| own[k]);
+            raise(&mut found[2], |k| {
+                if k + 1 < LANES {
+                    along[k + 1] - along[k]
+                } else {
+                    T::zero()
+                }
+            });
+            if beside {
+                let next = row(&brick.totals, i, j + 1);
+                let rise = step(&next);
+                raise(&mut found[5], |k| rise[k] - along[k]);
+                if j > y.start {
+                    let last = row(&brick.totals, i, j - 1);
+                    raise(&mut found[1], |k| (next[k] - own[k]) - (own[k] - last[k]));
+                }
+                if i + 1 < x.end {
+                    let (ahead, across) = (row(&brick.totals, i + 1, j), row(&brick.totals, i + 1, j + 1));
+                    raise(&mut found[3], |k| (across[k] - ahead[k]) - (next[k] - own[k]));
+                }
+            }
+            if i > x.start {
+                let [last, last_along] = &before;
+                raise(&mut found[4], |k| along[k] - last_along[k]);
+                if i + 1 < x.end {
+                    let ahead = row(&brick.totals, i + 1, j);
+                    raise(&mut found[0], |k| (ahead[k] - own[k]) - (own[k] - last[k]));
+                }
+            }
+            before = [own, along];
+        }
+    }
+    let most = |lanes: &[T; LANES], short: usize| {
+        let lanes = &lanes[z.start..z.end - short];
+        lanes.iter().fold(T::zero(), |m, d| if *d > m { *d } else { m })
+    };
+    let [xx, yy, zz, xy, xz, yz] = &found;
+    (
+        [
+            most(xx, 0),
+            most(yy, 0),
+            most(zz, 2),
+            most(xy, 0),
+            most(xz, 1),
+            most(yz, 1),
+        ],
+        most(&largest, 0),
+    )
+}

@@ -1,0 +1,429 @@
+//! What a block knows of the field: values at its nodes, and how finely each of its cells has to be divided.
+
+use glam::DVec3;
+
+use super::grid::{CELL_COUNT, Cells, Grids, NODE_COUNT, cell_index, each, node_index};
+use crate::polygonize::blocks::{BlockKey, CELLS, NODES};
+use crate::{Field, Interval, Jet};
+
+/// A pure function of field, frames, level and block, but for how many cells have been judged.
+#[derive(Clone)]
+pub(super) struct Sample {
+    /// Inside nodes: bit `k` of row `9i + j`. Nodes beyond the frame are outside.
+    pub rows: [u16; NODES * NODES],
+    /// `f - iso` at the nodes, 0 beyond the frame.
+    pub values: [f32; NODE_COUNT],
+    /// Chord error of each cell that was judged, world length; 0 without surface.
+    pub error: [f32; CELL_COUNT],
+    /// Cells judged.
+    pub judged: Cells,
+    /// Judged cells of which only an upper bound of the error is known.
+    pub bounded: Cells,
+    /// Judged cells that may hold a crease.
+    pub creased: Cells,
+    /// Nodes where the field is not a number.
+    pub nan_nodes: u32,
+}
+
+/// Buffers that a thread uses again from block to block.
+#[derive(Default)]
+pub(super) struct Scratch {
+    values: Vec<f64>,
+    points: Vec<DVec3>,
+    owners: Vec<(u16, f32)>,
+    jets: Vec<Jet>,
+}
+
+/// What to judge cells by.
+#[derive(Clone, Copy)]
+pub(super) struct Judge<'a> {
+    pub field: &'a dyn Field,
+    pub grids: &'a Grids,
+    pub iso: f64,
+    /// Of errors up to this an upper bound will do.
+    pub least: f64,
+    /// Level at which a hidden piece is looked for no longer.
+    pub detection: usize,
+}
+
+impl Sample {
+    /// Samples the nodes of a block.
+    pub fn new(judge: &Judge, level: usize, key: BlockKey, scratch: &mut Scratch) -> Self {
+        let grids = judge.grids;
+        let origin = key.map(|b| b * CELLS as i32);
+        let (lo, hi) = grids.clipped(level, origin, CELLS as i32);
+        let count: [usize; 3] = std::array::from_fn(|a| (hi[a] - lo[a] + 1) as usize);
+        let skip: [usize; 3] = std::array::from_fn(|a| (lo[a] - i64::from(origin[a])).max(0) as usize);
+        scratch.values.resize(count.iter().product(), 0.0);
+        judge
+            .field
+            .frame_values(&grids.frames[level], lo, count, &mut scratch.values);
+        let mut sample = Self {
+            rows: [0; NODES * NODES],
+            values: [0.0; NODE_COUNT],
+            error: [0.0; CELL_COUNT],
+            judged: [0; CELLS],
+            bounded: [0; CELLS],
+            creased: [0; CELLS],
+            nan_nodes: 0,
+        };
+        for (n, row) in scratch.values.chunks_exact(count[2]).enumerate() {
+            let (i, j) = (n / count[1] + skip[0], n % count[1] + skip[1]);
+            let start = node_index([i, j, skip[2]]);
+            let mut bits = 0;
+            for (k, (&f, out)) in row.iter().zip(&mut sample.values[start..]).enumerate() {
+                bits |= ((f > judge.iso) as u16) << k;
+                *out = (f - judge.iso) as f32;
+            }
+            sample.nan_nodes += row.iter().map(|f| u32::from(f.is_nan())).sum::<u32>();
+            sample.rows[NODES * i + j] = bits << skip[2];
+        }
+        sample
+    }
+
+    /// Whether a node is inside.
+    #[inline(always)]
+    pub fn is_inside(&self, n: [usize; 3]) -> bool {
+        self.rows[NODES * n[0] + n[1]] >> n[2] & 1 == 1
+    }
+
+    /// Case of a cell: bit `4x + 2y + z` says that the corner is inside.
+    #[inline(always)]
+    pub fn case(&self, c: [usize; 3]) -> usize {
+        let pair = |i: usize, j: usize| (self.rows[NODES * (c[0] + i) + c[1] + j] >> c[2] & 3) as usize;
+        pair(0, 0) | pair(0, 1) << 2 | pair(1, 0) << 4 | pair(1, 1) << 6
+    }
+
+    /// Cells that have corners on both sides.
+    pub fn crossed(&self) -> Cells {
+        std::array::from_fn(|x| {
+            (0..CELLS).fold(0, |word, y| {
+                let at = NODES * x + y;
+                let r = [at, at + 1, at + NODES, at + NODES + 1].map(|n| self.rows[n]);
+                let (any, all) = (r[0] | r[1] | r[2] | r[3], r[0] & r[1] & r[2] & r[3]);
+                let open = (any | any >> 1) & !(all & all >> 1) & 0xff;
+                word | u64::from(open) << (CELLS * y)
+            })
+        })
+    }
+
+    /// Values at the corners of a cell, in the order of the bits of [`Self::case`].
+    fn corners(&self, c: [usize; 3]) -> [f32; 8] {
+        let at = node_index(c);
+        let v = |o: usize| self.values[at + o];
+        const X: usize = NODES * NODES;
+        [
+            v(0),
+            v(1),
+            v(NODES),
+            v(NODES + 1),
+            v(X),
+            v(X + 1),
+            v(X + NODES),
+            v(X + NODES + 1),
+        ]
+    }
+
+    /// The cells of a set whose errors are not known as well as `judge` asks.
+    pub fn unjudged(&self, judge: &Judge, cells: &Cells) -> Cells {
+        let least = judge.least as f32;
+        let vague = each(std::array::from_fn(|x| cells[x] & self.bounded[x]))
+            .filter(|c| self.error[cell_index(*c)] > least);
+        let mut new: Cells = std::array::from_fn(|x| cells[x] & !self.judged[x]);
+        for c in vague {
+            new[c[0]] |= 1 << (CELLS * c[1] + c[2]);
+        }
+        new
+    }
+
+    /// Judges `cells` of the block, those of them that lie in the frame.
+    pub fn judge(
+        &mut self,
+        judge: &Judge,
+        level: usize,
+        key: BlockKey,
+        cells: &Cells,
+        scratch: &mut Scratch,
+    ) {
+        let grids = judge.grids;
+        let origin = key.map(|b| b * CELLS as i32);
+        let new = *cells;
+        let crossed = self.crossed();
+        let inside_frame = |c: [usize; 3]| {
+            (0..3).all(|a| {
+                let at = origin[a] + c[a] as i32;
+                0 <= at && at < grids.cells(level, a)
+            })
+        };
+        let border = grids.meets_border(level, key);
+        let size = grids.size(level);
+        let h = size.max_element();
+        let world_from_grid = grids.frames[level].world_from_grid;
+        scratch.points.clear();
+        scratch.owners.clear();
+        for octant in 0..8usize {
+            let at: [usize; 3] = [4 * (octant >> 2), 4 * (octant >> 1 & 1), 4 * (octant & 1)];
+            let part: Cells = octant_of_set(&new, at);
+            if part == [0; CELLS] {
+                continue;
+            }
+            let lo: [i32; 3] = std::array::from_fn(|a| origin[a] + at[a] as i32);
+            if (0..3).any(|a| lo[a] + 4 <= 0 || lo[a] >= grids.cells(level, a)) {
+                continue;
+            }
+            let is_crossed = (0..CELLS).any(|x| part[x] & crossed[x] != 0);
+            if !is_crossed {
+                let bounds = judge.bounds(level, lo, 4);
+                if bounds.hi <= judge.iso || bounds.lo > judge.iso {
+                    continue;
+                }
+            }
+            let bend = judge.field.hessian_bound(&grids.world_box(level, lo, 4));
+            for c in each(part) {
+                if border && !inside_frame(c) {
+                    continue;
+                }
+                let cell: [i32; 3] = std::array::from_fn(|a| origin[a] + c[a] as i32);
+                let v = self.corners(c);
+                let error = if !holds_any(&crossed, c) {
+                    let hidden = level < judge.detection
+                        && may_peak(&v, bend, size)
+                        && may_hide(judge, level, cell, v[0] > 0.0, bend, SEARCH);
+                    if hidden { f32::INFINITY } else { 0.0 }
+                } else {
+                    self.judge_crossed(judge, level, c, cell, &v, bend, h, &world_from_grid, scratch)
+                };
+                self.error[cell_index(c)] = error;
+            }
+        }
+        self.measure(judge, h, scratch);
+        for x in 0..CELLS {
+            self.judged[x] |= new[x];
+        }
+    }
+
+    /// A lower bound of a crossed cell's error, and points of the surface in it where the curvature is to be asked.
+    fn judge_crossed(
+        &mut self,
+        judge: &Judge,
+        level: usize,
+        c: [usize; 3],
+        cell: [i32; 3],
+        v: &[f32; 8],
+        octant_bend: f64,
+        h: f64,
+        world_from_grid: &glam::DAffine3,
+        scratch: &mut Scratch,
+    ) -> f32 {
+        let mut bend = octant_bend;
+        if bend == f64::INFINITY {
+            bend = judge.field.hessian_bound(&judge.grids.world_box(level, cell, 1));
+            if bend == f64::INFINITY {
+                self.creased[c[0]] |= 1 << (CELLS * c[1] + c[2]);
+                return (CREASE * h) as f32;
+            }
+        }
+        if super::cases::is_complex(self.case(c)) || v.iter().any(|v| !v.is_finite()) {
+            return (CREASE * h) as f32;
+        }
+        let size = judge.grids.size(level);
+        let weight = (1.0 / (size * size)).as_vec3();
+        let slope = |t: [f32; 3]| trilinear(v, t);
+        let (_, middle) = slope([0.5; 3]);
+        let steep = f64::from(
+            (0..3)
+                .map(|a| middle[a] * middle[a] * weight[a])
+                .sum::<f32>()
+                .sqrt(),
+        );
+        let most = bend * h * h / (8.0 * steep);
+        let bit = 1 << (CELLS * c[1] + c[2]);
+        if most <= judge.least {
+            self.bounded[c[0]] |= bit;
+            return most as f32;
+        }
+        self.bounded[c[0]] &= !bit;
+        let origin = DVec3::from_array(cell.map(f64::from));
+        let owner = cell_index(c) as u16;
+        let first = scratch.points.len();
+        let limit = (0.5 * h) as f32;
+        for s in 0..8usize {
+            let t = [s >> 2, s >> 1 & 1, s & 1].map(|b| 0.25 + 0.5 * b as f32);
+            let (f, g) = slope(t);
+            let square: f32 = (0..3).map(|a| g[a] * g[a] * weight[a]).sum();
+            let step = f / square;
+            if f.abs() > limit * square.sqrt() {
+                continue;
+            }
+            let p: [f32; 3] = std::array::from_fn(|a| t[a] - step * g[a] * weight[a]);
+            if p.iter().all(|x| (0.0..=1.0).contains(x)) {
+                let q = DVec3::from_array(p.map(f64::from));
+                scratch.points.push(world_from_grid.transform_point3(origin + q));
+                scratch.owners.push((owner, most as f32));
+            }
+        }
+        if scratch.points.len() == first {
+            scratch
+                .points
+                .push(world_from_grid.transform_point3(origin + mean_crossing(v)));
+            scratch.owners.push((owner, most as f32));
+        }
+        // Points may miss a bend that the bound of a coarse cell knows.
+        (MISTRUST * most).min(CREASE * h) as f32
+    }
+
+    /// Raises the errors by the curvatures at the points found.
+    fn measure(&mut self, judge: &Judge, h: f64, scratch: &mut Scratch) {
+        let Scratch {
+            points, owners, jets, ..
+        } = scratch;
+        let zero = Jet {
+            value: 0.0,
+            gradient: DVec3::ZERO,
+            hessian: glam::DMat3::ZERO,
+        };
+        jets.resize(points.len(), zero);
+        judge.field.jets(points, jets);
+        for ((owner, most), jet) in owners.iter().zip(jets.iter()) {
+            let error = curvature(jet) * h * h / 8.0;
+            // Not a number, where the gradient vanishes: no flatter than a crease.
+            let error = if error.is_nan() {
+                CREASE * h
+            } else {
+                error.min(CREASE * h)
+            };
+            let slot = &mut self.error[usize::from(*owner)];
+            *slot = slot.max((error as f32).min(*most));
+        }
+    }
+}
+
+/// What a crease, or a surface that is not told apart, can cost in cells: half of one.
+const CREASE: f64 = 0.5;
+
+/// Share of the bound of a cell's error that counts where points say less.
+const MISTRUST: f64 = 1.0 / 16.0;
+
+fn holds_any(set: &Cells, c: [usize; 3]) -> bool {
+    super::grid::holds(set, c)
+}
+
+/// The cells of a set in the octant whose first cell is `at`.
+fn octant_of_set(set: &Cells, at: [usize; 3]) -> Cells {
+    let mask = (0x0f0f_0f0f << (CELLS * at[1])) << at[2];
+    std::array::from_fn(|x| if x / 4 * 4 == at[0] { set[x] & mask } else { 0 })
+}
+
+impl Judge<'_> {
+    /// Bounds over `count` cells from `lo`, as tight as it takes to tell on which side they lie.
+    fn bounds(&self, level: usize, lo: [i32; 3], count: i32) -> Interval {
+        let (lo, hi) = self.grids.clipped(level, lo, count);
+        let frame = &self.grids.frames[level];
+        self.field.frame_bounds_about(frame, lo, hi, self.iso)
+    }
+}
+
+/// Whether a cell whose corners `v` lie on one side may hold a largest or least value on the other, if `‖∇²f‖ <= bend`.
+///
+/// Such a value lies no farther than half a diagonal `d` from a corner, so it differs by `bend d²/8` at most; and
+/// the gradient, which vanishes there, is at most `bend d` along each edge.
+fn may_peak(v: &[f32; 8], bend: f64, size: DVec3) -> bool {
+    let square = size.length_squared();
+    let least = v.iter().fold(f32::INFINITY, |m, v| m.min(v.abs()));
+    if f64::from(least) > 0.125 * bend * square {
+        return false;
+    }
+    let rise = |bit: usize| {
+        let sum: f32 = (0..8).map(|c| if c & bit != 0 { v[c] } else { -v[c] }).sum();
+        f64::from(sum.abs()) * 0.25
+    };
+    let steepest = (rise(4) / size.x).max(rise(2) / size.y).max(rise(1) / size.z);
+    let is_steep = steepest > bend * square.sqrt();
+    // Not where one of them is not a number.
+    !is_steep
+}
+
+/// How often a cell is halved to see whether a piece of the surface hides in it.
+const SEARCH: usize = 3;
+
+/// Whether a piece of the surface may lie in a cell without touching its corners, which are on one side.
+///
+/// A closed piece has a largest or a least value within, where the gradient vanishes. `bend` bounds the Hessian in the
+/// cell.
+fn may_hide(judge: &Judge, level: usize, cell: [i32; 3], inside: bool, bend: f64, search: usize) -> bool {
+    let around = judge.grids.world_box(level, cell, 1);
+    let reach = 0.5 * around.size().length();
+    let (value, slope) = judge.field.value_gradient(around.center());
+    if (value > judge.iso) != inside {
+        return true;
+    }
+    let (steepness, height) = (slope.length(), (value - judge.iso).abs());
+    // Neither a vanishing gradient nor the surface is within reach.
+    let is_safe = |bend: f64| steepness > bend * reach || height > (steepness + 0.5 * bend * reach) * reach;
+    if is_safe(bend) {
+        return false;
+    }
+    let bend = judge.field.hessian_bound(&around);
+    if is_safe(bend) {
+        return false;
+    }
+    let bounds = judge.bounds(level, cell, 1);
+    if bounds.hi <= judge.iso || bounds.lo > judge.iso {
+        return (bounds.lo > judge.iso) != inside;
+    }
+    if search > 0 && level < judge.grids.depth() {
+        return (0..8).any(|o| {
+            let child = std::array::from_fn(|a| 2 * cell[a] + (o >> a & 1));
+            may_hide(judge, level + 1, child, inside, bend, search - 1)
+        });
+    }
+    let slopes = judge.field.gradient_bounds(&around);
+    slopes.iter().all(|g| !(g.lo > 0.0 || g.hi < 0.0))
+}
+
+/// Value and gradient, by cells, of the trilinear function through the corners.
+#[inline]
+fn trilinear(v: &[f32; 8], t: [f32; 3]) -> (f32, [f32; 3]) {
+    let mix = |a: f32, b: f32, t: f32| a + (b - a) * t;
+    let x: [f32; 4] = std::array::from_fn(|i| mix(v[i], v[i + 4], t[0]));
+    let dx: [f32; 4] = std::array::from_fn(|i| v[i + 4] - v[i]);
+    let y = [mix(x[0], x[2], t[1]), mix(x[1], x[3], t[1])];
+    let dy = [x[2] - x[0], x[3] - x[1]];
+    let gx = mix(mix(dx[0], dx[2], t[1]), mix(dx[1], dx[3], t[1]), t[2]);
+    (mix(y[0], y[1], t[2]), [gx, mix(dy[0], dy[1], t[2]), y[1] - y[0]])
+}
+
+/// Mean of the crossings of a cell's edges, in cells.
+fn mean_crossing(v: &[f32; 8]) -> DVec3 {
+    let (mut sum, mut count) = (DVec3::ZERO, 0.0);
+    for a in 0..8usize {
+        for axis in 0..3 {
+            let bit = 4 >> axis;
+            let (p, q) = (v[a], v[a | bit]);
+            if a & bit == 0 && (p > 0.0) != (q > 0.0) {
+                let mut at = DVec3::new((a >> 2) as f64, (a >> 1 & 1) as f64, (a & 1) as f64);
+                at[axis] += f64::from(p / (p - q)).clamp(0.0, 1.0);
+                sum += at;
+                count += 1.0;
+            }
+        }
+    }
+    sum / f64::max(count, 1.0)
+}
+
+/// Largest normal curvature, in magnitude, of the level set through a point.
+///
+/// With the Hessian `A` across the unit gradient `n`, `tr A = tr H - nᵀHn` and `‖A‖² = ‖H‖² - 2|Hn|² + (nᵀHn)²` give
+/// both of its eigenvalues.
+fn curvature(jet: &Jet) -> f64 {
+    let slope = jet.gradient.length();
+    let n = jet.gradient / slope;
+    let hn = jet.hessian * n;
+    let along = n.dot(hn);
+    let h = &jet.hessian;
+    let sum = h.x_axis.x + h.y_axis.y + h.z_axis.z - along;
+    let square = h.x_axis.length_squared() + h.y_axis.length_squared() + h.z_axis.length_squared()
+        - 2.0 * hn.length_squared()
+        + along * along;
+    0.5 * (sum.abs() + (2.0 * square - sum * sum).max(0.0).sqrt()) / slope
+}
