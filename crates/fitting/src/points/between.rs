@@ -8,12 +8,11 @@
 use std::num::NonZero;
 
 use bspline::Real;
-use bspline::hierarchical::{BRICK, BrickKey, HALO};
 use glam::{DVec3, Vec3};
 use kiddo::SquaredEuclidean;
 use rayon::prelude::*;
 
-use super::band::Band;
+use super::band::{Band, halo_start, key_of};
 use super::band_solve::BandSample;
 use super::cells::Cell;
 use super::samples::Samples;
@@ -109,17 +108,13 @@ impl Neighbours {
         }
         let n = (1u64 << band.depth) as f64;
         let mut starts = vec![0u32; band.keys.len() + 2];
-        let mut last = (BrickKey([u32::MAX; 3]), None);
+        let mut last = ([u32::MAX; 3], None);
         let mut met: Vec<(u32, u32)> = Vec::new();
         for (i, b) in self.between.iter().enumerate() {
             if f64::from(b.distance) * n < 1.0 || !b.ends.iter().any(|&i| is_refined[i as usize]) {
                 continue;
             }
-            let key = BrickKey(
-                (b.position.as_dvec3() * n)
-                    .to_array()
-                    .map(|x| x as u32 / BRICK as u32),
-            );
+            let key = key_of((b.position.as_dvec3() * n).to_array().map(|x| x as u32));
             if key != last.0 {
                 last = (key, band.find(key));
             }
@@ -145,10 +140,9 @@ impl Neighbours {
     pub fn condition<T: Real>(&self, index: u32, n: f64, weight: f64) -> BandSample<T> {
         let b = &self.between[index as usize];
         let q = b.position.as_dvec3() * n;
-        let local = q.to_array().map(|x| x as usize % BRICK);
         BandSample {
             spot: Spot {
-                start: (local[0] * HALO + local[1]) * HALO + local[2],
+                start: halo_start(q.to_array().map(|x| x as u32)),
                 t: (q - q.floor()).to_array().map(T::from_f64),
             },
             weight: T::zero(),

@@ -3,10 +3,9 @@
 use std::ops::Range;
 
 use bspline::Real;
-use bspline::hierarchical::{BRICK, BrickKey, HALO};
 
 use super::NormalForm;
-use super::band::{Band, Coarser, REACH, bricks_near};
+use super::band::{BRICK_LEN, Band, Coarser, HALO_LEN, Key, REACH, count_bricks_near, halo_start, key_of};
 use super::band_solve::{BandProblem, BandSample, BrickSamples, SolveReport};
 use super::between::Neighbours;
 use super::cells::{Cell, LeafCell, cell_quality, children, judge, keep_within, root_cells};
@@ -28,8 +27,8 @@ pub(crate) struct Cascade<T> {
 
 /// The stored part of a level: the corrections `x` of its active functions, brick by brick.
 pub(crate) struct Level<T> {
-    pub keys: Vec<BrickKey>,
-    pub masks: Vec<[u64; BRICK]>,
+    pub keys: Vec<Key>,
+    pub masks: Vec<u64>,
     pub x: Vec<T>,
 }
 
@@ -134,9 +133,9 @@ fn no_room<T: Real>(
 ) -> Option<StopReason> {
     // The bricks are counted only where someone asks.
     control.memory_limit?;
-    let (keys, _) = bricks_near(depth, refined, REACH);
+    let bricks = count_bricks_near(depth, refined, REACH);
     control
-        .reserve(level_bytes::<T>(keys.len(), sample_count))
+        .reserve(level_bytes::<T>(bricks, sample_count))
         .is_err()
         .then_some(StopReason::Memory)
 }
@@ -144,7 +143,7 @@ fn no_room<T: Real>(
 /// Bytes held at once when the level with so many bricks is solved: the cloud and its samples, this level's
 /// vectors, and the levels before with the finished field, which together are no larger.
 pub(crate) fn level_bytes<T>(bricks: usize, sample_count: usize) -> u64 {
-    let per_brick = size_of::<T>() * (2 * HALO.pow(3) + 8 * BRICK.pow(3)) + 512;
+    let per_brick = size_of::<T>() * (2 * HALO_LEN + 8 * BRICK_LEN) + 512;
     let per_sample = 2 * size_of::<[f64; 6]>() + size_of::<BandSample<T>>() + 32;
     (bricks * per_brick + sample_count * per_sample) as u64 + (8 << 20)
 }
@@ -166,9 +165,9 @@ fn band_samples<T: Real>(
     let mut list = Vec::with_capacity(samples.positions.len() + between_count);
     let mut owners = Vec::with_capacity(list.capacity());
     let mut bricks: Vec<BrickSamples> = Vec::new();
-    let mut current = (BrickKey([u32::MAX; 3]), None);
+    let mut current = ([u32::MAX; 3], None);
     for (index, cell) in cells.iter().enumerate() {
-        let key = BrickKey(cell.at.map(|c| c / BRICK as u32));
+        let key = key_of(cell.at);
         if key != current.0 {
             current = (key, band.find(key));
             if let Some(brick) = current.1 {
@@ -186,11 +185,11 @@ fn band_samples<T: Real>(
                 });
             }
         }
-        if current.1.is_none() {
+        // What no active function reaches says nothing.
+        if !current.1.is_some_and(|brick| band.is_touched(brick, cell.at)) {
             continue;
         }
-        let local = cell.at.map(|c| c as usize % BRICK);
-        let start = (local[0] * HALO + local[1]) * HALO + local[2];
+        let start = halo_start(cell.at);
         let count = cell.end - cell.start;
         let stride = if plan.thin {
             (count / SAMPLES_PER_CELL).max(1)
@@ -228,6 +227,7 @@ fn band_samples<T: Real>(
         }
         bricks.last_mut().expect("the cell's brick is in the band").end = list.len() as u32;
     }
+    bricks.retain(|b| b.start < b.end);
     bricks.sort_unstable_by_key(|b| b.brick);
     (list, bricks, owners)
 }
