@@ -217,9 +217,7 @@ fn near_masks<T: Real>(depth: usize, band: &Band<T>, cells: &[Cell]) -> Vec<u64>
             for y in low[1] / size..=high[1] / size {
                 for z in low[2] / size..=high[2] / size {
                     let key = [x, y, z];
-                    let brick = band
-                        .find(key)
-                        .expect("the band reaches round its cells");
+                    let brick = band.find(key).expect("the band reaches round its cells");
                     let from: [u32; 3] = std::array::from_fn(|a| low[a].max(key[a] * size) % size);
                     let to: [u32; 3] = std::array::from_fn(|a| high[a].min(key[a] * size + size - 1) % size);
                     let run = (2u64 << to[2]) - (1 << from[2]);

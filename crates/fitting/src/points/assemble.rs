@@ -52,7 +52,10 @@ pub(crate) fn assemble_in<T: Real>(
                 .or_insert_with(Corrections::empty);
             for (slot, value) in band::active_slots(mask).zip(values.by_ref()) {
                 let within = [slot / 16, slot / 4 % 4, slot % 4];
-                brick.set(std::array::from_fn(|a| corner[a] % BRICK + within[a]), *value * unit);
+                brick.set(
+                    std::array::from_fn(|a| corner[a] % BRICK + within[a]),
+                    *value * unit,
+                );
             }
         }
         let corrections = bricks.into_iter().map(|(k, c)| (k, Arc::new(c))).collect();

@@ -218,7 +218,11 @@ const BELOW: [[u64; BRICK + 1]; 3] = {
     let mut masks = [[0; BRICK + 1]; 3];
     let mut bit = 0;
     while bit < 3 * (BRICK + 1) * BRICK_LEN {
-        let (axis, end, slot) = (bit / BRICK_LEN / (BRICK + 1), bit / BRICK_LEN % (BRICK + 1), bit % BRICK_LEN);
+        let (axis, end, slot) = (
+            bit / BRICK_LEN / (BRICK + 1),
+            bit / BRICK_LEN % (BRICK + 1),
+            bit % BRICK_LEN,
+        );
         let at = [slot / BRICK / BRICK, slot / BRICK % BRICK, slot % BRICK];
         if at[axis] < end {
             masks[axis][end] |= 1 << slot;

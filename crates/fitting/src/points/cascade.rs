@@ -192,7 +192,7 @@ fn band_samples<T: Real>(
         let start = halo_start(cell.at);
         let count = cell.end - cell.start;
         let stride = if plan.thin {
-            (count / SAMPLES_PER_CELL).max(1)
+            ((count + SAMPLES_PER_CELL / 2) / SAMPLES_PER_CELL).max(1)
         } else {
             1
         };

@@ -242,14 +242,14 @@ impl VCycle {
         let smoother = &self.levels[level - 1];
         let mut x = FullGrid::zeros(r.n);
         let mut rest = r.clone();
-        smoother.smooth(&mut x, &mut rest);
+        smoother.smooth(&mut x, &mut rest, true);
         let correction = self.descend(level - 1, &rest.restricted()).refined();
         let change = smoother.operator.apply(&correction);
         for i in 0..x.values.len() {
             x.values[i] += correction.values[i];
             rest.values[i] -= change.values[i];
         }
-        smoother.smooth(&mut x, &mut rest);
+        smoother.smooth(&mut x, &mut rest, false);
         x
     }
 }
@@ -279,8 +279,9 @@ impl Smoother {
         }
     }
 
-    /// Two steps of Chebyshev iteration on `[λ/8, λ]`; keeps `r` the residual of `x`.
-    fn smooth(&self, x: &mut FullGrid<f64>, r: &mut FullGrid<f64>) {
+    /// Two steps of Chebyshev iteration on `[λ/8, λ]`, from `r` the residual of `x`; `goes_on` if it is to be that of the new
+    /// `x` afterwards.
+    fn smooth(&self, x: &mut FullGrid<f64>, r: &mut FullGrid<f64>, goes_on: bool) {
         let (low, high) = (self.lambda / 8.0, self.lambda);
         let (theta, delta) = (0.5 * (high + low), 0.5 * (high - low));
         let sigma = theta / delta;
@@ -290,9 +291,14 @@ impl Smoother {
             step.values[i] = self.inverse_diagonal[i] * r.values[i] / theta;
         }
         for last in [false, true] {
-            let change = self.operator.apply(&step);
             for i in 0..x.values.len() {
                 x.values[i] += step.values[i];
+            }
+            if last && !goes_on {
+                break;
+            }
+            let change = self.operator.apply(&step);
+            for i in 0..r.values.len() {
                 r.values[i] -= change.values[i];
             }
             if last {
