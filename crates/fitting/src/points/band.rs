@@ -366,3 +366,59 @@ fn gather_span<T: Real>(band: &Band<T>, first: [usize; 3], source: &mut [T]) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Deep levels are refined in few places far apart: what each of them costs decides how deep a fit can go.
+    #[test]
+    fn lone_cells_hold_few_slots_and_all_that_they_read() {
+        let base = FullGrid::zeros(32);
+        for (i, at) in [[17, 200, 63], [128, 100, 35], [0, 255, 255]]
+            .into_iter()
+            .enumerate()
+        {
+            let band = Band::<f32>::around(8, &[at], &Coarser::Full(&base));
+            assert_eq!(band.active_count(), 8);
+            assert!(band.totals.len() <= 27 * 64, "{i}: {} slots", band.totals.len());
+            let own = band.find(key_of(at)).expect("the brick of the cell");
+            assert!(band.is_touched(own, at));
+            let last = (1 << 8) + 2;
+            for d in 0..216u32 {
+                let d = [d / 36, d / 6 % 6, d % 6];
+                // Slots within two of the central ones, at + 1 and at + 2.
+                let slot: [i64; 3] = std::array::from_fn(|a| i64::from(at[a] + d[a]) - 1);
+                if slot.iter().all(|s| (0..=last).contains(s)) {
+                    assert!(band.find(key_of(slot.map(|s| s as u32))).is_some(), "{slot:?}");
+                }
+            }
+        }
+    }
+
+    /// Every slot lies in the halos of the bricks round it as often as `collect_halos` adds it up.
+    #[test]
+    fn collecting_halos_is_the_transpose_of_reading_them() {
+        let base = FullGrid::zeros(32);
+        let cells: Vec<[u32; 3]> = (0..40).map(|i| [20 + i % 7, 30 + i % 11, 40 + i % 5]).collect();
+        let band = Band::<f64>::around(6, &cells, &Coarser::Full(&base));
+        let numbers =
+            |n: usize, k: usize| -> Vec<f64> { (0..n).map(|i| ((i * k) % 101) as f64 - 50.0).collect() };
+        let values = numbers(band.totals.len(), 37);
+        let halos = numbers(band.keys.len() * HALO_LEN, 53);
+        let place_of: Vec<u32> = (0..band.keys.len() as u32).collect();
+        let (mut read, mut collected) = (0.0, 0.0);
+        let (mut halo, mut own) = ([0.0; HALO_LEN], [0.0; BRICK_LEN]);
+        for brick in 0..band.keys.len() {
+            band.halo(&values, brick, &mut halo);
+            read += dot(&halo, &halos[brick * HALO_LEN..][..HALO_LEN]);
+            band.collect_halos(&halos, &place_of, brick, &mut own);
+            collected += dot(&own, &values[brick * BRICK_LEN..][..BRICK_LEN]);
+        }
+        assert_eq!(read, collected);
+    }
+
+    fn dot(a: &[f64], b: &[f64]) -> f64 {
+        a.iter().zip(b).map(|(a, b)| a * b).sum()
+    }
+}

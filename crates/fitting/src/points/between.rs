@@ -42,6 +42,9 @@ struct Between {
     distance: f32,
 }
 
+/// Bytes a condition takes while its samples are paired, and later.
+pub(crate) const BYTES: usize = 2 * size_of::<Between>();
+
 /// What lies between some of the samples.
 #[derive(Debug, Default)]
 pub(crate) struct Neighbours {

@@ -4,7 +4,6 @@ use std::ops::Range;
 
 use bspline::Real;
 
-use super::NormalForm;
 use super::band::{BRICK_LEN, Band, Coarser, HALO_LEN, Key, REACH, count_bricks_near, halo_start, key_of};
 use super::band_solve::{BandProblem, BandSample, BrickSamples, SolveReport};
 use super::between::Neighbours;
@@ -13,10 +12,14 @@ use super::full_grid::FullGrid;
 use super::plan::Plan;
 use super::samples::{BASE_DEPTH, Samples};
 use super::stencil::Spot;
+use super::{NormalForm, between};
 use crate::{Control, FitError, StopReason};
 
 /// Samples of a cell beyond this many are thinned.
 const SAMPLES_PER_CELL: u32 = 8;
+/// Conditions between samples for each sample, about.
+const BETWEEN_A_SAMPLE: usize = 3;
+
 /// A whole cascade.
 pub(crate) struct Cascade<T> {
     pub levels: Vec<Level<T>>,
@@ -70,9 +73,13 @@ pub(crate) fn run<T: Real>(
         if refined.is_empty() {
             break;
         }
-        // About three conditions between the samples for each of them, half as large as a sample.
-        let held = samples.positions.len() * if plan.is_sparse(depth) { 3 } else { 1 };
-        if let Some(reason) = no_room::<T>(depth, &refined, held, control) {
+        let between = if plan.is_sparse(depth) {
+            let refined = cells.iter().filter(|c| c.refined && c.is_live);
+            BETWEEN_A_SAMPLE * refined.map(|c| (c.end - c.start) as usize).sum::<usize>()
+        } else {
+            0
+        };
+        if let Some(reason) = no_room::<T>(depth, &refined, samples.positions.len(), between, control) {
             let kept = split
                 .iter()
                 .filter(|s| s.1)
@@ -129,21 +136,23 @@ fn no_room<T: Real>(
     depth: usize,
     refined: &[[u32; 3]],
     sample_count: usize,
+    between_count: usize,
     control: &Control,
 ) -> Option<StopReason> {
     // The bricks are counted only where someone asks.
     control.memory_limit?;
     let bricks = count_bricks_near(depth, refined, REACH);
+    let between = between_count * (size_of::<BandSample<T>>() + between::BYTES);
     control
-        .reserve(level_bytes::<T>(bricks, sample_count))
+        .reserve(level_bytes::<T>(bricks, sample_count) + between as u64)
         .is_err()
         .then_some(StopReason::Memory)
 }
 
-/// Bytes held at once when the level with so many bricks is solved: the cloud and its samples, this level's
-/// vectors, and the levels before with the finished field, which together are no larger.
+/// Bytes held at once when the level with so many bricks is solved, or when the field is finished: the cloud and its
+/// samples; this level's vectors and those of the one before, or the field's bricks, of which there are a quarter as many.
 pub(crate) fn level_bytes<T>(bricks: usize, sample_count: usize) -> u64 {
-    let per_brick = size_of::<T>() * (2 * HALO_LEN + 8 * BRICK_LEN) + 512;
+    let per_brick = size_of::<T>() * (2 * HALO_LEN + 2 * BRICK_LEN) + 256;
     let per_sample = 2 * size_of::<[f64; 6]>() + size_of::<BandSample<T>>() + 32;
     (bricks * per_brick + sample_count * per_sample) as u64 + (8 << 20)
 }
