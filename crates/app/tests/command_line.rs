@@ -253,12 +253,26 @@ fn mesh_keeps_its_number_of_triangles_and_the_tolerance_of_the_fit() {
     let allowed = 0.5 * number(&fit, "tolerance") + number(&fit, "p95");
     assert!(p95 <= allowed, "{p95} {allowed}");
     for most in [300, 2_000, 30_000] {
-        let mesh = bench.json(&format!("mesh field.iclay -o mesh.ply --triangles {most}"));
+        let mesh = bench.json(&format!(
+            "mesh field.iclay -o mesh.ply --triangles {most} --check"
+        ));
         let triangles = number(&mesh, "triangles") as usize;
         assert!(
             triangles <= most && triangles * 5 >= most * 4,
             "{triangles} for {most}"
         );
+        let quality = &mesh["quality"];
+        for (fault, count) in [
+            ("pieces", 1),
+            ("open_edges", 0),
+            ("faults", 0),
+            ("self_intersections", 0),
+        ] {
+            assert_eq!(quality[fault], count, "{fault}");
+        }
+        let median = number(quality, "smallest_angle_median");
+        let first = number(quality, "smallest_angle_p1");
+        assert!(median >= 40.0 && first >= 18.0, "{median}° {first}°");
         chord_error_on_unit_sphere(&bench);
     }
 }
