@@ -28,7 +28,7 @@ use self::grid::Grids;
 use self::polygons::{BlockTriangles, EXTRA, ExtraKey, Numbered};
 use self::sample::{Judge, Sample};
 use self::tree::{Limits, Samples, Tree, Watch};
-use self::vertices::{BlockVertices, PLACE_BITS, Placer};
+use self::vertices::{BlockVertices, PLACE_BITS, Placer, STEPS};
 use super::blocks::{BlockGrid, BlockKey, find_blocks};
 use super::settle::{SettleOptions, settle};
 use super::{Mesh, PolygonizeError, PolygonizeOptions};
@@ -187,7 +187,8 @@ impl<'a> AdaptiveMesher<'a> {
             field: self.field,
             grids: &self.grids,
             iso: self.options.iso,
-            steps: STEPS,
+            // Settling begins with such a step.
+            steps: if settled { 0 } else { STEPS },
         };
         let vertices = tree
             .iter()
@@ -230,9 +231,6 @@ impl<'a> AdaptiveMesher<'a> {
         Ok((made, report))
     }
 }
-
-/// Newton steps that take a vertex onto the surface: two, as the second is the size of the square of the first.
-const STEPS: usize = 2;
 
 /// What is common with other meshes, if all of it makes sense.
 fn checked(

@@ -114,6 +114,10 @@ fn gain(edges: &Edges, state: &State, rule: Rule, h: u32) -> f32 {
         return 0.0;
     }
     let [pa, pb, pc, pd] = all.map(|v| state.positions[v]);
+    // Both angles across are acute: the usual case.
+    if rule == Rule::Delaunay && (pa - pc).dot(pb - pc) >= 0.0 && (pa - pd).dot(pb - pd) >= 0.0 {
+        return 0.0;
+    }
     let [na, nb, nc, nd] = all.map(|v| state.normals[v]);
     let (now, then) = (sagitta(pa, pb, na, nb), sagitta(pc, pd, nc, nd));
     let gain = match rule {
