@@ -563,7 +563,7 @@ fn memory_stays_below_its_ceiling() {
         ("picture field.iclay -o out.png --size 3000x3000", &[128]),
         ("phantom gyroid -o out.ply --count 4000000", &[128]),
         (
-            "sample field.iclay --like head.nii --spacing 0.5 -o out.nrrd",
+            "sample field.iclay --like head.nii --spacing 1 -o out.nrrd",
             &[128],
         ),
         ("simulate scene.toml -o out.iclay --mesh out.ply", &[128]),
