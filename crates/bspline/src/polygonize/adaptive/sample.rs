@@ -247,6 +247,9 @@ impl Sample {
                     let error =
                         self.judge_crossed(judge, level, c, cell, &v, bend, h, &world_from_grid, scratch);
                     self.error[slot] = error.max(guess);
+                } else if level == grids.depth() {
+                    // What hides here cannot be divided.
+                    self.error[slot] = 0.0;
                 } else if is_coarse {
                     let bounds = judge.bounds(level, cell, 1);
                     let may_hold = bounds.lo <= judge.iso && judge.iso < bounds.hi;
