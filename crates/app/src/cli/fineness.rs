@@ -14,6 +14,7 @@ use rayon::prelude::*;
 use super::ceiling;
 use super::failure::{Failure, Outcome};
 use super::field::OpenField;
+use super::interrupt;
 use super::progress::Bar;
 use super::quantity::{Tolerance, human_count, human_number};
 
@@ -347,14 +348,17 @@ pub fn watch<'a>(
 /// What a failure of the mesher means to the user.
 pub fn failed(e: PolygonizeError) -> Failure {
     match e {
-        PolygonizeError::Cancelled if ceiling::is_exceeded() => Failure::limit(
-            "the mesh takes more than --memory allows; raise it, or lower --resolution or --triangles",
-        ),
-        PolygonizeError::Cancelled => fitting::FitError::Cancelled.into(),
+        PolygonizeError::Cancelled if interrupt::cancel().is_cancelled() => {
+            fitting::FitError::Cancelled.into()
+        }
+        // By now the memory may be given back.
+        PolygonizeError::Cancelled => {
+            Failure::limit("the mesh takes more than --memory allows; raise it, or ask for a coarser mesh")
+        }
         PolygonizeError::TooManyBlocks { .. } | PolygonizeError::TooManyVertices { .. } => Failure::limit(
-            format!("{e}: lower --resolution or --triangles, or raise --tolerance"),
+            format!("{e}; lower --resolution or --triangles, or raise --tolerance"),
         ),
-        PolygonizeError::Cells { .. } => Failure::usage(format!("{e}: lower --resolution")),
+        PolygonizeError::Cells { .. } => Failure::usage(format!("{e}; lower --resolution")),
         _ => Failure::input(e),
     }
 }

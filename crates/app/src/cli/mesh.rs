@@ -121,8 +121,12 @@ pub fn run(args: &Args) -> Outcome {
         return Err(open.no_surface(&field, options.iso));
     }
     interrupt::check(&cancel)?;
-    let left_out = args.written.keep(&mut mesh, open.unit(), &mut notes)?;
     trim(&mut mesh, &open, args.trim, &mut notes)?;
+    if args.open || args.trim.is_some() {
+        crate::fans::split(&mut mesh);
+    }
+    // Pieces are those of what is written.
+    let left_out = args.written.keep(&mut mesh, open.unit(), &mut notes)?;
     let quality = args.check.then(|| MeshQuality::of(&mesh));
     bar.show("writing", 0.99);
     let (vertices, triangles) = (mesh.positions.len(), mesh.triangles.len());
