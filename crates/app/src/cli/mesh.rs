@@ -32,7 +32,8 @@ pub struct Args {
     #[arg(long, value_name = "N", conflicts_with_all = ["tolerance", "triangles"], value_parser = between::<u32>(1, 65535))]
     resolution: Option<u32>,
     /// Distance from the surface that 95 % of the centres and sides of the triangles keep: in the field's unit, in mm, or
-    /// in per cent of the solid's diagonal [default: half the tolerance of the fit]
+    /// in per cent of the solid's diagonal [default: half the tolerance of the fit, a sixteenth where that
+    /// is the noise of the samples]
     #[arg(
         long,
         value_name = "T[mm|%]",
