@@ -223,19 +223,16 @@ fn mesh_tolerance_chooses_the_triangles() {
     }
 }
 
-/// 95th percentile over the triangles of the distances of centres and sides from the unit sphere.
+/// 95th percentile of the distances of the centres and sides of the triangles from the unit sphere.
 fn chord_error_on_unit_sphere(bench: &Bench) -> f64 {
     let mesh = common::read_mesh(&bench.path("mesh.ply"));
     assert!(bspline::polygonize::check_mesh(&mesh).is_closed_manifold());
     let mut errors: Vec<f64> = (0..mesh.triangles.len())
-        .map(|t| {
+        .flat_map(|t| {
             let [a, b, c] = mesh.corners(t);
-            let points = [(a + b + c) / 3.0, (a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5];
-            points
-                .iter()
-                .map(|p| (p.length() - 1.0).abs())
-                .fold(0.0, f64::max)
+            [(a + b + c) / 3.0, (a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5]
         })
+        .map(|p| (p.length() - 1.0).abs())
         .collect();
     errors.sort_by(f64::total_cmp);
     errors[errors.len() * 95 / 100]
@@ -253,12 +250,26 @@ fn mesh_keeps_its_number_of_triangles_and_the_tolerance_of_the_fit() {
     let allowed = 0.5 * number(&fit, "tolerance") + number(&fit, "p95");
     assert!(p95 <= allowed, "{p95} {allowed}");
     for most in [300, 2_000, 30_000] {
-        let mesh = bench.json(&format!("mesh field.iclay -o mesh.ply --triangles {most}"));
+        let mesh = bench.json(&format!(
+            "mesh field.iclay -o mesh.ply --triangles {most} --check"
+        ));
         let triangles = number(&mesh, "triangles") as usize;
         assert!(
             triangles <= most && triangles * 5 >= most * 4,
             "{triangles} for {most}"
         );
+        let quality = &mesh["quality"];
+        for (fault, count) in [
+            ("pieces", 1),
+            ("open_edges", 0),
+            ("faults", 0),
+            ("self_intersections", 0),
+        ] {
+            assert_eq!(quality[fault], count, "{fault}");
+        }
+        let median = number(quality, "smallest_angle_median");
+        let first = number(quality, "smallest_angle_p1");
+        assert!(median >= 40.0 && first >= 18.0, "{median}° {first}°");
         chord_error_on_unit_sphere(&bench);
     }
 }

@@ -22,6 +22,7 @@ mod input;
 mod interrupt;
 mod keep;
 mod mesh;
+mod mesh_check;
 mod mesh_output;
 mod output;
 mod overwrite;

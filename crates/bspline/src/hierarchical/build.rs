@@ -66,12 +66,28 @@ pub(super) fn brick_totals<T: Real>(
 
 /// Least and largest value.
 pub(super) fn min_max<T: Real>(values: &[T]) -> [T; 2] {
-    // Comparisons as written here turn into vector instructions; `Float::min` does not.
-    values
-        .iter()
-        .fold([T::infinity(), T::neg_infinity()], |[lo, hi], &v| {
-            [if v < lo { v } else { lo }, if v > hi { v } else { hi }]
-        })
+    const LANES: usize = 16;
+    // Lanes by hand: the order of one accumulator is not for the compiler to change. Comparisons as written here turn
+    // into vector instructions; `Float::min` does not.
+    let (mut lo, mut hi) = ([T::infinity(); LANES], [T::neg_infinity(); LANES]);
+    let raise = |lo: &mut [T], hi: &mut [T], values: &[T]| {
+        for ((lo, hi), &v) in lo.iter_mut().zip(hi).zip(values) {
+            *lo = if v < *lo { v } else { *lo };
+            *hi = if v > *hi { v } else { *hi };
+        }
+    };
+    let (rows, rest) = values.as_chunks::<LANES>();
+    for row in rows {
+        raise(&mut lo, &mut hi, row);
+    }
+    raise(&mut lo, &mut hi, rest);
+    let least = lo
+        .into_iter()
+        .fold(T::infinity(), |m, v| if v < m { v } else { m });
+    let most = hi
+        .into_iter()
+        .fold(T::neg_infinity(), |m, v| if v > m { v } else { m });
+    [least, most]
 }
 
 /// From the finest level up: a brick's hull covers its children's, and its own where a child is missing.
@@ -140,8 +156,9 @@ fn add_corrections<T: Real>(level: &LevelCorrections<T>, key: BrickKey, totals: 
             for y in 0..count[1] {
                 let source = (x * BRICK + y) * BRICK;
                 let target = ((x + ahead[0] * BRICK) * HALO + y + ahead[1] * BRICK) * HALO + ahead[2] * BRICK;
-                for z in 0..count[2] {
-                    totals[target + z] += c.values[source + z];
+                let row = &c.values[source..source + count[2]];
+                for (total, value) in totals[target..target + count[2]].iter_mut().zip(row) {
+                    *total += *value;
                 }
             }
         }

@@ -114,7 +114,13 @@ fn of_part<T: Real>(brick: &Brick<T>, level: usize, part: &Aabb) -> Second {
     });
     let (found, largest) = vectorized(
         #[inline(always)]
-        || second_differences(brick, &x, &y, &z),
+        || {
+            if z.len() <= 8 {
+                second_differences::<T, 8>(brick, &x, &y, &z)
+            } else {
+                second_differences::<T, 16>(brick, &x, &y, &z)
+            }
+        },
     );
     // Rounding of the differences here and of the evaluation, whose weights sum to 4 in magnitude.
     let rounding = 128.0 * T::UNIT_ROUND_OFF * largest.as_f64();
@@ -122,98 +128,84 @@ fn of_part<T: Real>(brick: &Brick<T>, level: usize, part: &Aabb) -> Second {
     found.map(|d| (d.as_f64() + rounding) * scale)
 }
 
-/// Lanes of a row: its 11 coefficients, and what follows them, which nobody looks at.
-const LANES: usize = 16;
-
-fn row<T: Real>(totals: &[T; HALO_LEN], i: usize, j: usize) -> [T; LANES] {
-    let start = (i * HALO + j) * HALO;
-    match totals.get(start..start + LANES) {
-        Some(row) => row.try_into().expect("sixteen"),
-        None => {
-            let mut row = [T::zero(); LANES];
-            row[..HALO].copy_from_slice(&totals[start..start + HALO]);
-            row
-        }
+/// `L` coefficients from a place on; those beyond the last are 0.
+#[inline(always)]
+fn lanes<T: Real, const L: usize>(totals: &[T; HALO_LEN], start: usize) -> [T; L] {
+    match totals.get(start..start + L) {
+        Some(row) => row.try_into().expect("L of them"),
+        None => std::array::from_fn(|k| totals.get(start + k).copied().unwrap_or(T::zero())),
     }
 }
 
 #[inline(always)]
-fn raise<T: Real>(most: &mut [T; LANES], of: impl Fn(usize) -> T) {
-    for k in 0..LANES {
-        let d = of(k).abs();
+fn minus<T: Real, const L: usize>(a: &[T; L], b: &[T; L]) -> [T; L] {
+    std::array::from_fn(|k| a[k] - b[k])
+}
+
+#[inline(always)]
+fn raise<T: Real, const L: usize>(most: &mut [T; L], by: &[T; L]) {
+    for k in 0..L {
+        let d = by[k].abs();
         most[k] = if d > most[k] { d } else { most[k] };
     }
 }
 
-/// Largest second differences, and the largest coefficient, among those of the ranges.
+/// Largest second differences, and the largest coefficient, among those of the ranges, `z` no longer than `L`.
+///
+/// A lane for each coefficient along `z`. What the lanes beyond the range find nobody looks at.
 #[inline(always)]
-fn second_differences<T: Real>(
+fn second_differences<T: Real, const L: usize>(
     brick: &Brick<T>,
     x: &Range<usize>,
     y: &Range<usize>,
     z: &Range<usize>,
 ) -> ([T; 6], T) {
-    let zero = [T::zero(); LANES];
-    // Of each lane; differences along z stand at their first coefficient.
-    let (mut found, mut largest) = ([zero; 6], zero);
-    let step = |r: &[T; LANES]| {
-        let mut d = [T::zero(); LANES];
-        for k in 0..LANES - 1 {
-            d[k] = r[k + 1] - r[k];
-        }
-        d
-    };
+    let zero = [T::zero(); L];
+    let [mut xx, mut yy, mut zz, mut xy, mut xz, mut yz, mut largest] = [zero; 7];
     for j in y.clone() {
-        let beside = j + 1 < y.end;
-        let mut before = [zero; 2];
+        let mut last_rise = zero;
         for i in x.clone() {
-            let own = row(&brick.totals, i, j);
-            let along = step(&own);
-            raise(&mut largest, |k| own[k]);
-            raise(&mut found[2], |k| {
-                if k + 1 < LANES {
-                    along[k + 1] - along[k]
-                } else {
-                    T::zero()
+            let at = |i: usize, j: usize, k: usize| {
+                lanes::<T, L>(&brick.totals, (i * HALO + j) * HALO + z.start + k)
+            };
+            let (own, up) = (at(i, j, 0), at(i, j, 1));
+            let along = minus(&up, &own);
+            raise(&mut largest, &own);
+            raise(&mut zz, &minus(&minus(&at(i, j, 2), &up), &along));
+            let ahead = (i + 1 < x.end).then(|| at(i + 1, j, 0));
+            if let Some(ahead) = &ahead {
+                let rise = minus(ahead, &own);
+                if i > x.start {
+                    raise(&mut xx, &minus(&rise, &last_rise));
                 }
-            });
-            if beside {
-                let next = row(&brick.totals, i, j + 1);
-                let rise = step(&next);
-                raise(&mut found[5], |k| rise[k] - along[k]);
+                raise(&mut xz, &minus(&minus(&at(i + 1, j, 1), ahead), &along));
+                last_rise = rise;
+            }
+            if j + 1 < y.end {
+                let beside = at(i, j + 1, 0);
+                let rise = minus(&beside, &own);
                 if j > y.start {
-                    let last = row(&brick.totals, i, j - 1);
-                    raise(&mut found[1], |k| (next[k] - own[k]) - (own[k] - last[k]));
+                    raise(&mut yy, &minus(&rise, &minus(&own, &at(i, j - 1, 0))));
                 }
-                if i + 1 < x.end {
-                    let (ahead, across) = (row(&brick.totals, i + 1, j), row(&brick.totals, i + 1, j + 1));
-                    raise(&mut found[3], |k| (across[k] - ahead[k]) - (next[k] - own[k]));
-                }
-            }
-            if i > x.start {
-                let [last, last_along] = &before;
-                raise(&mut found[4], |k| along[k] - last_along[k]);
-                if i + 1 < x.end {
-                    let ahead = row(&brick.totals, i + 1, j);
-                    raise(&mut found[0], |k| (ahead[k] - own[k]) - (own[k] - last[k]));
+                raise(&mut yz, &minus(&minus(&at(i, j + 1, 1), &beside), &along));
+                if let Some(ahead) = &ahead {
+                    raise(&mut xy, &minus(&minus(&at(i + 1, j + 1, 0), ahead), &rise));
                 }
             }
-            before = [own, along];
         }
     }
-    let most = |lanes: &[T; LANES], short: usize| {
-        let lanes = &lanes[z.start..z.end - short];
+    let most = |lanes: &[T; L], short: usize| {
+        let lanes = &lanes[..z.len() - short];
         lanes.iter().fold(T::zero(), |m, d| if *d > m { *d } else { m })
     };
-    let [xx, yy, zz, xy, xz, yz] = &found;
     (
         [
-            most(xx, 0),
-            most(yy, 0),
-            most(zz, 2),
-            most(xy, 0),
-            most(xz, 1),
-            most(yz, 1),
+            most(&xx, 0),
+            most(&yy, 0),
+            most(&zz, 2),
+            most(&xy, 0),
+            most(&xz, 1),
+            most(&yz, 1),
         ],
         most(&largest, 0),
     )

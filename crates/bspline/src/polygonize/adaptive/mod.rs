@@ -28,7 +28,7 @@ use self::grid::Grids;
 use self::polygons::{BlockTriangles, EXTRA, ExtraKey, Numbered};
 use self::sample::{Judge, Sample};
 use self::tree::{Limits, Samples, Tree, Watch};
-use self::vertices::{BlockVertices, PLACE_BITS, Placer};
+use self::vertices::{BlockVertices, PLACE_BITS, Placer, STEPS};
 use super::blocks::{BlockGrid, BlockKey, find_blocks};
 use super::settle::{SettleOptions, settle};
 use super::{Mesh, PolygonizeError, PolygonizeOptions};
@@ -187,7 +187,7 @@ impl<'a> AdaptiveMesher<'a> {
             field: self.field,
             grids: &self.grids,
             iso: self.options.iso,
-            steps: STEPS,
+            steps: steps(settled),
         };
         let vertices = tree
             .iter()
@@ -211,18 +211,7 @@ impl<'a> AdaptiveMesher<'a> {
             return Err(PolygonizeError::Cancelled);
         }
         if settled {
-            let Mesh {
-                positions, triangles, ..
-            } = &mut made.mesh;
-            let options = SettleOptions::new(error);
-            settle(
-                self.field,
-                self.options.iso,
-                positions,
-                triangles,
-                &made.fixed,
-                &options,
-            );
+            settle_made(self.field, self.options.iso, error, &mut made);
         }
         if progress(1.0).is_break() {
             return Err(PolygonizeError::Cancelled);
@@ -231,8 +220,24 @@ impl<'a> AdaptiveMesher<'a> {
     }
 }
 
-/// Newton steps that take a vertex onto the surface: two, as the second is the size of the square of the first.
-const STEPS: usize = 2;
+/// Newton steps of the vertices: settling begins with one of its own.
+fn steps(settled: bool) -> usize {
+    if settled { 0 } else { STEPS }
+}
+
+fn settle_made(field: &dyn Field, iso: f64, error: f64, made: &mut AdaptiveMesh) {
+    let Mesh {
+        positions, triangles, ..
+    } = &mut made.mesh;
+    settle(
+        field,
+        iso,
+        positions,
+        triangles,
+        &made.fixed,
+        &SettleOptions::new(error),
+    );
+}
 
 /// What is common with other meshes, if all of it makes sense.
 fn checked(

@@ -1,8 +1,8 @@
 //! What a block knows of the field: values at its nodes, and how finely each of its cells has to be divided.
 
-use glam::DVec3;
+use glam::{DVec3, Mat3, Vec3};
 
-use super::grid::{CELL_COUNT, Cells, Grids, NODE_COUNT, cell_index, each, node_index};
+use super::grid::{CELL_COUNT, Cells, Grids, NODE_COUNT, cell_index, each, holds, node_index};
 use crate::polygonize::blocks::{BlockKey, CELLS, NODES};
 use crate::{Field, Interval, Jet};
 
@@ -19,6 +19,12 @@ pub(super) struct Sample {
     pub judged: Cells,
     /// Judged cells of which only an upper bound of the error is known.
     pub bounded: Cells,
+    /// Judged cells of which only a lower bound of the error is known.
+    pub guessed: Cells,
+    /// Largest guess of each octant (`4x + 2y + z`).
+    guesses: [f32; 8],
+    /// Octants whose cells without surface were judged by bounds of values alone.
+    coarse: u8,
     /// Judged cells that may hold a crease.
     pub creased: Cells,
     /// Nodes where the field is not a number.
@@ -64,6 +70,9 @@ impl Sample {
             error: [0.0; CELL_COUNT],
             judged: [0; CELLS],
             bounded: [0; CELLS],
+            guessed: [0; CELLS],
+            guesses: [0.0; 8],
+            coarse: 0,
             creased: [0; CELLS],
             nan_nodes: 0,
         };
@@ -77,6 +86,13 @@ impl Sample {
             }
             sample.nan_nodes += row.iter().map(|f| u32::from(f.is_nan())).sum::<u32>();
             sample.rows[NODES * i + j] = bits << skip[2];
+        }
+        sample.guessed = sample.crossed();
+        for c in each(sample.guessed) {
+            let guess = sample.guess(judge, level, key, c);
+            sample.error[cell_index(c)] = guess;
+            let most = &mut sample.guesses[octant_with(c)];
+            *most = most.max(guess);
         }
         sample
     }
@@ -127,13 +143,33 @@ impl Sample {
     /// The cells of a set whose errors are not known as well as `judge` asks.
     pub fn unjudged(&self, judge: &Judge, cells: &Cells) -> Cells {
         let least = judge.least as f32;
-        let vague = each(std::array::from_fn(|x| cells[x] & self.bounded[x]))
-            .filter(|c| self.error[cell_index(*c)] > least);
+        let vague = each(std::array::from_fn(|x| {
+            cells[x] & (self.bounded[x] | self.guessed[x])
+        }))
+        .filter(|c| holds(&self.bounded, *c) == (self.error[cell_index(*c)] > least));
         let mut new: Cells = std::array::from_fn(|x| cells[x] & !self.judged[x]);
         for c in vague {
             new[c[0]] |= 1 << (CELLS * c[1] + c[2]);
         }
+        let crossed = self.crossed();
+        for octant in 0..8 {
+            if self.should_be_coarse(octant, least) != self.is_coarse(octant) {
+                let known = octant_of_set(&self.judged, octant);
+                for x in 0..CELLS {
+                    new[x] |= known[x] & cells[x] & !crossed[x];
+                }
+            }
+        }
         new
+    }
+
+    /// Whether the crossed cells of an octant are so far from fine enough that what hides beside them can wait.
+    fn should_be_coarse(&self, octant: usize, least: f32) -> bool {
+        self.guesses[octant] > COARSE * least
+    }
+
+    fn is_coarse(&self, octant: usize) -> bool {
+        self.coarse >> octant & 1 == 1
     }
 
     /// Judges `cells` of the block, those of them that lie in the frame.
@@ -159,11 +195,12 @@ impl Sample {
         let size = grids.size(level);
         let h = size.max_element();
         let world_from_grid = grids.frames[level].world_from_grid;
+        let least = judge.least as f32;
         scratch.points.clear();
         scratch.owners.clear();
         for octant in 0..8usize {
-            let at: [usize; 3] = [4 * (octant >> 2), 4 * (octant >> 1 & 1), 4 * (octant & 1)];
-            let part: Cells = octant_of_set(&new, at);
+            let at = octant_place(octant);
+            let part: Cells = octant_of_set(&new, octant);
             if part == [0; CELLS] {
                 continue;
             }
@@ -178,27 +215,105 @@ impl Sample {
                     continue;
                 }
             }
-            let bend = judge.field.hessian_bound(&grids.world_box(level, lo, 4));
+            let is_coarse = self.should_be_coarse(octant, least);
+            if is_coarse != self.is_coarse(octant) {
+                self.coarse ^= 1 << octant;
+                for (x, word) in octant_of_set(&self.judged, octant).into_iter().enumerate() {
+                    self.judged[x] &= !(word & !crossed[x]);
+                }
+            }
+            let mut bend = None;
             for c in each(part) {
                 if border && !inside_frame(c) {
                     continue;
                 }
                 let cell: [i32; 3] = std::array::from_fn(|a| origin[a] + c[a] as i32);
-                let v = self.corners(c);
-                let error = if !holds_any(&crossed, c) {
+                let slot = cell_index(c);
+                let bit = 1 << (CELLS * c[1] + c[2]);
+                if holds(&crossed, c) {
+                    let is_guessed = holds(&self.guessed, c);
+                    let guess = if is_guessed {
+                        self.error[slot]
+                    } else {
+                        self.guess(judge, level, key, c)
+                    };
+                    if is_guessed && guess > least {
+                        continue;
+                    }
+                    self.guessed[c[0]] &= !bit;
+                    let bend = *bend
+                        .get_or_insert_with(|| judge.field.hessian_bound(&grids.world_box(level, lo, 4)));
+                    let v = self.corners(c);
+                    let error =
+                        self.judge_crossed(judge, level, c, cell, &v, bend, h, &world_from_grid, scratch);
+                    self.error[slot] = error.max(guess);
+                } else if level == grids.depth() {
+                    // What hides here cannot be divided.
+                    self.error[slot] = 0.0;
+                } else if is_coarse {
+                    let bounds = judge.bounds(level, cell, 1);
+                    let may_hold = bounds.lo <= judge.iso && judge.iso < bounds.hi;
+                    self.error[slot] = if may_hold { f32::INFINITY } else { 0.0 };
+                } else {
+                    let bend = *bend
+                        .get_or_insert_with(|| judge.field.hessian_bound(&grids.world_box(level, lo, 4)));
+                    let v = self.corners(c);
                     let hidden = level < judge.detection
                         && may_peak(&v, bend, size)
                         && may_hide(judge, level, cell, v[0] > 0.0, bend, SEARCH);
-                    if hidden { f32::INFINITY } else { 0.0 }
-                } else {
-                    self.judge_crossed(judge, level, c, cell, &v, bend, h, &world_from_grid, scratch)
-                };
-                self.error[cell_index(c)] = error;
+                    self.error[slot] = if hidden { f32::INFINITY } else { 0.0 };
+                }
             }
         }
         self.measure(judge, h, scratch);
         for x in 0..CELLS {
             self.judged[x] |= new[x];
+        }
+    }
+
+    /// Lower bound of the chord error of a crossed cell, by differences of the values at nodes; 0 where they do not tell.
+    fn guess(&self, judge: &Judge, level: usize, key: BlockKey, c: [usize; 3]) -> f32 {
+        // First nodes of the three along each axis that second differences are taken of.
+        let first = c.map(|c| c.max(1) - 1);
+        let is_in = |a: usize| {
+            let low = key[a] * CELLS as i32 + first[a] as i32;
+            0 <= low && low + 2 <= judge.grids.cells(level, a)
+        };
+        if !(0..3).all(is_in) {
+            return 0.0;
+        }
+        const STRIDES: [usize; 3] = [NODES * NODES, NODES, 1];
+        let size = judge.grids.size(level).as_vec3();
+        let mut second = [0.0f32; 3];
+        for a in 0..3 {
+            let (s, t, u) = (STRIDES[a], STRIDES[(a + 1) % 3], STRIDES[(a + 2) % 3]);
+            let start = node_index(c) - s * (c[a] - first[a]);
+            let at = |n: usize| {
+                self.values[start + n]
+                    + self.values[start + n + t]
+                    + self.values[start + n + u]
+                    + self.values[start + n + t + u]
+            };
+            second[a] = 0.25 * (at(0) - 2.0 * at(s) + at(2 * s)) / (size[a] * size[a]);
+        }
+        let v = self.corners(c);
+        let x = [v[4] - v[0], v[5] - v[1], v[6] - v[2], v[7] - v[3]];
+        let y = [v[2] - v[0], v[3] - v[1], v[6] - v[4], v[7] - v[5]];
+        let xy = 0.5 * (x[2] - x[0] + x[3] - x[1]) / (size.x * size.y);
+        let xz = 0.5 * (x[1] - x[0] + x[3] - x[2]) / (size.x * size.z);
+        let yz = 0.5 * (y[1] - y[0] + y[3] - y[2]) / (size.y * size.z);
+        let hessian = Mat3::from_cols(
+            Vec3::new(second[0], xy, xz),
+            Vec3::new(xy, second[1], yz),
+            Vec3::new(xz, yz, second[2]),
+        );
+        let h = size.max_element();
+        let error = curvature(slopes(&v, size), hessian) * h * h / 8.0;
+        // Not a number, where the gradient vanishes.
+        if error.is_nan() {
+            0.0
+        } else {
+            error.min(CREASE as f32 * h) / GUESS
         }
     }
 
@@ -247,7 +362,8 @@ impl Sample {
         let owner = cell_index(c) as u16;
         let first = scratch.points.len();
         let limit = (0.5 * h) as f32;
-        for s in 0..8usize {
+        // The middles of every other eighth of the cell, like the corners of a tetrahedron.
+        for s in [0usize, 3, 5, 6] {
             let t = [s >> 2, s >> 1 & 1, s & 1].map(|b| 0.25 + 0.5 * b as f32);
             let (f, g) = slope(t);
             let square: f32 = (0..3).map(|a| g[a] * g[a] * weight[a]).sum();
@@ -285,7 +401,8 @@ impl Sample {
         jets.resize(points.len(), zero);
         judge.field.jets(points, jets);
         for ((owner, most), jet) in owners.iter().zip(jets.iter()) {
-            let error = curvature(jet) * h * h / 8.0;
+            let bend = curvature(jet.gradient.as_vec3(), jet.hessian.as_mat3());
+            let error = f64::from(bend) * h * h / 8.0;
             // Not a number, where the gradient vanishes: no flatter than a crease.
             let error = if error.is_nan() {
                 CREASE * h
@@ -301,15 +418,28 @@ impl Sample {
 /// What a crease, or a surface that is not told apart, can cost in cells: half of one.
 const CREASE: f64 = 0.5;
 
+/// What differences of values may say too much of an error.
+const GUESS: f32 = 1.5;
+
+/// Errors above those that are asked for, times this, are left to the next levels.
+const COARSE: f32 = 4.0;
+
 /// Share of the bound of a cell's error that counts where points say less.
 const MISTRUST: f64 = 1.0 / 16.0;
 
-fn holds_any(set: &Cells, c: [usize; 3]) -> bool {
-    super::grid::holds(set, c)
+/// First cell of an octant.
+fn octant_place(octant: usize) -> [usize; 3] {
+    [4 * (octant >> 2), 4 * (octant >> 1 & 1), 4 * (octant & 1)]
 }
 
-/// The cells of a set in the octant whose first cell is `at`.
-fn octant_of_set(set: &Cells, at: [usize; 3]) -> Cells {
+/// The octant that a cell lies in.
+fn octant_with(c: [usize; 3]) -> usize {
+    4 * (c[0] / 4) + 2 * (c[1] / 4) + c[2] / 4
+}
+
+/// The cells of a set in an octant.
+fn octant_of_set(set: &Cells, octant: usize) -> Cells {
+    let at = octant_place(octant);
     let mask = (0x0f0f_0f0f << (CELLS * at[1])) << at[2];
     std::array::from_fn(|x| if x / 4 * 4 == at[0] { set[x] & mask } else { 0 })
 }
@@ -325,22 +455,27 @@ impl Judge<'_> {
 
 /// Whether a cell whose corners `v` lie on one side may hold a largest or least value on the other, if `‖∇²f‖ <= bend`.
 ///
-/// Such a value lies no farther than half a diagonal `d` from a corner, so it differs by `bend d²/8` at most; and
-/// the gradient, which vanishes there, is at most `bend d` along each edge.
+/// Between the corners the field differs by `(|f_xx| + |f_yy| + |f_zz|) h²/8 <= √3 bend h²/8` at most from the function
+/// that is linear along each axis, which keeps to one side. And the gradient, which vanishes at such a value, differs
+/// by `1.1 bend h` at most from the mean slopes of the edges: no point is farther from theirs on average.
 fn may_peak(v: &[f32; 8], bend: f64, size: DVec3) -> bool {
-    let square = size.length_squared();
+    let h = size.max_element();
     let least = v.iter().fold(f32::INFINITY, |m, v| m.min(v.abs()));
-    if f64::from(least) > 0.125 * bend * square {
+    if f64::from(least) > 0.2166 * bend * h * h {
         return false;
     }
-    let rise = |bit: usize| {
-        let sum: f32 = (0..8).map(|c| if c & bit != 0 { v[c] } else { -v[c] }).sum();
-        f64::from(sum.abs()) * 0.25
-    };
-    let steepest = (rise(4) / size.x).max(rise(2) / size.y).max(rise(1) / size.z);
-    let is_steep = steepest > bend * square.sqrt();
+    let is_steep = slopes(v, size.as_vec3()).as_dvec3().length() > 1.1 * bend * h;
     // Not where one of them is not a number.
     !is_steep
+}
+
+/// Mean slopes of a cell's edges along each axis.
+fn slopes(v: &[f32; 8], size: Vec3) -> Vec3 {
+    0.25 * Vec3::new(
+        v[4] - v[0] + v[5] - v[1] + v[6] - v[2] + v[7] - v[3],
+        v[2] - v[0] + v[3] - v[1] + v[6] - v[4] + v[7] - v[5],
+        v[1] - v[0] + v[3] - v[2] + v[5] - v[4] + v[7] - v[6],
+    ) / size
 }
 
 /// How often a cell is halved to see whether a piece of the surface hides in it.
@@ -411,16 +546,17 @@ fn mean_crossing(v: &[f32; 8]) -> DVec3 {
     sum / f64::max(count, 1.0)
 }
 
-/// Largest normal curvature, in magnitude, of the level set through a point.
+/// Largest normal curvature, in magnitude, of the level set through a point with that gradient and Hessian.
 ///
 /// With the Hessian `A` across the unit gradient `n`, `tr A = tr H - nᵀHn` and `‖A‖² = ‖H‖² - 2|Hn|² + (nᵀHn)²` give
 /// both of its eigenvalues.
-fn curvature(jet: &Jet) -> f64 {
-    let slope = jet.gradient.length();
-    let n = jet.gradient / slope;
-    let hn = jet.hessian * n;
+#[inline(always)]
+fn curvature(gradient: Vec3, hessian: Mat3) -> f32 {
+    let slope = gradient.length();
+    let n = gradient / slope;
+    let hn = hessian * n;
     let along = n.dot(hn);
-    let h = &jet.hessian;
+    let h = &hessian;
     let sum = h.x_axis.x + h.y_axis.y + h.z_axis.z - along;
     let square = h.x_axis.length_squared() + h.y_axis.length_squared() + h.z_axis.length_squared()
         - 2.0 * hn.length_squared()

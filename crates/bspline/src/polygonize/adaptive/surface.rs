@@ -45,10 +45,11 @@ struct Next {
     open: u128,
 }
 
-/// Nodes of a leaf's surface with their signs and values.
+/// Nodes of a leaf's surface with their signs.
 struct Nodes {
-    inside: [bool; 27],
-    values: [f32; 27],
+    /// Bits of the nodes that are there, and of those that are inside.
+    known: u32,
+    inside: u32,
     split_edges: u16,
     split_faces: u8,
 }
@@ -74,8 +75,8 @@ impl Nodes {
     fn new(around: &Around, c: [usize; 3]) -> Self {
         let sample = &around.block.sample;
         let mut nodes = Self {
-            inside: [false; 27],
-            values: [0.0; 27],
+            known: 0,
+            inside: 0,
             split_edges: 0,
             split_faces: 0,
         };
@@ -83,17 +84,14 @@ impl Nodes {
             let at = [corner >> 2, corner >> 1 & 1, corner & 1];
             let n: [usize; 3] = std::array::from_fn(|a| c[a] + at[a]);
             let slot = node(at.map(|x| 2 * x));
-            nodes.inside[slot] = sample.is_inside(n);
-            nodes.values[slot] = sample.values[super::grid::node_index(n)];
+            nodes.put(slot, sample.is_inside(n));
         }
         let cell = c.map(|c| c as i32);
         let split = around.split_about(c);
         let take = |nodes: &mut Self, n: [usize; 3], out: [usize; 3]| {
             let beside = std::array::from_fn(|a| cell[a] + out[a] as i32 - 1);
             let fine = std::array::from_fn(|a| 2 * cell[a] + n[a] as i32);
-            let (inside, value) = around.fine_node(beside, fine);
-            nodes.inside[node(n)] = inside;
-            nodes.values[node(n)] = value;
+            nodes.put(node(n), around.fine_node(beside, fine).0);
         };
         // The cell beside the side 0 or 2 of an axis stands at 0 or 2 of the 27 as well.
         for axis in 0..3 {
@@ -119,6 +117,16 @@ impl Nodes {
         nodes
     }
 
+    fn put(&mut self, node: usize, inside: bool) {
+        self.known |= 1 << node;
+        self.inside |= u32::from(inside) << node;
+    }
+
+    /// Whether nodes lie on both sides.
+    fn is_crossed(&self) -> bool {
+        self.inside != 0 && self.inside != self.known
+    }
+
     /// Whether the edge between two corners of a face has a node in its middle.
     fn is_split(&self, axis: usize, u: usize, v: usize) -> bool {
         self.split_edges & edge_bit(axis, u, v) != 0
@@ -128,7 +136,12 @@ impl Nodes {
 impl LeafSurface {
     /// Finds the loops of the leaf `c` of the block.
     pub fn find(&mut self, around: &Around, c: [usize; 3]) {
+        self.segments.clear();
+        self.loops = 0;
         let nodes = Nodes::new(around, c);
+        if !nodes.is_crossed() {
+            return;
+        }
         let mut next = Next {
             to: [(0, 0); NAMES],
             open: 0,
@@ -138,8 +151,6 @@ impl LeafSurface {
                 cut_face(&nodes, axis, side, &mut next);
             }
         }
-        self.segments.clear();
-        self.loops = 0;
         while next.open != 0 {
             let mut from = next.open.trailing_zeros() as usize;
             while next.open >> from & 1 == 1 {
@@ -203,11 +214,11 @@ fn cut_face(nodes: &Nodes, axis: usize, side: usize, next: &mut Next) {
 /// Cuts each run of inside nodes round a minimal face off from the rest.
 fn cut(nodes: &Nodes, ring: &[[usize; 3]], face: u8, next: &mut Next) {
     let n = ring.len();
-    let count = ring.iter().filter(|p| nodes.inside[node(**p)]).count();
+    let count = ring.iter().filter(|p| nodes.inside >> node(**p) & 1 == 1).count();
     if count == 0 || count == n {
         return;
     }
-    let inside = |k: usize| nodes.inside[node(ring[k % n])];
+    let inside = |k: usize| nodes.inside >> node(ring[k % n]) & 1 == 1;
     let crossing = |k: usize| {
         let (a, b) = (ring[k % n], ring[(k + 1) % n]);
         25 * (a[0] + b[0]) + 5 * (a[1] + b[1]) + a[2] + b[2]

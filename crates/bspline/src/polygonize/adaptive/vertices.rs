@@ -19,6 +19,9 @@ const LOOP_BITS: u32 = 4;
 /// Bits of a vertex's key for each coordinate of its leaf.
 pub(super) const PLACE_BITS: u32 = 20;
 
+/// Newton steps that take a vertex onto the surface: two, as the second is the size of the square of the first.
+pub(super) const STEPS: usize = 2;
+
 /// The vertices of a block.
 pub(super) struct BlockVertices {
     /// First vertex of each leaf.
@@ -41,7 +44,7 @@ pub(super) struct Placer<'a> {
     pub field: &'a dyn Field,
     pub grids: &'a Grids,
     pub iso: f64,
-    /// Newton steps onto the surface.
+    /// Newton steps onto the surface, but for vertices on the cap's border: these always take [`STEPS`].
     pub steps: usize,
 }
 
@@ -280,7 +283,7 @@ fn cap_vertex(
     let frame = &placer.grids.frames[level];
     let m = frame.world_from_grid.matrix3;
     let mut p = start;
-    for _ in 0..placer.steps {
+    for _ in 0..STEPS {
         let (f, g) = placer
             .field
             .value_gradient(frame.world_from_grid.transform_point3(p));

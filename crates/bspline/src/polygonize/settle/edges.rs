@@ -80,31 +80,6 @@ impl<'a> Edges<'a> {
         self.start(before(h))
     }
 
-    /// The half-edges that start at `v`, round it, from the one of the first triangle on; empty at a border.
-    pub fn ring<'b>(&self, v: u32, ring: &'b mut Vec<u32>) -> &'b [u32] {
-        ring.clear();
-        let first = self.out[v as usize];
-        if first == NONE {
-            return ring;
-        }
-        let mut h = first;
-        loop {
-            ring.push(h);
-            h = self.twin[before(h) as usize];
-            if h == NONE {
-                ring.clear();
-                return ring;
-            }
-            if h == first {
-                break;
-            }
-        }
-        // Sums round a vertex begin at the same triangle whatever was flipped before.
-        let least = (0..ring.len()).min_by_key(|&n| ring[n]).expect("not empty");
-        ring.rotate_left(least);
-        ring
-    }
-
     /// Whether an edge joins `a` and `b`; `true` where a border keeps from telling.
     pub fn joined(&self, a: u32, b: u32) -> bool {
         let first = self.out[a as usize];

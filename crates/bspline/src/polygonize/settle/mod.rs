@@ -57,7 +57,8 @@ pub struct SettleReport {
 
 /// Improves a mesh of the surface `{ f = iso }` without a change in the number of its vertices and triangles.
 ///
-/// `fixed` vertices stay, and so do those beside them and those at the border of an open mesh. A vertex depends on nothing
+/// `fixed` vertices stay; those beside them and those at the border of an open mesh move onto the surface, no farther.
+/// A vertex depends on nothing
 /// farther than some rings of triangles, and of the numbering on the order alone: a part of a mesh settles, to the bit,
 /// as it does in the whole, but for a strip along its border.
 ///
@@ -74,23 +75,22 @@ pub fn settle(
     assert_eq!(positions.len(), fixed.len(), "one flag a vertex");
     let count = positions.len();
     let mut edges = Edges::new(triangles, count);
-    let mut held = fixed.to_vec();
-    for (t, triangle) in edges.triangles.iter().enumerate() {
-        let border = (3 * t..3 * t + 3).any(|h| edges.twin[h] == NONE);
-        if border || triangle.iter().any(|&v| fixed[v as usize]) {
-            for &v in triangle {
-                held[v as usize] = true;
-            }
-        }
-    }
     let mut state = State {
         positions,
         normals: vec![DVec3::ZERO; count],
-        held,
+        held: fixed.to_vec(),
         tolerance: options.tolerance,
     };
     let mut report = SettleReport::default();
     relax::project(field, iso, &edges, &mut state);
+    for (t, triangle) in edges.triangles.iter().enumerate() {
+        let border = (3 * t..3 * t + 3).any(|h| edges.twin[h] == NONE);
+        if border || triangle.iter().any(|&v| fixed[v as usize]) {
+            for &v in triangle {
+                state.held[v as usize] = true;
+            }
+        }
+    }
     for _ in 0..options.rounds {
         relax::relax(field, iso, &edges, &mut state);
         report.flips += flip(&mut edges, &state, Rule::Delaunay);

@@ -23,8 +23,27 @@ const TURN: f64 = 0.3;
 ///
 /// Vertices whose gradient leads too far away are held from then on.
 pub(super) fn project(field: &dyn Field, iso: f64, edges: &Edges, state: &mut State) {
+    let mut longest = vec![0.0; state.positions.len()];
+    for t in edges.triangles.iter() {
+        let [p, q, r] = t.map(|v| state.positions[v as usize]);
+        reach(&mut longest, t, [p, q, r]);
+    }
     let targets = state.positions.to_vec();
-    step(field, iso, edges, state, targets);
+    step(field, iso, edges, state, targets, &longest);
+}
+
+/// Raises the squares of the longest edges at the corners of a triangle.
+#[inline(always)]
+fn reach(longest: &mut [f64], t: &[u32; 3], [p, q, r]: [DVec3; 3]) {
+    let [pq, qr, rp] = [
+        p.distance_squared(q),
+        q.distance_squared(r),
+        r.distance_squared(p),
+    ];
+    for (v, d) in t.iter().zip([pq.max(rp), pq.max(qr), qr.max(rp)]) {
+        let slot = &mut longest[*v as usize];
+        *slot = slot.max(d);
+    }
 }
 
 /// One round: every free vertex moves to the mean of the centroids round it, weighted by area and the square root of the
@@ -42,34 +61,35 @@ pub(super) fn relax(field: &dyn Field, iso: f64, edges: &Edges, state: &mut Stat
                 .max(sagitta(q, r, m, n))
                 .max(sagitta(r, p, n, l));
             let area = (q - p).cross(r - p).length();
-            ((p + q + r) / 3.0, area * (error + FLOOR * state.tolerance).sqrt())
+            let weight = area * (error + FLOOR * state.tolerance).sqrt();
+            ((p + q + r) * (weight / 3.0), weight)
         })
         .collect();
-    let targets = (0..state.positions.len() as u32)
-        .into_par_iter()
-        .with_min_len(BATCH)
-        .map_init(Vec::new, |ring, v| {
-            let p = state.positions[v as usize];
-            if state.held[v as usize] {
+    // Triangle after triangle, so that sums round a vertex have one order.
+    let mut sums = vec![(DVec3::ZERO, 0.0); state.positions.len()];
+    let mut longest = vec![0.0; state.positions.len()];
+    for (t, (center, weight)) in edges.triangles.iter().zip(&parts) {
+        for &v in t {
+            let (sum, total) = &mut sums[v as usize];
+            *sum += *center;
+            *total += *weight;
+        }
+        reach(&mut longest, t, t.map(|v| state.positions[v as usize]));
+    }
+    drop(parts);
+    let targets = (0..state.positions.len())
+        .map(|v| {
+            let (p, n) = (state.positions[v], state.normals[v]);
+            let (sum, weight) = sums[v];
+            if state.held[v] || weight.is_nan() || weight <= 0.0 {
                 return p;
             }
-            let (sum, weight) = edges
-                .ring(v, ring)
-                .iter()
-                .map(|&h| parts[h as usize / 3])
-                .fold((DVec3::ZERO, 0.0), |(sum, weight), (c, w)| {
-                    (sum + c * w, weight + w)
-                });
-            if weight > 0.0 {
-                let n = state.normals[v as usize];
-                let d = sum / weight - p;
-                p + (d - n * n.dot(d))
-            } else {
-                p
-            }
+            let d = sum / weight - p;
+            p + (d - n * n.dot(d))
         })
         .collect();
-    step(field, iso, edges, state, targets);
+    drop(sums);
+    step(field, iso, edges, state, targets, &longest);
 }
 
 fn normal(p: &[DVec3], a: u32, b: u32, c: u32) -> DVec3 {
@@ -78,43 +98,38 @@ fn normal(p: &[DVec3], a: u32, b: u32, c: u32) -> DVec3 {
 }
 
 /// Moves the free vertices to the feet of `targets`; takes back what would turn a triangle over.
-fn step(field: &dyn Field, iso: f64, edges: &Edges, state: &mut State, targets: Vec<DVec3>) {
-    let mut answers = vec![(0.0, DVec3::ZERO); targets.len()];
+///
+/// `longest` are the squares of the longest edges at each vertex.
+fn step(field: &dyn Field, iso: f64, edges: &Edges, state: &mut State, targets: Vec<DVec3>, longest: &[f64]) {
+    let mut moved: Vec<(DVec3, DVec3)> = vec![(DVec3::ZERO, DVec3::ZERO); targets.len()];
+    let State {
+        positions,
+        normals,
+        held,
+        ..
+    } = state;
     targets
         .par_chunks(BATCH)
-        .zip(answers.par_chunks_mut(BATCH))
-        .for_each(|(points, answers)| field.values_gradients(points, answers));
-    let moved: Vec<(DVec3, DVec3)> = (0..targets.len() as u32)
-        .into_par_iter()
-        .with_min_len(BATCH)
-        .map_init(Vec::new, |ring, v| {
-            let i = v as usize;
-            let stay = (state.positions[i], state.normals[i]);
-            if state.held[i] {
-                return stay;
+        .zip(moved.par_chunks_mut(BATCH))
+        .enumerate()
+        .for_each_init(Vec::new, |answers, (n, (points, moved))| {
+            answers.resize(points.len(), (0.0, DVec3::ZERO));
+            field.values_gradients(points, answers);
+            for (k, slot) in moved.iter_mut().enumerate() {
+                let i = n * BATCH + k;
+                let (value, gradient) = answers[k];
+                let slope = gradient.length();
+                let distance = (value - iso) / slope;
+                // Not a number fails this test too.
+                *slot = if !held[i] && distance.abs() <= REACH * longest[i].sqrt() {
+                    let normal = -gradient / slope;
+                    (points[k] + normal * distance, normal)
+                } else {
+                    (positions[i], normals[i])
+                };
             }
-            let longest = edges
-                .ring(v, ring)
-                .iter()
-                .map(|&h| {
-                    (state.positions[edges.triangles[h as usize / 3][(h as usize + 1) % 3] as usize]
-                        - state.positions[i])
-                        .length_squared()
-                })
-                .fold(0.0, f64::max)
-                .sqrt();
-            let (value, gradient) = answers[i];
-            let slope = gradient.length();
-            let distance = (value - iso) / slope;
-            // Not a number fails this test too.
-            if distance.abs() <= REACH * longest {
-                let normal = -gradient / slope;
-                (targets[i] + normal * distance, normal)
-            } else {
-                stay
-            }
-        })
-        .collect();
+        });
+    drop(targets);
     let mut back = vec![false; moved.len()];
     for round in 0..2 {
         let at = |v: u32| {

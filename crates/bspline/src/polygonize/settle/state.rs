@@ -13,9 +13,15 @@ pub(super) struct State<'a> {
     pub tolerance: f64,
 }
 
-/// Height of the arc over the chord from `p` to `q` whose ends have the normals `m` and `n`: `|(q − p)·(n − m)|/8`, from
-/// the cubic through both ends along their tangents.
+/// Height of the arc over the chord from `p` to `q` whose ends have the normals `m` and `n`, positive where the surface
+/// bulges outward: `(q − p)·(n − m)/8`, from the cubic through both ends along their tangents.
+#[inline(always)]
+fn arc(p: DVec3, q: DVec3, m: DVec3, n: DVec3) -> f64 {
+    (q - p).dot(n - m) * 0.125
+}
+
+/// Magnitude of the height of the arc.
 #[inline(always)]
 pub(super) fn sagitta(p: DVec3, q: DVec3, m: DVec3, n: DVec3) -> f64 {
-    (q - p).dot(n - m).abs() * 0.125
+    arc(p, q, m, n).abs()
 }
