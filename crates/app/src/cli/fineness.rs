@@ -14,13 +14,14 @@ use rayon::prelude::*;
 use super::ceiling;
 use super::failure::{Failure, Outcome};
 use super::field::OpenField;
+use super::interrupt;
 use super::progress::Bar;
 use super::quantity::{Tolerance, human_count, human_number};
 
 /// What bounds the size of the triangles.
 #[derive(Clone, Copy, Debug)]
 pub enum Fineness {
-    /// Half the tolerance of the fit.
+    /// Half the tolerance of the fit; less where that is the noise of the samples.
     OfTheFit,
     /// A chord error.
     Error(Tolerance),
@@ -29,7 +30,9 @@ pub enum Fineness {
 }
 
 /// Chord error that a cell is divided at over the one that 95 % of the centres and sides of settled triangles keep.
-const SPARE: f64 = 3.45;
+const SPARE: f64 = 3.6;
+/// Distance of a fit from the surface over the noise of its samples, which is its tolerance then: it averages them.
+const OF_NOISE: f64 = 0.125;
 /// Share of the triangles asked for that is aimed at.
 const AIM: f64 = 0.96;
 /// Least share of the triangles asked for.
@@ -128,6 +131,7 @@ impl<'a> Adaptive<'a> {
                 let tolerance = open.report().tolerance;
                 let length = match open.source() {
                     SourceKind::Volume => tolerance / open.slope(),
+                    SourceKind::Cloud if open.report().noise.is_some() => OF_NOISE * tolerance,
                     _ => tolerance,
                 };
                 let wanted = if length > 0.0 {
@@ -347,14 +351,17 @@ pub fn watch<'a>(
 /// What a failure of the mesher means to the user.
 pub fn failed(e: PolygonizeError) -> Failure {
     match e {
-        PolygonizeError::Cancelled if ceiling::is_exceeded() => Failure::limit(
-            "the mesh takes more than --memory allows; raise it, or lower --resolution or --triangles",
-        ),
-        PolygonizeError::Cancelled => fitting::FitError::Cancelled.into(),
+        PolygonizeError::Cancelled if interrupt::cancel().is_cancelled() => {
+            fitting::FitError::Cancelled.into()
+        }
+        // By now the memory may be given back.
+        PolygonizeError::Cancelled => {
+            Failure::limit("the mesh takes more than --memory allows; raise it, or ask for a coarser mesh")
+        }
         PolygonizeError::TooManyBlocks { .. } | PolygonizeError::TooManyVertices { .. } => Failure::limit(
-            format!("{e}: lower --resolution or --triangles, or raise --tolerance"),
+            format!("{e}; lower --resolution or --triangles, or raise --tolerance"),
         ),
-        PolygonizeError::Cells { .. } => Failure::usage(format!("{e}: lower --resolution")),
+        PolygonizeError::Cells { .. } => Failure::usage(format!("{e}; lower --resolution")),
         _ => Failure::input(e),
     }
 }
