@@ -99,3 +99,64 @@ fn a_few_deep_spots_do_not_set_the_level() {
         assert_eq!(f.level_of_surface(1e3, 0.1), 0);
     }
 }
+
+/// A full level and a finer one over part of it, with coefficients anywhere.
+fn rough(seed: u64) -> HierarchicalSpline<f64> {
+    let mut random = Random(seed);
+    let cells = [8, 9, 10];
+    let lattice = Lattice {
+        world_from_lattice: DAffine3::IDENTITY,
+        cells,
+    };
+    let coarse = full(cells, |_| random.unit() - 0.5);
+    let mut fine = BTreeMap::new();
+    for _ in 0..60 {
+        let s = [0, 1, 2].map(|_| 4 + (random.unit() * 8.0) as u32);
+        set(&mut fine, s, random.unit() - 0.5);
+    }
+    spline(lattice, vec![coarse, fine])
+}
+
+#[test]
+fn still_cells_hold_every_critical_point_near_the_surface() {
+    let (mut met, mut listed, mut all) = (0, 0, 0);
+    for seed in 1..=4 {
+        let f = rough(seed);
+        let still = f.still_cells(0.1, 0.2);
+        listed += still.len();
+        all += 8 * 9 * 10;
+        let mut random = Random(100 + seed);
+        for _ in 0..2000 {
+            let mut x = DVec3::new(random.unit() * 8.0, random.unit() * 9.0, random.unit() * 10.0);
+            for _ in 0..20 {
+                let jet = f.jet(x);
+                x -= (jet.hessian.inverse() * jet.gradient).clamp_length_max(0.3);
+            }
+            let jet = f.jet(x);
+            let is_inside = x.min_element() > 0.0 && x.cmplt(DVec3::new(8.0, 9.0, 10.0)).all();
+            let on_level = |level: usize| {
+                let cell = (x * f64::from(1 << level)).to_array().map(|q| q as u32);
+                still.contains(&(level, cell))
+            };
+            // The reach is in knot spacings: of the finer level, half as much.
+            if is_inside && jet.gradient.length() < 1e-12 && (jet.value - 0.1).abs() <= 0.1 {
+                met += 1;
+                assert!(on_level(0) || on_level(1), "{x}");
+            }
+        }
+    }
+    assert!(met > 200, "{met} critical points");
+    assert!(listed < all, "{listed} of {all} coarse cells");
+}
+
+#[test]
+fn a_plane_has_no_still_cells() {
+    let cells = [8; 3];
+    let lattice = Lattice {
+        world_from_lattice: DAffine3::IDENTITY,
+        cells,
+    };
+    let plane = |[x, y, z]: [u32; 3]| f64::from(x) + 0.3 * f64::from(y) - 0.2 * f64::from(z) - 4.0;
+    let f = spline(lattice, vec![full(cells, plane)]);
+    assert_eq!(f.still_cells(0.0, 2.0), []);
+}

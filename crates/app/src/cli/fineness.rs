@@ -20,7 +20,7 @@ use super::quantity::{Tolerance, human_count, human_number};
 /// What bounds the size of the triangles.
 #[derive(Clone, Copy, Debug)]
 pub enum Fineness {
-    /// Half the tolerance of the fit.
+    /// Half the tolerance of the fit, a quarter of it where points are noisy.
     OfTheFit,
     /// A chord error.
     Error(Tolerance),
@@ -130,8 +130,10 @@ impl<'a> Adaptive<'a> {
                     SourceKind::Volume => tolerance / open.slope(),
                     _ => tolerance,
                 };
+                // Noise is averaged: the surface is known far better than to the tolerance, 1.25 standard deviations.
+                let share = if open.report().noise.is_some() { 0.25 } else { 0.5 };
                 let wanted = if length > 0.0 {
-                    0.5 * length
+                    share * length
                 } else {
                     1e-4 * diagonal
                 };

@@ -16,8 +16,9 @@ use super::progress::Bar;
 use super::quantity::{Tolerance, between, finite, human_number, threads};
 use super::source::{FIELDS, Source};
 use super::summary::Summary;
-use super::trim::{self, Sampled};
+use super::trim::{self, Sampled, drop_marked};
 use super::{interrupt, set_threads};
+use crate::pieces::of_narrow_parts;
 
 /// Arguments of `isoclay mesh`.
 #[derive(clap::Args)]
@@ -116,6 +117,7 @@ pub fn run(args: &Args) -> Outcome {
         return Err(open.no_surface(&field, options.iso));
     }
     interrupt::check(&cancel)?;
+    drop_specks(&mut mesh, &open);
     let left_out = args.written.keep(&mut mesh, open.unit(), &mut notes)?;
     trim(&mut mesh, &open, args.trim, &mut notes)?;
     bar.show("writing", 0.99);
@@ -137,6 +139,18 @@ pub fn run(args: &Args) -> Outcome {
     }
     .with_cost(&cost)
     .print_after(&output, args.json)
+}
+
+/// Leaves out parts of the surface of a cloud that are narrower than a finest knot interval: where sheets all but touch, a mesh
+/// splits off a few triangles that no sample speaks for.
+fn drop_specks(mesh: &mut Mesh, open: &OpenField) {
+    if open.source() == SourceKind::Cloud {
+        let width = open.lattice().spacing(open.level_count() - 1).max_element();
+        let narrow = of_narrow_parts(mesh, width);
+        if narrow.contains(&true) {
+            drop_marked(mesh, &narrow);
+        }
+    }
 }
 
 /// Mean spacings of the points from the next cell with points at which the surface counts as invented.

@@ -21,6 +21,7 @@ mod lattice;
 mod prolong;
 mod slopes;
 mod spline;
+mod still;
 mod surface;
 mod versions;
 

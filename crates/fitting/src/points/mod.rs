@@ -26,6 +26,7 @@ pub use measure::{LeafError, PointError, PointErrors, crossing, measure_points, 
 pub use residual::newton_distance;
 mod robust;
 pub(crate) mod samples;
+mod specks;
 pub(crate) mod stencil;
 mod support;
 
@@ -181,12 +182,22 @@ pub fn fit_points<T: Real>(
             break (cascade, field);
         }
         rounds += 1;
+        far_field::turn_over(&mut base, &samples, &conditions, pieces::width(&field));
         samples = samples.with_sign_conditions(&conditions);
         samples.notes.push(format!(
             "{} cells whose sign no sample speaks for were turned over (round {rounds})",
             conditions.len()
         ));
     };
+    let room = options
+        .coefficients
+        .map_or(usize::MAX, |most| most.saturating_sub(field.coefficient_count()));
+    let (field, specks) = specks::remove(field, &samples, room);
+    if specks > 0 {
+        samples.notes.push(format!(
+            "{specks} specks of solid or cavity without a point of their own were taken out"
+        ));
+    }
     control.step("measuring", 0.95)?;
     let report = residual::report(&field, &samples, &cascade, cloud.positions, &plan, noise);
     Ok((field, report))

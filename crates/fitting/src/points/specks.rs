@@ -1,0 +1,342 @@
+//! Specks: small closed pieces of solid or cavity without a sample of their own.
+//!
+//! Where sheets almost touch, or cells are finer than the samples, a fit wavers about zero and splits off drops and
+//! bubbles, most of them far smaller than a cell, which no grid finds. But in each of them lies an extremum of the field. So
+//! extrema are looked for in the few cells near the surface where the gradient may vanish; those whose piece ends round them
+//! and holds no foot of a sample are shifted over zero by the central functions of its cells.
+
+use std::collections::BTreeMap;
+
+use bspline::hierarchical::{BRICK, BrickKey, LevelEdit};
+use bspline::{Field, HierarchicalSpline, Jet, Real};
+use glam::{DMat3, DVec3};
+use nalgebra::{Matrix3, SymmetricEigen};
+use rayon::prelude::*;
+use rustc_hash::FxHashSet;
+
+use super::residual::newton_foot;
+use super::samples::Samples;
+
+/// Distance from the surface, in cells, within which an extremum is looked for; larger pieces are seen by the grid over the
+/// whole box.
+const REACH: f64 = 2.0;
+/// Slope, and distance from the surface in cells, up to which steps are tried although the field bends the other way.
+const GENTLE: f64 = 0.5;
+/// Depth in cells beyond zero that the parabola at the middle of a cell may be wrong by.
+const SLACK: f64 = 0.1;
+/// Steps to an extremum.
+const STEPS: usize = 12;
+/// Longest step, and the way after which another cell is closer, in cells.
+const LONGEST_STEP: f64 = 0.5;
+const FARTHEST: f64 = 1.5;
+/// Nodes from an extremum to where its piece would end if the field were the parabola there, and to where the look ends.
+const TO_END: f64 = 4.0;
+const TO_BORDER: i32 = 12;
+/// Longest half axis of a piece, in cells.
+const LONGEST_AXIS: f64 = 3.0;
+/// Distance of a sample to its foot, in cells, up to which the piece that this lies on is its own.
+const OWN: f64 = 0.5;
+/// Least sum of the eight central functions of a cell in it.
+const LEAST_SUM: f64 = 0.57;
+/// Share of a cell that the field is beyond zero after the repair.
+const BEYOND: f64 = 0.02;
+/// Rounds of search and repair.
+const ROUNDS: usize = 3;
+
+/// The field without specks, and how many there were. No more than `room` further functions are made active.
+pub(crate) fn remove<T: Real>(
+    mut field: HierarchicalSpline<T>,
+    samples: &Samples,
+    room: usize,
+) -> (HierarchicalSpline<T>, usize) {
+    let most = field.coefficient_count().saturating_add(room);
+    let mut removed = 0;
+    for _ in 0..ROUNDS {
+        let specks = specks(&field, samples);
+        let edits = shifts(&field, &specks, most.saturating_sub(field.coefficient_count()));
+        match field.edited(&edits) {
+            Ok(next) if !edits.is_empty() => field = next,
+            _ => break,
+        }
+        removed += specks.len();
+    }
+    (field, removed)
+}
+
+/// A closed piece round an extremum.
+struct Speck {
+    /// Value at the extremum.
+    value: f64,
+    level: usize,
+    /// Cells of the level that it lies in, in order.
+    cells: Vec<[u32; 3]>,
+}
+
+/// Largest or least value of a small region beyond zero.
+#[derive(Clone, Copy)]
+struct Peak {
+    at: DVec3,
+    value: f64,
+    level: usize,
+    /// From it along the half axes of its piece to the nodes of the look round.
+    node: DMat3,
+}
+
+fn specks<T: Real>(field: &HierarchicalSpline<T>, samples: &Samples) -> Vec<Speck> {
+    let mut peaks: Vec<Peak> = field
+        .still_cells(0.0, REACH)
+        .par_iter()
+        .with_min_len(64)
+        .flat_map_iter(|&(level, cell)| {
+            let h = field.lattice().spacing(level).x;
+            let centre = samples.origin + h * (DVec3::from_array(cell.map(f64::from)) + 0.5);
+            let jet = field.jet(centre);
+            [1.0, -1.0].map(|sign| {
+                let may = may_lead_to_peak(&jet, h, sign);
+                may.then(|| peak(field, centre, level, h, sign)).flatten()
+            })
+        })
+        .flatten_iter()
+        .collect();
+    // An extremum is found from several cells.
+    let place = |p: &Peak| {
+        (p.at * (16.0 / field.lattice().spacing(p.level).x))
+            .round()
+            .to_array()
+    };
+    peaks.sort_by(|a, b| {
+        let (p, q) = (place(a), place(b));
+        let order = p.iter().zip(&q).map(|(x, y)| x.total_cmp(y));
+        order.fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then)
+    });
+    peaks.dedup_by_key(|p| place(p));
+    peaks
+        .par_iter()
+        .filter_map(|peak| speck(field, samples, peak))
+        .collect()
+}
+
+/// Whether a maximum of `sign · f` above zero may lie within reach of where `jet` was taken, by the parabola there.
+fn may_lead_to_peak(jet: &Jet, h: f64, sign: f64) -> bool {
+    let Some(step) = to_maximum(jet, sign) else {
+        return jet.gradient.length() < GENTLE && jet.value.abs() < GENTLE * h;
+    };
+    let height = sign * (jet.value + 0.5 * jet.gradient.dot(step));
+    step.abs().max_element() < FARTHEST * h && height > -SLACK * h
+}
+
+/// Newton's step to the maximum of `sign · f`, if the field bends that way.
+fn to_maximum(jet: &Jet, sign: f64) -> Option<DVec3> {
+    let bend = -sign * jet.hessian;
+    let is_peaked = bend.x_axis.x > 0.0
+        && bend.x_axis.x * bend.y_axis.y > bend.x_axis.y * bend.x_axis.y
+        && bend.determinant() > 0.0;
+    let step = is_peaked.then(|| bend.inverse() * (sign * jet.gradient));
+    step.filter(|s| s.is_finite())
+}
+
+/// The maximum of `sign · f` that the steps from `start` lead to, if it is positive and its piece may be small.
+fn peak<T: Real>(
+    field: &HierarchicalSpline<T>,
+    start: DVec3,
+    level: usize,
+    h: f64,
+    sign: f64,
+) -> Option<Peak> {
+    let mut x = start;
+    for _ in 0..STEPS {
+        let jet = field.jet(x);
+        let newton = to_maximum(&jet, sign);
+        let uphill = || sign * jet.gradient.normalize_or_zero() * (LONGEST_STEP * h);
+        let step = newton.map_or_else(uphill, |s| s.clamp_length_max(LONGEST_STEP * h));
+        x += step;
+        if (x - start).abs().max_element() > FARTHEST * h {
+            return None;
+        }
+        if newton.is_some() && step.length() < 1e-3 * h {
+            let value = field.value(x);
+            let height = sign * value;
+            if height <= 0.0 {
+                return None;
+            }
+            let bend = -sign * jet.hessian;
+            let eigen = SymmetricEigen::new(Matrix3::from_column_slice(&bend.to_cols_array()));
+            let half: [f64; 3] = std::array::from_fn(|i| (2.0 * height / eigen.eigenvalues[i]).sqrt());
+            let is_small = half.iter().all(|a| *a < LONGEST_AXIS * h);
+            let axis =
+                |i: usize| DVec3::from_slice(eigen.eigenvectors.column(i).as_slice()) * (half[i] / TO_END);
+            return is_small.then(|| Peak {
+                at: x,
+                value,
+                level,
+                node: DMat3::from_cols(axis(0), axis(1), axis(2)),
+            });
+        }
+    }
+    None
+}
+
+/// The piece round `peak`, if it ends within the look and no sample has its foot on it.
+fn speck<T: Real>(field: &HierarchicalSpline<T>, samples: &Samples, peak: &Peak) -> Option<Speck> {
+    let nodes = piece(field, peak)?;
+    let node = |n: &[i32; 3]| peak.at + peak.node * DVec3::from_array(n.map(f64::from));
+    let radius = nodes
+        .iter()
+        .map(|n| node(n).distance(peak.at))
+        .fold(0.0, f64::max);
+    let h = field.lattice().spacing(peak.level).x;
+    let to_nodes = peak.node.inverse();
+    let is_on_it = |i: usize| {
+        let point = samples.world_of_conditions(i);
+        let foot = newton_foot(field, point).0;
+        let [x, y, z] = (to_nodes * (foot - peak.at)).round().to_array().map(|q| q as i32);
+        let is_near = |d: i32| nodes.contains(&[x + d / 9 - 1, y + d / 3 % 3 - 1, z + d % 3 - 1]);
+        foot.distance(point) <= OWN * h && (0..27).any(is_near)
+    };
+    let near = samples.within(peak.at, radius + 2.0 * OWN * h);
+    if near.into_iter().any(is_on_it) {
+        return None;
+    }
+    let mut cells: Vec<[u32; 3]> = nodes
+        .iter()
+        .map(|n| {
+            ((node(n) - samples.origin) / h)
+                .to_array()
+                .map(|q| q.max(0.0) as u32)
+        })
+        .collect();
+    cells.sort_unstable();
+    cells.dedup();
+    Some(Speck {
+        value: peak.value,
+        level: peak.level,
+        cells,
+    })
+}
+
+/// Nodes of the piece round `peak`, numbered along its axes, unless it goes on to the border.
+fn piece<T: Real>(field: &HierarchicalSpline<T>, peak: &Peak) -> Option<FxHashSet<[i32; 3]>> {
+    let mut seen = FxHashSet::from_iter([[0; 3]]);
+    let mut open = vec![[0i32; 3]];
+    while let Some(n) = open.pop() {
+        for step in 0..6 {
+            let mut next = n;
+            next[step / 2] += if step % 2 == 0 { 1 } else { -1 };
+            if seen.contains(&next) {
+                continue;
+            }
+            let value = field.value(peak.at + peak.node * DVec3::from_array(next.map(f64::from)));
+            if (value > 0.0) == (peak.value > 0.0) {
+                if next[step / 2].abs() == TO_BORDER {
+                    return None;
+                }
+                seen.insert(next);
+                open.push(next);
+            }
+        }
+    }
+    Some(seen)
+}
+
+/// What shifts all of the specks over zero, at most `room` functions that are not active yet among it.
+fn shifts<T: Real>(field: &HierarchicalSpline<T>, specks: &[Speck], mut room: usize) -> Vec<LevelEdit<T>> {
+    let mut deltas: BTreeMap<(usize, [u32; 3]), f64> = BTreeMap::new();
+    for speck in specks {
+        let beyond = BEYOND * field.lattice().spacing(speck.level).x;
+        let delta = -(speck.value + beyond * speck.value.signum()) / LEAST_SUM;
+        for cell in &speck.cells {
+            for corner in 0..8u32 {
+                let function = std::array::from_fn(|a| cell[a] + 1 + (corner >> a & 1));
+                let known = deltas.entry((speck.level, function)).or_insert(0.0);
+                *known = if delta.abs() > known.abs() { delta } else { *known };
+            }
+        }
+    }
+    let mut edits = Vec::with_capacity(deltas.len());
+    for ((level, function), delta) in deltas {
+        if !is_active(field, level, function) {
+            if room == 0 {
+                continue;
+            }
+            room -= 1;
+        }
+        edits.push(LevelEdit {
+            level,
+            function,
+            delta: T::from_f64(delta),
+        });
+    }
+    edits
+}
+
+fn is_active<T: Real>(field: &HierarchicalSpline<T>, level: usize, function: [u32; 3]) -> bool {
+    let [x, y, z] = function.map(|s| s as usize % BRICK);
+    let key = BrickKey(function.map(|s| s / BRICK as u32));
+    let brick = field.corrections(level).get(&key);
+    brick.is_some_and(|b| b.is_active((x * BRICK + y) * BRICK + z))
+}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Control;
+    use crate::phantoms::{CloudOptions, Solid, sample_cloud};
+    use crate::points::{OrientedPoints, PointOptions, fit_points};
+
+    fn prepared(positions: &[DVec3], normals: &[DVec3]) -> (HierarchicalSpline<f32>, Samples) {
+        let points = OrientedPoints {
+            positions,
+            normals,
+            certainty: None,
+        };
+        let options = PointOptions {
+            max_depth: Some(7),
+            ..PointOptions::default()
+        };
+        let (field, _) = fit_points(&points, &options, &mut Control::default()).expect("a ball");
+        (field, Samples::prepare(points).expect("a ball"))
+    }
+
+    /// A drop outside a ball and a bubble in it, each about a cell wide, and a drop that holds a sample.
+    #[test]
+    fn drops_and_bubbles_go_unless_a_sample_lies_on_them() {
+        let ball = Solid::Sphere;
+        let cloud = sample_cloud(&*ball.field(), &ball.within(), &CloudOptions::default()).expect("a ball");
+        let (field, mut samples) = prepared(&cloud.positions, &cloud.normals);
+        let level = field.level_count() - 1;
+        let h = field.lattice().spacing(level).x;
+        let last = field.corrections(level).keys().next_back().expect("bricks").0;
+        assert!(last[0] > 0);
+        let to_cell = |p: DVec3| ((p - samples.origin) / h).round();
+        let at = |p: DVec3| samples.origin + h * to_cell(p);
+        let spots = [
+            DVec3::X * (1.0 + 3.0 * h),
+            DVec3::Y * (1.0 - 3.0 * h),
+            DVec3::Z * (1.0 + 3.0 * h),
+        ]
+        .map(at);
+        let edits = spots.map(|p| LevelEdit {
+            level,
+            function: (to_cell(p) + 1.0).to_array().map(|s| s as u32),
+            delta: (-(field.value(p) + 0.3 * h * field.value(p).signum()) / 0.2963) as f32,
+        });
+        let spoiled = field.edited(&edits).expect("finite");
+        let is_solid = |f: &HierarchicalSpline<f32>| spots.map(|p| f.value(p) > 0.0);
+        assert_eq!(is_solid(&field), [false, true, false]);
+        assert_eq!(is_solid(&spoiled), [true, false, true]);
+        let foot = newton_foot(&spoiled, spots[2] + DVec3::X * 0.5 * h).0;
+        let mut entry = samples.entry(0);
+        entry.position = (foot - samples.origin) / samples.scale;
+        entry.measured = entry.position;
+        let mut entries: Vec<_> = (0..samples.positions.len()).map(|i| samples.entry(i)).collect();
+        entries.push(entry);
+        samples = samples.with_entries(entries);
+        let (mended, count) = remove(spoiled, &samples, usize::MAX);
+        assert_eq!(count, 2);
+        assert_eq!(is_solid(&mended), [false, true, true]);
+        let moved = cloud
+            .positions
+            .iter()
+            .map(|p| (mended.value(*p) - field.value(*p)).abs());
+        assert!(moved.fold(0.0, f64::max) < 0.2 * h);
+    }
+}
