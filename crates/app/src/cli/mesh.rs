@@ -188,7 +188,7 @@ fn trim(
         return Ok(());
     }
     if asked.is_some() {
-        trim::drop_marked(mesh, &invented);
+        drop_marked(mesh, &invented);
     }
     if mesh.triangles.is_empty() {
         return Err(Failure::input(format!(
