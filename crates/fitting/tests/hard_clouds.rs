@@ -2,13 +2,11 @@
 
 mod common;
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use bspline::csg::Csg;
-use bspline::polygonize::{PolygonizeOptions, polygonize};
 use bspline::primitives::Sphere;
-use bspline::{Aabb, Field, Frame, HierarchicalSpline};
+use bspline::{Aabb, Field, Frame};
 use common::{cloud, fit, to_depth};
 use fitting::orient::{OrientOptions, orient_points};
 use fitting::phantoms::{COARSE_CELL, CloudOptions, SampledCloud, Solid, SplitMix64, sample_cloud};
@@ -292,62 +290,6 @@ fn a_thin_sheet_keeps_its_walls_apart_or_says_where_it_does_not() {
             ),
         }
         println!("depth {max_depth:?}: {lost} of 1000 lost, {told} of the leaves over the tolerance");
-    }
-}
-
-/// Closed pieces of the surface on which no sample has its foot.
-fn bare_pieces(field: &HierarchicalSpline<f32>, samples: &SampledCloud) -> usize {
-    let h = field.lattice().spacing(field.level_count() - 1).x;
-    let within = field.lattice().world_box();
-    let frame = Frame::over(&within, (within.size() * (2.0 / h)).round().as_uvec3().to_array());
-    let (mesh, _) = polygonize(field, &frame, &PolygonizeOptions::default()).expect("a surface");
-    let mut parent: Vec<u32> = (0..mesh.positions.len() as u32).collect();
-    let root = |parent: &mut Vec<u32>, mut i: u32| {
-        while parent[i as usize] != i {
-            parent[i as usize] = parent[parent[i as usize] as usize];
-            i = parent[i as usize];
-        }
-        i
-    };
-    for [a, b, c] in &mesh.triangles {
-        for other in [b, c] {
-            let (p, q) = (root(&mut parent, *a), root(&mut parent, *other));
-            parent[p.max(q) as usize] = p.min(q);
-        }
-    }
-    let mut boxes: BTreeMap<u32, Aabb> = BTreeMap::new();
-    for (i, p) in mesh.positions.iter().enumerate() {
-        let own = boxes
-            .entry(root(&mut parent, i as u32))
-            .or_insert(Aabb::new(*p, *p));
-        (own.min, own.max) = (own.min.min(*p), own.max.max(*p));
-    }
-    let feet: Vec<DVec3> = samples.positions.iter().map(|p| foot(field, *p)).collect();
-    let is_bare = |b: &&Aabb| {
-        let on_it = |p: &DVec3| (b.min - 0.1 * h).cmple(*p).all() && p.cmple(b.max + 0.1 * h).all();
-        !feet.iter().any(on_it)
-    };
-    boxes.values().filter(is_bare).count()
-}
-
-fn foot(field: &dyn Field, mut p: DVec3) -> DVec3 {
-    for _ in 0..5 {
-        let (value, gradient) = field.value_gradient(p);
-        p -= gradient * (value / gradient.length_squared().max(1e-12));
-    }
-    p
-}
-
-/// Sheets that almost touch, in cells finer than the samples: the fit wavers between them and split off drops and bubbles.
-#[test]
-fn no_piece_of_the_surface_is_without_a_sample() {
-    for (name, samples) in [
-        ("sheet", thin_sheet()),
-        ("gyroid", cloud(Solid::Gyroid, &CloudOptions::default())),
-    ] {
-        let (field, report) = fit::<f32>(&samples, &PointOptions::default()).expect("a clean cloud");
-        println!("{name}: {:?}", report.notes);
-        assert_eq!(bare_pieces(&field, &samples), 0, "{name}");
     }
 }
 

@@ -121,7 +121,8 @@ fn may_lead_to_peak(jet: &Jet, h: f64, sign: f64) -> bool {
     let Some(step) = to_maximum(jet, sign) else {
         return jet.gradient.length() < GENTLE && jet.value.abs() < GENTLE * h;
     };
-    let height = sign * (jet.value + 0.5 * jet.gradient.dot(step));
+    // Twice what the parabola rises.
+    let height = sign * (jet.value + jet.gradient.dot(step));
     step.abs().max_element() < FARTHEST * h && height > -SLACK * h
 }
 
@@ -306,20 +307,28 @@ mod tests {
         let h = field.lattice().spacing(level).x;
         let last = field.corrections(level).keys().next_back().expect("bricks").0;
         assert!(last[0] > 0);
-        let to_cell = |p: DVec3| ((p - samples.origin) / h).round();
-        let at = |p: DVec3| samples.origin + h * to_cell(p);
+        let to_cell = |p: DVec3| ((p - samples.origin) / h).floor();
+        let at = |p: DVec3| samples.origin + h * (to_cell(p) + 0.5);
         let spots = [
             DVec3::X * (1.0 + 3.0 * h),
             DVec3::Y * (1.0 - 3.0 * h),
             DVec3::Z * (1.0 + 3.0 * h),
         ]
         .map(at);
-        let edits = spots.map(|p| LevelEdit {
-            level,
-            function: (to_cell(p) + 1.0).to_array().map(|s| s as u32),
-            delta: (-(field.value(p) + 0.3 * h * field.value(p).signum()) / 0.2963) as f32,
+        // In the middle of a cell its eight central functions sum to (23/24)³.
+        let edits = spots.map(|p| {
+            let beyond = field.value(p) + 0.3 * h * field.value(p).signum();
+            [0, 1, 2, 3, 4, 5, 6, 7].map(|corner| {
+                let first = to_cell(p).to_array().map(|c| c as u32 + 1);
+                LevelEdit {
+                    level,
+                    function: std::array::from_fn(|a| first[a] + (corner >> a & 1)),
+                    delta: (-beyond / 0.8801) as f32,
+                }
+            })
         });
-        let spoiled = field.edited(&edits).expect("finite");
+        let edits = edits.as_flattened();
+        let spoiled = field.edited(edits).expect("finite");
         let is_solid = |f: &HierarchicalSpline<f32>| spots.map(|p| f.value(p) > 0.0);
         assert_eq!(is_solid(&field), [false, true, false]);
         assert_eq!(is_solid(&spoiled), [true, false, true]);
