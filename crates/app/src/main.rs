@@ -1,13 +1,18 @@
 //! The `isoclay` program: scans in, solids out.
 
+mod allocator;
 mod charts;
 mod check;
 mod cli;
+mod fans;
 mod picture;
 mod pieces;
 mod simulate;
 
 use std::process::ExitCode;
+
+#[global_allocator]
+static ALLOCATOR: allocator::OrEnd = allocator::OrEnd;
 
 fn main() -> ExitCode {
     cli::main()

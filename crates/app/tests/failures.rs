@@ -203,6 +203,20 @@ fn a_memory_ceiling_is_obeyed() {
     assert!(!bench.path("out.iclay").exists());
     let run = bench.run(&format!("fit {} -o out.iclay --memory 8MiB", data("head.nii.gz")));
     assert_eq!(run.code, 4, "{}", run.stderr);
+    // What is advised is more than what was given, and suffices.
+    let mut limit = 20;
+    for attempt in 0.. {
+        let run = bench.run(&format!(
+            "fit cloud.ply -o out.iclay --max-depth 6 --memory {limit}MiB"
+        ));
+        if run.code == 0 {
+            break;
+        }
+        let (_, advice) = run.stderr.split_once("raise --memory to ").expect("advice");
+        let advised: u64 = advice.split_once("MiB").unwrap().0.parse().unwrap();
+        assert!(advised > limit && attempt < 3, "{limit} MiB: {}", run.stderr);
+        limit = advised;
+    }
     let fitted = bench.json(&format!(
         "fit {} -o out.iclay --memory 256MiB",
         data("head.nii.gz")
@@ -352,6 +366,7 @@ fn ctrl_c_ends_every_command() {
     bench.json("phantom head -o head.nii --size 96");
     bench.json("fit cloud.ply -o field.iclay");
     bench.json("mesh field.iclay -o mesh.stl --resolution 150");
+    std::fs::create_dir(bench.path("tmp")).unwrap();
     let before = bench.files();
     let mut draw = 0x2545_f491_4f6c_dd1du64;
     let mut cancelled = Vec::new();
@@ -369,10 +384,15 @@ fn ctrl_c_ends_every_command() {
         "info mesh.stl",
         "phantom gyroid -o out.ply --count 3000000",
         "eval field.iclay --points -",
+        // Fits in a hidden directory of the charts, and files of standard input and output in temporary ones.
+        "charts hard sphere -o charts",
+        "charts fit phantom:gyroid -o charts",
+        "mesh field.iclay -o - --resolution 1000 --threads 1",
     ] {
         let mut child = bench
             .command()
             .args(command.split_whitespace())
+            .env("TMPDIR", bench.path("tmp"))
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
@@ -394,12 +414,16 @@ fn ctrl_c_ends_every_command() {
             .filter(|f| !before.contains(f))
             .collect();
         match run.code {
-            0 => written
-                .iter()
-                .for_each(|f| std::fs::remove_file(bench.path(f)).unwrap()),
+            0 => written.iter().map(|f| bench.path(f)).for_each(|f| {
+                std::fs::remove_file(&f)
+                    .or_else(|_| std::fs::remove_dir_all(&f))
+                    .unwrap()
+            }),
             4 => {
                 assert!(run.stderr.contains("cancelled"), "{command}: {}", run.stderr);
                 assert!(written.is_empty(), "{command}: left {written:?}");
+                let kept = std::fs::read_dir(bench.path("tmp")).unwrap().count();
+                assert_eq!(kept, 0, "{command}: temporary files are left");
                 cancelled.push(command);
             }
             other => panic!("{command}: code {other}: {}", run.stderr),
@@ -515,6 +539,10 @@ fn memory_stays_below_its_ceiling() {
     long.extend(6_000_000u32.to_le_bytes());
     long.extend((0..6_000_000u32).map(|i| (i % 4) as u8));
     bench.write("long.ply", long);
+    let region =
+        "[region]\nmin = [-0.8, -0.8, -0.8]\nmax = [0.8, 0.8, 0.8]\n[time]\nduration = 0.02\nstep = 0.01\n";
+    let pull = "[[pull]]\nat = [0.0, 0.0, 0.0]\nradius = 0.1\nstrength = 1.0\n";
+    bench.write("scene.toml", format!("field = \"field.iclay\"\n{region}{pull}"));
     for (command, limits) in [
         ("fit clean.ply -o out.iclay --tolerance 1e-4", &[128u64, 160][..]),
         ("fit clean.ply -o out.iclay --unoriented", &[128, 200]),
@@ -534,6 +562,11 @@ fn memory_stays_below_its_ceiling() {
         ("convert long.ply out.stl --as mesh", &[200]),
         ("picture field.iclay -o out.png --size 3000x3000", &[128]),
         ("phantom gyroid -o out.ply --count 4000000", &[128]),
+        (
+            "sample field.iclay --like head.nii --spacing 1 -o out.nrrd",
+            &[128],
+        ),
+        ("simulate scene.toml -o out.iclay --mesh out.ply", &[128]),
     ] {
         for &limit in limits {
             let (code, peak, said) = peak_of(&bench, &format!("{command} --memory {limit}MiB"));
@@ -542,6 +575,12 @@ fn memory_stays_below_its_ceiling() {
             assert!(
                 code == 0 || code == 4,
                 "{command} in {limit} MiB: code {code}: {said}"
+            );
+            // The last word is the program's own, wherever the memory ended.
+            let refused = said.lines().last().unwrap_or_default();
+            assert!(
+                code == 0 || said.lines().count() == 1 && refused.contains("; raise"),
+                "{command} in {limit} MiB: {said}"
             );
         }
     }

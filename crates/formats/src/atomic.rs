@@ -8,31 +8,140 @@
 use std::fs::{self, File, OpenOptions, Permissions};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
+use std::time::Duration;
 
-use tempfile::TempPath;
+use tempfile::{TempDir, TempPath};
 
 use crate::{Fault, FormatError};
 
 /// Bytes gathered before they go to the system.
 const BUFFER: usize = 1 << 17;
 
-/// Temporary files that have not taken their target's name yet.
-static UNDER_WAY: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+/// What goes away with the program, in the order in which it was made.
+static UNDER_WAY: Mutex<Vec<Passing>> = Mutex::new(Vec::new());
 
-fn under_way() -> MutexGuard<'static, Vec<PathBuf>> {
+/// A path that stays only if its work ends well.
+#[derive(PartialEq)]
+enum Passing {
+    /// A temporary file that has not taken its target's name yet.
+    File(PathBuf),
+    /// A directory for what is not whole yet, with all that is in it.
+    Directory(PathBuf),
+    /// A directory made for files to come, as long as none is in it.
+    Empty(PathBuf),
+}
+
+impl Passing {
+    /// Whoever ends can do no more about a path that stays.
+    fn remove(&self) {
+        let _ = match self {
+            Self::File(path) => fs::remove_file(path),
+            Self::Directory(path) => fs::remove_dir_all(path),
+            Self::Empty(path) => fs::remove_dir(path),
+        };
+    }
+}
+
+fn under_way() -> MutexGuard<'static, Vec<Passing>> {
     UNDER_WAY.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes the temporary files of all writes under way, on any thread, and lets none begin or end any more: for a
-/// program that is about to exit. A write that has ended stays whole; one that meets this call waits for ever.
+/// Removes the temporary files and directories of all work under way, on any thread, and lets no write begin or end any
+/// more: for a program that is about to exit. A write that has ended stays whole; one that meets this call waits for
+/// ever. Does nothing if a write is about to begin or end for longer than a tenth of a second, as it is where the calling
+/// thread does so itself.
 pub fn abandon() {
-    let files = under_way();
-    for file in files.iter() {
-        // Whoever exits can do no more about a file that stays.
-        let _ = fs::remove_file(file);
+    for _ in 0..100 {
+        let passing = match UNDER_WAY.try_lock() {
+            Ok(passing) => passing,
+            Err(TryLockError::Poisoned(e)) => e.into_inner(),
+            Err(TryLockError::WouldBlock) => {
+                std::thread::sleep(Duration::from_millis(1));
+                continue;
+            }
+        };
+        passing.iter().rev().for_each(Passing::remove);
+        std::mem::forget(passing);
+        return;
     }
-    std::mem::forget(files);
+}
+
+/// Does what must not be cut off by [`abandon`]: some renames. Nothing in it may write through [`replace`].
+pub fn whole<T>(work: impl FnOnce() -> T) -> T {
+    let _held = under_way();
+    work()
+}
+
+/// A directory that goes away when dropped, with all that is in it, and by [`abandon`].
+pub struct PassingDirectory(TempDir);
+
+impl PassingDirectory {
+    /// A new directory with a name of its own: hidden in `parent`, or where the system keeps temporary files.
+    ///
+    /// # Errors
+    /// Those of the system.
+    pub fn new(parent: Option<&Path>) -> io::Result<Self> {
+        let mut list = under_way();
+        let directory = match parent {
+            Some(parent) => tempfile::Builder::new()
+                .prefix(".isoclay.")
+                .suffix(".tmp")
+                .tempdir_in(parent),
+            None => tempfile::tempdir(),
+        }?;
+        list.push(Passing::Directory(directory.path().to_path_buf()));
+        Ok(Self(directory))
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        self.0.path()
+    }
+}
+
+impl Drop for PassingDirectory {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(self.path());
+        let own = Passing::Directory(self.path().to_path_buf());
+        under_way().retain(|p| *p != own);
+    }
+}
+
+/// A directory for files to come, made with those above it that are missing. Those made go away when this is dropped,
+/// and by [`abandon`], as long as they are empty.
+pub struct MadeDirectory(Vec<PathBuf>);
+
+impl MadeDirectory {
+    /// Makes `path`, if it is missing.
+    ///
+    /// # Errors
+    /// Those of the system.
+    pub fn new(path: &Path) -> io::Result<Self> {
+        let missing = (path.ancestors()).take_while(|d| !d.as_os_str().is_empty() && !d.exists());
+        let mut made = Self(Vec::new());
+        let mut list = under_way();
+        for directory in missing.collect::<Vec<_>>().into_iter().rev() {
+            match fs::create_dir(directory) {
+                // Another program was faster; it is not ours to remove.
+                Err(e) if e.kind() == io::ErrorKind::AlreadyExists => continue,
+                other => other?,
+            }
+            made.0.push(directory.to_path_buf());
+            list.push(Passing::Empty(directory.to_path_buf()));
+        }
+        Ok(made)
+    }
+}
+
+impl Drop for MadeDirectory {
+    fn drop(&mut self) {
+        for directory in self.0.drain(..).rev() {
+            let own = Passing::Empty(directory);
+            own.remove();
+            under_way().retain(|p| *p != own);
+        }
+    }
 }
 
 /// A temporary file on the list, off it and gone when dropped.
@@ -43,9 +152,9 @@ struct Temporary {
 
 impl Temporary {
     fn new(target: &Path, old: Option<Permissions>) -> io::Result<(File, Self)> {
-        let mut files = under_way();
+        let mut list = under_way();
         let (file, path) = temporary_in(target, old)?.into_parts();
-        files.push(path.to_path_buf());
+        list.push(Passing::File(path.to_path_buf()));
         Ok((file, Self { path: Some(path) }))
     }
 
@@ -53,8 +162,9 @@ impl Temporary {
         let Some(path) = self.path.take() else {
             return Ok(());
         };
-        let mut files = under_way();
-        files.retain(|f| **f != *path);
+        let own = Passing::File(path.to_path_buf());
+        let mut list = under_way();
+        list.retain(|p| *p != own);
         path.persist(target).map_err(|e| e.error)
     }
 }
@@ -62,7 +172,8 @@ impl Temporary {
 impl Drop for Temporary {
     fn drop(&mut self) {
         if let Some(path) = self.path.take() {
-            under_way().retain(|f| **f != *path);
+            let own = Passing::File(path.to_path_buf());
+            under_way().retain(|p| *p != own);
         }
     }
 }

@@ -3,12 +3,12 @@
 //! Fits and readers estimate what they need before they take it, and say what is missing. What no estimate foresees, the
 //! system refuses: beyond the ceiling it gives no more memory, and the program ends with exit code 4.
 
-use std::sync::atomic::AtomicBool;
-use std::sync::{Arc, OnceLock};
+use std::sync::OnceLock;
 
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 
 use super::cost::{data_bytes, rss_bytes};
+use super::end;
 use super::failure::{Failure, OrFail, Outcome};
 use super::quantity::{Memory, human_bytes};
 
@@ -52,13 +52,35 @@ pub fn hold(ceiling: Memory) -> Outcome {
     setrlimit(Resource::Data, limit)
         .map_err(|e| anyhow::anyhow!("--memory: the system refuses the limit ({e})"))
         .or_limit()?;
-    // An allocation that the system refuses ends the program by this signal.
-    let always = Arc::new(AtomicBool::new(true));
-    signal_hook::flag::register_conditional_shutdown(signal_hook::consts::SIGABRT, 4, always)
-        .map_err(|e| anyhow::anyhow!("--memory: cannot listen for a refused allocation ({e})"))
-        .or_limit()?;
     let _ = CEILING.set(ceiling);
     Ok(())
+}
+
+/// Ends the program because an allocation of `size` bytes was refused. Comes back only if there is no memory for the end
+/// either.
+pub fn out_of_memory(size: usize) {
+    // The end needs some itself.
+    if limit().is_some() {
+        let maximum = getrlimit(Resource::Data).maximum;
+        let _ = setrlimit(
+            Resource::Data,
+            Rlimit {
+                current: maximum,
+                maximum,
+            },
+        );
+    }
+    let held = rss_bytes().map_or_else(String::new, |held| format!("holds {} and ", human_bytes(held)));
+    let work = format!("the work {held}needs {} more", human_bytes(size as u64));
+    end::now(Failure::limit(match limit() {
+        Some(ceiling) => format!(
+            "--memory {}: {work}; raise --memory, or ask for less: a coarser result, or a part of the input",
+            human_bytes(ceiling.0)
+        ),
+        None => format!(
+            "the system gives no more memory: {work}; free some, or give --memory, within which the work is planned"
+        ),
+    }))
 }
 
 /// The ceiling of the whole process, if the user gave one.

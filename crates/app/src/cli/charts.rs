@@ -15,7 +15,7 @@ use super::interrupt;
 use super::phantom::Name;
 use super::progress::Bar;
 use super::quantity::between;
-use super::source::{SAMPLES, Source};
+use super::source::{SAMPLES, Source, scratch};
 use super::staged::StagedFiles;
 use super::{chart_dynamics, chart_mesh, chart_orient};
 use crate::charts::{Chart, Configuration, Input, Measurement, Scene, noise, outliers, sweeps};
@@ -131,7 +131,7 @@ fn hard(args: &HardArgs, cancel: &Cancel) -> Outcome {
 }
 
 fn fits(args: &FitArgs, cancel: &Cancel) -> Outcome {
-    let scratch = tempfile::tempdir().or_limit()?;
+    let scratch = scratch("the runs")?;
     for input in &args.inputs {
         let mut staged = StagedFiles::new("-o", &args.output)?;
         let subject = match input.strip_prefix("phantom:") {

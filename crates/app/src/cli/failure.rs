@@ -3,9 +3,9 @@ use std::io;
 
 use fitting::{Control, FitError};
 
-use super::cost::rss_bytes;
+use super::ceiling;
 use super::flags;
-use super::quantity::human_bytes;
+use super::quantity::{Memory, human_bytes};
 
 /// What a subcommand gives back.
 pub type Outcome<T = ()> = Result<T, Failure>;
@@ -150,16 +150,16 @@ impl From<FitError> for Failure {
 
 /// A memory limit in terms of the whole process, which is what the user gave.
 pub fn explain(e: FitError, control: &Control) -> Failure {
-    match (&e, control.memory_limit) {
-        (FitError::MemoryLimit { needed, limit }, Some(_)) => {
-            let held = rss_bytes().unwrap_or(0);
+    match (&e, control.memory_limit, ceiling::limit()) {
+        (FitError::MemoryLimit { needed, limit }, Some(_), Some(Memory(given))) => {
+            // Rounded up, so that what is advised suffices.
+            let enough = (given + needed.saturating_sub(*limit)).div_ceil(1 << 20);
             Failure::limit(format!(
-                "the fit needs about {} beside what is already held ({}), and --memory leaves {}; raise --memory \
-                 to {} or lower --max-depth",
+                "the fit needs about {}, and --memory {} leaves it {} beside the program and the input; raise --memory to \
+                 {enough}MiB or lower --max-depth",
                 human_bytes(*needed),
-                human_bytes(held),
+                human_bytes(given),
                 human_bytes(*limit),
-                human_bytes(needed + held),
             ))
         }
         _ => e.into(),

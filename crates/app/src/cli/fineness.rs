@@ -14,13 +14,14 @@ use rayon::prelude::*;
 use super::ceiling;
 use super::failure::{Failure, Outcome};
 use super::field::OpenField;
+use super::interrupt;
 use super::progress::Bar;
 use super::quantity::{Tolerance, human_count, human_number};
 
 /// What bounds the size of the triangles.
 #[derive(Clone, Copy, Debug)]
 pub enum Fineness {
-    /// Half the tolerance of the fit, a quarter of it where points are noisy.
+    /// Half the tolerance of the fit; less where that is the noise of the samples.
     OfTheFit,
     /// A chord error.
     Error(Tolerance),
@@ -29,7 +30,9 @@ pub enum Fineness {
 }
 
 /// Chord error that a cell is divided at over the one that 95 % of the centres and sides of settled triangles keep.
-const SPARE: f64 = 3.45;
+const SPARE: f64 = 3.6;
+/// Distance of a fit from the surface over the noise of its samples, which is its tolerance then: it averages them.
+const OF_NOISE: f64 = 0.125;
 /// Share of the triangles asked for that is aimed at.
 const AIM: f64 = 0.96;
 /// Least share of the triangles asked for.
@@ -37,7 +40,7 @@ const LEAST: f64 = 0.8;
 /// Trials until the best found is taken.
 const TRIALS: usize = 12;
 /// Triangles whose chord error is measured; of larger meshes as many, evenly spread.
-const MEASURED: usize = 1 << 14;
+const MEASURED: usize = 1 << 13;
 
 /// A field being meshed as finely as it needs.
 pub struct Adaptive<'a> {
@@ -128,12 +131,11 @@ impl<'a> Adaptive<'a> {
                 let tolerance = open.report().tolerance;
                 let length = match open.source() {
                     SourceKind::Volume => tolerance / open.slope(),
+                    SourceKind::Cloud if open.report().noise.is_some() => OF_NOISE * tolerance,
                     _ => tolerance,
                 };
-                // Noise is averaged: the surface is known far better than to the tolerance, 1.25 standard deviations.
-                let share = if open.report().noise.is_some() { 0.25 } else { 0.5 };
                 let wanted = if length > 0.0 {
-                    share * length
+                    0.5 * length
                 } else {
                     1e-4 * diagonal
                 };
@@ -293,8 +295,8 @@ impl<'a> Adaptive<'a> {
         )))
     }
 
-    /// 95th percentile over the triangles of the distance to the surface, to first order, of their centres and the
-    /// middles of their sides. What lies on the frame's box belongs to the cut and does not count.
+    /// 95th percentile of the distances to the surface, by two steps of Newton's method, of the centres of the triangles
+    /// and the middles of their sides. What lies on the frame's box belongs to the cut and does not count.
     fn chord_error(&self, mesh: &Mesh) -> f64 {
         let grid = self.frame.world_from_grid.inverse();
         let end = DVec3::from_array(self.frame.cells.map(f64::from));
@@ -309,9 +311,15 @@ impl<'a> Adaptive<'a> {
                 if q.min(end - q).min_element() < 1e-6 {
                     return None;
                 }
-                let mut answers = [(0.0, DVec3::ZERO); 4];
-                self.open.field().values_gradients(&points, &mut answers);
-                Some(answers.map(|(f, g)| (f - self.options.iso).abs() / g.length()))
+                let (mut feet, mut answers) = (points, [(0.0, DVec3::ZERO); 4]);
+                // One step says too little where the triangles are as large as the bends of the field.
+                for _ in 0..2 {
+                    self.open.field().values_gradients(&feet, &mut answers);
+                    for (foot, (f, g)) in feet.iter_mut().zip(answers) {
+                        *foot += g * ((self.options.iso - f) / g.length_squared());
+                    }
+                }
+                Some(std::array::from_fn::<_, 4, _>(|k| points[k].distance(feet[k])))
             })
             .flatten_iter()
             .collect();
@@ -343,14 +351,17 @@ pub fn watch<'a>(
 /// What a failure of the mesher means to the user.
 pub fn failed(e: PolygonizeError) -> Failure {
     match e {
-        PolygonizeError::Cancelled if ceiling::is_exceeded() => Failure::limit(
-            "the mesh takes more than --memory allows; raise it, or lower --resolution or --triangles",
-        ),
-        PolygonizeError::Cancelled => fitting::FitError::Cancelled.into(),
+        PolygonizeError::Cancelled if interrupt::cancel().is_cancelled() => {
+            fitting::FitError::Cancelled.into()
+        }
+        // By now the memory may be given back.
+        PolygonizeError::Cancelled => {
+            Failure::limit("the mesh takes more than --memory allows; raise it, or ask for a coarser mesh")
+        }
         PolygonizeError::TooManyBlocks { .. } | PolygonizeError::TooManyVertices { .. } => Failure::limit(
-            format!("{e}: lower --resolution or --triangles, or raise --tolerance"),
+            format!("{e}; lower --resolution or --triangles, or raise --tolerance"),
         ),
-        PolygonizeError::Cells { .. } => Failure::usage(format!("{e}: lower --resolution")),
+        PolygonizeError::Cells { .. } => Failure::usage(format!("{e}; lower --resolution")),
         _ => Failure::input(e),
     }
 }

@@ -3,6 +3,7 @@ use std::time::Duration;
 
 use fitting::Cancel;
 
+use super::end;
 use super::failure::{Failure, Outcome};
 
 /// Raised by the first Ctrl-C or SIGTERM.
@@ -17,9 +18,7 @@ pub fn listen() -> Outcome {
     ctrlc::set_handler(|| {
         ASKED.cancel();
         std::thread::sleep(GRACE);
-        formats::atomic::abandon();
-        eprintln!("isoclay: {}", Failure::from(fitting::FitError::Cancelled));
-        std::process::exit(4);
+        end::now(fitting::FitError::Cancelled.into())
     })
     .map_err(|e| Failure::limit(format!("cannot listen for Ctrl-C: {e}")))
 }

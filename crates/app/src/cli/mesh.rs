@@ -10,6 +10,7 @@ use super::cost::Cost;
 use super::failure::{Failure, Outcome};
 use super::field::OpenField;
 use super::fineness::{Adaptive, Fineness, failed, watch};
+use super::mesh_check::MeshQuality;
 use super::mesh_output::{MESHES, MeshOutput};
 use super::output::Output;
 use super::progress::Bar;
@@ -32,7 +33,8 @@ pub struct Args {
     #[arg(long, value_name = "N", conflicts_with_all = ["tolerance", "triangles"], value_parser = between::<u32>(1, 65535))]
     resolution: Option<u32>,
     /// Distance from the surface that 95 % of the centres and sides of the triangles keep: in the field's unit, in mm, or
-    /// in per cent of the solid's diagonal [default: half the tolerance of the fit]
+    /// in per cent of the solid's diagonal [default: half the tolerance of the fit, a sixteenth where that
+    /// is the noise of the samples]
     #[arg(
         long,
         value_name = "T[mm|%]",
@@ -53,6 +55,10 @@ pub struct Args {
     /// or in per cent of the solid's diagonal [default of the distance: 4 times the mean spacing of the points]
     #[arg(long, value_name = "DISTANCE[mm|%]", num_args = 0..=1, allow_negative_numbers = true)]
     trim: Option<Option<Tolerance>>,
+    /// Tell what those mind who print the mesh or compute on it: pieces, open edges, triangles that pass through each
+    /// other, smallest angles, area, volume
+    #[arg(long)]
+    check: bool,
     /// Threads to work with [default: all cores]
     #[arg(long, value_name = "N", value_parser = threads)]
     threads: Option<NonZeroUsize>,
@@ -118,8 +124,13 @@ pub fn run(args: &Args) -> Outcome {
     }
     interrupt::check(&cancel)?;
     drop_specks(&mut mesh, &open);
-    let left_out = args.written.keep(&mut mesh, open.unit(), &mut notes)?;
     trim(&mut mesh, &open, args.trim, &mut notes)?;
+    if args.open || args.trim.is_some() {
+        crate::fans::split(&mut mesh);
+    }
+    // Pieces are those of what is written.
+    let left_out = args.written.keep(&mut mesh, open.unit(), &mut notes)?;
+    let quality = args.check.then(|| MeshQuality::of(&mesh));
     bar.show("writing", 0.99);
     let (vertices, triangles) = (mesh.positions.len(), mesh.triangles.len());
     let unit = args.written.write(mesh, open.unit(), &output, &mut notes)?;
@@ -130,6 +141,7 @@ pub fn run(args: &Args) -> Outcome {
     Summary {
         vertices: Some(vertices),
         triangles: Some(triangles),
+        quality,
         left_out,
         cells,
         unit: Some(unit.to_string()),

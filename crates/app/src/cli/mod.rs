@@ -11,6 +11,7 @@ mod charts;
 mod check;
 mod convert;
 mod cost;
+mod end;
 mod eval;
 mod failure;
 mod field;
@@ -22,6 +23,7 @@ mod input;
 mod interrupt;
 mod keep;
 mod mesh;
+mod mesh_check;
 mod mesh_output;
 mod output;
 mod overwrite;
@@ -39,7 +41,6 @@ mod trim;
 mod unoriented;
 mod volume_choice;
 
-use std::io::{self, Write};
 use std::num::NonZeroUsize;
 use std::path::Path;
 use std::process::ExitCode;
@@ -111,6 +112,8 @@ pub fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(e) => return refuse(&e),
     };
+    let (json, data_on_stdout) = cli.command.stdout();
+    end::tell_as(json, data_on_stdout);
     let ready = interrupt::listen().and_then(|()| cli.memory.map_or(Ok(()), ceiling::hold));
     let outcome = ready.and_then(|()| match &cli.command {
         Command::Fit(a) => fit::run(a),
@@ -129,13 +132,7 @@ pub fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(f) if f.is_broken_pipe() => ExitCode::SUCCESS,
         Err(f) => {
-            eprintln!("isoclay: {f}");
-            let (json, data_on_stdout) = cli.command.stdout();
-            match (json, data_on_stdout) {
-                (true, false) => print_quietly(io::stdout(), &f.json()),
-                (true, true) => print_quietly(io::stderr(), &f.json()),
-                (false, _) => {}
-            }
+            end::tell(&f);
             ExitCode::from(f.code())
         }
     }
@@ -162,14 +159,12 @@ fn refuse(e: &clap::Error) -> ExitCode {
             .lines()
             .map(str::trim)
             .find(|l| l.starts_with("tip:") || l.starts_with("Usage:"));
-        print_quietly(io::stdout(), &error_object(code, &message, remedy));
+        end::print_quietly(&error_object(code, &message, remedy));
     }
     ExitCode::from(code)
 }
 
-fn print_quietly(mut out: impl Write, line: &str) {
-    let _ = writeln!(out, "{line}").and_then(|()| out.flush());
-}
+pub use ceiling::out_of_memory;
 
 impl Command {
     /// Whether `--json` was given, and whether standard output is taken by data.

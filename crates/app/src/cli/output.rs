@@ -4,8 +4,8 @@ use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use formats::atomic::PassingDirectory;
 use formats::{Fault, FormatError};
-use tempfile::TempDir;
 
 use super::failure::{Failure, OrFail, Outcome};
 use super::overwrite::refuse_own_input;
@@ -18,7 +18,7 @@ pub struct Output {
     path: PathBuf,
     /// What the user calls it; `None` is standard output.
     given: Option<PathBuf>,
-    held: Option<TempDir>,
+    held: Option<PassingDirectory>,
 }
 
 impl Output {

@@ -188,7 +188,9 @@ pub fn human_count(n: usize) -> String {
 /// Four significant digits, without an exponent where people would not want one.
 pub fn human_number(x: f64) -> String {
     let a = x.abs();
-    if x == 0.0 || !x.is_finite() {
+    if x == 0.0 {
+        "0".into()
+    } else if !x.is_finite() {
         format!("{x}")
     } else if (1e-3..1e6).contains(&a) {
         let decimals = (3 - a.log10().floor() as i32).max(0) as usize;
@@ -268,6 +270,7 @@ mod tests {
         assert_eq!(human_count(34834), "34 834");
         assert_eq!(human_count(1234567), "1 234 567");
         assert_eq!(human_number(0.0), "0");
+        assert_eq!(human_number(-0.0), "0");
         assert_eq!(human_number(0.012346), "0.01235");
         assert_eq!(human_number(1234.56), "1235");
         assert_eq!(human_number(1.5e-9), "1.500e-9");

@@ -9,8 +9,8 @@ use std::time::Duration;
 
 use clap::builder::PossibleValuesParser;
 use fitting::Cancel;
+use formats::atomic::PassingDirectory;
 use formats::{Fault, FormatError};
-use tempfile::TempDir;
 
 use super::failure::{Failure, Outcome};
 use super::flags;
@@ -24,7 +24,7 @@ pub struct Source {
     name: String,
     /// What may be read here, for the message about a file that is something else.
     accepted: &'static str,
-    _held: Option<TempDir>,
+    _held: Option<PassingDirectory>,
 }
 
 /// Names of formats that `--format` takes for an input.
@@ -139,8 +139,8 @@ impl Source {
 }
 
 /// A directory for what goes away again.
-pub fn scratch(what: &str) -> Outcome<TempDir> {
-    tempfile::tempdir().map_err(|e| {
+pub fn scratch(what: &str) -> Outcome<PassingDirectory> {
+    PassingDirectory::new(None).map_err(|e| {
         Failure::limit(format!(
             "{what}: no temporary file can be made in {} ({e}); set TMPDIR to a directory with room",
             std::env::temp_dir().display()

@@ -2,7 +2,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use formats::FormatError;
-use tempfile::TempDir;
+use formats::atomic::{MadeDirectory, PassingDirectory};
 
 use super::failure::{Failure, OrFail, Outcome};
 use super::input::writing;
@@ -11,9 +11,9 @@ use super::input::writing;
 /// take their names when all are whole.
 pub struct StagedFiles {
     directory: PathBuf,
-    /// Directories that were made for this, outermost first.
-    made: Vec<PathBuf>,
-    held: Option<TempDir>,
+    // In this order they go: the hidden directory before the one that it is in.
+    hidden: PassingDirectory,
+    _made: MadeDirectory,
     names: Vec<String>,
 }
 
@@ -32,25 +32,13 @@ impl StagedFiles {
                 directory.display()
             )));
         }
-        let mut made: Vec<PathBuf> = (directory.ancestors())
-            .take_while(|d| !d.as_os_str().is_empty() && !d.exists())
-            .map(PathBuf::from)
-            .collect();
-        made.reverse();
-        let mut staged = Self {
+        let made = MadeDirectory::new(directory).map_err(fail)?;
+        Ok(Self {
             directory: directory.to_path_buf(),
-            made,
-            held: None,
+            hidden: PassingDirectory::new(Some(directory)).map_err(fail)?,
+            _made: made,
             names: Vec::new(),
-        };
-        fs::create_dir_all(directory).map_err(fail)?;
-        let held = tempfile::Builder::new()
-            .prefix(".isoclay.")
-            .suffix(".tmp")
-            .tempdir_in(directory)
-            .map_err(fail)?;
-        staged.held = Some(held);
-        Ok(staged)
+        })
     }
 
     /// Writes a file, which nobody sees yet, at the path that `write` is given.
@@ -83,7 +71,17 @@ impl StagedFiles {
                 self.copy(name, target)?;
             }
         }
-        for (name, target) in self.names.iter().zip(&targets) {
+        let elsewhere = formats::atomic::whole(|| self.rename(&targets))?;
+        for (name, target) in elsewhere {
+            self.copy(name, target)?;
+        }
+        Ok(targets)
+    }
+
+    /// Gives the hidden files the names of `targets`; returns those that have to be copied, to another disk.
+    fn rename<'a>(&'a self, targets: &'a [PathBuf]) -> Outcome<Vec<(&'a str, &'a Path)>> {
+        let mut elsewhere = Vec::new();
+        for (name, target) in self.names.iter().zip(targets) {
             let old = target.metadata().ok();
             if old.as_ref().is_some_and(|m| !m.is_file()) {
                 continue;
@@ -95,33 +93,19 @@ impl StagedFiles {
             // A link is followed; it may lead to another disk.
             let real = target.canonicalize().unwrap_or_else(|_| target.clone());
             if fs::rename(&hidden, real).is_err() {
-                self.copy(name, target)?;
+                elsewhere.push((name.as_str(), target.as_path()));
             }
         }
-        Ok(targets)
+        Ok(elsewhere)
     }
 
     fn hidden(&self, name: &str) -> PathBuf {
-        let held = self
-            .held
-            .as_ref()
-            .expect("the hidden directory lives as long as this");
-        held.path().join(name)
+        self.hidden.path().join(name)
     }
 
     fn copy(&self, name: &str, target: &Path) -> Outcome {
         let mut whole = fs::File::open(self.hidden(name)).or_limit()?;
         formats::atomic::replace(target, |out| std::io::copy(&mut whole, out).map(drop)).map_err(writing)
-    }
-}
-
-impl Drop for StagedFiles {
-    fn drop(&mut self) {
-        self.held = None;
-        // A directory that was made for files that never came: only while it is empty.
-        for directory in self.made.iter().rev() {
-            let _ = fs::remove_dir(directory);
-        }
     }
 }
 

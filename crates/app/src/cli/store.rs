@@ -62,13 +62,20 @@ pub fn like(like: &VolumeHeader, [low, high]: [f64; 2], keeps_scale: bool) -> (S
             (store, Some(note))
         }
         None => {
-            let note = format!(
-                "densities are stored as float32: those from {} to {} are beyond the range of {}, or it is too coarse \
-                 for them",
-                human_number(low),
-                human_number(high),
-                like.stored
-            );
+            let stored = like.stored;
+            let note = if is_whole || keeps_scale {
+                let (low, high) = (human_number(low), human_number(high));
+                format!(
+                    "densities are stored as float32: those from {low} to {high} are beyond the range of {stored}, or it is too \
+                     coarse for them"
+                )
+            } else {
+                format!(
+                    "densities are stored as float32: those of the volume are {stored} in steps of {}, which this format \
+                     cannot state (.nii can)",
+                    human_number(slope.abs())
+                )
+            };
             (StoreAs::Float32, Some(note))
         }
     }
@@ -170,6 +177,10 @@ mod tests {
             None,
             "no scale to keep"
         );
+        let why = like(&header(I16, Some([0.01, 0.0])), [0.0, 200.0], false)
+            .1
+            .unwrap();
+        assert!(why.contains("steps of 0.01") && !why.contains("beyond"), "{why}");
         assert_eq!(found(I16, None, [0.0, 1e9], false), Some((I32, 1.0)));
         assert_eq!(found(I16, None, [0.0, 1e12], false), None);
     }

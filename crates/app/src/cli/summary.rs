@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::cost::{self, Cost};
 use super::failure::{OrFail, Outcome};
 use super::keep::LeftOut;
+use super::mesh_check::MeshQuality;
 use super::output::Output;
 use super::quantity::{human_bytes, human_count, human_number};
 
@@ -103,6 +104,9 @@ pub struct Summary {
     /// Triangles of the mesh.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub triangles: Option<usize>,
+    /// What those mind who use the mesh.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub quality: Option<MeshQuality>,
     /// What was left out of the mesh as small pieces.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left_out: Option<LeftOut>,
@@ -172,7 +176,8 @@ impl Summary {
         let unit = self.unit.as_deref().map(|u| format!(" {u}")).unwrap_or_default();
         let count = |n: usize| human_count(n);
         let size = |x: f64| format!("{}{unit}", human_number(x));
-        let rows = [
+        let quality = self.quality.iter().flat_map(|q| q.rows()).collect::<Vec<_>>();
+        let first = [
             ("input", self.input_count.map(count)),
             (
                 "used",
@@ -212,6 +217,8 @@ impl Summary {
             ("finest level", self.depth.map(count)),
             ("vertices", self.vertices.map(count)),
             ("triangles", self.triangles.map(count)),
+        ];
+        let last = [
             ("cells", self.cells.map(|[x, y, z]| format!("{x} × {y} × {z}"))),
             ("time", self.seconds.map(|s| format!("{s:.2} s"))),
             ("processor time", self.cpu_seconds.map(|s| format!("{s:.2} s"))),
@@ -220,8 +227,7 @@ impl Summary {
             ("field sha256", self.field_sha256.clone()),
             ("written", self.output.clone()),
         ];
-        rows.into_iter()
-            .filter_map(|(label, value)| Some((label, value?)))
+        (first.into_iter().chain(quality).chain(last)).filter_map(|(label, value)| Some((label, value?)))
     }
 }
 

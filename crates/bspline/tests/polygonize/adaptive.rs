@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use bspline::polygonize::{
     AdaptiveBlockMesh, AdaptiveMesh, AdaptiveMesher, AdaptiveOptions, AdaptiveReport, Mesh, MeshCheck,
-    PolygonizeError, PolygonizeOptions, check_mesh, polygonize,
+    PolygonizeError, PolygonizeOptions, check_mesh, polygonize, self_intersections,
 };
 use bspline::primitives::{Cuboid, Gyroid, Sphere, Torus};
 use bspline::{Aabb, Csg, Field, Frame};
@@ -36,56 +36,6 @@ fn options(depth: usize) -> AdaptiveOptions {
 
 fn ball(center: DVec3, radius: f64) -> Arc<dyn Field> {
     Arc::new(Sphere::new(center, radius).expect("a sphere"))
-}
-
-/// Pairs of triangles without a common corner of which a side of one passes through the other.
-fn self_intersections(mesh: &Mesh) -> usize {
-    let around = mesh.bounding_box().expect("not empty");
-    let n = 1 + (mesh.triangles.len() as f64 / 4.0).cbrt() as usize * 2;
-    let cell = around.size() / n as f64 + 1e-300;
-    let place = |p: DVec3| {
-        ((p - around.min) / cell)
-            .floor()
-            .clamp(DVec3::ZERO, DVec3::splat(n as f64 - 1.0))
-    };
-    let mut buckets = vec![Vec::new(); n * n * n];
-    for t in 0..mesh.triangles.len() {
-        let [a, b, c] = mesh.corners(t);
-        let (lo, hi) = (
-            place(a.min(b).min(c)).as_usizevec3(),
-            place(a.max(b).max(c)).as_usizevec3(),
-        );
-        for x in lo.x..=hi.x {
-            for y in lo.y..=hi.y {
-                for z in lo.z..=hi.z {
-                    buckets[(x * n + y) * n + z].push(t);
-                }
-            }
-        }
-    }
-    let volume = |a: DVec3, b: DVec3, c: DVec3, d: DVec3| (b - a).cross(c - a).dot(d - a);
-    let pierces = |p: DVec3, q: DVec3, [a, b, c]: [DVec3; 3]| {
-        let sides = [volume(a, b, c, p), volume(a, b, c, q)];
-        let turns = [volume(p, q, a, b), volume(p, q, b, c), volume(p, q, c, a)];
-        sides[0] * sides[1] < 0.0 && (turns.iter().all(|t| *t > 0.0) || turns.iter().all(|t| *t < 0.0))
-    };
-    let mut found = std::collections::BTreeSet::new();
-    for bucket in buckets {
-        for (i, &s) in bucket.iter().enumerate() {
-            for &t in &bucket[i + 1..] {
-                if mesh.triangles[s].iter().any(|v| mesh.triangles[t].contains(v)) {
-                    continue;
-                }
-                let (p, q) = (mesh.corners(s), mesh.corners(t));
-                let hit =
-                    (0..3).any(|k| pierces(p[k], p[(k + 1) % 3], q) || pierces(q[k], q[(k + 1) % 3], p));
-                if hit {
-                    found.insert((s, t));
-                }
-            }
-        }
-    }
-    found.len()
 }
 
 /// Closed, manifold and oriented; where the surface is rougher than the smallest cells, one vertex in 300 may stand where
@@ -468,9 +418,13 @@ fn a_mesh_that_followed_edits_is_the_one_made_anew() {
         cells: [16; 3],
     };
     let mut field = ball_spline(lattice);
-    let mut mesh = AdaptiveBlockMesh::new(&field, &frame, &iso, 0.0005).expect("a mesh");
+    let live = |field: &dyn Field, settled| {
+        AdaptiveBlockMesh::new(field, &frame, &iso, 0.002, settled).expect("a mesh")
+    };
+    let [mut mesh, mut calm] = [false, true].map(|settled| live(&field, settled));
     let (mut placed, mut whole) = (0, 0);
-    let rounds = 200;
+    let mut strokes = Vec::new();
+    let rounds = 1000;
     for round in 1..=rounds {
         let n = field.lattice().cells_at(1)[0] as f64;
         let out =
@@ -484,19 +438,24 @@ fn a_mesh_that_followed_edits_is_the_one_made_anew() {
         let next = field.edited(&[edit]).expect("an edit");
         let boxes = next.changed_boxes(&field, &region);
         placed += mesh.update(&next, &boxes).expect("an update");
+        strokes.extend(boxes);
+        if round % 10 == 0 {
+            calm.update(&next, &std::mem::take(&mut strokes))
+                .expect("an update");
+        }
         whole += mesh.block_count();
         field = next;
-        if round % 40 == 0 {
-            let anew = AdaptiveBlockMesh::new(&field, &frame, &iso, 0.0005)
-                .expect("a mesh")
-                .mesh(&field);
-            let once = meshed(&field, &frame, &iso, 0.0005, false).0;
-            let kept = mesh.mesh(&field).expect("a mesh").0;
-            assert!(
-                kept == anew.expect("a mesh").0 && kept == once,
-                "after {round} edits"
-            );
-            assert!(check_mesh(&kept.mesh).is_closed_manifold());
+        if round % 100 == 0 {
+            for (kept, settled) in [(&mesh, false), (&calm, true)] {
+                let kept = kept.mesh(&field).expect("a mesh").0;
+                let anew = live(&field, settled).mesh(&field).expect("a mesh").0;
+                let once = meshed(&field, &frame, &iso, 0.002, settled).0;
+                assert!(
+                    kept == anew && kept == once,
+                    "after {round} edits, settled: {settled}"
+                );
+                assert!(check_mesh(&kept.mesh).is_closed_manifold());
+            }
         }
     }
     assert!(placed * 2 < whole, "{placed} of {whole} blocks placed anew");

@@ -346,9 +346,9 @@ fn report<T: Real>(
     let mut notes = Vec::new();
     if domain.samples() != domain.padded() {
         notes.push(format!(
-            "the box of {:?} voxels is continued to {:?} by the edge values, to whole cells of {} voxels",
-            domain.samples(),
-            domain.padded(),
+            "the box of {} voxels is continued to {} by the edge values, to whole cells of {} voxels",
+            domain.samples().map(|n| n.to_string()).join(" × "),
+            domain.padded().map(|n| n.to_string()).join(" × "),
             domain.axes[0].spacing(0)
         ));
     }

@@ -7,22 +7,25 @@ use rayon::prelude::*;
 
 use super::around::Around;
 use super::grid::{Cells, Grids, NONE};
-use super::sample::{Judge, Sample};
+use super::judge::Judge;
+use super::sample::Sample;
 use super::tree::{Block, Limits, Samples, Tree};
 use super::vertices::{self, BlockVertices, Placer};
-use super::{AdaptiveMesh, AdaptiveOptions, AdaptiveReport, checked, contour, report_of};
+use super::{AdaptiveMesh, AdaptiveOptions, AdaptiveReport, checked, contour, report_of, settle_made, steps};
 use crate::polygonize::blocks::{BlockGrid, BlockKey, Dirty, find_blocks};
 use crate::polygonize::{PolygonizeError, PolygonizeOptions};
 use crate::{Aabb, Field, Frame};
 
 /// An adaptive mesh kept in blocks of 8³ cells, so that it can follow a field that changes in places.
 ///
-/// After any number of updates [`Self::mesh`] is the unsettled mesh that [`super::AdaptiveMesher`] makes of the last field,
-/// to the bit. The field is asked again only where it changed; joining the blocks takes time in proportion to the mesh.
+/// After any number of updates [`Self::mesh`] is the mesh that [`super::AdaptiveMesher`] makes of the last field, to the
+/// bit. The field is asked again only where it changed; joining the blocks, and settling, take time in proportion to the
+/// mesh. Unsettled meshes are for while a stroke lasts.
 pub struct AdaptiveBlockMesh {
     frame: Frame,
     options: AdaptiveOptions,
     error: f64,
+    settled: bool,
     grids: Grids,
     samples: Samples,
     roots: Vec<BlockKey>,
@@ -31,7 +34,8 @@ pub struct AdaptiveBlockMesh {
 }
 
 impl AdaptiveBlockMesh {
-    /// The surface of `field` over the cells of `frame`, in cells that keep the chord error `error`, a world length.
+    /// The surface of `field` over the cells of `frame`, in cells that keep the chord error `error`, a world length;
+    /// `settled` as of [`super::AdaptiveMesher::mesh`].
     ///
     /// # Errors
     /// Any [`PolygonizeError`] but `Cancelled`.
@@ -40,12 +44,14 @@ impl AdaptiveBlockMesh {
         frame: &Frame,
         options: &AdaptiveOptions,
         error: f64,
+        settled: bool,
     ) -> Result<Self, PolygonizeError> {
         checked(frame, options, error)?;
         let mut mesh = Self {
             frame: *frame,
             options: *options,
             error,
+            settled,
             grids: Grids::new(frame, options.depth),
             samples: Samples::new(options.depth),
             roots: Vec::new(),
@@ -68,19 +74,18 @@ impl AdaptiveBlockMesh {
         self.follow(field, Some(changed))
     }
 
-    /// The whole mesh.
+    /// The whole mesh of `field`, which is the one last followed.
     ///
     /// # Errors
     /// [`PolygonizeError::TooManyVertices`], [`PolygonizeError::InconsistentField`].
     pub fn mesh(&self, field: &dyn Field) -> Result<(AdaptiveMesh, AdaptiveReport), PolygonizeError> {
         let report = report_of(&self.samples, &self.tree, &self.options, self.error);
-        contour(
-            &self.placer(field),
-            &self.tree,
-            &self.vertices,
-            self.options.open,
-            report,
-        )
+        let placer = self.placer(field);
+        let (mut made, report) = contour(&placer, &self.tree, &self.vertices, self.options.open, report)?;
+        if self.settled {
+            settle_made(field, self.options.iso, self.error, &mut made);
+        }
+        Ok((made, report))
     }
 
     /// Blocks of 8³ cells over all levels.
@@ -93,7 +98,7 @@ impl AdaptiveBlockMesh {
             field,
             grids: &self.grids,
             iso: self.options.iso,
-            steps: super::STEPS,
+            steps: steps(self.settled),
         }
     }
 

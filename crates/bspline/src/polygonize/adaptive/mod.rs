@@ -8,6 +8,8 @@
 mod around;
 mod cases;
 mod grid;
+mod hidden;
+mod judge;
 mod live;
 mod polygons;
 mod sample;
@@ -25,8 +27,9 @@ pub use self::live::AdaptiveBlockMesh;
 
 use self::around::Around;
 use self::grid::Grids;
+use self::judge::Judge;
 use self::polygons::{BlockTriangles, EXTRA, ExtraKey, Numbered};
-use self::sample::{Judge, Sample};
+use self::sample::Sample;
 use self::tree::{Limits, Samples, Tree, Watch};
 use self::vertices::{BlockVertices, PLACE_BITS, Placer, STEPS};
 use super::blocks::{BlockGrid, BlockKey, find_blocks};
@@ -187,8 +190,7 @@ impl<'a> AdaptiveMesher<'a> {
             field: self.field,
             grids: &self.grids,
             iso: self.options.iso,
-            // Settling begins with such a step.
-            steps: if settled { 0 } else { STEPS },
+            steps: steps(settled),
         };
         let vertices = tree
             .iter()
@@ -212,24 +214,32 @@ impl<'a> AdaptiveMesher<'a> {
             return Err(PolygonizeError::Cancelled);
         }
         if settled {
-            let Mesh {
-                positions, triangles, ..
-            } = &mut made.mesh;
-            let options = SettleOptions::new(error);
-            settle(
-                self.field,
-                self.options.iso,
-                positions,
-                triangles,
-                &made.fixed,
-                &options,
-            );
+            settle_made(self.field, self.options.iso, error, &mut made);
         }
         if progress(1.0).is_break() {
             return Err(PolygonizeError::Cancelled);
         }
         Ok((made, report))
     }
+}
+
+/// Newton steps of the vertices: settling begins with one of its own.
+fn steps(settled: bool) -> usize {
+    if settled { 0 } else { STEPS }
+}
+
+fn settle_made(field: &dyn Field, iso: f64, error: f64, made: &mut AdaptiveMesh) {
+    let Mesh {
+        positions, triangles, ..
+    } = &mut made.mesh;
+    settle(
+        field,
+        iso,
+        positions,
+        triangles,
+        &made.fixed,
+        &SettleOptions::new(error),
+    );
 }
 
 /// What is common with other meshes, if all of it makes sense.

@@ -42,22 +42,19 @@ pub(super) fn flip(edges: &mut Edges, state: &State, rule: Rule) -> usize {
             .copied()
             .filter(|&h| is_best(edges, &gains, h))
             .collect();
-        let mut touched = Vec::with_capacity(chosen.len() * 6);
+        // Half-edges whose triangles are new.
+        let mut touched = Vec::with_capacity(chosen.len() * 10);
         for h in chosen {
-            let (c, d) = (edges.apex(h), edges.apex(edges.twin[h as usize]));
-            // Another flip of this pass may have joined them.
-            if edges.joined(c, d) {
+            let g = edges.twin[h as usize];
+            // Another flip of this pass may have joined the new ends, or left the old ones with few edges.
+            if is_bound(edges, h) {
                 continue;
             }
-            let pair = [h / 3, edges.twin[h as usize] / 3];
             edges.flip(h);
             count += 1;
-            for t in pair {
-                let around = (3 * t..3 * t + 3)
-                    .map(|h| edges.twin[h as usize])
-                    .filter(|&g| g != NONE);
-                touched.extend(around.map(|g| g / 3));
-                touched.push(t);
+            for half in [h, g].into_iter().flat_map(|h| h / 3 * 3..h / 3 * 3 + 3) {
+                touched.push(half);
+                touched.extend(Some(edges.twin[half as usize]).filter(|&twin| twin != NONE));
             }
         }
         if touched.is_empty() {
@@ -65,14 +62,15 @@ pub(super) fn flip(edges: &mut Edges, state: &State, rule: Rule) -> usize {
         }
         touched.sort_unstable();
         touched.dedup();
-        for h in touched.into_iter().flat_map(|t| 3 * t..3 * t + 3) {
-            for h in [h, edges.twin[h as usize]] {
-                if h != NONE {
-                    gains[h as usize] = gain(edges, state, rule, h);
-                    candidates.push(h);
-                }
-            }
+        let new: Vec<f32> = touched
+            .par_iter()
+            .with_min_len(BATCH)
+            .map(|&h| gain(edges, state, rule, h))
+            .collect();
+        for (&h, new) in touched.iter().zip(new) {
+            gains[h as usize] = new;
         }
+        candidates.extend(touched);
         candidates.retain(|&h| gains[h as usize] > 0.0);
         candidates.sort_unstable();
         candidates.dedup();
@@ -150,10 +148,14 @@ fn gain(edges: &Edges, state: &State, rule: Rule, h: u32) -> f32 {
     if !faces(first, na + nd + nc) || !faces(second, nb + nc + nd) || first.dot(second) <= 0.0 {
         return 0.0;
     }
-    if edges.valence(a) <= 3 || edges.valence(b) <= 3 || edges.joined(c, d) {
-        return 0.0;
-    }
-    gain as f32
+    if is_bound(edges, h) { 0.0 } else { gain as f32 }
+}
+
+/// Whether the edge of `h` has to stay: its ends have three edges only, or its new ends are joined already.
+fn is_bound(edges: &Edges, h: u32) -> bool {
+    let g = edges.twin[h as usize];
+    let few = |v: u32| edges.valence(v) <= 3;
+    few(edges.start(h)) || few(edges.start(g)) || edges.joined(edges.apex(h), edges.apex(g))
 }
 
 /// Cotangent of the angle at `p` in the triangle with `q` and `r`.

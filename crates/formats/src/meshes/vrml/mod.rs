@@ -40,6 +40,7 @@ pub(super) fn parse(bytes: &[u8], path: Option<&Path>, budget: &mut Budget) -> R
         faces: Faces::new(),
         corners: Vec::new(),
         instances: 0,
+        round_count: 0,
     };
     out.place_all(&scene, budget)?;
     let mut raw = RawShape {
@@ -58,10 +59,10 @@ pub(super) fn parse(bytes: &[u8], path: Option<&Path>, budget: &mut Budget) -> R
         raw.notes
             .push(format!("not read and left out: {}", unread.join(", ")));
     }
-    if scene.round_count > 0 {
+    if out.round_count > 0 {
         raw.notes.push(format!(
-            "{} spheres, cones and cylinders became polygons of 64 sides, within 0.25 % of their radius",
-            scene.round_count
+            "spheres, cones and cylinders became polygons of 64 sides, within 0.25 % of their radius: {}",
+            out.round_count
         ));
     }
     out.faces.finish(&mut raw);
@@ -73,6 +74,8 @@ struct Out {
     faces: Faces,
     corners: Vec<u32>,
     instances: usize,
+    /// Spheres, cones and cylinders that were placed.
+    round_count: usize,
 }
 
 impl Out {
@@ -146,10 +149,12 @@ impl Out {
             first,
             count,
             ccw,
+            is_round,
         } = &scene.nodes[node]
         else {
             return Ok(());
         };
+        self.round_count += usize::from(*is_round);
         let indices = &scene.indices.items[*first..first + count];
         let points = match coord.map(|c| &scene.nodes[c]) {
             Some(Node::Points { first, count }) => &scene.points.items[*first..first + count],

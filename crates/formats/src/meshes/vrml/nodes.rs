@@ -37,6 +37,8 @@ pub(super) enum Node {
         first: usize,
         count: usize,
         ccw: bool,
+        /// Whether the faces stand for something round.
+        is_round: bool,
     },
 }
 
@@ -49,8 +51,6 @@ pub(super) struct Scene {
     pub indices: Counted<i32>,
     /// Kinds of geometry that are not read.
     pub unread: BTreeSet<&'static str>,
-    /// Spheres, cones and cylinders.
-    pub round_count: usize,
 }
 
 const OTHER_GEOMETRY: [&str; 5] = ["ElevationGrid", "Extrusion", "IndexedLineSet", "PointSet", "Text"];
@@ -63,7 +63,6 @@ pub(super) fn parse(bytes: &[u8], path: Option<&Path>, budget: &mut Budget) -> R
         points: Counted::new("points"),
         indices: Counted::new("indices"),
         unread: BTreeSet::new(),
-        round_count: 0,
     };
     scene.roots = File::new(&mut scene, path, 0).nodes_of(bytes, 0, budget)?;
     Ok(scene)
@@ -310,7 +309,6 @@ impl<'a, 's> File<'a, 's> {
         budget: &mut Budget,
     ) -> Result<Node, Fault> {
         let polygons = primitives::read(kind, tokens)?;
-        self.scene.round_count += usize::from(kind != b"Box");
         let first = self.scene.points.items.len();
         for p in &polygons.points {
             self.scene.points.push(*p, budget)?;
@@ -326,6 +324,7 @@ impl<'a, 's> File<'a, 's> {
             first,
             count: polygons.indices.len(),
             ccw: true,
+            is_round: kind != b"Box",
         })
     }
 
@@ -470,6 +469,7 @@ impl<'a, 's> File<'a, 's> {
             first,
             count,
             ccw,
+            is_round: false,
         })
     }
 }

@@ -225,6 +225,21 @@ fn primitives_are_closed_outward_and_of_their_volume() {
     );
 }
 
+/// What a switch or a level of detail hides was counted, and what is used twice was counted once.
+#[test]
+fn round_things_are_counted_where_they_are_placed() {
+    let ball = shape("Sphere { }");
+    let counted = |body: String| read(&body).unwrap().notes.concat();
+    let hidden = format!("LOD {{ level [ {} {ball} ] }}", shape("Box { }"));
+    assert_eq!(counted(hidden), "");
+    assert!(
+        counted(format!(
+            "DEF A {ball} Transform {{ translation 5 0 0 children USE A }}"
+        ))
+        .ends_with(": 2")
+    );
+}
+
 #[test]
 fn prototypes_stand_for_the_first_node_of_their_body_with_the_fields_of_the_instance() {
     let wheel = format!(

@@ -332,16 +332,17 @@ fn ambiguous(all: &[Group], chosen: &[usize], wanted: Option<&str>, others: usiz
         _ => all.iter().collect(),
     };
     let list: String = listed.iter().map(|g| format!("\n  {}", g.text)).collect();
-    let value = match wanted {
-        Some(w) => format!(
-            "{} named {}:{list}\n",
-            chosen.len(),
-            crate::error::excerpt(w.as_bytes())
+    let name = wanted.map(|w| crate::error::excerpt(w.as_bytes()));
+    let (what, value) = match (name, chosen.len()) {
+        (Some(name), 0) => ("the series asked for", format!("{name}, and there are:{list}")),
+        (Some(name), n) => ("the number of series", format!("{n} named {name}:{list}")),
+        (None, n) => (
+            "the number of series",
+            format!("{}, of which {n} are volumes:{list}", all.len()),
         ),
-        None => format!("{}, of which {} are volumes:{list}\n", all.len(), chosen.len()),
     };
     Fault::Choose {
-        what: "the number of series",
+        what,
         value,
         remedy: "choose one by its number or identifier",
         choice: Choice::Series,

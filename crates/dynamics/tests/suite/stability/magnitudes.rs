@@ -9,7 +9,7 @@ use dynamics::patch::{Patch, PatchError};
 use dynamics::solve::{Method, SolverOptions, VCycleOptions};
 use dynamics::springs::{Law, Neighbours, Weights};
 
-use crate::{ball, damped, painted, pull, slope};
+use super::{ball, damped, painted, pull, slope};
 
 const ALL: [Integrator; 4] = [
     Integrator::Paper,

@@ -1,14 +1,12 @@
 //! Solvers of a step against dense double precision.
 
-mod common;
-
 use dynamics::lattice::{Lattice, Rim, TensorWorkspace};
 use dynamics::solve::{BandCholesky, Galerkin, Method, SolverOptions, StepSolver};
 use dynamics::springs::{Neighbours, SpringWeights, StepMatrix, Weights};
 use dynamics::study::{Pattern, spring_weights};
 use nalgebra::DVector;
 
-use common::dense;
+use crate::common::dense;
 
 fn matrix(
     pattern: Pattern,

@@ -1,7 +1,5 @@
 //! Tensor-product patches with nonuniform, clamped knots as dynamic patches.
 
-mod common;
-
 use bspline::tensor::TensorSpline;
 use bspline::{Field, KnotVector};
 use dynamics::integrators::Integrator;
@@ -78,7 +76,7 @@ fn a_pushed_patch_rests_where_a_dense_solve_says() {
         let lumped = region.patch().matter().lumped(lattice, Neighbours::Six).unwrap();
         let s = StepMatrix::new([17; 3], lumped.ground, lumped.springs);
         // Springs have σ² = 1/4.
-        let k = 0.25 * common::dense(lattice, &s);
+        let k = 0.25 * crate::common::dense(lattice, &s);
         let mut column = vec![0.0; lattice.coefficient_count()];
         lattice.gather(&force, &mut column, &mut TensorWorkspace::new());
         let exact = k.cholesky().unwrap().solve(&DVector::from_vec(column));

@@ -7,7 +7,7 @@ use dynamics::matter::Quantity;
 use dynamics::region::{Cells, Region, RegionOptions};
 use dynamics::springs::{Law, Neighbours, Plasticity};
 
-use crate::{Random, damped, field, push, state_bits};
+use super::{Random, damped, field, push, state_bits};
 
 /// What is left of a region after forty events; an error tells which event went wrong.
 fn play<T: Real>(seed: u64) -> Result<Vec<u64>, String> {

@@ -1,7 +1,5 @@
 //! A part of a scanned animal: rest lengths, stiffness and mass as a sculptor paints them, and what holds it.
 
-mod common;
-
 use std::io::Read;
 use std::path::Path;
 use std::sync::LazyLock;
@@ -245,7 +243,7 @@ fn rest_lengths_inflate_and_deflate_four_d_springs() {
 /// `Aᵀ(diag(m) + Bᵀdiag(k)B)A` element by element.
 fn dense(region: &Region<f64>, mass: Weights<f64>, springs: Vec<SpringWeights<f64>>) -> DMatrix<f64> {
     let lattice = region.patch().lattice();
-    common::dense(lattice, &StepMatrix::new(lattice.sample_dims(), mass, springs))
+    crate::common::dense(lattice, &StepMatrix::new(lattice.sample_dims(), mass, springs))
 }
 
 /// Mass, damping and stiffness matrices of a region under the linear law.

@@ -5,7 +5,7 @@ use bspline::{Field, HierarchicalSpline, Real};
 use dynamics::region::{Cells, Region, RegionError, RegionOptions, Thresholds};
 use glam::DVec3;
 
-use crate::{CELLS, Random, damped, field, lattice, options, pushed};
+use super::{CELLS, Random, damped, field, lattice, options, pushed};
 
 /// Random world points of the lattice's box, some just outside the faces of the region, and whether they lie in it.
 fn points(cells: Cells, count: usize) -> Vec<(DVec3, bool)> {

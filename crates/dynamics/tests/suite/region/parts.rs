@@ -9,7 +9,7 @@ use dynamics::patch::PatchError;
 use dynamics::region::{Cells, Region, RegionOptions, Schedule, Thresholds, Turn};
 use glam::{DMat3, DVec3};
 
-use crate::{damped, field, lattice, options, push, state_bits};
+use super::{damped, field, lattice, options, push, state_bits};
 
 /// A pushed region of 7³ cells from the cell `x` on.
 fn pushed_at(field: &HierarchicalSpline<f32>, x: u32) -> Region<f32> {

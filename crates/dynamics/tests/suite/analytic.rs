@@ -1,7 +1,5 @@
 //! Motion and rest against theory: one mode, a static solve, the closed form of a pull, its limit under refinement.
 
-mod common;
-
 use bspline::Basis;
 use dynamics::integrators::Integrator;
 use dynamics::lattice::{Lattice, Rim, TensorWorkspace};
@@ -89,7 +87,7 @@ fn frequency_and_decay_of_a_free_mode() {
 fn stiffness(p: &Patch<f64>) -> DMatrix<f64> {
     let lumped = p.matter().lumped(p.lattice(), Neighbours::Six).unwrap();
     let s = StepMatrix::new(p.lattice().sample_dims(), lumped.ground, lumped.springs);
-    common::dense(p.lattice(), &s)
+    crate::common::dense(p.lattice(), &s)
 }
 
 #[test]

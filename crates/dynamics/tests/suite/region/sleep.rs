@@ -7,7 +7,7 @@ use dynamics::matter::{Matter, Quantity};
 use dynamics::region::{Region, RegionOptions, Thresholds};
 use dynamics::springs::{Law, Neighbours, Weights};
 
-use crate::{CELLS, INTEGRATORS, damped, field, options, push, pushed, state_bits};
+use super::{CELLS, INTEGRATORS, damped, field, options, push, pushed, state_bits};
 
 #[test]
 fn released_clay_stays_to_the_bit() {

@@ -10,7 +10,7 @@ use dynamics::region::{Cells, Region, RegionError, RegionOptions};
 use dynamics::springs::Neighbours;
 use glam::{DMat3, DVec3};
 
-use crate::{CELLS, damped, field, lattice, options, push, pushed};
+use super::{CELLS, damped, field, lattice, options, push, pushed};
 
 #[test]
 fn cells_that_are_not_cubic_are_sampled_in_world_lengths() {

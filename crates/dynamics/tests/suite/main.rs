@@ -1,0 +1,16 @@
+//! All tests of the crate from outside, in one program: each further one would compile the solvers once more.
+
+mod analytic;
+mod bunny;
+mod choice;
+mod common;
+mod constraints;
+mod increment;
+mod lattice;
+mod motion;
+mod plasticity;
+mod region;
+mod solve;
+mod springs;
+mod stability;
+mod tensor_region;
