@@ -21,7 +21,6 @@ mod lattice;
 mod prolong;
 mod slopes;
 mod spline;
-mod still;
 mod surface;
 mod versions;
 
