@@ -26,7 +26,6 @@ pub use measure::{LeafError, PointError, PointErrors, crossing, measure_points, 
 pub use residual::newton_distance;
 mod robust;
 pub(crate) mod samples;
-mod specks;
 pub(crate) mod stencil;
 mod support;
 
@@ -189,15 +188,6 @@ pub fn fit_points<T: Real>(
             conditions.len()
         ));
     };
-    let room = options
-        .coefficients
-        .map_or(usize::MAX, |most| most.saturating_sub(field.coefficient_count()));
-    let (field, specks) = specks::remove(field, &samples, room);
-    if specks > 0 {
-        samples.notes.push(format!(
-            "{specks} specks of solid or cavity without a point of their own were taken out"
-        ));
-    }
     control.step("measuring", 0.95)?;
     let report = residual::report(&field, &samples, &cascade, cloud.positions, &plan, noise);
     Ok((field, report))
