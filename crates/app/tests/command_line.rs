@@ -309,6 +309,9 @@ fn a_mesh_is_fitted_as_the_solid_that_it_bounds() {
     let tolerance = number(&fit, "tolerance");
     assert!(number(&fit, "max") <= tolerance);
     let check = bench.json("check box.iclay box.obj --as mesh");
+    // Points of chance bound nothing and judge no leaf: a bound below the largest error of the fit was given.
+    assert!(check["bound"].is_null() && check["leaves_over_tolerance"].is_null());
+    assert!(check["notes"].to_string().contains("by chance"), "{check}");
     assert_eq!(check["wrong_signs"], 0);
     // At a right-angled corner the distance grows by 1/√3 of the way.
     assert!(number(&check, "p95") <= tolerance && number(&check, "max") <= 1.8 * tolerance);

@@ -15,7 +15,7 @@ use super::cost::Cost;
 use super::failure::{Failure, Outcome};
 use super::field::{OpenField, either};
 use super::input::{self, Input, Shape};
-use super::quantity::{human_number, threads};
+use super::quantity::{human_count, human_number, threads};
 use super::sample::voxel_frame;
 use super::source::{FIELDS, SAMPLES, Source, input_formats};
 use super::staged::StagedFiles;
@@ -117,8 +117,17 @@ pub fn run(args: &Args) -> Outcome {
     let (s, audit) = (&measured.statistics, &measured.audit);
     // An interpolating fit aims at none.
     let has_tolerance = open.report().tolerance > 0.0;
+    // Of a mesh a leaf holds a few points of chance, which neither judge it nor bound anything.
+    let judges_leaves = has_tolerance && measured.against_mesh.is_none();
     let mut notes = Vec::new();
-    if has_tolerance && audit.claimed_below > 0 {
+    if measured.against_mesh.is_some() {
+        notes.push(format!(
+            "measured at {} points spread over the mesh by chance, others than those of the fit, whose figures isoclay info \
+             prints",
+            human_count(measured.count)
+        ));
+    }
+    if judges_leaves && audit.claimed_below > 0 {
         notes.push(format!(
             "{} leaves are above the tolerance although the fit calls them below",
             audit.claimed_below
@@ -152,15 +161,15 @@ pub fn run(args: &Args) -> Outcome {
         p95: Some(s.p95),
         max: Some(s.max),
         used_count: Some(measured.used),
-        bound: measured.bound,
+        bound: measured.bound.filter(|_| measured.against_mesh.is_none()),
         unprojected: measured.unprojected,
         back_p95: measured.against_mesh.as_ref().map(|m| m.back.p95),
         back_max: measured.against_mesh.as_ref().map(|m| m.back.max),
         wrong_signs: measured.against_mesh.as_ref().map(|m| m.wrong_signs),
         unsupported_components: Some(measured.unsupported.len()).filter(|_| measured.unprojected.is_some()),
         leaves: Some(audit.leaves),
-        leaves_over_tolerance: has_tolerance.then_some(audit.over_tolerance),
-        leaves_without_data: has_tolerance.then_some(audit.without_data),
+        leaves_over_tolerance: judges_leaves.then_some(audit.over_tolerance),
+        leaves_without_data: judges_leaves.then_some(audit.without_data),
         field_sha256: Some(open.sha256()),
         output: args.output.as_ref().map(|d| d.display().to_string()),
         notes,
