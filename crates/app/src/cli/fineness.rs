@@ -30,7 +30,7 @@ pub enum Fineness {
 }
 
 /// Chord error that a cell is divided at over the one that 95 % of the centres and sides of settled triangles keep.
-const SPARE: f64 = 3.45;
+const SPARE: f64 = 3.6;
 /// Share of the triangles asked for that is aimed at.
 const AIM: f64 = 0.96;
 /// Least share of the triangles asked for.

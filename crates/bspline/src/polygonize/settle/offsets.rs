@@ -13,6 +13,11 @@ const BATCH: usize = 1024;
 /// Steps towards a mean distance of nothing round every vertex.
 const STEPS: usize = 2;
 
+/// What a vertex moves by over what would bring the mean to nothing: the 95th percentile of the distances at centres and
+/// sides is least from 1.05 to 1.1, and smooth surfaces, which round off convex edges, come nearer to what they were
+/// fitted to (bunny, 108 k triangles: 1.60 u from the points with 1, 1.57 with 1.1).
+const BEYOND: f64 = 1.1;
+
 /// Moves each free vertex by the mean signed distance of the triangles round it, in two steps.
 ///
 /// The distance of a triangle to the surface is taken for a quadratic: its mean is three quarters of that at the centroid
@@ -68,6 +73,6 @@ pub(super) fn offset(field: &dyn Field, iso: f64, edges: &Edges, state: &mut Sta
         }
     }
     for (v, &h) in height.iter().enumerate() {
-        state.positions[v] += state.normals[v] * h;
+        state.positions[v] += state.normals[v] * (BEYOND * h);
     }
 }
