@@ -276,6 +276,20 @@ fn mesh_keeps_its_number_of_triangles_and_the_tolerance_of_the_fit() {
     }
 }
 
+/// The mesh of a noisy cloud is as near to the surface as the fit is, which is much nearer than its samples are.
+#[test]
+fn meshes_of_noisy_clouds_lose_nothing_of_the_fit() {
+    let bench = Bench::new();
+    bench.json("phantom sphere -o cloud.ply --noise 1%");
+    bench.json("fit cloud.ply -o field.iclay");
+    let error_with = |options: &str| {
+        bench.json(&format!("mesh field.iclay -o mesh.ply {options}"));
+        chord_error_on_unit_sphere(&bench)
+    };
+    let (default, fine) = (error_with(""), error_with("--resolution 150"));
+    assert!(default < 1.05 * fine, "{default} {fine}");
+}
+
 #[test]
 fn same_bits_with_1_and_2_threads() {
     let bench = Bench::new();

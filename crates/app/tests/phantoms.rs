@@ -159,7 +159,7 @@ fn tetrahedron_with_four_holes() {
     hold(&Thresholds {
         solid: Solid::Tetrahedron,
         rms: 1.2e-5,
-        p95: 2.4e-5,
+        p95: 2.0e-5,
         mesh: 4e-5,
         genus: 3,
     });

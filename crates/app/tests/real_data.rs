@@ -13,9 +13,9 @@ fn bunny_becomes_a_closed_mesh_near_its_points() {
     let fit = bench.json(&format!("fit {bunny} -o bunny.iclay"));
     bench.json("mesh bunny.iclay -o bunny.ply");
     let check = bench.json(&format!("check bunny.iclay {bunny} -o report"));
-    // The diagonal is 15.76: p95 of 5e-4 of it.
-    assert!(number(&check, "p95") < 0.010, "{check}");
-    assert!(number(&check, "rms") < 0.006, "{check}");
+    // The diagonal is 15.76: p95 is 3.3e-4 of it. With heavier conditions between the samples it was 5.1e-4.
+    assert!(number(&check, "p95") < 0.0065, "{check}");
+    assert!(number(&check, "rms") < 0.0033, "{check}");
     // The fit and the check measure alike, each in its own way.
     assert!(
         (number(&check, "rms") / number(&fit, "rms") - 1.0).abs() < 0.05,

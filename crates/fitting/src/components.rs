@@ -14,6 +14,9 @@ pub struct UnsupportedComponent {
     pub at: DVec3,
 }
 
+/// Values held at once, about.
+const SLAB: usize = 1 << 17;
+
 /// Cells `start..end` of one row along z, all of one sign.
 struct Run {
     start: u32,
@@ -99,9 +102,13 @@ fn runs_of_sign(field: &dyn Field, iso: f64, frame: &Frame) -> (Vec<Run>, Vec<u3
         ..*frame
     };
     let (mut runs, mut rows) = (Vec::new(), vec![0]);
-    let mut slab = vec![0.0; ny * nz];
-    for x in 0..nx {
-        field.frame_values(&centres, [x as i64, 0, 0], [1, ny, nz], &mut slab);
+    // Several planes at once, where they are small: a brick is found once for all of them.
+    let planes = (SLAB / (ny * nz).max(1)).clamp(1, 8);
+    let mut slab = vec![0.0; planes * ny * nz];
+    for x in (0..nx).step_by(planes) {
+        let count = planes.min(nx - x);
+        let slab = &mut slab[..count * ny * nz];
+        field.frame_values(&centres, [x as i64, 0, 0], [count, ny, nz], slab);
         for values in slab.chunks_exact(nz) {
             let mut start = 0;
             for end in 1..=nz {

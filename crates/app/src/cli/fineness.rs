@@ -21,7 +21,7 @@ use super::quantity::{Tolerance, human_count, human_number};
 /// What bounds the size of the triangles.
 #[derive(Clone, Copy, Debug)]
 pub enum Fineness {
-    /// Half the tolerance of the fit.
+    /// Half the tolerance of the fit; less where that is the noise of the samples.
     OfTheFit,
     /// A chord error.
     Error(Tolerance),
@@ -31,6 +31,8 @@ pub enum Fineness {
 
 /// Chord error that a cell is divided at over the one that 95 % of the centres and sides of settled triangles keep.
 const SPARE: f64 = 3.6;
+/// Distance of a fit from the surface over the noise of its samples, which is its tolerance then: it averages them.
+const OF_NOISE: f64 = 0.125;
 /// Share of the triangles asked for that is aimed at.
 const AIM: f64 = 0.96;
 /// Least share of the triangles asked for.
@@ -129,6 +131,7 @@ impl<'a> Adaptive<'a> {
                 let tolerance = open.report().tolerance;
                 let length = match open.source() {
                     SourceKind::Volume => tolerance / open.slope(),
+                    SourceKind::Cloud if open.report().noise.is_some() => OF_NOISE * tolerance,
                     _ => tolerance,
                 };
                 let wanted = if length > 0.0 {

@@ -21,11 +21,16 @@ pub(crate) fn build_levels<T: Real>(
             .as_ref()
             .map(|p| p.iter().enumerate().map(|(i, b)| (b.key, i as u32)).collect())
             .unwrap_or_default();
-        let make = |key: &BrickKey| {
+        let make = |(key, mut totals): (&BrickKey, Arc<[T; HALO_LEN]>)| {
             let parent = parents
                 .as_deref()
                 .map(|parents| &*parents[parent_index[&key.parent()] as usize].totals);
-            let totals = brick_totals(parent, &corrections[level], *key);
+            fill_totals(
+                parent,
+                &corrections[level],
+                *key,
+                Arc::get_mut(&mut totals).expect("just made"),
+            );
             let hull = min_max(totals.as_slice());
             Brick {
                 key: *key,
@@ -35,7 +40,9 @@ pub(crate) fn build_levels<T: Real>(
                 children: [NONE; 8],
             }
         };
-        let bricks: Vec<Brick<T>> = keys.par_iter().with_min_len(64).map(make).collect();
+        // Asked for here, not by the threads: so they take the place of what the caller has freed.
+        let blank: Vec<_> = keys.iter().map(|_| Arc::new([T::zero(); HALO_LEN])).collect();
+        let bricks: Vec<Brick<T>> = keys.par_iter().zip(blank).with_min_len(64).map(make).collect();
         if let Some(parents) = levels.last_mut() {
             for (i, brick) in bricks.iter().enumerate() {
                 let o = brick.key.octant();
@@ -56,12 +63,25 @@ pub(super) fn brick_totals<T: Real>(
     key: BrickKey,
 ) -> Arc<[T; HALO_LEN]> {
     let mut totals = Arc::new([T::zero(); HALO_LEN]);
-    let slots = Arc::get_mut(&mut totals).expect("just made");
-    if let Some(parent) = parent {
-        prolong(parent, key.octant(), slots);
-    }
-    add_corrections(corrections, key, slots);
+    fill_totals(
+        parent,
+        corrections,
+        key,
+        Arc::get_mut(&mut totals).expect("just made"),
+    );
     totals
+}
+
+fn fill_totals<T: Real>(
+    parent: Option<&[T; HALO_LEN]>,
+    corrections: &LevelCorrections<T>,
+    key: BrickKey,
+    blank: &mut [T; HALO_LEN],
+) {
+    if let Some(parent) = parent {
+        prolong(parent, key.octant(), blank);
+    }
+    add_corrections(corrections, key, blank);
 }
 
 /// Least and largest value.

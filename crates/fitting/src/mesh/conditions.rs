@@ -1,14 +1,13 @@
 //! The conditions of one level, and the errors of its cells.
 
 use bspline::Real;
-use bspline::hierarchical::{BRICK, BrickKey, HALO};
 use glam::DVec3;
 use rayon::prelude::*;
 
 use super::Plan;
 use super::judge::Quality;
 use super::probes::{Cell, Octants, Probe, cell_of, center, child};
-use crate::points::band::Band;
+use crate::points::band::{BRICK, Band, HALO, HALO_LEN, Key, halo_start, key_of, slot_of};
 use crate::points::band_solve::{BandSample, BrickSamples};
 use crate::points::stencil::{Spot, gather};
 
@@ -37,9 +36,8 @@ pub(super) struct Around<'a> {
 /// Place of a point in its cell of a brick's halo.
 fn spot<T: Real>(at: DVec3, cell: [u32; 3], depth: usize) -> Spot<T> {
     let q = at * (1u64 << depth) as f64;
-    let [x, y, z] = cell.map(|c| c as usize % BRICK);
     Spot {
-        start: (x * HALO + y) * HALO + z,
+        start: halo_start(cell),
         t: std::array::from_fn(|a| T::from_f64(q[a] - f64::from(cell[a]))),
     }
 }
@@ -62,16 +60,12 @@ fn sample<T: Real>(probe: &Probe, depth: usize) -> BandSample<T> {
     }
 }
 
-fn brick_of(cell: [u32; 3]) -> BrickKey {
-    BrickKey(cell.map(|c| c / BRICK as u32))
-}
-
 /// The cells of each brick: `cells` are sorted brick by brick.
-pub(super) fn by_brick(cells: &[Cell]) -> Vec<(BrickKey, std::ops::Range<usize>)> {
+pub(super) fn by_brick(cells: &[Cell]) -> Vec<(Key, std::ops::Range<usize>)> {
     let mut out = Vec::new();
     let mut start = 0;
-    for group in cells.chunk_by(|a, b| brick_of(a.at) == brick_of(b.at)) {
-        out.push((brick_of(group[0].at), start..start + group.len()));
+    for group in cells.chunk_by(|a, b| key_of(a.at) == key_of(b.at)) {
+        out.push((key_of(group[0].at), start..start + group.len()));
         start += group.len();
     }
     out
@@ -89,9 +83,8 @@ impl<T: Real> Conditions<T> {
         let near = near_masks(depth, band, cells);
         let place = |probe: &Probe| -> Option<u32> {
             let cell = cell_of(probe.at, depth);
-            let brick = band.find(brick_of(cell))?;
-            let [x, y, z] = cell.map(|c| c as usize % BRICK);
-            (near[brick][x] >> (BRICK * y + z) & 1 == 1).then_some(brick as u32)
+            let brick = band.find(key_of(cell))?;
+            (near[brick] >> slot_of(cell) & 1 == 1).then_some(brick as u32)
         };
         let others = [around.settled, around.corners];
         // (brick, list, index): keys of their own, so any sort gives one order.
@@ -158,16 +151,16 @@ pub(super) fn qualities<T: Real>(
     plan: &Plan,
 ) -> Vec<Quality> {
     let n = (1u64 << depth) as f64;
-    let mut cornered: Vec<(BrickKey, u32)> = corners
+    let mut cornered: Vec<(Key, u32)> = corners
         .par_iter()
         .zip(0u32..corners.len() as u32)
-        .map(|(c, i)| (brick_of(cell_of(c.at, depth)), i))
+        .map(|(c, i)| (key_of(cell_of(c.at, depth)), i))
         .collect();
     cornered.par_sort_unstable();
     by_brick(cells)
         .into_par_iter()
         .flat_map_iter(|(key, range)| {
-            let mut values = [T::zero(); HALO * HALO * HALO];
+            let mut values = [T::zero(); HALO_LEN];
             let brick = band.find(key).expect("the band reaches round its cells");
             band.halo(&band.totals, brick, &mut values);
             let field = |at: DVec3, cell: [u32; 3]| {
@@ -212,9 +205,9 @@ pub(super) fn part(cell: &Cell, o: usize, depth: usize) -> DVec3 {
     center(child(cell.at, o), depth + 1)
 }
 
-/// Cells, brick by brick, within two of a refined one: those that its functions reach. Word `x`, bit `8y + z`.
-fn near_masks<T: Real>(depth: usize, band: &Band<T>, cells: &[Cell]) -> Vec<[u64; BRICK]> {
-    let mut masks = vec![[0u64; BRICK]; band.keys.len()];
+/// Cells, brick by brick, within two of a refined one: those that its functions reach.
+fn near_masks<T: Real>(depth: usize, band: &Band<T>, cells: &[Cell]) -> Vec<u64> {
+    let mut masks = vec![0u64; band.keys.len()];
     let last = (1u32 << depth) - 1;
     let size = BRICK as u32;
     for cell in cells {
@@ -224,15 +217,13 @@ fn near_masks<T: Real>(depth: usize, band: &Band<T>, cells: &[Cell]) -> Vec<[u64
             for y in low[1] / size..=high[1] / size {
                 for z in low[2] / size..=high[2] / size {
                     let key = [x, y, z];
-                    let brick = band
-                        .find(BrickKey(key))
-                        .expect("the band reaches round its cells");
+                    let brick = band.find(key).expect("the band reaches round its cells");
                     let from: [u32; 3] = std::array::from_fn(|a| low[a].max(key[a] * size) % size);
                     let to: [u32; 3] = std::array::from_fn(|a| high[a].min(key[a] * size + size - 1) % size);
                     let run = (2u64 << to[2]) - (1 << from[2]);
                     for i in from[0]..=to[0] {
                         for j in from[1]..=to[1] {
-                            masks[brick][i as usize] |= run << (size * j);
+                            masks[brick] |= run << (size * (size * i + j));
                         }
                     }
                 }

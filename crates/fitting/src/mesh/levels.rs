@@ -1,6 +1,5 @@
 //! The octree: each level corrects the one before where the signed distance is not met.
 
-use bspline::hierarchical::BRICK;
 use bspline::{HierarchicalSpline, Real};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -15,7 +14,7 @@ use super::probes::{Cell, Octants, Probe, center, child};
 use super::summary::{LeafCell, summary};
 use crate::points::BASE_DEPTH;
 use crate::points::assemble::assemble_in;
-use crate::points::band::{Band, Coarser, active_count, bricks_near};
+use crate::points::band::{Band, Coarser, active_count, count_bricks_near, key_of};
 use crate::points::band_solve::{BandProblem, BandSample, Weights};
 use crate::points::cascade::{Level, level_bytes};
 use crate::points::stencil::{Spot, gather};
@@ -237,7 +236,7 @@ impl Octree<'_> {
         let mut next = children(&split);
         let at: Vec<[u32; 3]> = next.iter().map(|c| c.at).collect();
         if !room(
-            bricks_near(depth + 1, &at, REACH).0.len(),
+            count_bricks_near(depth + 1, &at, REACH),
             next.len(),
             self.settled.len(),
         ) {
@@ -246,7 +245,7 @@ impl Octree<'_> {
             next.clear();
         }
         self.settle(depth, &cells, octants, found, &split, &reasons);
-        next.sort_unstable_by_key(|c| (c.at.map(|x| x / BRICK as u32), c.at));
+        next.sort_unstable_by_key(|c| (key_of(c.at), c.at));
         self.cells = next;
     }
 

@@ -7,7 +7,7 @@ use bspline::hierarchical::{BRICK, BrickKey, Corrections, LevelCorrections};
 use bspline::{HierarchicalSpline, Real};
 use glam::DVec3;
 
-use super::band::active_slots;
+use super::band;
 use super::cascade::Level;
 use super::full_grid::FullGrid;
 use super::samples::{Samples, lattice};
@@ -44,20 +44,21 @@ pub(crate) fn assemble_in<T: Real>(
     let unit = T::from_f64(scale);
     for level in levels {
         let mut values = level.x.iter();
-        let mut corrections = LevelCorrections::new();
-        for (key, mask) in level.keys.iter().zip(&level.masks) {
-            if *mask == [0; BRICK] {
-                continue;
+        let mut bricks: BTreeMap<BrickKey, Corrections<T>> = BTreeMap::new();
+        for (key, &mask) in level.keys.iter().zip(&level.masks).filter(|(_, m)| **m != 0) {
+            let corner = key.map(|k| k as usize * band::BRICK);
+            let brick = bricks
+                .entry(BrickKey(corner.map(|c| (c / BRICK) as u32)))
+                .or_insert_with(Corrections::empty);
+            for (slot, value) in band::active_slots(mask).zip(values.by_ref()) {
+                let within = [slot / 16, slot / 4 % 4, slot % 4];
+                brick.set(
+                    std::array::from_fn(|a| corner[a] % BRICK + within[a]),
+                    *value * unit,
+                );
             }
-            let mut brick = Corrections {
-                mask: *mask,
-                ..Corrections::empty()
-            };
-            for (slot, value) in active_slots(mask).zip(values.by_ref()) {
-                brick.values[slot] = *value * unit;
-            }
-            corrections.insert(*key, Arc::new(brick));
         }
+        let corrections = bricks.into_iter().map(|(k, c)| (k, Arc::new(c))).collect();
         stored.push(corrections);
     }
     HierarchicalSpline::from_corrections(lattice(origin, scale), 1.0, stored)

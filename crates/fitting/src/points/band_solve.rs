@@ -6,16 +6,15 @@
 //! active functions; the penalty sees the whole field, so the coarser levels' part is on the right-hand side.
 
 use bspline::Real;
-use bspline::hierarchical::{BRICK, BRICK_LEN, HALO, HALO_LEN};
 use rayon::prelude::*;
 
-use super::band::{Band, NONE};
+use super::band::{BRICK, BRICK_LEN, Band, HALO, HALO_LEN, NONE};
 use super::stencil::{Spot, gather, scatter, scatter_squares};
 
 /// Strides of a brick with halo.
 const STRIDES: [usize; 2] = [HALO * HALO, HALO];
 /// Bricks a thread takes at once; sums are over these chunks, whatever the number of threads.
-const CHUNK: usize = 32;
+const CHUNK: usize = 128;
 
 /// Out of line, where its registers are its own: within the loop over bricks the whole fit takes a seventh longer, and so
 /// it does compiled for wider vectors, since rows have four coefficients.
@@ -89,7 +88,7 @@ pub(crate) struct BandProblem<'a, T> {
     pub bricks: &'a [BrickSamples],
     pub weights: Weights,
     /// Index of a brick's halo among those of bricks with samples.
-    slot_of: Vec<u32>,
+    place_of: Vec<u32>,
 }
 
 impl<'a, T: Real> BandProblem<'a, T> {
@@ -99,16 +98,16 @@ impl<'a, T: Real> BandProblem<'a, T> {
         bricks: &'a [BrickSamples],
         weights: Weights,
     ) -> Self {
-        let mut slot_of = vec![NONE; band.keys.len()];
+        let mut place_of = vec![NONE; band.keys.len()];
         for (slot, b) in bricks.iter().enumerate() {
-            slot_of[b.brick as usize] = slot as u32;
+            place_of[b.brick as usize] = slot as u32;
         }
         Self {
             band,
             samples,
             bricks,
             weights,
-            slot_of,
+            place_of,
         }
     }
 
@@ -116,8 +115,9 @@ impl<'a, T: Real> BandProblem<'a, T> {
     ///
     /// Stops at `tolerance` times the starting preconditioned residual, or after `limit` iterations.
     pub fn solve(&self, tolerance: f64, limit: usize) -> (Vec<T>, SolveReport) {
-        let inverse = self.inverse_diagonal();
-        let mut r = self.descent_direction();
+        let mut scratch = Scratch::default();
+        let inverse = self.inverse_diagonal(&mut scratch);
+        let mut r = self.descent_direction(&mut scratch);
         let mut x = vec![T::zero(); r.len()];
         let mut p: Vec<T> = r.iter().zip(&inverse).map(|(r, d)| *r * *d).collect();
         let mut energy = weighted_square(&r, &inverse);
@@ -127,7 +127,6 @@ impl<'a, T: Real> BandProblem<'a, T> {
             residual: f64::from(start > 0.0),
         };
         let mut dense = vec![T::zero(); self.band.totals.len()];
-        let mut scratch = Scratch::default();
         while report.iterations < limit && energy > tolerance * tolerance * start {
             self.expand(&p, &mut dense);
             let image = self.apply(&dense, &mut scratch);
@@ -176,10 +175,9 @@ impl<'a, T: Real> BandProblem<'a, T> {
     }
 
     /// Half the negative gradient of the energy at the prolonged field.
-    fn descent_direction(&self) -> Vec<T> {
+    fn descent_direction(&self, scratch: &mut Scratch<T>) -> Vec<T> {
         let gw = self.gradient_weight();
         let h = T::from_f64(0.5f64.powi(self.band.depth as i32));
-        let mut scratch = Scratch::default();
         self.data_halos(&self.band.totals, &mut scratch.halos, |sample, v, g, out| {
             let slope = sample.gradient_weight * gw;
             let miss = std::array::from_fn(|a| g[a] + h * sample.normal[a]);
@@ -193,7 +191,7 @@ impl<'a, T: Real> BandProblem<'a, T> {
             );
         });
         self.laplacians(&self.band.totals, &mut scratch.laplacians);
-        self.gathered(&scratch, -T::one())
+        self.gathered(scratch, -T::one())
     }
 
     /// For every sample: value and cell gradient of `dense`, handed to `f` with the halo to add to.
@@ -235,12 +233,13 @@ impl<'a, T: Real> BandProblem<'a, T> {
     /// Stencils centred on the first or last function of the box lack a tap.
     fn clear_incomplete(&self, brick: usize, out: &mut [T]) {
         let last = (1usize << self.band.depth) + 2;
-        let key = self.band.keys[brick].0.map(|k| k as usize * BRICK);
+        let key = self.band.keys[brick].map(|k| k as usize * BRICK);
         if key.iter().all(|&k| k > 0 && k + BRICK <= last) {
             return;
         }
         for (slot, value) in out.iter_mut().enumerate() {
-            let s = [key[0] + slot / 64, key[1] + slot / 8 % 8, key[2] + slot % 8];
+            let [x, y, z] = [slot / BRICK / BRICK, slot / BRICK % BRICK, slot % BRICK];
+            let s = [key[0] + x, key[1] + y, key[2] + z];
             if s.iter().any(|&s| s == 0 || s >= last) {
                 *value = T::zero();
             }
@@ -257,11 +256,11 @@ impl<'a, T: Real> BandProblem<'a, T> {
             let base = self.band.offsets[first];
             let (mut data, mut penalty) = ([T::zero(); BRICK_LEN], [T::zero(); BRICK_LEN]);
             for brick in first..(first + CHUNK).min(self.band.keys.len()) {
-                if self.band.masks[brick] == [0; BRICK] {
+                if self.band.masks[brick] == 0 {
                     continue;
                 }
                 self.band
-                    .collect_halos(&scratch.halos, &self.slot_of, brick, &mut data);
+                    .collect_halos(&scratch.halos, &self.place_of, brick, &mut data);
                 seven_point(self.band, &scratch.laplacians, brick, &mut penalty);
                 self.band.for_active(brick, |slot, at| {
                     out[at - base] = sign * (data[slot] + mu * penalty[slot]);
@@ -271,9 +270,8 @@ impl<'a, T: Real> BandProblem<'a, T> {
         out
     }
 
-    fn inverse_diagonal(&self) -> Vec<T> {
+    fn inverse_diagonal(&self, scratch: &mut Scratch<T>) -> Vec<T> {
         let gw = self.gradient_weight();
-        let mut scratch = Scratch::default();
         self.data_halos(&self.band.totals, &mut scratch.halos, |sample, _, _, out| {
             let slope = sample.gradient_weight * gw;
             let along = (T::one() - sample.tangential) * slope;
@@ -281,7 +279,7 @@ impl<'a, T: Real> BandProblem<'a, T> {
             scatter_squares(out, sample.spot, STRIDES, sample.weight, squares);
         });
         scratch.laplacians.resize(self.band.totals.len(), T::zero());
-        let mut diagonal = self.gathered(&scratch, T::one());
+        let mut diagonal = self.gathered(scratch, T::one());
         // Δᵀ Δ: 6² from the stencil's own centre, 1 from each of six neighbours'. Where the box cuts some off
         // this is an overestimate, which a preconditioner may be.
         let penalty = T::from_f64(42.0 * self.weights.mu);
@@ -309,12 +307,13 @@ fn seven_point<T: Real>(band: &Band<T>, dense: &[T], brick: usize, out: &mut [T]
             padded[to..to + BRICK].copy_from_slice(&own[(x * BRICK + y) * BRICK..][..BRICK]);
         }
     }
-    let face = |d: usize| match band.neighbours[brick][d] {
+    let face = |neighbour: u32| match neighbour {
         NONE => None,
         b => Some(&dense[b as usize * BRICK_LEN..(b as usize + 1) * BRICK_LEN]),
     };
     const LAST: usize = BRICK - 1;
-    for (neighbour, layer, at) in [(4, LAST, 0), (22, 0, W - 1)] {
+    let (behind, ahead) = (band.behind[brick], band.ahead[brick]);
+    for (neighbour, layer, at) in [(behind[4], LAST, 0), (ahead[4], 0, W - 1)] {
         if let Some(values) = face(neighbour) {
             for y in 0..BRICK {
                 let to = (at * W + y + 1) * W + 1;
@@ -322,7 +321,7 @@ fn seven_point<T: Real>(band: &Band<T>, dense: &[T], brick: usize, out: &mut [T]
             }
         }
     }
-    for (neighbour, layer, at) in [(10, LAST, 0), (16, 0, W - 1)] {
+    for (neighbour, layer, at) in [(behind[2], LAST, 0), (ahead[2], 0, W - 1)] {
         if let Some(values) = face(neighbour) {
             for x in 0..BRICK {
                 let to = ((x + 1) * W + at) * W + 1;
@@ -330,7 +329,7 @@ fn seven_point<T: Real>(band: &Band<T>, dense: &[T], brick: usize, out: &mut [T]
             }
         }
     }
-    for (neighbour, layer, at) in [(12, LAST, 0), (14, 0, W - 1)] {
+    for (neighbour, layer, at) in [(behind[1], LAST, 0), (ahead[1], 0, W - 1)] {
         if let Some(values) = face(neighbour) {
             for x in 0..BRICK {
                 for y in 0..BRICK {

@@ -8,12 +8,11 @@
 use std::num::NonZero;
 
 use bspline::Real;
-use bspline::hierarchical::{BRICK, BrickKey, HALO};
 use glam::{DVec3, Vec3};
 use kiddo::SquaredEuclidean;
 use rayon::prelude::*;
 
-use super::band::Band;
+use super::band::{Band, halo_start, key_of};
 use super::band_solve::BandSample;
 use super::cells::Cell;
 use super::samples::Samples;
@@ -42,6 +41,9 @@ struct Between {
     /// Their distance, unit box.
     distance: f32,
 }
+
+/// Bytes a condition takes while its samples are paired, and later.
+pub(crate) const BYTES: usize = 2 * size_of::<Between>();
 
 /// What lies between some of the samples.
 #[derive(Debug, Default)]
@@ -101,30 +103,21 @@ impl Neighbours {
     }
 
     /// The conditions of a level, those whose samples are farther apart than its cells are wide and one of which lies in
-    /// a cell that was refined, sorted by brick; those of brick `b` are at `starts[b]..starts[b + 1]`.
-    pub fn by_brick<T: Real>(
-        &self,
-        band: &Band<T>,
-        cells: &[Cell],
-        weight: f64,
-    ) -> (Vec<BandSample<T>>, Vec<u32>) {
+    /// a cell that was refined, sorted by brick, and where those of each brick start (with one start past the last).
+    pub fn by_brick<T: Real>(&self, band: &Band<T>, cells: &[Cell]) -> (Vec<u32>, Vec<u32>) {
         let mut is_refined = vec![false; self.spacing.len()];
         for cell in cells.iter().filter(|c| c.refined) {
             is_refined[cell.start as usize..cell.end as usize].fill(true);
         }
         let n = (1u64 << band.depth) as f64;
         let mut starts = vec![0u32; band.keys.len() + 2];
-        let mut last = (BrickKey([u32::MAX; 3]), None);
+        let mut last = ([u32::MAX; 3], None);
         let mut met: Vec<(u32, u32)> = Vec::new();
         for (i, b) in self.between.iter().enumerate() {
             if f64::from(b.distance) * n < 1.0 || !b.ends.iter().any(|&i| is_refined[i as usize]) {
                 continue;
             }
-            let key = BrickKey(
-                (b.position.as_dvec3() * n)
-                    .to_array()
-                    .map(|x| x as u32 / BRICK as u32),
-            );
+            let key = key_of((b.position.as_dvec3() * n).to_array().map(|x| x as u32));
             if key != last.0 {
                 last = (key, band.find(key));
             }
@@ -143,28 +136,23 @@ impl Neighbours {
             *to += 1;
         }
         starts.pop();
-        let list = order
-            .iter()
-            .map(|&i| self.between[i as usize].on_level(n, weight))
-            .collect();
-        (list, starts)
+        (order, starts)
     }
-}
 
-impl Between {
-    fn on_level<T: Real>(&self, n: f64, weight: f64) -> BandSample<T> {
-        let q = self.position.as_dvec3() * n;
-        let local = q.to_array().map(|x| x as usize % BRICK);
+    /// Condition `index` on the level with `n` cells along the box, `weight` times as heavy as a gradient at a sample.
+    pub fn condition<T: Real>(&self, index: u32, n: f64, weight: f64) -> BandSample<T> {
+        let b = &self.between[index as usize];
+        let q = b.position.as_dvec3() * n;
         BandSample {
             spot: Spot {
-                start: (local[0] * HALO + local[1]) * HALO + local[2],
+                start: halo_start(q.to_array().map(|x| x as u32)),
                 t: (q - q.floor()).to_array().map(T::from_f64),
             },
             weight: T::zero(),
-            gradient_weight: T::from_f64(f64::from(self.weight) * weight),
-            tangential: T::from_f64(f64::from(self.certainty)),
+            gradient_weight: T::from_f64(f64::from(b.weight) * weight),
+            tangential: T::from_f64(f64::from(b.certainty)),
             target: T::zero(),
-            normal: self.normal.as_dvec3().to_array().map(T::from_f64),
+            normal: b.normal.as_dvec3().to_array().map(T::from_f64),
         }
     }
 }

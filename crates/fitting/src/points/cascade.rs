@@ -3,10 +3,8 @@
 use std::ops::Range;
 
 use bspline::Real;
-use bspline::hierarchical::{BRICK, BrickKey, HALO};
 
-use super::NormalForm;
-use super::band::{Band, Coarser, REACH, bricks_near};
+use super::band::{BRICK_LEN, Band, Coarser, HALO_LEN, Key, REACH, count_bricks_near, halo_start, key_of};
 use super::band_solve::{BandProblem, BandSample, BrickSamples, SolveReport};
 use super::between::Neighbours;
 use super::cells::{Cell, LeafCell, cell_quality, children, judge, keep_within, root_cells};
@@ -14,10 +12,14 @@ use super::full_grid::FullGrid;
 use super::plan::Plan;
 use super::samples::{BASE_DEPTH, Samples};
 use super::stencil::Spot;
+use super::{NormalForm, between};
 use crate::{Control, FitError, StopReason};
 
 /// Samples of a cell beyond this many are thinned.
 const SAMPLES_PER_CELL: u32 = 8;
+/// Conditions between samples for each sample, about.
+const BETWEEN_A_SAMPLE: usize = 3;
+
 /// A whole cascade.
 pub(crate) struct Cascade<T> {
     pub levels: Vec<Level<T>>,
@@ -28,8 +30,8 @@ pub(crate) struct Cascade<T> {
 
 /// The stored part of a level: the corrections `x` of its active functions, brick by brick.
 pub(crate) struct Level<T> {
-    pub keys: Vec<BrickKey>,
-    pub masks: Vec<[u64; BRICK]>,
+    pub keys: Vec<Key>,
+    pub masks: Vec<u64>,
     pub x: Vec<T>,
 }
 
@@ -71,7 +73,13 @@ pub(crate) fn run<T: Real>(
         if refined.is_empty() {
             break;
         }
-        if let Some(reason) = no_room::<T>(depth, &refined, samples, control) {
+        let between = if plan.is_sparse(depth) {
+            let refined = cells.iter().filter(|c| c.refined && c.is_live);
+            BETWEEN_A_SAMPLE * refined.map(|c| (c.end - c.start) as usize).sum::<usize>()
+        } else {
+            0
+        };
+        if let Some(reason) = no_room::<T>(depth, &refined, samples.positions.len(), between, control) {
             let kept = split
                 .iter()
                 .filter(|s| s.1)
@@ -127,22 +135,24 @@ pub(crate) fn run<T: Real>(
 fn no_room<T: Real>(
     depth: usize,
     refined: &[[u32; 3]],
-    samples: &Samples,
+    sample_count: usize,
+    between_count: usize,
     control: &Control,
 ) -> Option<StopReason> {
     // The bricks are counted only where someone asks.
     control.memory_limit?;
-    let (keys, _) = bricks_near(depth, refined, REACH);
+    let bricks = count_bricks_near(depth, refined, REACH);
+    let between = between_count * (size_of::<BandSample<T>>() + between::BYTES);
     control
-        .reserve(level_bytes::<T>(keys.len(), samples.positions.len()))
+        .reserve(level_bytes::<T>(bricks, sample_count) + between as u64)
         .is_err()
         .then_some(StopReason::Memory)
 }
 
-/// Bytes held at once when the level with so many bricks is solved: the cloud and its samples, this level's
-/// vectors, and the levels before with the finished field, which together are no larger.
+/// Bytes held at once when the level with so many bricks is solved, or when the field is finished: the cloud and its
+/// samples; this level's vectors and those of the one before, or the field's bricks, of which there are a quarter as many.
 pub(crate) fn level_bytes<T>(bricks: usize, sample_count: usize) -> u64 {
-    let per_brick = size_of::<T>() * (2 * HALO.pow(3) + 8 * BRICK.pow(3)) + 512;
+    let per_brick = size_of::<T>() * (2 * HALO_LEN + 2 * BRICK_LEN) + 256;
     let per_sample = 2 * size_of::<[f64; 6]>() + size_of::<BandSample<T>>() + 32;
     (bricks * per_brick + sample_count * per_sample) as u64 + (8 << 20)
 }
@@ -158,21 +168,22 @@ fn band_samples<T: Real>(
     depth: usize,
 ) -> (Vec<BandSample<T>>, Vec<BrickSamples>, Vec<u32>) {
     let n = (1u64 << depth) as f64;
-    let (between, starts) = neighbours.map_or_else(Default::default, |n| {
-        n.by_brick(band, cells, plan.between_weight(depth))
-    });
-    let mut list = Vec::with_capacity(samples.positions.len() + between.len());
+    let between_weight = plan.between_weight(depth);
+    let between = neighbours.map(|n| (n, n.by_brick(band, cells)));
+    let between_count = between.as_ref().map_or(0, |(_, (order, _))| order.len());
+    let mut list = Vec::with_capacity(samples.positions.len() + between_count);
     let mut owners = Vec::with_capacity(list.capacity());
     let mut bricks: Vec<BrickSamples> = Vec::new();
-    let mut current = (BrickKey([u32::MAX; 3]), None);
+    let mut current = ([u32::MAX; 3], None);
     for (index, cell) in cells.iter().enumerate() {
-        let key = BrickKey(cell.at.map(|c| c / BRICK as u32));
+        let key = key_of(cell.at);
         if key != current.0 {
             current = (key, band.find(key));
             if let Some(brick) = current.1 {
                 let start = list.len() as u32;
-                if let Some(&[from, to]) = starts.get(brick..brick + 2) {
-                    list.extend_from_slice(&between[from as usize..to as usize]);
+                if let Some((all, (order, starts))) = &between {
+                    let own = &order[starts[brick] as usize..starts[brick + 1] as usize];
+                    list.extend(own.iter().map(|&i| all.condition(i, n, between_weight)));
                     // Without weight, they count for no cell.
                     owners.resize(list.len(), index as u32);
                 }
@@ -183,14 +194,14 @@ fn band_samples<T: Real>(
                 });
             }
         }
-        if current.1.is_none() {
+        // What no active function reaches says nothing.
+        if !current.1.is_some_and(|brick| band.is_touched(brick, cell.at)) {
             continue;
         }
-        let local = cell.at.map(|c| c as usize % BRICK);
-        let start = (local[0] * HALO + local[1]) * HALO + local[2];
+        let start = halo_start(cell.at);
         let count = cell.end - cell.start;
         let stride = if plan.thin {
-            (count / SAMPLES_PER_CELL).max(1)
+            ((count + SAMPLES_PER_CELL / 2) / SAMPLES_PER_CELL).max(1)
         } else {
             1
         };
@@ -225,6 +236,7 @@ fn band_samples<T: Real>(
         }
         bricks.last_mut().expect("the cell's brick is in the band").end = list.len() as u32;
     }
+    bricks.retain(|b| b.start < b.end);
     bricks.sort_unstable_by_key(|b| b.brick);
     (list, bricks, owners)
 }

@@ -1,10 +1,9 @@
 //! The octree's occupied cells: which are split, and why the others are not.
 
 use bspline::Real;
-use bspline::hierarchical::HALO;
 use rustc_hash::FxHashSet;
 
-use super::band::Band;
+use super::band::{Band, HALO, HALO_LEN};
 use super::band_solve::{BandSample, BrickSamples};
 use super::plan::Plan;
 use super::samples::{BASE_DEPTH, Samples};
@@ -198,7 +197,7 @@ pub(crate) fn cell_quality<T: Real>(
 ) -> Vec<Quality> {
     let n = (1u64 << band.depth) as f64;
     let mut out = vec![Quality::default(); cell_count];
-    let mut values = [T::zero(); HALO * HALO * HALO];
+    let mut values = [T::zero(); HALO_LEN];
     for b in bricks {
         band.halo(&band.totals, b.brick as usize, &mut values);
         for i in b.start as usize..b.end as usize {

@@ -5,6 +5,7 @@
 //! with `a_k` from the [clusters](super::clusters), `β = max(h, β_s)`. No factor of the sample count appears,
 //! so the balance is the same for a sparse and a dense scan; without that, false solids appear far away.
 
+use bspline::Real;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::clusters::{Cluster, clusters, coarser, doubt_the_sparse};
@@ -41,12 +42,12 @@ pub(crate) fn solve(samples: &Samples, beta_s: f64, suspicion: bool) -> FullGrid
             x = x.refined();
         }
         let cycle = VCycle::new(&by_depth[..=level], beta(n));
-        let top = Operator::new(data, n, beta(n), 1.0, BENDING);
+        let top = Operator::<f64>::new(data, n, beta(n), 1.0, BENDING);
         conjugate_gradients(&top, &mut x, |r| cycle.apply(r), TOLERANCE, 60);
     }
     x = x.refined();
     let n = 1 << BASE_DEPTH;
-    let top = Operator::new(&by_depth[BASE_DEPTH - 2], n, beta(n), 1.0, BENDING);
+    let top = Operator::<f64>::new(&by_depth[BASE_DEPTH - 2], n, beta(n), 1.0, BENDING);
     let inverse = top.inverse_diagonal();
     let jacobi = |r: &FullGrid<f64>| FullGrid {
         n: r.n,
@@ -57,14 +58,14 @@ pub(crate) fn solve(samples: &Samples, beta_s: f64, suspicion: bool) -> FullGrid
 }
 
 /// The normal equations of one full level.
-struct Operator {
+struct Operator<T> {
     n: usize,
     beta: f64,
     bending: f64,
-    data: Vec<(Spot<f64>, f64, [f64; 3])>,
+    data: Vec<(Spot<T>, T, [T; 3])>,
 }
 
-impl Operator {
+impl<T: Real> Operator<T> {
     fn new(clusters: &[Cluster], n: usize, beta: f64, data_scale: f64, bending: f64) -> Self {
         let m = n + 3;
         let data = clusters
@@ -74,9 +75,10 @@ impl Operator {
                 let cell = q.to_array().map(|x| (x as usize).min(n - 1));
                 let spot = Spot {
                     start: (cell[0] * m + cell[1]) * m + cell[2],
-                    t: std::array::from_fn(|a| q[a] - cell[a] as f64),
+                    t: std::array::from_fn(|a| T::from_f64(q[a] - cell[a] as f64)),
                 };
-                (spot, c.weight * data_scale, c.normal.to_array())
+                let weight = T::from_f64(c.weight * data_scale);
+                (spot, weight, c.normal.to_array().map(T::from_f64))
             })
             .collect();
         Self {
@@ -93,13 +95,13 @@ impl Operator {
     }
 
     /// `β²n²`: gradients here are by cell coordinates.
-    fn gradient_weight(&self) -> f64 {
-        (self.beta * self.n as f64).powi(2)
+    fn gradient_weight(&self) -> T {
+        T::from_f64((self.beta * self.n as f64).powi(2))
     }
 
-    fn apply(&self, x: &FullGrid<f64>) -> FullGrid<f64> {
+    fn apply(&self, x: &FullGrid<T>) -> FullGrid<T> {
         let mut out = FullGrid::zeros(self.n);
-        add_bending(x, self.bending, &mut out);
+        add_bending(x, T::from_f64(self.bending), &mut out);
         let gw = self.gradient_weight();
         for (spot, a, _) in &self.data {
             let (v, g) = gather(&x.values, *spot, self.strides());
@@ -107,48 +109,50 @@ impl Operator {
                 &mut out.values,
                 *spot,
                 self.strides(),
-                a * v,
-                g.map(|g| a * gw * g),
+                *a * v,
+                g.map(|g| *a * gw * g),
             );
         }
         out
     }
 
     /// `∇f = -n` in world units is `-n/N` by cell coordinates.
-    fn right_hand_side(&self) -> FullGrid<f64> {
+    fn right_hand_side(&self) -> FullGrid<T> {
         let mut out = FullGrid::zeros(self.n);
-        let gw = self.gradient_weight() / self.n as f64;
+        let gw = self.gradient_weight() / T::from_f64(self.n as f64);
         for (spot, a, normal) in &self.data {
             scatter(
                 &mut out.values,
                 *spot,
                 self.strides(),
-                0.0,
-                normal.map(|n| -a * gw * n),
+                T::zero(),
+                normal.map(|n| -*a * gw * n),
             );
         }
         out
     }
 
-    fn inverse_diagonal(&self) -> Vec<f64> {
+    fn inverse_diagonal(&self) -> Vec<T> {
         let m = self.n + 3;
         let mut out = FullGrid::zeros(self.n);
         let gw = self.gradient_weight();
         for (spot, a, _) in &self.data {
-            scatter_squares(&mut out.values, *spot, self.strides(), *a, [a * gw; 3]);
+            scatter_squares(&mut out.values, *spot, self.strides(), *a, [*a * gw; 3]);
         }
         let mut slot = out.values.iter_mut();
         for x in 0..m {
             for y in 0..m {
                 for z in 0..m {
                     let d = slot.next().expect("m³ slots");
-                    *d = 1.0 / (*d + self.bending * bending_diagonal(m, [x, y, z]));
+                    *d = T::one() / (*d + T::from_f64(self.bending * bending_diagonal(m, [x, y, z])));
                 }
             }
         }
         out.values
     }
+}
 
+impl Operator<f64> {
     /// The operator as a dense matrix, for the coarsest level.
     fn dense(&self) -> DMatrix<f64> {
         let m = self.n + 3;
@@ -191,15 +195,15 @@ impl Operator {
 }
 
 /// One symmetric multigrid cycle as preconditioner: the same energy on every coarser level, Chebyshev–Jacobi
-/// smoothing, and a Cholesky factor on 4³.
+/// smoothing, and a Cholesky factor on 4³. In single precision: what it gets wrong the iterations round it mend.
 struct VCycle {
     bottom: Cholesky<f64, Dyn>,
     levels: Vec<Smoother>,
 }
 
 struct Smoother {
-    operator: Operator,
-    inverse_diagonal: Vec<f64>,
+    operator: Operator<f32>,
+    inverse_diagonal: Vec<f32>,
     /// Estimate of the largest eigenvalue of `D⁻¹A`.
     lambda: f64,
 }
@@ -209,12 +213,7 @@ impl VCycle {
     /// data weigh `(h_j/h)²` each, since there are fewer half-cells, and the bending term `h/h_j`, so that
     /// both energies keep their size.
     fn new(clusters: &[Vec<Cluster>], beta: f64) -> Self {
-        let finest = clusters.len() - 1;
-        let operator = |level: usize| {
-            let ratio = (1u64 << (finest - level)) as f64;
-            Operator::new(&clusters[level], 4 << level, beta, ratio * ratio, BENDING / ratio)
-        };
-        let mut dense = operator(0).dense();
+        let mut dense = Self::operator::<f64>(clusters, 0, beta).dense();
         // The bending energy does not see linear functions; where data does not either, this does.
         let ridge = 1e-12 * dense.diagonal().max();
         for i in 0..dense.nrows() {
@@ -223,44 +222,58 @@ impl VCycle {
         let bottom = Cholesky::new(dense).expect("normal equations with a ridge are positive definite");
         Self {
             bottom,
-            levels: (1..=finest).map(|l| Smoother::new(operator(l))).collect(),
+            levels: (1..clusters.len())
+                .map(|l| Smoother::new(Self::operator(clusters, l, beta)))
+                .collect(),
         }
     }
 
-    fn apply(&self, r: &FullGrid<f64>) -> FullGrid<f64> {
-        self.descend(self.levels.len(), r)
+    fn operator<T: Real>(clusters: &[Vec<Cluster>], level: usize, beta: f64) -> Operator<T> {
+        let ratio = (1u64 << (clusters.len() - 1 - level)) as f64;
+        Operator::new(&clusters[level], 4 << level, beta, ratio * ratio, BENDING / ratio)
     }
 
-    fn descend(&self, level: usize, r: &FullGrid<f64>) -> FullGrid<f64> {
+    fn apply(&self, r: &FullGrid<f64>) -> FullGrid<f64> {
+        if self.levels.is_empty() {
+            return self.bottom(r);
+        }
+        self.descend(self.levels.len(), &r.converted()).converted()
+    }
+
+    fn bottom(&self, r: &FullGrid<f64>) -> FullGrid<f64> {
+        let solved = self.bottom.solve(&DVector::from_column_slice(&r.values));
+        FullGrid {
+            n: r.n,
+            values: solved.as_slice().to_vec(),
+        }
+    }
+
+    fn descend(&self, level: usize, r: &FullGrid<f32>) -> FullGrid<f32> {
         if level == 0 {
-            let solved = self.bottom.solve(&DVector::from_column_slice(&r.values));
-            return FullGrid {
-                n: r.n,
-                values: solved.as_slice().to_vec(),
-            };
+            return self.bottom(&r.converted()).converted();
         }
         let smoother = &self.levels[level - 1];
         let mut x = FullGrid::zeros(r.n);
         let mut rest = r.clone();
-        smoother.smooth(&mut x, &mut rest);
+        smoother.smooth(&mut x, &mut rest, true);
         let correction = self.descend(level - 1, &rest.restricted()).refined();
         let change = smoother.operator.apply(&correction);
         for i in 0..x.values.len() {
             x.values[i] += correction.values[i];
             rest.values[i] -= change.values[i];
         }
-        smoother.smooth(&mut x, &mut rest);
+        smoother.smooth(&mut x, &mut rest, false);
         x
     }
 }
 
 impl Smoother {
-    fn new(operator: Operator) -> Self {
+    fn new(operator: Operator<f32>) -> Self {
         let inverse_diagonal = operator.inverse_diagonal();
         // Power iteration from a fixed rough vector; 1.1 twice covers what five steps leave out.
         let mut v = FullGrid::zeros(operator.n);
         for (i, x) in v.values.iter_mut().enumerate() {
-            *x = (i.wrapping_mul(2654435761) >> 7 & 1023) as f64 - 511.5;
+            *x = (i.wrapping_mul(2654435761) >> 7 & 1023) as f32 - 511.5;
         }
         let mut lambda = 1.0;
         for _ in 0..5 {
@@ -268,7 +281,7 @@ impl Smoother {
             for (x, d) in next.values.iter_mut().zip(&inverse_diagonal) {
                 *x *= d;
             }
-            let norm = |g: &FullGrid<f64>| g.values.iter().map(|x| x * x).sum::<f64>().sqrt();
+            let norm = |g: &FullGrid<f32>| g.values.iter().map(|x| f64::from(*x).powi(2)).sum::<f64>().sqrt();
             lambda = norm(&next) / norm(&v);
             v = next;
         }
@@ -279,29 +292,35 @@ impl Smoother {
         }
     }
 
-    /// Two steps of Chebyshev iteration on `[λ/8, λ]`; keeps `r` the residual of `x`.
-    fn smooth(&self, x: &mut FullGrid<f64>, r: &mut FullGrid<f64>) {
+    /// Two steps of Chebyshev iteration on `[λ/8, λ]`, from `r` the residual of `x`; `goes_on` if it is to be that of the new
+    /// `x` afterwards.
+    fn smooth(&self, x: &mut FullGrid<f32>, r: &mut FullGrid<f32>, goes_on: bool) {
         let (low, high) = (self.lambda / 8.0, self.lambda);
         let (theta, delta) = (0.5 * (high + low), 0.5 * (high - low));
         let sigma = theta / delta;
         let mut rho = 1.0 / sigma;
         let mut step = FullGrid::zeros(r.n);
         for i in 0..step.values.len() {
-            step.values[i] = self.inverse_diagonal[i] * r.values[i] / theta;
+            step.values[i] = self.inverse_diagonal[i] * r.values[i] / theta as f32;
         }
         for last in [false, true] {
-            let change = self.operator.apply(&step);
             for i in 0..x.values.len() {
                 x.values[i] += step.values[i];
+            }
+            if last && !goes_on {
+                break;
+            }
+            let change = self.operator.apply(&step);
+            for i in 0..r.values.len() {
                 r.values[i] -= change.values[i];
             }
             if last {
                 break;
             }
             let next = 1.0 / (2.0 * sigma - rho);
+            let (keep, add) = ((next * rho) as f32, (2.0 * next / delta) as f32);
             for i in 0..step.values.len() {
-                step.values[i] =
-                    next * rho * step.values[i] + 2.0 * next / delta * self.inverse_diagonal[i] * r.values[i];
+                step.values[i] = keep * step.values[i] + add * self.inverse_diagonal[i] * r.values[i];
             }
             rho = next;
         }
@@ -311,7 +330,7 @@ impl Smoother {
 /// Preconditioned conjugate gradients on the normal equations, from `x`; stops when the preconditioned
 /// residual is `tolerance` of the one of a zero start. Returns the iterations made.
 fn conjugate_gradients(
-    operator: &Operator,
+    operator: &Operator<f64>,
     x: &mut FullGrid<f64>,
     precondition: impl Fn(&FullGrid<f64>) -> FullGrid<f64>,
     tolerance: f64,

@@ -24,6 +24,14 @@ impl<T: Real> FullGrid<T> {
         self.n + 3
     }
 
+    /// The same in another precision.
+    pub fn converted<U: Real>(&self) -> FullGrid<U> {
+        FullGrid {
+            n: self.n,
+            values: self.values.iter().map(|v| U::from_f64(v.as_f64())).collect(),
+        }
+    }
+
     /// The same function on the next level.
     pub fn refined(&self) -> Self {
         let (m, w) = (self.width(), 2 * self.n + 3);

@@ -38,9 +38,7 @@ pub(crate) fn leaves(field: &dyn Field, samples: &Samples, leaves: &[Leaf]) -> V
         cells: [n as u32; 3],
     };
     let mut values = vec![0.0; n * n * n];
-    for (x, slab) in values.chunks_exact_mut(n * n).enumerate() {
-        field.frame_values(&centres, [x as i64, 0, 0], [1, n, n], slab);
-    }
+    field.frame_values(&centres, [0; 3], [n; 3], &mut values);
     let taken: FxHashSet<(u8, [u32; 3])> = leaves.iter().map(|l| (l.level, l.cell)).collect();
     let level = (depth - BASE_DEPTH) as u8;
     let mut found = Vec::new();

@@ -6,7 +6,7 @@ use bspline::{Field, HierarchicalSpline, Real};
 use glam::DVec3;
 
 use super::cascade::Cascade;
-use super::measure::measure_points;
+use super::measure::measure_in_order;
 use super::plan::{Plan, Smoothing};
 use super::samples::{ADDED, Samples};
 use crate::{FitReport, Leaf, LeafIndex, StopReason};
@@ -83,7 +83,8 @@ pub(crate) fn report<T: Real>(
     let leaf_of = leaves_of_points(field, samples, cascade, &leaves, plan.robust, positions);
     let counts = |i: usize| leaf_of[i] != LEFT_OUT;
     let in_leaf = |i: usize| Some(leaf_of[i] as usize).filter(|l| *l < leaves.len());
-    let errors = measure_points(field, positions, counts, in_leaf, leaves.len());
+    let order: Vec<u32> = samples.source.iter().copied().filter(|&i| i != ADDED).collect();
+    let errors = measure_in_order(field, positions, &order, counts, in_leaf, leaves.len());
     for (leaf, error) in leaves.iter_mut().zip(&errors.leaves) {
         leaf.sample_count = error.count;
         (leaf.rms, leaf.max) = (error.rms as f32, error.max as f32);

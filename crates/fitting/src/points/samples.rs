@@ -156,7 +156,7 @@ impl Samples {
             .iter()
             .map(|&i| (morton((cloud.positions[i as usize] - origin) / scale), i))
             .collect();
-        keyed.sort_unstable();
+        sort_by_morton(&mut keyed);
         let positions = keyed
             .iter()
             .map(|k| (cloud.positions[k.1 as usize] - origin) / scale)
@@ -227,7 +227,7 @@ impl Samples {
     /// Other samples in the same box, put in Morton order.
     pub fn with_entries(&self, entries: Vec<Entry>) -> Self {
         let mut keyed: Vec<(u64, u32)> = entries.iter().map(|e| morton(e.position)).zip(0..).collect();
-        keyed.sort_unstable();
+        sort_by_morton(&mut keyed);
         let sorted = || keyed.iter().map(|k| &entries[k.1 as usize]);
         let is_moved = entries.iter().any(|e| e.measured != e.position);
         Self {
@@ -366,6 +366,27 @@ pub(crate) fn is_collinear(positions: &[DVec3], kept: &[u32], longest: f64) -> b
     let direction = (b - a).normalize_or_zero();
     kept.iter()
         .all(|&i| (p(i) - a).cross(direction).length() <= 1e-9 * longest)
+}
+
+/// Sorts by key, those of one key as they come: digit by digit, the last first.
+fn sort_by_morton(keyed: &mut Vec<(u64, u32)>) {
+    const BITS: usize = 12;
+    let mut sorted = vec![(0, 0); keyed.len()];
+    for shift in (0..3 * MAX_DEPTH).step_by(BITS) {
+        let digit = |key: u64| (key >> shift) as usize & ((1 << BITS) - 1);
+        let mut place = vec![0u32; 1 << BITS];
+        keyed.iter().for_each(|(key, _)| place[digit(*key)] += 1);
+        let mut next = 0;
+        for p in &mut place {
+            next += std::mem::replace(p, next);
+        }
+        for entry in keyed.iter() {
+            let p = &mut place[digit(entry.0)];
+            sorted[*p as usize] = *entry;
+            *p += 1;
+        }
+        std::mem::swap(keyed, &mut sorted);
+    }
 }
 
 /// Interleaved bits of the cell at [`MAX_DEPTH`], x highest.

@@ -58,10 +58,20 @@ fn face_alike(samples: &Samples, i: usize, j: usize) -> bool {
     i != j && a.dot(b) > SAME_WAY
 }
 
-/// Whether `reach²` is beyond that of the five nearest neighbours.
-fn is_isolated(reach: f64, mut nearest: [f64; 5]) -> bool {
-    nearest.sort_by(f64::total_cmp);
-    reach > FACTOR * FACTOR * nearest[2]
+/// Whether `reach²` is beyond the median of those of the five nearest neighbours, of which no more are asked for than decide.
+fn is_isolated(reach: f64, nearest: impl Fn(usize) -> f64) -> bool {
+    let (mut closer, mut others) = (0, 0);
+    for k in 0..5 {
+        if reach > FACTOR * FACTOR * nearest(k) {
+            closer += 1;
+        } else {
+            others += 1;
+        }
+        if closer.max(others) == 3 {
+            break;
+        }
+    }
+    closer == 3
 }
 
 /// Weight 1 for points whose neighbours speak for them, 0 for the others.
@@ -79,7 +89,7 @@ pub(crate) fn weights(samples: &Samples, tree: &Tree) -> Vec<f32> {
     };
     let mut live: Vec<bool> = found
         .iter()
-        .map(|(near, reach)| !is_isolated(*reach, std::array::from_fn(|k| found[near[k] as usize].1)))
+        .map(|(near, reach)| !is_isolated(*reach, |k| found[near[k] as usize].1))
         .collect();
     for _ in 0..ROUNDS {
         live = (0..n)
@@ -105,8 +115,8 @@ pub(crate) fn doubt(samples: &Samples, tree: &Tree) -> Option<String> {
                 .iter()
                 .filter(|&&j| face_alike(samples, i, j as usize))
                 .count();
-            let nearest = std::array::from_fn(|k| neighbours(samples, tree, near[k] as usize).1);
-            [is_isolated(reach, nearest), facing < NEEDED]
+            let reach_of = |k: usize| neighbours(samples, tree, near[k] as usize).1;
+            [is_isolated(reach, reach_of), facing < NEEDED]
         })
         .collect();
     let share = |k: usize| asked.iter().filter(|a| a[k]).count() as f64 / asked.len().max(1) as f64;

@@ -144,6 +144,23 @@ pub(super) fn octants(set: &Cells) -> u8 {
     found
 }
 
+/// First cell of an octant.
+pub(super) fn octant_place(octant: usize) -> [usize; 3] {
+    [4 * (octant >> 2), 4 * (octant >> 1 & 1), 4 * (octant & 1)]
+}
+
+/// The octant that a cell lies in.
+pub(super) fn octant_with(c: [usize; 3]) -> usize {
+    4 * (c[0] / 4) + 2 * (c[1] / 4) + c[2] / 4
+}
+
+/// The cells of a set in an octant.
+pub(super) fn octant_of_set(set: &Cells, octant: usize) -> Cells {
+    let at = octant_place(octant);
+    let mask = (0x0f0f_0f0f << (CELLS * at[1])) << at[2];
+    std::array::from_fn(|x| if x / 4 * 4 == at[0] { set[x] & mask } else { 0 })
+}
+
 /// The children of a set's cells in an octant, as cells of the child block.
 pub(super) fn children(set: &Cells, octant: usize) -> Cells {
     const TWICE: [u64; 16] = {

@@ -8,6 +8,8 @@
 mod around;
 mod cases;
 mod grid;
+mod hidden;
+mod judge;
 mod live;
 mod polygons;
 mod sample;
@@ -25,8 +27,9 @@ pub use self::live::AdaptiveBlockMesh;
 
 use self::around::Around;
 use self::grid::Grids;
+use self::judge::Judge;
 use self::polygons::{BlockTriangles, EXTRA, ExtraKey, Numbered};
-use self::sample::{Judge, Sample};
+use self::sample::Sample;
 use self::tree::{Limits, Samples, Tree, Watch};
 use self::vertices::{BlockVertices, PLACE_BITS, Placer, STEPS};
 use super::blocks::{BlockGrid, BlockKey, find_blocks};

@@ -6,7 +6,8 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::grid::{Cells, NONE, child, children, count, each, octant_of, octants, parent};
-use super::sample::{Judge, Sample, Scratch};
+use super::judge::{Judge, Scratch};
+use super::sample::Sample;
 use crate::polygonize::PolygonizeError;
 use crate::polygonize::blocks::{BlockKey, CELLS};
 
