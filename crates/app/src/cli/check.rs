@@ -1,7 +1,7 @@
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use fitting::mesh::MeshDistance;
+use fitting::mesh::{MeshDistance, measure_mesh};
 use fitting::points::measure_points;
 use fitting::volume::VolumeView;
 use fitting::{LeafIndex, StopReason, UnsupportedComponent, unsupported_components};
@@ -15,7 +15,7 @@ use super::cost::Cost;
 use super::failure::{Failure, Outcome};
 use super::field::{OpenField, either};
 use super::input::{self, Input, Shape};
-use super::quantity::{human_count, human_number, threads};
+use super::quantity::{human_number, threads};
 use super::sample::voxel_frame;
 use super::source::{FIELDS, SAMPLES, Source, input_formats};
 use super::staged::StagedFiles;
@@ -101,7 +101,7 @@ pub fn run(args: &Args) -> Outcome {
             let left_out = if is_own { &open.report().left_out[..] } else { &[] };
             measure_cloud(&open, &cloud.positions, left_out)
         }
-        Input::Mesh(mesh) => measure_mesh(&open, mesh)?,
+        Input::Mesh(mesh) => measure_triangles(&open, mesh)?,
         Input::Volume(volume) => measure_volume(&open, volume, args.output.is_some())?,
     };
     interrupt::check(&cancel)?;
@@ -117,17 +117,8 @@ pub fn run(args: &Args) -> Outcome {
     let (s, audit) = (&measured.statistics, &measured.audit);
     // An interpolating fit aims at none.
     let has_tolerance = open.report().tolerance > 0.0;
-    // Of a mesh a leaf holds a few points of chance, which neither judge it nor bound anything.
-    let judges_leaves = has_tolerance && measured.against_mesh.is_none();
     let mut notes = Vec::new();
-    if measured.against_mesh.is_some() {
-        notes.push(format!(
-            "measured at {} points spread over the mesh by chance, others than those of the fit, whose figures isoclay info \
-             prints",
-            human_count(measured.count)
-        ));
-    }
-    if judges_leaves && audit.claimed_below > 0 {
+    if has_tolerance && audit.claimed_below > 0 {
         notes.push(format!(
             "{} leaves are above the tolerance although the fit calls them below",
             audit.claimed_below
@@ -161,15 +152,15 @@ pub fn run(args: &Args) -> Outcome {
         p95: Some(s.p95),
         max: Some(s.max),
         used_count: Some(measured.used),
-        bound: measured.bound.filter(|_| measured.against_mesh.is_none()),
+        bound: measured.bound,
         unprojected: measured.unprojected,
         back_p95: measured.against_mesh.as_ref().map(|m| m.back.p95),
         back_max: measured.against_mesh.as_ref().map(|m| m.back.max),
         wrong_signs: measured.against_mesh.as_ref().map(|m| m.wrong_signs),
         unsupported_components: Some(measured.unsupported.len()).filter(|_| measured.unprojected.is_some()),
         leaves: Some(audit.leaves),
-        leaves_over_tolerance: judges_leaves.then_some(audit.over_tolerance),
-        leaves_without_data: judges_leaves.then_some(audit.without_data),
+        leaves_over_tolerance: has_tolerance.then_some(audit.over_tolerance),
+        leaves_without_data: has_tolerance.then_some(audit.without_data),
         field_sha256: Some(open.sha256()),
         output: args.output.as_ref().map(|d| d.display().to_string()),
         notes,
@@ -216,21 +207,37 @@ fn measure_cloud(open: &OpenField, positions: &[DVec3], left_out: &[u32]) -> Mea
     }
 }
 
-/// Points of the mesh that are measured.
-const MESH_SAMPLES: usize = 100_000;
-
-fn measure_mesh(open: &OpenField, mesh: &TriangleMesh) -> Outcome<Measured> {
+/// Measures as the fit did, and also the way back and the sign.
+fn measure_triangles(open: &OpenField, mesh: &TriangleMesh) -> Outcome<Measured> {
     let (solid, _) = MeshDistance::new(&mesh.vertices, &mesh.triangles)?;
     let spacing = open.lattice().spacing(open.level_count() - 1).min_element();
+    let report = open.report();
+    let found = either!(&open.loaded().field, f => measure_mesh(f, &solid, &report.leaves));
+    let errors = found.errors;
+    let of_leaves = errors.leaves.iter().map(|l| (l.count, l.rms));
     Ok(Measured {
+        statistics: ErrorStatistics {
+            rms: errors.rms,
+            p95: errors.p95,
+            max: errors.max,
+            ..ErrorStatistics::of(&mut errors.distances.clone())
+        },
+        audit: audit_leaves(&report.leaves, of_leaves, report.tolerance),
+        count: mesh.triangles.len(),
+        used: mesh.triangles.len(),
+        bound: Some(errors.bound),
+        unprojected: Some(errors.unprojected),
+        unsupported: unsupported(open, &found.samples),
         against_mesh: Some(against_mesh(
             open.field(),
             &solid,
-            centers(open.lattice(), &open.report().leaves),
+            centers(open.lattice(), &report.leaves),
             spacing,
-            open.report().tolerance,
+            report.tolerance,
         )),
-        ..measure_cloud(open, &solid.surface_samples(MESH_SAMPLES), &[])
+        unit: open.unit().to_string(),
+        positions: found.samples,
+        errors: errors.distances,
     })
 }
 
