@@ -221,3 +221,46 @@ fn add_up_3(values: &mut [f64], n: usize) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::points::OrientedPoints;
+
+    /// Coefficients of the cells asked for turn over, but for those beside a point and those that are right already.
+    #[test]
+    fn a_pocket_away_from_all_points_turns_over() {
+        let normals: Vec<DVec3> = (0..400)
+            .map(|i| {
+                let z = 1.0 - (2.0 * f64::from(i) + 1.0) / 400.0;
+                let (sin, cos) = libm::sincos(2.399_963_229_728_653 * f64::from(i));
+                let r = (1.0 - z * z).sqrt();
+                DVec3::new(r * cos, r * sin, z)
+            })
+            .collect();
+        let cloud = OrientedPoints {
+            positions: &normals,
+            normals: &normals,
+            certainty: None,
+        };
+        let samples = Samples::prepare(cloud).expect("a ball");
+        let mut base = FullGrid::zeros(32);
+        let site = |knot: [usize; 3]| ((knot[0] + 1) * 35 + knot[1] + 1) * 35 + knot[2] + 1;
+        // The ball ends at knot 29.9 of each axis through its middle.
+        let (pocket, right, beside, elsewhere) = ([29, 29, 29], [29, 29, 30], [30, 16, 16], [2, 2, 2]);
+        for (knot, value) in [(pocket, 0.5), (right, -0.25), (beside, 0.5), (elsewhere, 0.5)] {
+            base.values[site(knot)] = value;
+        }
+        let h = 1.0 / 128.0;
+        let conditions: Vec<(DVec3, f32)> = [pocket, right, beside]
+            .iter()
+            .map(|knot| {
+                let corner = DVec3::from_array(knot.map(|k| k as f64 / 32.0));
+                (corner + 0.5 * h, -h as f32)
+            })
+            .collect();
+        turn_over(&mut base, &samples, &conditions, h);
+        let found = [pocket, right, beside, elsewhere].map(|knot| base.values[site(knot)]);
+        assert_eq!(found, [-0.5, -0.25, 0.5, 0.5]);
+    }
+}
