@@ -47,6 +47,28 @@ impl Pieces {
     }
 }
 
+/// For each triangle whether it belongs to a part narrower than `width` on every axis; all false if there is no other.
+pub fn of_narrow_parts(mesh: &Mesh, width: f64) -> Vec<bool> {
+    let pieces = connected(mesh);
+    let mut boxes = vec![(DVec3::INFINITY, DVec3::NEG_INFINITY); pieces.parts.len()];
+    if boxes.len() > 1 {
+        for (t, &part) in pieces.part_of.iter().enumerate() {
+            let (low, high) = &mut boxes[part as usize];
+            for p in mesh.corners(t) {
+                (*low, *high) = (low.min(p), high.max(p));
+            }
+        }
+    }
+    let is_narrow = |(low, high): &(DVec3, DVec3)| (*high - *low).max_element() < width;
+    let narrow: Vec<bool> = boxes.iter().map(is_narrow).collect();
+    let drop = narrow.contains(&true) && narrow.contains(&false);
+    pieces
+        .part_of
+        .iter()
+        .map(|&p| drop && narrow[p as usize])
+        .collect()
+}
+
 /// Parts by union and find over the vertices, smaller numbers as roots.
 fn connected(mesh: &Mesh) -> Pieces {
     let mut parent: Vec<u32> = (0..mesh.positions.len() as u32).collect();
@@ -280,6 +302,18 @@ mod tests {
         let owners: Vec<_> = pieces.parts.iter().map(|p| p.owner).collect();
         assert_eq!(owners, [None, Some(0), None, Some(2), None, None]);
         assert!(pieces.parts.iter().all(|p| p.triangle_count == 12 && !p.is_open));
+    }
+
+    #[test]
+    fn narrow_parts_are_told_unless_there_are_no_others() {
+        let mut mesh = empty();
+        cube(&mut mesh, [0.0; 3], 2.0, false);
+        cube(&mut mesh, [0.5; 3], 0.5, true);
+        cube(&mut mesh, [4.0; 3], 0.9, false);
+        let narrow = of_narrow_parts(&mesh, 1.0);
+        assert_eq!(narrow, [[false; 12], [true; 12], [true; 12]].concat());
+        assert_eq!(of_narrow_parts(&mesh, 3.0), [false; 36]);
+        assert_eq!(of_narrow_parts(&mesh, 0.1), [false; 36]);
     }
 
     #[test]

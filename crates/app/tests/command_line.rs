@@ -394,7 +394,37 @@ fn fit_info_and_check_agree() {
     bench.json("phantom cup -o clean.ply --count 9000");
     bench.json("phantom cup -o noisy.ply --count 9000 --noise 1%");
     bench.json("phantom head -o head.nii --size 40 --noise 2%");
+    bench.json("fit clean.ply -o field.iclay");
+    bench.json("mesh field.iclay -o smooth.stl --resolution 40");
+    let corners = "v 0 0 0\nv 2 0 0\nv 0 1 0\nv 2 1 0\nv 0 0 1\nv 2 0 1\nv 0 1 1\nv 2 1 1\n";
+    // A box, and the same again across it: creases, crossings, inner walls.
+    let crossed = "v 1 -1 .2\nv 3 -1 .2\nv 1 .5 .2\nv 3 .5 .2\nv 1 -1 .7\nv 3 -1 .7\nv 1 .5 .7\nv 3 .5 .7\n";
+    let faces = |first: usize| {
+        let quads = [
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ];
+        quads.map(|q| {
+            format!(
+                "f {} {} {} {}\n",
+                q[0] + first,
+                q[1] + first,
+                q[2] + first,
+                q[3] + first
+            )
+        })
+    };
+    let sharp = format!("{corners}{crossed}{}{}", faces(1).concat(), faces(9).concat());
+    std::fs::write(bench.path("sharp.obj"), sharp).unwrap();
     for (input, options) in [
+        ("smooth.stl", "--tolerance 0.1%"),
+        ("smooth.stl", "--coefficients 60000"),
+        ("sharp.obj --as mesh", "--tolerance 0.2%"),
+        ("sharp.obj --as mesh", "--coefficients 70000 --precision f64"),
         ("clean.ply", ""),
         ("clean.ply", "--tolerance 1e-5 --max-depth 7"),
         ("clean.ply", "--coefficients 50000 --precision f64"),
@@ -412,6 +442,10 @@ fn fit_info_and_check_agree() {
         let fit = bench.json(&format!("fit {input} -o field.iclay {options}"));
         let info = bench.json("info field.iclay");
         let check = bench.json(&format!("check field.iclay {input}"));
+        let told = fit["notes"].to_string();
+        let spent = ["coefficients allowed are spent", "--coefficients leaves no room"];
+        let count: usize = spent.iter().map(|words| told.matches(words).count()).sum();
+        assert!(count <= 1, "{input} {options}: {told}");
         for key in [
             "input_count",
             "used_count",

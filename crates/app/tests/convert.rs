@@ -77,7 +77,7 @@ fn what_makes_no_sense_is_refused_with_the_remedy() {
     for (arguments, word) in [
         ("field.iclay mesh.ply".into(), "isoclay mesh"),
         (format!("{head} out.ply"), ".nrrd"),
-        (format!("{bunny} out.nii"), ".ply"),
+        (format!("{bunny} out.nii"), ".glb"),
         (format!("{bunny} out.ply --stride 2"), "volumes"),
         (format!("{bunny} out.ply --store int16"), "voxels"),
         (format!("{head} out.nii --as mesh"), "--as"),

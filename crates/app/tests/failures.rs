@@ -508,6 +508,27 @@ fn limits_that_cannot_be_kept() {
     assert!(note("--tolerance 1e-9 --max-depth 6").contains("--precision f64"));
     assert!(!note("--tolerance 1e-9 --max-depth 6 --precision f64").contains("--precision"));
     assert!(!note("--tolerance 0.01").contains("--tolerance"));
+    // Meshes and volumes are doubted alike.
+    bench.write(
+        "wedge.obj",
+        "v 0 0 0\nv 2 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n",
+    );
+    bench.json("phantom head -o head.nii --size 16");
+    for (input, large, words) in [
+        ("wedge.obj --as mesh", "10", "larger than the object"),
+        ("head.nii", "1e9", "larger than the range"),
+    ] {
+        let note = |options: &str| {
+            bench.json(&format!("fit {input} -o out.iclay --tolerance {options}"))["notes"].to_string()
+        };
+        assert!(note(large).contains(words), "{input}: {}", note(large));
+        assert!(
+            note("1e-9 --coefficients 45000").contains("--precision f64"),
+            "{input}"
+        );
+        assert!(!note("1e-9 --coefficients 45000 --precision f64").contains("--precision"));
+        assert!(!note("1%").contains("--tolerance"), "{input}");
+    }
     let fitted = bench.json("fit ball.xyz -o out.iclay --tolerance 1e-5 --coefficients 45000");
     assert!(number(&fitted, "coefficients") <= 45000.0, "{fitted}");
     assert!(

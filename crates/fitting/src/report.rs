@@ -24,6 +24,9 @@ pub enum StopReason {
     Crease = 7,
     /// The smoothing that was asked for leaves more than the tolerance.
     Smoothing = 8,
+    /// A part or a gap passes through that is too thin to be shown by the coefficients or the depth allowed; on the way
+    /// there it would show in shreds.
+    Thin = 9,
 }
 
 /// A dyadic cell that was not split, with its own error.

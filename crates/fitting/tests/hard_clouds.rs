@@ -2,10 +2,14 @@
 
 mod common;
 
-use bspline::{Field, Frame};
+use std::sync::Arc;
+
+use bspline::csg::Csg;
+use bspline::primitives::Sphere;
+use bspline::{Aabb, Field, Frame};
 use common::{cloud, fit, to_depth};
 use fitting::orient::{OrientOptions, orient_points};
-use fitting::phantoms::{CloudOptions, SampledCloud, Solid, SplitMix64};
+use fitting::phantoms::{COARSE_CELL, CloudOptions, SampledCloud, Solid, SplitMix64, sample_cloud};
 use fitting::points::{NormalForm, OrientedPoints, PointOptions, fit_points, newton_distance};
 use fitting::{Control, FitReport, StopReason, unsupported_components};
 use glam::DVec3;
@@ -41,7 +45,7 @@ fn anywhere(random: &mut SplitMix64) -> DVec3 {
 }
 
 /// Signs that differ from those of `truth` among points of the box farther than `distance` from its surface.
-fn wrong_signs(field: &dyn Field, truth: &dyn Field, within: bspline::Aabb, distance: f64) -> usize {
+fn wrong_signs(field: &dyn Field, truth: &dyn Field, within: Aabb, distance: f64) -> usize {
     let mut random = SplitMix64::new(5);
     (0..5000)
         .map(|_| within.min + within.size() * random.uniform3())
@@ -286,6 +290,60 @@ fn a_thin_sheet_keeps_its_walls_apart_or_says_where_it_does_not() {
             ),
         }
         println!("depth {max_depth:?}: {lost} of 1000 lost, {told} of the leaves over the tolerance");
+    }
+}
+
+/// A cup and nested shells with walls and gaps of six standard deviations of the noise: far from all walls each point is on
+/// the side it should be, and no horn leaves the box of the samples.
+#[test]
+fn far_signs_of_noisy_walls_are_right_at_any_seed() {
+    let shell =
+        |radius: f64| -> Arc<dyn Field> { Arc::new(Sphere::new(DVec3::ZERO, radius).expect("a ball")) };
+    for seed in 1..=3 {
+        let noise = 0.02 + 0.005 * seed as f64;
+        let gap = 6.0 * noise;
+        let [a, b, c, d] = [0.0, 1.0, 2.0, 3.0].map(|i| shell(1.0 - gap * i));
+        let outer = Arc::new(Csg::difference(a, vec![b], 0.0).expect("a wall"));
+        let inner = Arc::new(Csg::difference(c, vec![d], 0.0).expect("a wall"));
+        let shells: Arc<dyn Field> = Arc::new(Csg::union(vec![outer, inner]).expect("two shells"));
+        let noise_of_cup = COARSE_CELL / 2.0 / 6.0;
+        for (truth, within, noise) in [
+            (shells, Solid::Sphere.within(), noise),
+            (Solid::Cup.field(), Solid::Cup.within(), noise_of_cup),
+        ] {
+            let options = CloudOptions {
+                count: 12_000,
+                noise,
+                seed,
+                ..CloudOptions::default()
+            };
+            let mut samples = sample_cloud(&*truth, &within, &options).expect("walls");
+            let mut random = SplitMix64::new(seed);
+            // As estimated normals lean.
+            for n in &mut samples.normals {
+                *n = (*n + 0.2 * random.normal3()).normalize();
+            }
+            let (field, _) = fit::<f32>(&samples, &PointOptions::default()).expect("a noisy cloud");
+            let around = field.lattice().world_box();
+            let wrong = wrong_signs(&field, &*truth, around, 4.0 * noise);
+            let extent = samples.positions.iter().fold(
+                Aabb {
+                    min: DVec3::INFINITY,
+                    max: DVec3::NEG_INFINITY,
+                },
+                |b, p| Aabb {
+                    min: b.min.min(*p),
+                    max: b.max.max(*p),
+                },
+            );
+            let room = 0.02 * extent.size().length();
+            let horn = (0..20_000)
+                .map(|_| around.min + around.size() * random.uniform3())
+                .filter(|p| (extent.min - *p).max(*p - extent.max).max_element() > room)
+                .filter(|p| field.value(*p) > 0.0)
+                .count();
+            assert_eq!((wrong, horn), (0, 0), "seed {seed}, noise {noise}");
+        }
     }
 }
 

@@ -42,6 +42,8 @@ pub struct LeafAudit {
     pub at_creases: usize,
     /// Of these, leaves that the smoothing asked for leaves above it.
     pub smoothed: usize,
+    /// Of these, leaves of parts too thin to be shown.
+    pub too_thin: usize,
     /// Moved above the tolerance when cells beside them were refined.
     pub moved: usize,
     /// Of these, leaves that the fit believed to be below the tolerance: a wrong statement of the fit.
@@ -81,6 +83,7 @@ pub fn audit_leaves(
             StopReason::Neighbours => &mut audit.moved,
             StopReason::Crease => &mut audit.at_creases,
             StopReason::Smoothing => &mut audit.smoothed,
+            StopReason::Thin => &mut audit.too_thin,
             StopReason::Tolerance => &mut audit.claimed_below,
         } += 1;
     }

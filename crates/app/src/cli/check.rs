@@ -1,7 +1,7 @@
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use fitting::mesh::MeshDistance;
+use fitting::mesh::{MeshDistance, measure_mesh};
 use fitting::points::measure_points;
 use fitting::volume::VolumeView;
 use fitting::{LeafIndex, StopReason, UnsupportedComponent, unsupported_components};
@@ -101,7 +101,7 @@ pub fn run(args: &Args) -> Outcome {
             let left_out = if is_own { &open.report().left_out[..] } else { &[] };
             measure_cloud(&open, &cloud.positions, left_out)
         }
-        Input::Mesh(mesh) => measure_mesh(&open, mesh)?,
+        Input::Mesh(mesh) => measure_triangles(&open, mesh)?,
         Input::Volume(volume) => measure_volume(&open, volume, args.output.is_some())?,
     };
     interrupt::check(&cancel)?;
@@ -207,21 +207,37 @@ fn measure_cloud(open: &OpenField, positions: &[DVec3], left_out: &[u32]) -> Mea
     }
 }
 
-/// Points of the mesh that are measured.
-const MESH_SAMPLES: usize = 100_000;
-
-fn measure_mesh(open: &OpenField, mesh: &TriangleMesh) -> Outcome<Measured> {
+/// Measures as the fit did, and also the way back and the sign.
+fn measure_triangles(open: &OpenField, mesh: &TriangleMesh) -> Outcome<Measured> {
     let (solid, _) = MeshDistance::new(&mesh.vertices, &mesh.triangles)?;
     let spacing = open.lattice().spacing(open.level_count() - 1).min_element();
+    let report = open.report();
+    let found = either!(&open.loaded().field, f => measure_mesh(f, &solid, &report.leaves));
+    let errors = found.errors;
+    let of_leaves = errors.leaves.iter().map(|l| (l.count, l.rms));
     Ok(Measured {
+        statistics: ErrorStatistics {
+            rms: errors.rms,
+            p95: errors.p95,
+            max: errors.max,
+            ..ErrorStatistics::of(&mut errors.distances.clone())
+        },
+        audit: audit_leaves(&report.leaves, of_leaves, report.tolerance),
+        count: mesh.triangles.len(),
+        used: mesh.triangles.len(),
+        bound: Some(errors.bound),
+        unprojected: Some(errors.unprojected),
+        unsupported: unsupported(open, &found.samples),
         against_mesh: Some(against_mesh(
             open.field(),
             &solid,
-            centers(open.lattice(), &open.report().leaves),
+            centers(open.lattice(), &report.leaves),
             spacing,
-            open.report().tolerance,
+            report.tolerance,
         )),
-        ..measure_cloud(open, &solid.surface_samples(MESH_SAMPLES), &[])
+        unit: open.unit().to_string(),
+        positions: found.samples,
+        errors: errors.distances,
     })
 }
 

@@ -176,7 +176,12 @@ fn points_or_faces(args: &Args, source: &Source, bar: &Bar) -> Outcome<(Summary,
         Some(shape) => shape == Shape::Mesh,
         None => has_faces && can_be_mesh(args),
     };
-    let output = output(args, source, if as_mesh { &MESHES } else { &CLOUDS })?;
+    // What has faces may become a mesh under another name.
+    let also = MESHES
+        .iter()
+        .filter(|m| !CLOUDS.contains(m) && has_faces && args.shape.is_none());
+    let clouds: Vec<&str> = CLOUDS.iter().chain(also).copied().collect();
+    let output = output(args, source, if as_mesh { &MESHES } else { &clouds })?;
     if as_mesh {
         drop(cloud);
         return Ok((mesh(args, source, &output, bar)?, output));

@@ -345,7 +345,7 @@ fn signs(stored: StoredSigns, leaf_confidence: &[f32]) -> SignReport {
 fn leaf(r: &LeafRecord) -> Option<Leaf> {
     use StopReason::*;
     let reason = [
-        Tolerance, Depth, NoData, Noise, Budget, Memory, Neighbours, Crease, Smoothing,
+        Tolerance, Depth, NoData, Noise, Budget, Memory, Neighbours, Crease, Smoothing, Thin,
     ]
     .into_iter()
     .find(|s| *s as u8 == r.reason)?;

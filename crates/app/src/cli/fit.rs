@@ -189,8 +189,11 @@ pub fn run(args: &Args) -> Outcome {
 /// Fits an input as chosen.
 pub fn fit(input: &Input, choice: &Choice, control: &mut Control) -> Outcome<Fitted> {
     let mut fitted = fit_as(input, choice, control)?;
-    let notes = limits_met(&fitted.report);
-    fitted.report.notes.extend(notes);
+    // Of meshes the fit itself tells it, with the share of the surface.
+    if !matches!(input, Input::Mesh(_)) {
+        let notes = limits_met(&fitted.report);
+        fitted.report.notes.extend(notes);
+    }
     Ok(fitted)
 }
 
@@ -210,14 +213,16 @@ fn limits_met(report: &FitReport) -> impl Iterator<Item = String> + use<> {
     })
 }
 
-/// A doubt about a tolerance that the user gave, on an object of this `size` whose numbers are as large as `magnitude`.
-fn tolerance_doubt(choice: &Choice, tolerance: f64, size: f64, magnitude: f64) -> Option<String> {
+const OBJECT: &str = "the object itself";
+
+/// A doubt about a tolerance that the user gave, on `what` of this `size` whose numbers are as large as `magnitude`.
+fn tolerance_doubt(choice: &Choice, tolerance: f64, what: &str, size: f64, magnitude: f64) -> Option<String> {
     choice.tolerance?;
     let finest = magnitude * f64::from(f32::EPSILON) / 2.0;
-    if tolerance >= size {
+    if tolerance >= size && size > 0.0 {
         let (t, s) = (human_number(tolerance), human_number(size));
         Some(format!(
-            "--tolerance {t} is larger than the object itself ({s}): the field may miss it altogether"
+            "--tolerance {t} is larger than {what} ({s}): the field may miss it altogether"
         ))
     } else if tolerance < finest && choice.precision == Precision::F32 {
         Some(format!(
@@ -281,9 +286,13 @@ fn fit_cloud<T: Stored>(cloud: &PointCloud, choice: &Choice, control: &mut Contr
     let (field, mut report) = fit_points::<T>(&points, &options, control).map_err(|e| explain(e, control))?;
     oriented.complete(&mut report, field.lattice());
     report.notes.splice(0..0, cloud.notes.iter().cloned());
-    report
-        .notes
-        .extend(tolerance_doubt(choice, report.tolerance, diagonal, diagonal));
+    report.notes.extend(tolerance_doubt(
+        choice,
+        report.tolerance,
+        OBJECT,
+        diagonal,
+        diagonal,
+    ));
     Ok(Fitted {
         field: T::any(field),
         report,
@@ -327,6 +336,13 @@ fn fit_triangles<T: Stored>(mesh: &TriangleMesh, choice: &Choice, control: &mut 
     let (field, mut report, defects) =
         fit_mesh::<T>(&mesh.vertices, &mesh.triangles, &options, control).map_err(|e| explain(e, control))?;
     report.notes.splice(0..0, mesh.notes.iter().cloned());
+    report.notes.extend(tolerance_doubt(
+        choice,
+        report.tolerance,
+        OBJECT,
+        diagonal,
+        diagonal,
+    ));
     Ok(Fitted {
         field: T::any(field),
         report,
@@ -383,6 +399,22 @@ fn fit_voxels<T: Stored>(volume: &Volume, choice: &Choice, control: &mut Control
     };
     let (field, mut report) = fit_volume::<T>(&view, &options, control).map_err(|e| explain(e, control))?;
     report.notes.splice(0..0, volume.notes.iter().cloned());
+    if choice.tolerance.is_some() {
+        let [low, high] = volume
+            .values
+            .iter()
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
+                [low.min(f64::from(*v)), high.max(f64::from(*v))]
+            });
+        let magnitude = low.abs().max(high.abs());
+        report.notes.extend(tolerance_doubt(
+            choice,
+            report.tolerance,
+            "the range of the densities",
+            high - low,
+            magnitude,
+        ));
+    }
     let iso = otsu_threshold(&volume.values);
     Ok(Fitted {
         field: T::any(field),

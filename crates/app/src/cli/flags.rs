@@ -35,13 +35,19 @@ pub fn fault(fault: &Fault) -> String {
 }
 
 /// What the fitting library advises, and the option for it.
-const ADVICE: [(&str, &str); 4] = [
+const ADVICE: [(&str, &str); 7] = [
     ("fit them by the robust loss", "--robust"),
     ("fit it as a cloud", "--as cloud"),
     ("a mesh can be trimmed there", "isoclay mesh --trim"),
     (
         "raise the memory ceiling or lower the depth limit",
         "--memory, --max-depth",
+    ),
+    ("the coefficients allowed are spent", "--coefficients"),
+    ("the memory allowed is spent", "--memory"),
+    (
+        "raise the coefficients and the depth allowed",
+        "--coefficients, --max-depth",
     ),
 ];
 

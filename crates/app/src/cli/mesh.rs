@@ -17,8 +17,9 @@ use super::progress::Bar;
 use super::quantity::{Tolerance, between, finite, human_number, threads};
 use super::source::{FIELDS, Source};
 use super::summary::Summary;
-use super::trim::{self, Sampled};
+use super::trim::{self, Sampled, drop_marked};
 use super::{interrupt, set_threads};
+use crate::pieces::of_narrow_parts;
 
 /// Arguments of `isoclay mesh`.
 #[derive(clap::Args)]
@@ -122,6 +123,7 @@ pub fn run(args: &Args) -> Outcome {
         return Err(open.no_surface(&field, options.iso));
     }
     interrupt::check(&cancel)?;
+    drop_specks(&mut mesh, &open);
     trim(&mut mesh, &open, args.trim, &mut notes)?;
     if args.open || args.trim.is_some() {
         crate::fans::split(&mut mesh);
@@ -149,6 +151,18 @@ pub fn run(args: &Args) -> Outcome {
     }
     .with_cost(&cost)
     .print_after(&output, args.json)
+}
+
+/// Leaves out parts of the surface of a cloud that are narrower than a finest knot interval: where sheets all but touch, a mesh
+/// splits off a few triangles that no sample speaks for.
+fn drop_specks(mesh: &mut Mesh, open: &OpenField) {
+    if open.source() == SourceKind::Cloud {
+        let width = open.lattice().spacing(open.level_count() - 1).max_element();
+        let narrow = of_narrow_parts(mesh, width);
+        if narrow.contains(&true) {
+            drop_marked(mesh, &narrow);
+        }
+    }
 }
 
 /// Mean spacings of the points from the next cell with points at which the surface counts as invented.
@@ -186,7 +200,7 @@ fn trim(
         return Ok(());
     }
     if asked.is_some() {
-        trim::drop_marked(mesh, &invented);
+        drop_marked(mesh, &invented);
     }
     if mesh.triangles.is_empty() {
         return Err(Failure::input(format!(

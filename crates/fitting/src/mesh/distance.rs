@@ -36,8 +36,10 @@ pub(crate) struct Distance {
     share: f32,
     /// Triangle of the foot, for searches near by.
     hint: u32,
-    /// Of a surface with holes: the winding number less that of a closed one, 1 inside and 0 outside, and how wrong
-    /// this may be; how far the rim of the nearest hole is, at least; how fast the winding number may change, at most.
+    /// Whether the foot lies on a face, not on an edge or a corner.
+    pub on_face: bool,
+    /// Of a surface with holes: the winding number less the nearest whole one, which it would be without holes, and how
+    /// wrong this may be; how far the rim of the nearest hole is, at least; how fast the winding number may change, at most.
     stray: f32,
     doubt: f32,
     rim: f32,
@@ -54,6 +56,7 @@ impl Distance {
             foot: found.point,
             distance: found.distance_squared.sqrt(),
             hint: found.triangle,
+            on_face: found.feature == Feature::Inner,
             share: 0.0,
             stray: 0.0,
             doubt: 0.0,
@@ -75,7 +78,7 @@ impl Distance {
     /// Takes over what the winding number was a little `way` from here.
     ///
     /// Off the surface `w = (1/4π) ∫ x·n/|x|³ dA` has by Stokes the gradient of a current loop along the rim, so
-    /// `|∇w| ≤ Σ l/(4πr²)` over its edges of length `l` at distance `r`; through the surface it changes by 1.
+    /// `|∇w| ≤ Σ l/(4πr²)` over its edges of length `l` at distance `r`; through each triangle it changes by 1.
     fn carry(&mut self, way: f64, other: &Self) {
         let rim = f64::from(other.rim) - way;
         (self.stray, self.rim) = (other.stray, rim as f32);
@@ -220,6 +223,36 @@ impl MeshDistance {
             .unwrap_or_else(|| self.wind(p, &found))
     }
 
+    /// How far the other side of a sheet is from a point of the surface along `way`, a unit vector across it, if it is
+    /// nearer than `reach` and faces the other way: the contact of the ball that touches the surface in both
+    /// \[Ma12\].
+    pub(crate) fn across(&self, foot: DVec3, way: DVec3, reach: f64) -> Option<f64> {
+        let mut radius = 0.5 * reach;
+        let mut to = None;
+        for _ in 0..12 {
+            let center = foot + way * radius;
+            let point = self.surface.boundary.nearest(center, 0).point;
+            if center.distance(point) >= radius * (1.0 - 1e-6) {
+                let to: DVec3 = to?;
+                let faces_back = (to - way * radius).dot(way) > 0.5 * radius;
+                return faces_back.then(|| to.dot(way));
+            }
+            let next = point - foot;
+            if next.dot(way) <= 0.0 {
+                return None;
+            }
+            radius = next.length_squared() / (2.0 * next.dot(way));
+            to = Some(next);
+        }
+        None
+    }
+
+    /// Nearest points of the surface to eight places near each other, unit box.
+    pub(crate) fn feet(&self, places: &[DVec3; PLACES]) -> [DVec3; PLACES] {
+        let found = self.surface.boundary.nearest_of_eight(places, 0);
+        found.map(|n| n.point)
+    }
+
     /// [`MeshDistance::at`] for eight places near each other and near the one that something is known of.
     pub(crate) fn at_eight(
         &self,
@@ -250,7 +283,7 @@ impl MeshDistance {
             let (q, other) = near?;
             let way = p.distance(q);
             out.carry(way, other);
-            if !out.is_whole() || (self.surface.normals.is_none() && way >= other.distance * NEARER) {
+            if !out.is_whole() {
                 return None;
             }
         }
@@ -268,7 +301,7 @@ impl MeshDistance {
             return out;
         };
         out.share = (4.0 * winding - 2.0).clamp(-1.0, 1.0) as f32;
-        out.stray = (winding - side) as f32;
+        out.stray = (winding - winding.round()) as f32;
         if out.is_whole() {
             let (nearest, slope) = edges.seen_from(p);
             (out.rim, out.slope) = (nearest as f32, slope as f32);
@@ -287,15 +320,10 @@ impl MeshDistance {
         {
             return Some(other.share);
         }
-        let triangle = found.triangle as usize;
-        let outward = match &self.surface.normals {
-            Some(normals) => normals.at(&self.surface.boundary, found.triangle, found.feature)?,
-            // The way to the inner of a triangle meets no other.
-            None if found.feature == Feature::Inner && self.surface.certain[triangle] => {
-                area_vector(&self.surface.boundary.corners[triangle])
-            }
-            None => return None,
-        };
+        let outward = self
+            .surface
+            .normals
+            .at(&self.surface.boundary, found.triangle, found.feature)?;
         let height = (p - found.point).dot(outward);
         (height != 0.0).then(|| if height < 0.0 { 1.0 } else { -1.0 })
     }

@@ -21,7 +21,7 @@ const BLIND: f64 = 0.5;
 /// sixteenth.
 const FALL: f64 = 0.3;
 /// Slopes of the field below this are taken for it where distances to the zero set are told.
-pub(super) const LEAST_SLOPE: f64 = 0.25;
+const LEAST_SLOPE: f64 = 0.25;
 
 /// Distances from points of the surface to the zero set.
 #[derive(Clone, Copy, Debug, Default)]

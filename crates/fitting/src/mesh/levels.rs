@@ -10,8 +10,9 @@ use super::base::{Base, KNOTS, base};
 use super::conditions::{Around, Conditions, base_qualities, part, qualities};
 use super::distance::MeshDistance;
 use super::judge::{Quality, Verdict, verdict};
-use super::probes::{Cell, Octants, Probe, center, child};
+use super::probes::{Cell, Octants, Probe, around, center, child};
 use super::summary::{LeafCell, summary};
+use super::thin::{Sheets, TooThin};
 use crate::points::BASE_DEPTH;
 use crate::points::assemble::assemble_in;
 use crate::points::band::{Band, Coarser, active_count, count_bricks_near, key_of};
@@ -63,7 +64,7 @@ struct Octree<'a> {
     /// Corners of the surface.
     corners: Vec<Probe>,
     leaves: Vec<LeafCell>,
-    /// Points of the surface in leaves beside cells that were split, leaf by leaf.
+    /// Points of the surface in leaves, leaf by leaf.
     feet: Vec<DVec3>,
     /// Coefficients on creases and elsewhere, about, and in all.
     on_creases: usize,
@@ -71,6 +72,7 @@ struct Octree<'a> {
     coefficients: usize,
     /// Sum over the creases left as they are of mean square error times area.
     left_at_creases: f64,
+    too_thin: TooThin,
 }
 
 pub(crate) fn fit<T: Real>(
@@ -94,6 +96,7 @@ pub(crate) fn fit<T: Real>(
         elsewhere: 0,
         coefficients: base.grid.values.len(),
         left_at_creases: 0.0,
+        too_thin: TooThin::default(),
     };
     let room = |bricks: usize, cells: usize, settled: usize, control: &Control| {
         control
@@ -117,7 +120,15 @@ pub(crate) fn fit<T: Real>(
     control.step("measuring", 0.92)?;
     drop(coarser);
     let field = assemble_in(mesh.origin, mesh.scale, &base.grid, &levels);
-    let report = summary(mesh, plan, &field, &tree.leaves, &tree.feet, triangles);
+    let report = summary(
+        mesh,
+        plan,
+        &field,
+        &tree.leaves,
+        &tree.feet,
+        &tree.too_thin,
+        triangles,
+    );
     Ok((field, report))
 }
 
@@ -197,15 +208,39 @@ impl Octree<'_> {
         };
         let mut reasons = vec![StopReason::Tolerance; cells.len()];
         let mut stop = |list: &[usize], reason: StopReason| list.iter().for_each(|&i| reasons[i] = reason);
-        let (mut split, creased) = (splits_of(Verdict::Split), splits_of(Verdict::Crease));
+        let (mut split, mut creased) = (splits_of(Verdict::Split), splits_of(Verdict::Crease));
+        let budget = self
+            .plan
+            .coefficients
+            .map(|c| c.saturating_sub(self.coefficients));
         let square = |&i: &usize| found[i].rms().powi(2) * found[i].area(h);
         let urgency = |&i: &usize| (found[i].is_lost(), found[i].rms());
-        let left: f64 = creased.iter().map(square).sum();
+        let mut reserved = 0;
         if depth == self.plan.max_depth {
             stop(&split, StopReason::Depth);
             stop(&creased, StopReason::Depth);
             split.clear();
         } else {
+            let above = split.iter().chain(&creased);
+            let of = |&i: &usize| (i, &cells[i], &octants[i], &found[i]);
+            let sheets = Sheets::find(self.mesh, depth, above.map(of));
+            let choice = sheets.choose(
+                depth,
+                plan.max_depth,
+                budget,
+                count,
+                |i| (cells[i].at, found[i].area(h)),
+                self.coefficients,
+                &mut self.too_thin,
+            );
+            let mut is_refused = vec![false; cells.len()];
+            choice.refused.iter().for_each(|&i| is_refused[i] = true);
+            stop(&choice.refused, StopReason::Thin);
+            split.retain(|&i| !is_refused[i]);
+            creased.retain(|&i| !is_refused[i]);
+            reserved = choice.reserved;
+
+            let left: f64 = creased.iter().map(square).sum();
             let elsewhere = count(&split);
             self.elsewhere += elsewhere;
             let matters = self.left_at_creases + left > (CREASE_SHARE * plan.tolerance).powi(2) * plan.area;
@@ -221,12 +256,10 @@ impl Octree<'_> {
             split.sort_unstable();
             self.on_creases += count(&split) - elsewhere;
         }
-        let budget = self
-            .plan
-            .coefficients
-            .map(|c| c.saturating_sub(self.coefficients));
         if let Some(budget) = budget {
-            let kept = affordable(split.clone(), budget, urgency, count);
+            let lost: Vec<usize> = split.iter().copied().filter(|&i| found[i].is_lost()).collect();
+            let room = budget.saturating_sub(reserved).max(count(&lost).min(budget));
+            let kept = affordable(split.clone(), room, urgency, count);
             let mut is_kept = vec![false; cells.len()];
             kept.iter().for_each(|&i| is_kept[i] = true);
             let refused: Vec<usize> = split.iter().copied().filter(|&i| !is_kept[i]).collect();
@@ -263,13 +296,7 @@ impl Octree<'_> {
         let mut is_split = vec![false; cells.len()];
         split.iter().for_each(|&i| is_split[i] = true);
         let split_cells: FxHashSet<[u32; 3]> = split.iter().map(|&i| cells[i].at).collect();
-        let beside_split = |at: [u32; 3]| {
-            (0..27u32).any(|i| {
-                let d = [i / 9, i / 3 % 3, i % 3];
-                let at: [u32; 3] = std::array::from_fn(|a| (at[a] + d[a]).wrapping_sub(1));
-                split_cells.contains(&at)
-            })
-        };
+        let beside_split = |at| around(at).any(|cell| split_cells.contains(&cell));
         for (i, cell) in cells.iter().enumerate() {
             if is_split[i] {
                 for (o, d) in octants[i].iter().enumerate() {
@@ -279,17 +306,16 @@ impl Octree<'_> {
                 }
                 continue;
             }
-            let moves = beside_split(cell.at);
-            let first = self.feet.len();
-            if moves {
+            if beside_split(cell.at) {
                 cell.conditions(&octants[i], depth, &mut self.settled);
-                self.feet.extend(cell.feet(&octants[i], depth).map(|f| f.foot));
             }
+            let first = self.feet.len();
+            self.feet.extend(cell.feet(&octants[i], depth));
             self.leaves.push(LeafCell {
                 depth,
                 at: cell.at,
                 reason: reasons[i],
-                found: found[i],
+                area: found[i].area(h),
                 feet: first..self.feet.len(),
             });
         }

@@ -7,6 +7,7 @@ mod defects;
 mod distance;
 mod judge;
 mod levels;
+mod measure;
 mod moments;
 mod nearest;
 mod normals;
@@ -16,6 +17,7 @@ mod probes;
 mod sides;
 mod summary;
 mod surface;
+mod thin;
 mod topology;
 mod tree;
 mod winding;
@@ -25,6 +27,7 @@ use glam::DVec3;
 
 pub use defects::MeshDefects;
 pub use distance::MeshDistance;
+pub use measure::{MeshErrors, measure_mesh};
 
 use crate::points::check_limits;
 use crate::{Control, FitError, FitReport};

@@ -13,26 +13,36 @@ use super::tree::TriangleTree;
 const NONE: u32 = u32::MAX;
 
 /// Neighbours of the triangles of a tree, and normals of its corners.
+///
+/// Only whole triangles of the mesh that cross no other are known here: of them alone it is known what lies beside them.
 pub(crate) struct Normals {
     /// Beyond the edges from the first to the second corner, from there to the third, and back.
     beyond: Vec<[u32; 3]>,
+    /// Vertices of each triangle; [`NONE`] of one that is not known.
     corners: Vec<[u32; 3]>,
-    /// Of each vertex; zero where the triangles round it are no single fan.
+    /// Of each vertex; zero where the triangles round it are no single fan of known ones.
     vertices: Vec<DVec3>,
 }
 
 impl Normals {
-    /// `face_of` is the face of each triangle of the tree.
-    pub fn new(faces: &Faces, tree: &TriangleTree, face_of: impl Fn(u32) -> u32) -> Self {
+    /// `face_of` is the face of each triangle of the tree, if it is known; `used` are all faces that count.
+    pub fn new(
+        faces: &Faces,
+        tree: &TriangleTree,
+        used: &[u32],
+        face_of: impl Fn(u32) -> Option<u32>,
+    ) -> Self {
         let mut place = vec![NONE; faces.corners.len()];
         let corners: Vec<[u32; 3]> = tree
             .ids
             .iter()
             .zip(0..)
-            .map(|(&id, t)| {
-                let face = face_of(id) as usize;
-                place[face] = t;
-                faces.corners[face]
+            .map(|(&id, t)| match face_of(id) {
+                Some(face) => {
+                    place[face as usize] = t;
+                    faces.corners[face as usize]
+                }
+                None => [NONE; 3],
             })
             .collect();
         let mut beyond = vec![[NONE; 3]; corners.len()];
@@ -55,6 +65,12 @@ impl Normals {
             vertices: vec![DVec3::ZERO; faces.vertices.len()],
         };
         out.weigh(tree);
+        // What else meets at a vertex may be surface too.
+        for face in used.iter().map(|&f| f as usize).filter(|&f| place[f] == NONE) {
+            faces.corners[face]
+                .iter()
+                .for_each(|&v| out.vertices[v as usize] = DVec3::ZERO);
+        }
         out
     }
 
@@ -62,7 +78,7 @@ impl Normals {
     fn weigh(&mut self, tree: &TriangleTree) {
         let mut round = vec![0u32; self.vertices.len()];
         let mut first = vec![NONE; self.vertices.len()];
-        for (t, ids) in self.corners.iter().enumerate() {
+        for (t, ids) in self.corners.iter().enumerate().filter(|(_, ids)| ids[0] != NONE) {
             let points = &tree.corners[t];
             let normal = area_vector(points).normalize_or_zero();
             for k in 0..3 {
@@ -99,6 +115,9 @@ impl Normals {
 
     /// A vector that points outwards at a place of triangle `t`, if the surface has two sides there for sure.
     pub fn at(&self, tree: &TriangleTree, t: u32, feature: Feature) -> Option<DVec3> {
+        if self.corners[t as usize][0] == NONE {
+            return None;
+        }
         let unit = |t: u32| area_vector(&tree.corners[t as usize]).normalize_or_zero();
         let normal = match feature {
             Feature::Inner => unit(t),

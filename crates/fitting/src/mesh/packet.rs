@@ -10,6 +10,10 @@ use super::tree::{Node, TriangleTree};
 pub(crate) const PLACES: usize = 8;
 type Lanes = [f64; PLACES];
 
+/// A box is opened if it comes so near, in squares of the distance to the nearest triangle known: the rounding of both may
+/// not decide which of equally near triangles is found.
+const SLACK: f64 = 1.0 + 1e-12;
+
 /// Squared sine of an angle of a triangle below which it is taken for its edges: its plane is not known any more.
 const SLIVER: f64 = 1e-16;
 
@@ -22,7 +26,7 @@ struct Packet {
 
 impl TriangleTree {
     /// Nearest points to places that lie near each other. A `hint` (a triangle likely to be near) makes the search
-    /// shorter and, up to the choice between triangles equally near but for rounding, changes nothing.
+    /// shorter and changes nothing.
     pub fn nearest_of_eight(&self, places: &[DVec3; PLACES], hint: u32) -> [Nearest; PLACES] {
         let packet = Packet {
             x: places.map(|p| p.x),
@@ -95,7 +99,7 @@ fn sum(d: &Lanes) -> f64 {
 fn any_below(bound: &Lanes, best: &Lanes) -> bool {
     let mut any = false;
     for l in 0..PLACES {
-        any |= bound[l] <= best[l];
+        any |= bound[l] <= best[l] * SLACK;
     }
     any
 }
@@ -190,6 +194,37 @@ mod tests {
             for (p, n) in places.iter().zip(found) {
                 let alone = tree.nearest(*p, 0).distance_squared.sqrt();
                 assert!((n.distance_squared.sqrt() - alone).abs() <= 1e-9, "{p}");
+            }
+        }
+    }
+
+    /// On the planes of symmetry of a box two or four faces are equally near.
+    #[test]
+    fn the_hint_does_not_decide_between_equally_near_triangles() {
+        let corner = |i: usize| DVec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2) as f64) * 0.3 + 0.1;
+        let quads = [
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ];
+        let triangles: Vec<[DVec3; 3]> = quads
+            .iter()
+            .flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]])
+            .map(|t| t.map(corner))
+            .collect();
+        let tree = TriangleTree::new(&triangles);
+        let mut random = SplitMix64::new(9);
+        for _ in 0..100 {
+            let places = [(); PLACES].map(|()| {
+                let p = random.uniform3() * 0.3 + 0.1;
+                DVec3::new(p.x, p.x, if random.uniform() < 0.5 { p.z } else { 0.25 })
+            });
+            let found = tree.nearest_of_eight(&places, 0);
+            for hint in 1..12 {
+                assert_eq!(tree.nearest_of_eight(&places, hint), found, "{places:?}");
             }
         }
     }

@@ -60,6 +60,14 @@ pub(crate) fn child(cell: [u32; 3], octant: usize) -> [u32; 3] {
     std::array::from_fn(|a| 2 * cell[a] + (octant >> (2 - a) & 1) as u32)
 }
 
+/// A cell and those beside it; beyond the borders of the grid they are none.
+pub(crate) fn around(cell: [u32; 3]) -> impl Iterator<Item = [u32; 3]> {
+    (0..27u32).map(move |i| {
+        let d = [i / 9, i / 3 % 3, i % 3];
+        std::array::from_fn(|a| (cell[a] + d[a]).wrapping_sub(1))
+    })
+}
+
 /// The cell of the grid with `2^depth` cells that holds `at`.
 pub(crate) fn cell_of(at: DVec3, depth: usize) -> [u32; 3] {
     let last = (1u32 << depth) - 1;
@@ -69,17 +77,21 @@ pub(crate) fn cell_of(at: DVec3, depth: usize) -> [u32; 3] {
 }
 
 impl Cell {
+    /// Centres of its eight parts.
+    pub fn places(&self, depth: usize) -> impl Iterator<Item = DVec3> {
+        (0..8).map(move |o| center(child(self.at, o), depth + 1))
+    }
+
     pub fn ask(&self, mesh: &MeshDistance, depth: usize) -> Octants {
         let middle = center(self.at, depth);
         let places = std::array::from_fn(|o| center(child(self.at, o), depth + 1));
         mesh.at_eight(&places, Some((middle, &self.center)))
     }
 
-    /// Feet of the parts that lie in the cell, each once.
-    pub fn feet<'a>(&'a self, octants: &'a Octants, depth: usize) -> impl Iterator<Item = &'a Distance> {
-        octants
-            .iter()
-            .filter(move |found| cell_of(found.foot, depth) == self.at)
+    /// Feet of the parts that lie in the cell.
+    pub fn feet(&self, octants: &Octants, depth: usize) -> impl Iterator<Item = DVec3> {
+        let feet = octants.iter().map(|found| found.foot);
+        feet.filter(move |foot| cell_of(*foot, depth) == self.at)
     }
 
     /// Appends what is asked of the field in the cell: the distance and its gradient in every second of its parts,

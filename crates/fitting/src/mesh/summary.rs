@@ -2,27 +2,25 @@
 
 use std::ops::Range;
 
-use bspline::{Field, HierarchicalSpline, Real};
+use bspline::{HierarchicalSpline, Real};
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::Plan;
 use super::distance::MeshDistance;
-use super::judge::{LEAST_SLOPE, Misses, Quality};
 use super::levels::BENDING;
+use super::measure::measure;
+use super::thin::TooThin;
 use crate::points::BASE_DEPTH;
 use crate::{FitReport, Leaf, StopReason};
-
-/// Random points of the surface at which the whole field is measured.
-const SAMPLES: usize = 30_000;
 
 /// A leaf as it was judged.
 pub(super) struct LeafCell {
     pub depth: usize,
     pub at: [u32; 3],
     pub reason: StopReason,
-    pub found: Quality,
-    /// Points of its surface, if cells beside it were split: what was found may have moved.
+    /// Area of the surface in it, unit box, about.
+    pub area: f64,
+    /// Feet of its parts that lie in it.
     pub feet: Range<usize>,
 }
 
@@ -34,83 +32,74 @@ struct Above {
     max: f64,
 }
 
-/// Measures the finished field. Errors of leaves that nothing changed beside are those of their own level.
+/// Measures the finished field.
 pub(super) fn summary<T: Real>(
     mesh: &MeshDistance,
     plan: &Plan,
     field: &HierarchicalSpline<T>,
-    leaves: &[LeafCell],
+    cells: &[LeafCell],
     feet: &[DVec3],
+    too_thin: &TooThin,
     triangles: usize,
 ) -> FitReport {
-    let found: Vec<Quality> = leaves
-        .par_iter()
-        .with_min_len(256)
-        .map(|leaf| {
-            let mut found = leaf.found;
-            if !leaf.feet.is_empty() {
-                found.feet = Misses::default();
-                for &foot in &feet[leaf.feet.clone()] {
-                    let (f, slope) = field.value_gradient(mesh.origin + foot * mesh.scale);
-                    found.feet.add((f / mesh.scale, slope));
-                }
-            }
-            found
+    let mut leaves: Vec<Leaf> = cells
+        .iter()
+        .map(|c| Leaf {
+            level: (c.depth - BASE_DEPTH) as u8,
+            cell: c.at,
+            sample_count: 0,
+            rms: 0.0,
+            max: 0.0,
+            reason: c.reason,
         })
         .collect();
+    let found = measure(field, mesh, &leaves, |i, out| {
+        out.extend_from_slice(&feet[cells[i].feet.clone()]);
+    })
+    .errors;
     let tolerance = plan.tolerance * mesh.scale;
-    let mut out = FitReport {
+    let mut area = 0.0;
+    let mut above = [Above::default(); StopReason::Thin as usize + 1];
+    for ((leaf, cell), error) in leaves.iter_mut().zip(cells).zip(&found.leaves) {
+        (leaf.sample_count, leaf.rms, leaf.max) = (error.count, error.rms as f32, error.max as f32);
+        area += cell.area;
+        if leaf.is_above(tolerance) {
+            if leaf.reason == StopReason::Tolerance {
+                leaf.reason = StopReason::Neighbours;
+            }
+            let a = &mut above[leaf.reason as usize];
+            (a.leaves, a.area, a.max) = (a.leaves + 1, a.area + cell.area, a.max.max(error.max));
+        }
+    }
+    let mut notes = notes(&above, area);
+    if too_thin.area > 0.0 {
+        let length = |l: f64| l * mesh.scale;
+        notes.push(format!(
+            "parts and gaps thinner than {:.3e} are left out, with {:.2} % of the surface: the thinnest found, {:.3e}, would \
+             show in shreds with less than {} coefficients, about, on levels down to {}; raise the coefficients and the \
+             depth allowed",
+            length(too_thin.shown),
+            100.0 * too_thin.area / area,
+            length(too_thin.least),
+            too_thin.coefficients,
+            too_thin.depth,
+        ));
+    }
+    FitReport {
         input_count: triangles,
         used_count: triangles,
         coefficients: field.coefficient_count(),
         depth: BASE_DEPTH + field.level_count() - 1,
         tolerance,
         smoothing: BENDING,
+        rms: found.rms,
+        p95: found.p95,
+        max: found.max,
+        bound: found.bound,
+        leaves,
+        notes,
         ..FitReport::default()
-    };
-    let mut area = 0.0;
-    let mut above = [Above::default(); StopReason::Crease as usize + 1];
-    for (leaf, q) in leaves.iter().zip(&found) {
-        let rms = q.feet.rms() * mesh.scale;
-        let max = q.feet.max.max(q.corners.max) * mesh.scale;
-        let own_area = q.area(0.5f64.powi(leaf.depth as i32));
-        area += own_area;
-        let is_over = rms > tolerance;
-        let reason = match leaf.reason {
-            StopReason::Tolerance if is_over => StopReason::Neighbours,
-            reason => reason,
-        };
-        if is_over {
-            let a = &mut above[reason as usize];
-            (a.leaves, a.area, a.max) = (a.leaves + 1, a.area + own_area, a.max.max(max));
-        }
-        out.max = out.max.max(max);
-        out.leaves.push(Leaf {
-            level: (leaf.depth - BASE_DEPTH) as u8,
-            cell: leaf.at,
-            sample_count: q.feet.count,
-            rms: rms as f32,
-            max: max as f32,
-            reason,
-        });
     }
-    let mut errors: Vec<f64> = mesh
-        .surface_samples(SAMPLES)
-        .par_iter()
-        .with_min_len(1024)
-        .map(|&p| {
-            let (f, slope) = field.value_gradient(p);
-            f.abs() / slope.length().max(LEAST_SLOPE)
-        })
-        .collect();
-    out.rms = (errors.iter().map(|e| e * e).sum::<f64>() / SAMPLES as f64).sqrt();
-    out.max = errors.iter().copied().fold(out.max, f64::max);
-    out.p95 = *errors
-        .select_nth_unstable_by(SAMPLES * 95 / 100, f64::total_cmp)
-        .1;
-    out.bound = out.max + field.rounding_bound();
-    out.notes = notes(&above, area);
-    out
 }
 
 /// Sentences on what stays above the tolerance, where anything does.

@@ -29,11 +29,8 @@ const BOUNDS_SOMETHING: f64 = 0.1;
 pub(crate) struct Surface {
     /// Triangles and parts of triangles that have the solid on one side and not on the other.
     pub boundary: Arc<TriangleTree>,
-    /// Whether each triangle of `boundary` is a whole triangle of the mesh that crosses no other.
-    pub certain: Vec<bool>,
-    /// Normals of its edges and corners, if it is all triangles: what crosses one of them goes from the outside to the
-    /// inside or back.
-    pub normals: Option<Normals>,
+    /// Normals of its triangles, edges and corners, where they are sure to tell inside from outside.
+    pub normals: Normals,
     /// All triangles that count for the winding number.
     pub winding: WindingTree,
     /// The rim of its holes; none if the winding number is a whole number off the surface.
@@ -102,7 +99,7 @@ pub(crate) fn surface(faces: &mut Faces, defects: &mut MeshDefects) -> Result<Su
     defects.self_intersections = found.pairs;
     defects.intersections_sampled = found.sampled;
     let boundary = boundary(faces, &face_of, &winding, &found.partners, defects);
-    let (triangles, certain): (Vec<_>, Vec<_>) = boundary.into_iter().unzip();
+    let (triangles, known): (Vec<_>, Vec<_>) = boundary.into_iter().unzip();
     if triangles.is_empty() {
         return Err(bounds_nothing(defects));
     }
@@ -112,11 +109,10 @@ pub(crate) fn surface(faces: &mut Faces, defects: &mut MeshDefects) -> Result<Su
     } else {
         Arc::new(TriangleTree::new(&triangles))
     };
-    let certain: Vec<bool> = tree.ids.iter().map(|&i| certain[i as usize]).collect();
+    let normals = Normals::new(faces, &tree, &face_of, |id| known[id as usize]);
     Ok(Surface {
         boundary: tree,
-        certain,
-        normals: all.then(|| Normals::new(faces, &winding.tree, |id| face_of[id as usize])),
+        normals,
         winding,
         rim,
     })
@@ -242,7 +238,7 @@ fn sides_of(winding: &WindingTree, points: &[DVec3; 3]) -> Sides {
     Sides::at(winding, middle, area_vector(points).normalize_or_zero())
 }
 
-/// Triangles with the solid behind them alone, and whether each is a whole triangle of the mesh. Triangles that
+/// Triangles with the solid behind them alone, and the face that each is, if it is one that crosses no other. Triangles that
 /// cross others are cut where they do.
 fn boundary(
     faces: &Faces,
@@ -250,7 +246,7 @@ fn boundary(
     winding: &WindingTree,
     partners: &BTreeMap<u32, Vec<u32>>,
     defects: &mut MeshDefects,
-) -> Vec<([DVec3; 3], bool)> {
+) -> Vec<([DVec3; 3], Option<u32>)> {
     let tree = &winding.tree;
     let mut crosses = vec![false; faces.corners.len()];
     for &t in partners.keys() {
@@ -261,7 +257,7 @@ fn boundary(
     if patch_count == 1 && partners.is_empty() {
         return face_of
             .iter()
-            .map(|&f| (faces.points(f as usize), true))
+            .map(|&f| (faces.points(f as usize), Some(f)))
             .collect();
     }
     let uncut: Vec<u32> = face_of
@@ -280,10 +276,10 @@ fn boundary(
             2 * votes.count() >= count
         })
         .collect();
-    let mut out: Vec<([DVec3; 3], bool)> = uncut
+    let mut out: Vec<([DVec3; 3], Option<u32>)> = uncut
         .iter()
         .filter(|&&f| kept[patch_of[f as usize] as usize])
-        .map(|&f| (faces.points(f as usize), true))
+        .map(|&f| (faces.points(f as usize), Some(f)))
         .collect();
     defects.interior_faces = uncut.len() - out.len();
     let cuts: Vec<(Vec<[DVec3; 3]>, bool)> = partners
@@ -295,7 +291,7 @@ fn boundary(
         .collect();
     for (pieces, whole) in cuts {
         defects.interior_faces += usize::from(!whole);
-        out.extend(pieces.into_iter().map(|p| (p, false)));
+        out.extend(pieces.into_iter().map(|p| (p, None)));
     }
     out
 }

@@ -37,7 +37,7 @@ const RUN: usize = 16;
 /// Turns over the coefficients of the full level `base` that contradict both witnesses; returns how many.
 pub(crate) fn settle(base: &mut FullGrid<f64>, samples: &Samples) -> usize {
     let data = clusters(samples, BASE_DEPTH);
-    let sites = far_sites(&data, base.n);
+    let sites = far_sites(data.iter().map(|c| c.position), base.n);
     let numbers = winding_numbers(&data, &sites, base.n);
     let (low, high) = data
         .iter()
@@ -63,6 +63,36 @@ pub(crate) fn settle(base: &mut FullGrid<f64>, samples: &Samples) -> usize {
         }
     }
     turned
+}
+
+/// Turns over the coefficients of the full level `base` that lie in the cells of `conditions` (position and value asked for),
+/// away from all points, and have the other sign: where noise asks for a stiff surface, conditions on the finer levels
+/// cannot bend a whole pocket away.
+pub(crate) fn turn_over(base: &mut FullGrid<f64>, samples: &Samples, conditions: &[(DVec3, f32)], h: f64) {
+    let m = base.width();
+    let mut is_far = vec![false; base.values.len()];
+    for site in far_sites(samples.live_points().map(|i| samples.positions[i]), base.n) {
+        is_far[site] = true;
+    }
+    let mut asked: Vec<(usize, f32)> = Vec::new();
+    for (centre, target) in conditions {
+        // Knots on the border of a cell belong to it.
+        let [lo, hi] = [-0.5 * h, 0.5 * h].map(|d| ((*centre + d) * base.n as f64).to_array());
+        let range = |a: usize| (lo[a] - 1e-9).ceil() as usize..=(hi[a] + 1e-9) as usize;
+        for x in range(0) {
+            for y in range(1) {
+                asked.extend(range(2).map(|z| (((x + 1) * m + y + 1) * m + z + 1, *target)));
+            }
+        }
+    }
+    asked.sort_unstable_by_key(|a| a.0);
+    asked.dedup_by_key(|a| a.0);
+    for (site, target) in asked {
+        let value = &mut base.values[site];
+        if is_far[site] && *value * f64::from(target) < 0.0 {
+            *value = -*value;
+        }
+    }
 }
 
 /// Distance from `x` to the nearest cluster, and the mean cosine between the ways to `x` from the clusters that are hardly
@@ -93,14 +123,12 @@ fn site_position(site: usize, n: usize) -> DVec3 {
     (DVec3::from_array(s.map(|s| s as f64)) - 1.0) / n as f64
 }
 
-/// Sites of a level of `n` cells in whose eight cells there is no cluster.
-fn far_sites(data: &[Cluster], n: usize) -> Vec<usize> {
+/// Sites of a level of `n` cells in whose eight cells there is none of `points`.
+fn far_sites(points: impl Iterator<Item = DVec3>, n: usize) -> Vec<usize> {
     let m = n + 3;
     let mut is_near = vec![false; m * m * m];
-    for c in data {
-        let cell = (c.position * n as f64)
-            .to_array()
-            .map(|x| (x as usize).min(n - 1));
+    for p in points {
+        let cell = (p * n as f64).to_array().map(|x| (x as usize).min(n - 1));
         for corner in 0..8 {
             let s = [0, 1, 2].map(|a| cell[a] + 1 + (corner >> a & 1));
             is_near[(s[0] * m + s[1]) * m + s[2]] = true;
@@ -191,5 +219,48 @@ fn add_up_3(values: &mut [f64], n: usize) {
             let high = if at + 1 < n { before[i + stride] } else { 0.0 };
             *v += low + high;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::points::OrientedPoints;
+
+    /// Coefficients of the cells asked for turn over, but for those beside a point and those that are right already.
+    #[test]
+    fn a_pocket_away_from_all_points_turns_over() {
+        let normals: Vec<DVec3> = (0..400)
+            .map(|i| {
+                let z = 1.0 - (2.0 * f64::from(i) + 1.0) / 400.0;
+                let (sin, cos) = libm::sincos(2.399_963_229_728_653 * f64::from(i));
+                let r = (1.0 - z * z).sqrt();
+                DVec3::new(r * cos, r * sin, z)
+            })
+            .collect();
+        let cloud = OrientedPoints {
+            positions: &normals,
+            normals: &normals,
+            certainty: None,
+        };
+        let samples = Samples::prepare(cloud).expect("a ball");
+        let mut base = FullGrid::zeros(32);
+        let site = |knot: [usize; 3]| ((knot[0] + 1) * 35 + knot[1] + 1) * 35 + knot[2] + 1;
+        // The ball ends at knot 29.9 of each axis through its middle.
+        let (pocket, right, beside, elsewhere) = ([29, 29, 29], [29, 29, 30], [30, 16, 16], [2, 2, 2]);
+        for (knot, value) in [(pocket, 0.5), (right, -0.25), (beside, 0.5), (elsewhere, 0.5)] {
+            base.values[site(knot)] = value;
+        }
+        let h = 1.0 / 128.0;
+        let conditions: Vec<(DVec3, f32)> = [pocket, right, beside]
+            .iter()
+            .map(|knot| {
+                let corner = DVec3::from_array(knot.map(|k| k as f64 / 32.0));
+                (corner + 0.5 * h, -h as f32)
+            })
+            .collect();
+        turn_over(&mut base, &samples, &conditions, h);
+        let found = [pocket, right, beside, elsewhere].map(|knot| base.values[site(knot)]);
+        assert_eq!(found, [-0.5, -0.25, 0.5, 0.5]);
     }
 }

@@ -181,6 +181,7 @@ pub fn fit_points<T: Real>(
             break (cascade, field);
         }
         rounds += 1;
+        far_field::turn_over(&mut base, &samples, &conditions, pieces::width(&field));
         samples = samples.with_sign_conditions(&conditions);
         samples.notes.push(format!(
             "{} cells whose sign no sample speaks for were turned over (round {rounds})",

@@ -15,12 +15,16 @@ const CELLS_TO_ACT: usize = 2;
 /// side of it, and the other side is no mistake.
 const LARGEST_SHARE: f64 = 0.1;
 
+/// Width of the cells that are looked at, unit box.
+pub(crate) fn width<T: Real>(field: &HierarchicalSpline<T>) -> f64 {
+    0.5f64.powi(DEPTH.min(BASE_DEPTH + field.level_count() - 1) as i32)
+}
+
 /// Conditions of the opposite sign, one cell deep, at the cells of every component that holds no sample: position
 /// and value in the unit box.
 pub(crate) fn conditions<T: Real>(field: &HierarchicalSpline<T>, samples: &Samples) -> Vec<(DVec3, f32)> {
-    let depth = DEPTH.min(BASE_DEPTH + field.level_count() - 1);
-    let n = 1u32 << depth;
-    let h = 1.0 / f64::from(n);
+    let h = width(field);
+    let n = (1.0 / h) as u32;
     let cell = DVec3::splat(samples.scale * h);
     let frame = Frame {
         world_from_grid: DAffine3::from_scale_rotation_translation(

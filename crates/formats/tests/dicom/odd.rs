@@ -277,7 +277,7 @@ fn two_volumes_in_a_directory_are_listed_and_chosen_by_number_or_identifier() {
     };
     assert_eq!(choose("9").unwrap().values[0], 9.0);
     assert_eq!(choose("1.2.3.7").unwrap().values[0], 7.0);
-    refused(choose("8"), &["0 named \"8\"", "scan 7", "scan 9"]);
+    refused(choose("8"), &["asked for is \"8\"", "scan 7", "scan 9"]);
     // A file names its series.
     assert_eq!(read(&directory.path().join("004.dcm")).unwrap().values[0], 9.0);
 }

@@ -149,7 +149,7 @@ fn short(needed: u64, found: u64) -> Result<(), Fault> {
         return Ok(());
     }
     Err(Fault::Truncated {
-        what: "the pixels".into(),
+        what: "the block of pixels".into(),
         needed,
         found,
     })
