@@ -33,6 +33,8 @@ pub enum Fineness {
 const SPARE: f64 = 3.6;
 /// Distance of a fit from the surface over the noise of its samples, which is its tolerance then: it averages them.
 const OF_NOISE: f64 = 0.125;
+/// The same of a fit to a mesh, which leaves less of its tolerance to be spent again: bunny within 1.0 u both ways.
+const OF_MESH: f64 = 0.8;
 /// Share of the triangles asked for that is aimed at.
 const AIM: f64 = 0.96;
 /// Least share of the triangles asked for.
@@ -132,6 +134,8 @@ impl<'a> Adaptive<'a> {
                 let length = match open.source() {
                     SourceKind::Volume => tolerance / open.slope(),
                     SourceKind::Cloud if open.report().noise.is_some() => OF_NOISE * tolerance,
+                    // Of a mesh: no samples of its own.
+                    SourceKind::Cloud if open.report().used_count == 0 => OF_MESH * tolerance,
                     _ => tolerance,
                 };
                 let wanted = if length > 0.0 {
