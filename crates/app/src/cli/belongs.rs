@@ -21,12 +21,21 @@ pub fn provenance(input: &Input, name: Option<String>) -> String {
     .to_string()
 }
 
+/// Whether a field says that it was fitted to a mesh.
+pub fn is_of_mesh(open: &OpenField) -> bool {
+    stored(open)["input_kind"] == "mesh"
+}
+
+fn stored(open: &OpenField) -> Value {
+    serde_json::from_str(&open.loaded().meta.provenance).unwrap_or_default()
+}
+
 /// Refuses an input that `open` was not fitted to, as far as the field tells.
 ///
 /// # Errors
 /// Exit code 2 with what differs: the kind, the samples, or, where a field remembers no samples, the box.
 pub fn check(open: &OpenField, field: &str, input: &Input, name: &str) -> Outcome {
-    let stored: Value = serde_json::from_str(&open.loaded().meta.provenance).unwrap_or_default();
+    let stored = stored(open);
     let was = |key: &str| stored[key].as_str();
     let (fitted_to, given) = (was("input_kind"), kind(input));
     let differs = if fitted_to.is_some_and(|k| k != given) {

@@ -11,12 +11,12 @@ use formats::field::SourceKind;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::ceiling;
 use super::failure::{Failure, Outcome};
 use super::field::OpenField;
 use super::interrupt;
 use super::progress::Bar;
 use super::quantity::{Tolerance, human_count, human_number};
+use super::{belongs, ceiling};
 
 /// What bounds the size of the triangles.
 #[derive(Clone, Copy, Debug)]
@@ -34,7 +34,7 @@ const SPARE: f64 = 3.6;
 /// Distance of a fit from the surface over the noise of its samples, which is its tolerance then: it averages them.
 const OF_NOISE: f64 = 0.125;
 /// The same of a fit to a mesh, which leaves less of its tolerance to be spent again: bunny within 1.0 u both ways.
-const OF_MESH: f64 = 0.8;
+const OF_MESH: f64 = 0.75;
 /// Share of the triangles asked for that is aimed at.
 const AIM: f64 = 0.96;
 /// Least share of the triangles asked for.
@@ -134,8 +134,7 @@ impl<'a> Adaptive<'a> {
                 let length = match open.source() {
                     SourceKind::Volume => tolerance / open.slope(),
                     SourceKind::Cloud if open.report().noise.is_some() => OF_NOISE * tolerance,
-                    // Of a mesh: no samples of its own.
-                    SourceKind::Cloud if open.report().used_count == 0 => OF_MESH * tolerance,
+                    _ if belongs::is_of_mesh(open) => OF_MESH * tolerance,
                     _ => tolerance,
                 };
                 let wanted = if length > 0.0 {
