@@ -42,7 +42,7 @@ const LEAST: f64 = 0.8;
 /// Trials until the best found is taken.
 const TRIALS: usize = 12;
 /// Triangles whose chord error is measured; of larger meshes as many, evenly spread.
-const MEASURED: usize = 1 << 13;
+const MEASURED: usize = 1 << 12;
 
 /// A field being meshed as finely as it needs.
 pub struct Adaptive<'a> {
