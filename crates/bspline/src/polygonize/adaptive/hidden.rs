@@ -1,8 +1,8 @@
 //! Pieces of the surface that touch no corner of a cell.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
-use super::judge::{Judge, slopes};
+use super::sample::Judge;
 
 /// Whether a cell whose corners `v` lie on one side may hold a largest or least value on the other, if `‖∇²f‖ <= bend`.
 ///
@@ -63,4 +63,13 @@ pub(super) fn may_hide(
     }
     let slopes = judge.field.gradient_bounds(&around);
     slopes.iter().all(|g| !(g.lo > 0.0 || g.hi < 0.0))
+}
+
+/// Mean slopes of a cell's edges along each axis.
+pub(super) fn slopes(v: &[f32; 8], size: Vec3) -> Vec3 {
+    0.25 * Vec3::new(
+        v[4] - v[0] + v[5] - v[1] + v[6] - v[2] + v[7] - v[3],
+        v[2] - v[0] + v[3] - v[1] + v[6] - v[4] + v[7] - v[5],
+        v[1] - v[0] + v[3] - v[2] + v[5] - v[4] + v[7] - v[6],
+    ) / size
 }

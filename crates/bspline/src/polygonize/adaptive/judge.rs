@@ -3,41 +3,11 @@
 use glam::{DVec3, Mat3, Vec3};
 
 use super::cases::is_complex;
-use super::grid::{Cells, Grids, cell_index, each, holds, node_index, octant_of_set, octant_place};
-use super::hidden::{SEARCH, may_hide, may_peak};
-use super::sample::Sample;
+use super::grid::{Cells, cell_index, each, holds, node_index, octant_of_set, octant_place};
+use super::hidden::{SEARCH, may_hide, may_peak, slopes};
+use super::sample::{Judge, Sample, Scratch};
+use crate::Jet;
 use crate::polygonize::blocks::{BlockKey, CELLS, NODES};
-use crate::{Field, Interval, Jet};
-
-/// Buffers that a thread uses again from block to block.
-#[derive(Default)]
-pub(super) struct Scratch {
-    pub values: Vec<f64>,
-    points: Vec<DVec3>,
-    owners: Vec<(u16, f32)>,
-    jets: Vec<Jet>,
-}
-
-/// What to judge cells by.
-#[derive(Clone, Copy)]
-pub(super) struct Judge<'a> {
-    pub field: &'a dyn Field,
-    pub grids: &'a Grids,
-    pub iso: f64,
-    /// Of errors up to this an upper bound will do.
-    pub least: f64,
-    /// Level at which a hidden piece is looked for no longer.
-    pub detection: usize,
-}
-
-impl Judge<'_> {
-    /// Bounds over `count` cells from `lo`, as tight as it takes to tell on which side they lie.
-    pub fn bounds(&self, level: usize, lo: [i32; 3], count: i32) -> Interval {
-        let (lo, hi) = self.grids.clipped(level, lo, count);
-        let frame = &self.grids.frames[level];
-        self.field.frame_bounds_about(frame, lo, hi, self.iso)
-    }
-}
 
 impl Sample {
     /// The cells of a set whose errors are not known as well as `judge` asks.
@@ -326,15 +296,6 @@ const COARSE: f32 = 4.0;
 
 /// Share of the bound of a cell's error that counts where points say less.
 const MISTRUST: f64 = 1.0 / 16.0;
-
-/// Mean slopes of a cell's edges along each axis.
-pub(super) fn slopes(v: &[f32; 8], size: Vec3) -> Vec3 {
-    0.25 * Vec3::new(
-        v[4] - v[0] + v[5] - v[1] + v[6] - v[2] + v[7] - v[3],
-        v[2] - v[0] + v[3] - v[1] + v[6] - v[4] + v[7] - v[5],
-        v[1] - v[0] + v[3] - v[2] + v[5] - v[4] + v[7] - v[6],
-    ) / size
-}
 
 /// Value and gradient, by cells, of the trilinear function through the corners.
 #[inline]

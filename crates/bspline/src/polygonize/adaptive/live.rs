@@ -7,8 +7,7 @@ use rayon::prelude::*;
 
 use super::around::Around;
 use super::grid::{Cells, Grids, NONE};
-use super::judge::Judge;
-use super::sample::Sample;
+use super::sample::{Judge, Sample};
 use super::tree::{Block, Limits, Samples, Tree};
 use super::vertices::{self, BlockVertices, Placer};
 use super::{AdaptiveMesh, AdaptiveOptions, AdaptiveReport, checked, contour, report_of, settle_made, steps};

@@ -27,9 +27,8 @@ pub use self::live::AdaptiveBlockMesh;
 
 use self::around::Around;
 use self::grid::Grids;
-use self::judge::Judge;
 use self::polygons::{BlockTriangles, EXTRA, ExtraKey, Numbered};
-use self::sample::Sample;
+use self::sample::{Judge, Sample};
 use self::tree::{Limits, Samples, Tree, Watch};
 use self::vertices::{BlockVertices, PLACE_BITS, Placer, STEPS};
 use super::blocks::{BlockGrid, BlockKey, find_blocks};

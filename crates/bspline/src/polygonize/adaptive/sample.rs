@@ -1,8 +1,40 @@
 //! What a block knows of the field.
 
-use super::grid::{CELL_COUNT, Cells, NODE_COUNT, cell_index, each, node_index, octant_with};
-use super::judge::{Judge, Scratch};
+use glam::DVec3;
+
+use super::grid::{CELL_COUNT, Cells, Grids, NODE_COUNT, cell_index, each, node_index, octant_with};
 use crate::polygonize::blocks::{BlockKey, CELLS, NODES};
+use crate::{Field, Interval, Jet};
+
+/// Buffers that a thread uses again from block to block.
+#[derive(Default)]
+pub(super) struct Scratch {
+    pub values: Vec<f64>,
+    pub points: Vec<DVec3>,
+    pub owners: Vec<(u16, f32)>,
+    pub jets: Vec<Jet>,
+}
+
+/// What to judge cells by.
+#[derive(Clone, Copy)]
+pub(super) struct Judge<'a> {
+    pub field: &'a dyn Field,
+    pub grids: &'a Grids,
+    pub iso: f64,
+    /// Of errors up to this an upper bound will do.
+    pub least: f64,
+    /// Level at which a hidden piece is looked for no longer.
+    pub detection: usize,
+}
+
+impl Judge<'_> {
+    /// Bounds over `count` cells from `lo`, as tight as it takes to tell on which side they lie.
+    pub fn bounds(&self, level: usize, lo: [i32; 3], count: i32) -> Interval {
+        let (lo, hi) = self.grids.clipped(level, lo, count);
+        let frame = &self.grids.frames[level];
+        self.field.frame_bounds_about(frame, lo, hi, self.iso)
+    }
+}
 
 /// A pure function of field, frames, level and block, but for how many cells have been judged.
 #[derive(Clone)]

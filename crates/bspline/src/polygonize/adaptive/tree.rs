@@ -6,8 +6,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::grid::{Cells, NONE, child, children, count, each, octant_of, octants, parent};
-use super::judge::{Judge, Scratch};
-use super::sample::Sample;
+use super::sample::{Judge, Sample, Scratch};
 use crate::polygonize::PolygonizeError;
 use crate::polygonize::blocks::{BlockKey, CELLS};
 
