@@ -213,8 +213,6 @@ fn limits_met(report: &FitReport) -> impl Iterator<Item = String> + use<> {
     })
 }
 
-const OBJECT: &str = "the object itself";
-
 /// A doubt about a tolerance that the user gave, on `what` of this `size` whose numbers are as large as `magnitude`.
 fn tolerance_doubt(choice: &Choice, tolerance: f64, what: &str, size: f64, magnitude: f64) -> Option<String> {
     choice.tolerance?;
@@ -233,6 +231,11 @@ fn tolerance_doubt(choice: &Choice, tolerance: f64, what: &str, size: f64, magni
     } else {
         None
     }
+}
+
+/// The same of a length, on an object of that diagonal.
+fn length_doubt(choice: &Choice, tolerance: f64, diagonal: f64) -> Option<String> {
+    tolerance_doubt(choice, tolerance, "the object itself", diagonal, diagonal)
 }
 
 fn fit_as(input: &Input, choice: &Choice, control: &mut Control) -> Outcome<Fitted> {
@@ -286,13 +289,9 @@ fn fit_cloud<T: Stored>(cloud: &PointCloud, choice: &Choice, control: &mut Contr
     let (field, mut report) = fit_points::<T>(&points, &options, control).map_err(|e| explain(e, control))?;
     oriented.complete(&mut report, field.lattice());
     report.notes.splice(0..0, cloud.notes.iter().cloned());
-    report.notes.extend(tolerance_doubt(
-        choice,
-        report.tolerance,
-        OBJECT,
-        diagonal,
-        diagonal,
-    ));
+    report
+        .notes
+        .extend(length_doubt(choice, report.tolerance, diagonal));
     Ok(Fitted {
         field: T::any(field),
         report,
@@ -336,13 +335,9 @@ fn fit_triangles<T: Stored>(mesh: &TriangleMesh, choice: &Choice, control: &mut 
     let (field, mut report, defects) =
         fit_mesh::<T>(&mesh.vertices, &mesh.triangles, &options, control).map_err(|e| explain(e, control))?;
     report.notes.splice(0..0, mesh.notes.iter().cloned());
-    report.notes.extend(tolerance_doubt(
-        choice,
-        report.tolerance,
-        OBJECT,
-        diagonal,
-        diagonal,
-    ));
+    report
+        .notes
+        .extend(length_doubt(choice, report.tolerance, diagonal));
     Ok(Fitted {
         field: T::any(field),
         report,
