@@ -92,6 +92,8 @@ impl<'a> Adaptive<'a> {
             // Room for cells of half the size.
             depth: (finest + beyond).min(AdaptiveOptions::most_depth(2 * longest)),
             detection: finest + 1,
+            // Their first mesh is nearly always the last.
+            frugal: !matches!(fineness, Fineness::Error(_)),
             ..AdaptiveOptions::default()
         };
         let frame = open.frame(cells);
@@ -134,7 +136,7 @@ impl<'a> Adaptive<'a> {
                 let length = match open.source() {
                     SourceKind::Volume => tolerance / open.slope(),
                     SourceKind::Cloud if open.report().noise.is_some() => OF_NOISE * tolerance,
-                    _ if belongs::is_of_mesh(open) => OF_MESH * tolerance,
+                    _ if belongs::is_of_mesh(open) => OF_MESH * reached(open, notes),
                     _ => tolerance,
                 };
                 let wanted = if length > 0.0 {
@@ -332,6 +334,20 @@ impl<'a> Adaptive<'a> {
         let rank = (errors.len() * 95 / 100).min(errors.len() - 1);
         *errors.select_nth_unstable_by(rank, f64::total_cmp).1
     }
+}
+
+/// The tolerance of a fit to a mesh, or what 95 % of the surface keep where its budget was spent before: triangles finer
+/// than that would show no more of the mesh.
+fn reached(open: &OpenField, notes: &mut Vec<String>) -> f64 {
+    let report = open.report();
+    if report.p95 > report.tolerance {
+        notes.push(format!(
+            "the fit is farther off than its tolerance, by {} at 95 % of the surface; triangles are made for that (finer: \
+             --tolerance, --triangles)",
+            human_number(report.p95)
+        ));
+    }
+    report.tolerance.max(report.p95)
 }
 
 /// Shows progress between two shares of the whole and listens for the user's wish to stop.

@@ -34,7 +34,7 @@ pub struct Args {
     resolution: Option<u32>,
     /// Distance from the surface that 95 % of the centres and sides of the triangles keep: in the field's unit, in mm, or
     /// in per cent of the solid's diagonal [default: half the tolerance of the fit, a sixteenth where that
-    /// is the noise of the samples]
+    /// is the noise of the samples; of a mesh three eighths, or of what its fit reached, if that is more]
     #[arg(
         long,
         value_name = "T[mm|%]",
