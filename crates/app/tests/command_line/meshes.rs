@@ -106,8 +106,16 @@ fn meshes_of_fits_that_ran_out_of_coefficients_are_as_fine_as_the_fit() {
     let (tolerance, reached) = (number(&fit, "tolerance"), number(&fit, "p95"));
     assert!(reached > 3.0 * tolerance, "{reached} {tolerance}");
     let mesh = bench.json("mesh field.iclay -o mesh.ply");
-    assert!(mesh["notes"].to_string().contains("farther off than its tolerance"), "{mesh}");
-    let asked = bench.json(&format!("mesh field.iclay -o fine.ply --tolerance {}", 0.375 * tolerance));
+    assert!(
+        mesh["notes"]
+            .to_string()
+            .contains("farther off than its tolerance"),
+        "{mesh}"
+    );
+    let asked = bench.json(&format!(
+        "mesh field.iclay -o fine.ply --tolerance {}",
+        0.375 * tolerance
+    ));
     let [own, fine] = [&mesh, &asked].map(|m| number(m, "triangles"));
     assert!(own < fine / 2.0, "{own} {fine}");
 }

@@ -139,7 +139,8 @@ impl<T: Real> Conditions<T> {
                     cells[i].conditions(&octants[i], depth, &mut probes);
                 }
                 let own = probes.iter().map(|p| sample(p, depth));
-                own.chain(others.of_brick(brick).map(|p| sample(p, depth))).collect()
+                own.chain(others.of_brick(brick).map(|p| sample(p, depth)))
+                    .collect()
             })
             .collect();
         let mut out = Self {

@@ -89,7 +89,11 @@ const BESIDE: [[[usize; 3]; 3]; 12] = {
     let mut e = 0;
     while e < 12 {
         let (axis, u, v) = (e / 4, e / 2 % 2 * 2, e % 2 * 2);
-        beside[e] = [placed(axis, 1, u, 1), placed(axis, 1, 1, v), placed(axis, 1, u, v)];
+        beside[e] = [
+            placed(axis, 1, u, 1),
+            placed(axis, 1, 1, v),
+            placed(axis, 1, u, v),
+        ];
         e += 1;
     }
     beside
