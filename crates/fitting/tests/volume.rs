@@ -381,8 +381,9 @@ fn smoothing_shrinks_detail() {
             ..Default::default()
         };
         let (field, report) = fit::<f32>(dims, &values, options).unwrap();
-        let detail = field.corrections(field.level_count() - 1).values();
+        let detail = field.corrections(field.level_count() - 1);
         let sum: f64 = detail
+            .values()
             .flat_map(|c| c.values.iter())
             .map(|&c| f64::from(c) * f64::from(c))
             .sum();

@@ -1,5 +1,5 @@
 use std::collections::BTreeMap;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use crate::Real;
 
@@ -23,6 +23,13 @@ impl BrickKey {
     /// The brick of the next coarser level that covers this one's cells.
     pub fn parent(self) -> Self {
         Self(self.0.map(|b| b >> 1))
+    }
+
+    /// The brick of the next finer level in octant `4x + 2y + z`.
+    pub fn child(self, octant: usize) -> Self {
+        Self(std::array::from_fn(|a| {
+            2 * self.0[a] + (octant >> (2 - a) & 1) as u32
+        }))
     }
 
     /// Which half of its parent the brick is, on each axis.
@@ -65,39 +72,21 @@ impl<T: Real> Corrections<T> {
         self.mask[slot / 64] >> (slot % 64) & 1 == 1
     }
 
-    /// Whether the support of an active function reaches into the brick `back` bricks behind on each axis
-    /// (0 or 1): the functions in slots 0, 1 and 2 do.
+    /// [`reaches`] for the active functions.
     pub(crate) fn reaches(&self, back: [usize; 3]) -> bool {
-        const Y_LOW: u64 = 0x00ff_ffff;
-        const Z_LOW: u64 = 0x0707_0707_0707_0707;
-        let planes = if back[0] == 1 { 3 } else { BRICK };
-        let rows = if back[1] == 1 { Y_LOW } else { !0 } & if back[2] == 1 { Z_LOW } else { !0 };
-        self.mask[..planes].iter().any(|w| w & rows != 0)
+        reaches(&self.mask, back)
     }
+}
+
+/// Whether the support of one of the functions `mask` reaches into the brick `back` bricks behind on each axis
+/// (0 or 1): the functions in slots 0, 1 and 2 do.
+pub(super) fn reaches(mask: &[u64; BRICK], back: [usize; 3]) -> bool {
+    const Y_LOW: u64 = 0x00ff_ffff;
+    const Z_LOW: u64 = 0x0707_0707_0707_0707;
+    let planes = if back[0] == 1 { 3 } else { BRICK };
+    let rows = if back[1] == 1 { Y_LOW } else { !0 } & if back[2] == 1 { Z_LOW } else { !0 };
+    mask[..planes].iter().any(|w| w & rows != 0)
 }
 
 /// The stored part of a level: bricks with active functions, in key order.
 pub type LevelCorrections<T> = BTreeMap<BrickKey, Arc<Corrections<T>>>;
-
-/// What evaluation reads of one brick, and what lies below it.
-#[derive(Clone, Debug)]
-pub(crate) struct Brick<T> {
-    pub key: BrickKey,
-    /// `C_ℓ` = prolonged `C_{ℓ-1}` + corrections, functions `8b-1 ..= 8b+9` on each axis.
-    pub totals: Arc<[T; HALO_LEN]>,
-    /// Least and largest coefficient that the evaluation of any point of the brick reads, here or below.
-    pub hull: [T; 2],
-    /// Bound of the Hessian over the brick's cells, here or below, once somebody has asked.
-    pub bend: OnceLock<f64>,
-    /// Indices of the eight bricks of the next level, octant `4x + 2y + z`; [`NONE`] where there is none.
-    pub children: [u32; 8],
-}
-
-/// No child.
-pub(crate) const NONE: u32 = u32::MAX;
-
-impl<T> Brick<T> {
-    pub fn has_children(&self) -> bool {
-        self.children.iter().any(|&c| c != NONE)
-    }
-}

@@ -75,7 +75,7 @@ fn stored_level<T: Real>(
 ) -> (ActiveSet, Vec<T>) {
     let size = domain.functions(level);
     let mut found: Vec<(usize, T)> = Vec::new();
-    for (key, corrections) in field.corrections(level) {
+    for (key, corrections) in &field.corrections(level) {
         let corner = key.0.map(|k| k as usize * BRICK);
         for (slot, value) in corrections.values.iter().enumerate() {
             if corrections.is_active(slot) {

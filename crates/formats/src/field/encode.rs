@@ -39,7 +39,7 @@ pub(super) fn check<T: Stored>(field: &HierarchicalSpline<T>, meta: &FieldMeta) 
         let count = field.level_count();
         valid::frame(field.lattice(), count as u64, field.slope(), meta.iso)?;
         for level in 0..count {
-            for (key, c) in field.corrections(level) {
+            for (key, c) in &field.corrections(level) {
                 valid::brick(field.lattice(), level, *key, c)?;
             }
         }
@@ -69,7 +69,7 @@ pub(super) fn write<T: Stored>(
     };
     put(HEADER, &header(field, meta))?;
     for level in 0..field.level_count() {
-        put(LEVEL, &to_bytes(level as u32, field.corrections(level)))?;
+        put(LEVEL, &to_bytes(level as u32, &field.corrections(level)))?;
     }
     if !meta.leaves.is_empty() {
         put(LEAVES, &leaves(meta))?;
