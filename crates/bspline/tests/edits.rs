@@ -24,7 +24,9 @@ fn set<T: Real>(level: &mut LevelCorrections<T>, s: [u32; 3], delta: T) {
         .entry(BrickKey(s.map(|s| s / 8)))
         .or_insert_with(|| Arc::new(Corrections::empty()));
     let slot = s.map(|s| s as usize % 8);
-    let old = brick.values[64 * slot[0] + 8 * slot[1] + slot[2]];
+    let old = brick
+        .get(64 * slot[0] + 8 * slot[1] + slot[2])
+        .unwrap_or(T::zero());
     Arc::make_mut(brick).set(slot, old + delta);
 }
 

@@ -90,12 +90,12 @@ fn definition<T: Real>(f: &HierarchicalSpline<T>, p: DVec3) -> f64 {
     for level in 0..f.level_count() {
         let scaled = q * (1u64 << level) as f64;
         for (key, c) in &f.corrections(level) {
-            for slot in (0..512).filter(|&s| c.is_active(s)) {
+            for (slot, value) in c.iter() {
                 let s = [slot / 64, slot / 8 % 8, slot % 8];
                 let b: f64 = (0..3)
                     .map(|a| bump(scaled[a] - (8.0 * key.0[a] as f64 + s[a] as f64 - 1.0)))
                     .product();
-                sum += c.values[slot].as_f64() * b;
+                sum += value.as_f64() * b;
             }
         }
     }

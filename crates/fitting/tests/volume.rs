@@ -384,7 +384,7 @@ fn smoothing_shrinks_detail() {
         let detail = field.corrections(field.level_count() - 1);
         let sum: f64 = detail
             .values()
-            .flat_map(|c| c.values.iter())
+            .flat_map(|c| c.values())
             .map(|&c| f64::from(c) * f64::from(c))
             .sum();
         (sum, report.rms)

@@ -14,7 +14,7 @@ pub(super) fn tree<T: Real>(lattice: &Lattice, levels: Vec<LevelCorrections<T>>)
     let whole = (0..nx).flat_map(|x| (0..ny).flat_map(move |y| (0..nz).map(move |z| BrickKey([x, y, z]))));
     let mut grafts: Vec<Graft<T>> = whole.map(|key| Graft::stale(lattice, 0, key)).collect();
     for (level, bricks) in levels.into_iter().enumerate() {
-        let reached = bricks.iter().flat_map(|(key, c)| readers(*key, &c.mask));
+        let reached = bricks.iter().flat_map(|(key, c)| readers(*key, *c.mask()));
         let mut reached: Vec<BrickKey> = reached.filter(|key| !bricks.contains_key(key)).collect();
         reached.sort_unstable();
         reached.dedup();

@@ -18,12 +18,9 @@ pub(super) fn of<T: Real>(node: &Node<T>) -> [u8; 32] {
     let mut hash = Sha256::new();
     hash.update([u8::from(node.corrections.is_some())]);
     if let Some(c) = &node.corrections {
-        let mut bytes = Vec::with_capacity(64 + c.count() * size_of::<T>());
-        c.mask.iter().for_each(|m| bytes.extend(m.to_le_bytes()));
-        for slot in (0..c.values.len()).filter(|&s| c.is_active(s)) {
-            // Adding +0 turns -0 into +0: both are the same field.
-            (c.values[slot] + T::zero()).extend_le_bytes(&mut bytes);
-        }
+        let mut bytes = Vec::with_capacity(64 + size_of_val(c.values()));
+        c.mask().iter().for_each(|m| bytes.extend(m.to_le_bytes()));
+        c.values().iter().for_each(|v| v.extend_le_bytes(&mut bytes));
         hash.update(&bytes);
     }
     for (octant, child) in node.children.iter().enumerate() {

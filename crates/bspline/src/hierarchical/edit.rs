@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::brick::{BRICK, Corrections, HALO, HALO_LEN, reaches};
+use super::brick::{BRICK, DenseCorrections, HALO, HALO_LEN, reaches};
 use super::graft::{Graft, grafted};
 use super::prolong::prolong;
 use super::renew::renewed;
@@ -268,8 +268,8 @@ struct Pending<'a, T> {
 }
 
 struct Brick<T> {
-    corrections: Corrections<T>,
-    /// Slots that changed, as in [`Corrections::mask`].
+    corrections: DenseCorrections<T>,
+    /// Slots that changed, as in [`DenseCorrections::mask`].
     changed: [u64; BRICK],
 }
 
@@ -291,7 +291,7 @@ impl<'a, T: Real> Pending<'a, T> {
                 let node = self.field.find(place.0, place.1);
                 let corrections = node.and_then(|n| n.corrections.as_deref());
                 Brick {
-                    corrections: corrections.cloned().unwrap_or_else(Corrections::empty),
+                    corrections: corrections.map_or_else(DenseCorrections::empty, DenseCorrections::from),
                     changed: [0; BRICK],
                 }
             });
@@ -321,11 +321,7 @@ impl<'a, T: Real> Pending<'a, T> {
                 value: new.as_f64(),
             });
         }
-        let is_same = match (old, new) {
-            (Some(a), Some(b)) => a == b && a.is_sign_negative() == b.is_sign_negative(),
-            (a, b) => a.is_none() && b.is_none(),
-        };
-        if !is_same {
+        if old != new {
             *value = new.unwrap_or(T::zero());
             brick.changed[slot[0]] |= bit;
             brick.corrections.mask[slot[0]] &= !bit;
@@ -344,10 +340,10 @@ impl<'a, T: Real> Pending<'a, T> {
             if brick.changed == [0; BRICK] {
                 continue;
             }
-            let readers = readers(key, &brick.changed);
+            let readers = readers(key, brick.changed);
             grafts.extend(readers.map(|key| Graft::stale(lattice, level, key)));
             let is_empty = brick.corrections.mask == [0; BRICK];
-            let functions = (!is_empty).then(|| Arc::new(brick.corrections));
+            let functions = (!is_empty).then(|| Arc::new(brick.corrections.pack()));
             grafts.push(Graft::functions(lattice, level, key, functions));
         }
         self.field.with_grafts(grafts)
@@ -369,8 +365,7 @@ impl<T: Real> HierarchicalSpline<T> {
 }
 
 /// The bricks behind one whose cells read its functions `mask`.
-pub(super) fn readers(key: BrickKey, mask: &[u64; BRICK]) -> impl Iterator<Item = BrickKey> {
-    let mask = *mask;
+pub(super) fn readers(key: BrickKey, mask: [u64; BRICK]) -> impl Iterator<Item = BrickKey> {
     (1..8usize).filter_map(move |octant| {
         let back = [octant >> 2, octant >> 1 & 1, octant & 1];
         let is_read = (0..3).all(|a| key.0[a] as usize >= back[a]) && reaches(&mask, back);

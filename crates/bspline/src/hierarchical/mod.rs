@@ -15,6 +15,7 @@ mod bounds;
 mod brick;
 mod build;
 mod curvature;
+mod difference;
 mod digest;
 mod edit;
 mod evaluate;
@@ -32,7 +33,10 @@ mod totals;
 mod versions;
 mod window;
 
-pub use brick::{BRICK, BRICK_LEN, BrickKey, Corrections, HALO, HALO_LEN, LevelCorrections};
+pub use brick::{
+    BRICK, BRICK_LEN, BrickKey, Corrections, DenseCorrections, HALO, HALO_LEN, LevelCorrections, active_slots,
+};
+pub use difference::{BrickChange, BrickDiff, DiffError};
 pub use edit::{BlockEdit, Change, EditError, LevelEdit, MAX_LEVELS};
 pub use lattice::Lattice;
 pub use prolong::refine_block;

@@ -149,10 +149,11 @@ impl<T: Real> Node<T> {
         (node.key == key).then_some(node)
     }
 
-    /// Calls `visit` for every node of the tree, parents first.
-    pub fn walk<'a>(&'a self, visit: &mut impl FnMut(&'a Self)) {
-        visit(self);
-        self.children.iter().flatten().for_each(|c| c.walk(visit));
+    /// Calls `visit` for the node and, where that says so, for all below it.
+    pub fn walk<'a>(&'a self, visit: &mut impl FnMut(&'a Self) -> bool) {
+        if visit(self) {
+            self.children.iter().flatten().for_each(|c| c.walk(visit));
+        }
     }
 
     /// SHA-256 over the functions here and below, however deep the tree above is.

@@ -88,15 +88,16 @@ impl<T: Real> HierarchicalSpline<T> {
         })
     }
 
-    /// Bricks of `level` that hold active functions, in key order. Takes time in proportion to all bricks.
+    /// Bricks of `level` that hold active functions, in key order. Takes time in proportion to their number.
     pub fn corrections(&self, level: usize) -> LevelCorrections<T> {
-        let mut found = LevelCorrections::new();
+        let mut found = Vec::new();
         self.root.walk(&mut |node| {
-            if let Some(c) = node.corrections.as_ref().filter(|_| node.level as usize == level) {
-                found.insert(node.key, c.clone());
+            if node.level as usize == level {
+                found.extend(node.corrections.clone().map(|c| (node.key, c)));
             }
+            i64::from(node.level) < level as i64 && usize::from(node.level_count) > level
         });
-        found
+        found.into_iter().collect()
     }
 
     /// Grids the field stands on.
@@ -122,6 +123,18 @@ impl<T: Real> HierarchicalSpline<T> {
     /// Active functions over all levels.
     pub fn coefficient_count(&self) -> usize {
         self.root.count as usize
+    }
+
+    /// Active functions of each level. Takes time in proportion to all bricks.
+    pub fn coefficient_counts(&self) -> Vec<usize> {
+        let mut counts = vec![0; self.level_count()];
+        self.root.walk(&mut |node| {
+            if let Some(c) = &node.corrections {
+                counts[node.level as usize] += c.count();
+            }
+            node.count > 0
+        });
+        counts
     }
 
     /// Bricks of totals over all levels.
@@ -235,7 +248,8 @@ fn octant_of(cell: [u32; 3], shift: usize) -> usize {
     octant(cell, shift + BRICK.ilog2() as usize)
 }
 
-fn check_functions<T: Real>(
+/// Whether a lattice has the functions of a brick, and their coefficients are numbers.
+pub(super) fn check_functions<T: Real>(
     lattice: &Lattice,
     level: usize,
     key: BrickKey,
@@ -246,10 +260,9 @@ fn check_functions<T: Real>(
         std::array::from_fn(|a| key.0[a].saturating_mul(BRICK as u32).saturating_add(at[a] as u32))
     };
     let mut last = [0; 3];
-    for slot in (0..functions.values.len()).filter(|&s| functions.is_active(s)) {
+    for (slot, value) in functions.iter() {
         let at = function(slot);
         last = std::array::from_fn(|a| at[a].max(last[a]));
-        let value = functions.values[slot];
         if !value.is_finite() {
             return Err(EditError::NotFinite {
                 level,

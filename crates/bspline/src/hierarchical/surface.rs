@@ -21,6 +21,7 @@ impl<T: Real> HierarchicalSpline<T> {
             if node.totals.is_some() {
                 levels[node.level as usize].push(node);
             }
+            node.holds_cells()
         });
         levels
             .iter()

@@ -47,17 +47,8 @@ impl<'a, T: Real> Window<'a, T> {
             };
             let ahead = [ahead >> 2, ahead >> 1 & 1, ahead & 1];
             let count = ahead.map(|a| if a == 1 { HALO - BRICK } else { BRICK });
-            for x in 0..count[0] {
-                for y in 0..count[1] {
-                    let source = (x * BRICK + y) * BRICK;
-                    let target =
-                        ((x + ahead[0] * BRICK) * HALO + y + ahead[1] * BRICK) * HALO + ahead[2] * BRICK;
-                    let row = &c.values[source..source + count[2]];
-                    for (total, value) in blank[target..target + count[2]].iter_mut().zip(row) {
-                        *total += *value;
-                    }
-                }
-            }
+            let start = BRICK * ((ahead[0] * HALO + ahead[1]) * HALO + ahead[2]);
+            c.add_to(count, blank, start);
         }
     }
 }
