@@ -36,6 +36,7 @@
 //!
 //! What it cannot do yet: use more than one thread.
 
+mod cache;
 pub mod constraints;
 pub mod integrators;
 pub mod lattice;
@@ -44,6 +45,7 @@ pub mod patch;
 mod patch_error;
 pub mod region;
 mod rest;
+pub mod snapshot;
 pub mod solve;
 pub mod springs;
 pub mod study;

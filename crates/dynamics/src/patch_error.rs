@@ -58,6 +58,12 @@ pub enum PatchError {
         /// Name of the precision.
         precision: &'static str,
     },
+    /// A snapshot that no patch can have made.
+    #[error("the snapshot cannot be restored: {what}; take another one")]
+    Snapshot {
+        /// What is wrong with it.
+        what: String,
+    },
     /// Springs of other directions than those of the patch.
     #[error("springs along {found:?}; the patch needs {needed:?}, in this order")]
     Directions {

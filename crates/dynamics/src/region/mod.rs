@@ -28,11 +28,13 @@
 mod cells;
 mod parts;
 mod sleep;
+mod snapshot;
 mod tensor;
 mod watch;
 
 pub use cells::{Cells, MAX_EDGE, MAX_SIZE, MIN_CELLS};
 pub use sleep::{Schedule, Thresholds, Turn};
+pub use snapshot::RegionSnapshot;
 pub use tensor::{TensorOptions, TensorRegion};
 
 use bspline::hierarchical::{EditError, Lattice as FieldLattice, LevelEdit};
@@ -316,8 +318,9 @@ impl<T: Real> Region<T> {
     }
 
     /// Lets clay go: bakes it, and makes the present shape the rest. Rest := current, velocity := 0, force := 0, no
-    /// constraints; the region sleeps. From then on it is a region of the field returned, to which it adds nothing until it is moved again:
-    /// the shape stays, to the bit.
+    /// constraints; the region sleeps. From then on it is, to the bit, the region that [`new`](Self::new) cuts out of the field
+    /// returned with this matter, plasticity and choice of parts: nothing is left of the steps before, in densities or solvers. Factors
+    /// that would come out the same are not made again.
     ///
     /// # Errors
     /// As [`Self::bake`]; nothing has changed then.
@@ -326,7 +329,8 @@ impl<T: Real> Region<T> {
         onto: &HierarchicalSpline<T>,
     ) -> Result<HierarchicalSpline<T>, RegionError> {
         let baked = self.bake(onto)?;
-        self.patch.rest_here();
+        let samples = self.patch.lattice().sample_dims().map(|n| n as u64);
+        self.patch.rest_at(densities(&baked, &self.cells, samples));
         self.part = None;
         self.parts.forget();
         self.asleep = true;

@@ -1,6 +1,7 @@
 //! Parts of a region that sleep: only a box of cells round what moves is stepped, the rest is its rim.
 
 use bspline::{KnotVector, Real};
+use serde::{Deserialize, Serialize};
 
 use super::Region;
 use super::sleep::solves;
@@ -8,7 +9,7 @@ use crate::integrators::{Integrator, StepReport};
 use crate::lattice::{Axis, Lattice, LatticeError, Rim};
 use crate::matter::{Matter, Quantity};
 use crate::patch::{Patch, PatchError};
-use crate::springs::{Plasticity, SpringWeights, Weights};
+use crate::springs::{Plasticity, Weights};
 
 /// Steps between two looks at the whole region, whose cost is that of its forces; up to eight times as many while looks
 /// find nothing to cut.
@@ -28,16 +29,16 @@ const SHRINK: f64 = 0.5;
 #[derive(Clone, Debug)]
 pub(super) struct Part<T> {
     pub patch: Patch<T>,
-    window: Window,
+    pub window: Window,
     /// Operations that it saved, less what it cost.
-    earned: f64,
+    pub earned: f64,
 }
 
 /// Whether parts sleep, and what that costs and saves, in operations.
 ///
 /// A part is cut when what it costs has been saved before: by other parts, or by what this one would have saved while it
 /// was waited for. So a motion that outgrows every part costs hardly more than one without parts.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Parts {
     pub on: bool,
     pub steps_to_look: usize,
@@ -72,6 +73,11 @@ impl Default for Parts {
 }
 
 impl Parts {
+    /// Whether looks can come of it.
+    pub fn is_sound(&self) -> bool {
+        self.misses <= MOST_MISSES && self.growths <= MOST_GROWTHS
+    }
+
     /// All that was learnt of one matter says nothing of another.
     pub fn forget(&mut self) {
         *self = Self {
@@ -84,8 +90,8 @@ impl Parts {
 }
 
 /// A box of cells whose ends are samples.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Window {
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct Window {
     /// First free coefficient, which is also the first cell, and cells.
     first: [usize; 3],
     cells: [usize; 3],
@@ -109,6 +115,21 @@ impl Window {
             let before = low[k].saturating_sub(LEAST_MARGIN) >= self.first[k];
             before && (high[k] + LEAST_MARGIN).min(all[k] - 1) < end
         })
+    }
+
+    /// Whether it is one of `whole`, and `part` lies on it.
+    pub fn fits<T: Real>(&self, whole: &Lattice<T>, part: &Lattice<T>) -> bool {
+        let (n, m) = (whole.coefficient_dims(), whole.sample_dims());
+        let lies = |k: usize| {
+            let cells = self.first[k].checked_add(self.cells[k]);
+            let samples = self.first_sample[k].checked_add(self.samples[k]);
+            self.cells[k] > 3
+                && cells.is_some_and(|end| end <= n[k] + 3)
+                && samples.is_some_and(|end| end <= m[k])
+        };
+        (0..3).all(lies)
+            && part.coefficient_dims() == self.coefficients()
+            && part.sample_dims() == self.samples
     }
 
     /// Whether a sample lies in it.
@@ -205,7 +226,7 @@ impl<T: Real> Region<T> {
         self.parts.savings += solves * (saved - taken);
         self.parts.operations += solves * taken;
         let (w, state) = (part.window, &mut self.patch.state);
-        let lattice = self.patch.solver.lattice();
+        let lattice = self.patch.cache.solver.lattice();
         let (n, m) = (lattice.coefficient_dims(), lattice.sample_dims());
         let from = part.patch.state();
         paste(&mut state.p, n, w.first, w.coefficients(), &from.p);
@@ -411,26 +432,22 @@ impl<T: Real> Region<T> {
         };
         let law = whole.springs().law();
         let d = samples(&whole.state.d);
-        let options = whole.solver.options();
+        let options = whole.cache.solver.options();
         let mut part = Patch::new(lattice, matter, law, whole.neighbours, &d, options)?;
         part.base = samples(&whole.base);
+        part.anchor = samples(&whole.anchor);
         part.write_force(|force| force.copy_from_slice(&samples(&whole.external)));
         let n = whole.lattice().coefficient_dims();
         part.state.p = crop(&whole.state.p, n, w.first, w.coefficients());
         part.state.v = crop(&whole.state.v, n, w.first, w.coefficients());
         part.state.w = samples(&whole.state.w);
-        let network = whole.springs();
-        let springs = network.springs().iter().map(|s| SpringWeights {
-            direction: s.direction,
-            weights: match &s.weights {
-                Weights::Constant(k) => Weights::Constant(network.stiffness_unit() * k.as_f64()),
-                Weights::Each(k) => {
-                    let inside = samples(k).into_iter();
-                    Weights::Each(inside.map(|k| network.stiffness_unit() * k.as_f64()).collect())
-                }
-            },
-        });
-        part.network.set_springs(&springs.collect::<Vec<_>>());
+        let mut springs = whole.exact_springs();
+        for s in &mut springs {
+            if let Weights::Each(k) = &mut s.weights {
+                *k = crop(k, m, w.first_sample, w.samples);
+            }
+        }
+        part.network.set_springs(&springs);
         let rest = part.network.rest_mut();
         let from = whole.springs().rest();
         rest.differences = from.differences.iter().map(|r| samples(r)).collect();

@@ -1,6 +1,7 @@
 //! Sleep and wake of regions, and how much of them may move at a time.
 
 use bspline::Real;
+use serde::{Deserialize, Serialize};
 
 use super::Region;
 use crate::integrators::{Integrator, StepReport};
@@ -12,7 +13,7 @@ use crate::patch::PatchError;
 /// Both have to hold, so neither a turning point nor a pass through balance puts a region to sleep. What it is off its
 /// balance then is about `acceleration/ω²`, `ω` its lowest frequency. In single precision a stiff solid cannot get below
 /// the rounding of its forces, about `1e-7·(κ/μh²)` of the densities; thresholds below that keep it awake.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Thresholds {
     /// Speed of the mean kinetic energy, `σ√(2E/M)`, in lengths per second.
     pub speed: f64,
@@ -31,6 +32,14 @@ impl<T: Real> Region<T> {
     pub fn wake(&mut self) {
         self.asleep = false;
         self.parts.steps_to_look = 0;
+    }
+
+    /// Finishes at once the factors that are being made beside the steps.
+    pub fn settle(&mut self) {
+        self.patch.settle();
+        if let Some(part) = &mut self.part {
+            part.patch.settle();
+        }
     }
 
     /// Sets the external forces on the samples. A region asleep wakes if they leave more unbalanced than the threshold;
@@ -105,8 +114,15 @@ pub enum Turn {
     Failed(PatchError),
 }
 
+impl Turn {
+    /// Whether the region had its turn. How many had is all that has to be journaled of [`Schedule::step_while`].
+    pub fn was_taken(&self) -> bool {
+        matches!(self, Self::Stepped(_) | Self::Failed(_))
+    }
+}
+
 /// Steps of many regions within a budget of work, in turns.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Schedule {
     next: usize,
 }
@@ -126,6 +142,23 @@ impl Schedule {
         self.step_while(regions, integrator, dt, |work| {
             spent = spent.saturating_add(work);
             spent <= budget
+        })
+    }
+
+    /// What [`step_while`](Self::step_while) did when `taken` regions had their turn, whatever made it stop there: a session
+    /// whose budget was one of time is replayed by it to the same bits.
+    pub fn replay<T: Real>(
+        &mut self,
+        regions: &mut [Region<T>],
+        integrator: Integrator,
+        dt: f64,
+        taken: usize,
+    ) -> Vec<Turn> {
+        let mut left = taken;
+        self.step_while(regions, integrator, dt, |_| {
+            let may = left > 0;
+            left = left.saturating_sub(1);
+            may
         })
     }
 

@@ -4,12 +4,13 @@
 
 use bspline::Real;
 use bspline::vectorized;
+use serde::{Deserialize, Serialize};
 
 use super::stencil::{SpringWeights, Weights};
 use crate::units::{binary_unit, springs_in_units};
 
 /// Which law, with its scale `σ`, a length per density: without it a density could not be added to a distance.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Law {
     /// `½k(Δ - Δ₀)²`: always convex.
     Linear {
@@ -82,7 +83,7 @@ fn spring<T: Real, const FOUR_D: bool>(delta: T, rest: T, rest_scale: T, h2: T) 
 }
 
 /// Rest of all springs: `Δ₀` per direction and starting sample, and how much each is scaled.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Rest<T> {
     /// `Δ₀` of each spring, per direction, in units of [`SpringNetwork::length_unit`].
     pub differences: Vec<Vec<T>>,

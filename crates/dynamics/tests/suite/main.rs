@@ -10,6 +10,7 @@ mod lattice;
 mod motion;
 mod plasticity;
 mod region;
+mod replay;
 mod solve;
 mod springs;
 mod stability;
