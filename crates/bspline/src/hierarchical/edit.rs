@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use super::brick::{BRICK, DenseCorrections, HALO, HALO_LEN, reaches};
 use super::graft::{Graft, grafted};
 use super::prolong::prolong;
@@ -99,17 +101,28 @@ impl<T: Real> HierarchicalSpline<T> {
     /// # Errors
     /// Any [`EditError`]; then nothing is done.
     pub fn edited(&self, edits: &[LevelEdit<T>]) -> Result<Self, EditError> {
-        let mut pending = Pending::new(self);
         for edit in edits {
             check_function(&self.lattice, edit.level, edit.function)?;
-            let &LevelEdit {
-                level,
-                function,
-                delta,
-            } = edit;
-            pending.put(level, function, |old| Some(old.unwrap_or(T::zero()) + delta))?;
         }
-        Ok(pending.apply())
+        // Edits of one brick stand together, and keep their order.
+        let mut order: Vec<(usize, BrickKey, usize)> = (edits.iter().enumerate())
+            .map(|(i, edit)| (edit.level, BrickKey::of(edit.function), i))
+            .collect();
+        order.sort_unstable();
+        let same_brick =
+            |a: &(usize, BrickKey, usize), b: &(usize, BrickKey, usize)| (a.0, a.1) == (b.0, b.1);
+        let groups: Vec<_> = order.chunk_by(same_brick).collect();
+        let changed = groups.into_par_iter().with_min_len(1000).map(|group| {
+            let mut brick = ChangedBrick::of(self, group[0].0, group[0].1);
+            for (.., i) in group {
+                let LevelEdit { function, delta, .. } = edits[*i];
+                brick.put(function, |old| Some(old.unwrap_or(T::zero()) + delta))?;
+            }
+            Ok(brick)
+        });
+        // The first error, whichever thread meets one first.
+        let changed: Vec<Result<_, EditError>> = changed.collect();
+        Ok(self.with_bricks(changed.into_iter().collect::<Result<_, _>>()?))
     }
 
     /// The field with blocks of coefficients changed, in the order given.
@@ -122,29 +135,32 @@ impl<T: Real> HierarchicalSpline<T> {
     /// # Errors
     /// Any [`EditError`]; then nothing is done.
     pub fn edited_blocks(&self, edits: &[BlockEdit<T>]) -> Result<Self, EditError> {
-        let mut pending = Pending::new(self);
+        let mut bricks: BTreeMap<(usize, BrickKey), ChangedBrick<T>> = BTreeMap::new();
         for edit in edits {
-            let (Change::Add(values) | Change::Set(values)) = &edit.change else {
-                edit.each(&self.lattice, |_, function| {
-                    pending.put(edit.level, function, |_| None)
-                })?;
-                continue;
+            let [nx, ny, nz] = edit.shape;
+            let found = match &edit.change {
+                Change::Add(values) | Change::Set(values) => values.len(),
+                Change::Deactivate => nx * ny * nz,
             };
-            if values.len() != edit.shape.iter().product::<usize>() {
+            if found != nx * ny * nz {
                 return Err(EditError::Length {
                     shape: edit.shape,
-                    found: values.len(),
+                    found,
                 });
             }
-            let adds = matches!(edit.change, Change::Add(_));
-            edit.each(&self.lattice, |i, function| {
-                pending.put(edit.level, function, |old| {
-                    let base = old.filter(|_| adds);
-                    Some(base.map_or(values[i], |old| old + values[i]))
-                })
-            })?;
+            if found == 0 {
+                continue;
+            }
+            let last = last_of(edit.first, edit.shape);
+            check_function(&self.lattice, edit.level, last)?;
+            for key in keys_between(BrickKey::of(edit.first), BrickKey::of(last)) {
+                bricks
+                    .entry((edit.level, key))
+                    .or_insert_with(|| ChangedBrick::of(self, edit.level, key))
+                    .put_block(edit, last)?;
+            }
         }
-        Ok(pending.apply())
+        Ok(self.with_bricks(bricks.into_values().collect()))
     }
 
     /// Coefficients `first .. first + count` of the total spline of `level` (function numbers as in [`LevelEdit`]), last
@@ -206,31 +222,6 @@ impl<T: Real> HierarchicalSpline<T> {
     }
 }
 
-impl<T> BlockEdit<T> {
-    /// Calls `visit` with the place in `values` and the number of every function.
-    fn each(
-        &self,
-        lattice: &Lattice,
-        mut visit: impl FnMut(usize, [u32; 3]) -> Result<(), EditError>,
-    ) -> Result<(), EditError> {
-        let [nx, ny, nz] = self.shape;
-        if nx * ny * nz == 0 {
-            return Ok(());
-        }
-        check_function(lattice, self.level, last_of(self.first, self.shape))?;
-        for x in 0..nx {
-            for y in 0..ny {
-                for z in 0..nz {
-                    let at = [x, y, z];
-                    let function = std::array::from_fn(|a| self.first[a] + at[a] as u32);
-                    visit((x * ny + y) * nz + z, function)?;
-                }
-            }
-        }
-        Ok(())
-    }
-}
-
 fn last_of(first: [u32; 3], count: [usize; 3]) -> [u32; 3] {
     std::array::from_fn(|a| {
         let last = first[a] as u64 + (count[a] as u64).saturating_sub(1);
@@ -259,98 +250,103 @@ pub(super) fn check_function(lattice: &Lattice, level: usize, function: [u32; 3]
     Ok(())
 }
 
-/// Bricks with changed functions.
-struct Pending<'a, T> {
-    field: &'a HierarchicalSpline<T>,
-    bricks: BTreeMap<(usize, BrickKey), Brick<T>>,
-    /// The brick of the last change, out of `bricks`: changes come in blocks.
-    last: Option<((usize, BrickKey), Brick<T>)>,
+fn keys_between(first: BrickKey, last: BrickKey) -> impl Iterator<Item = BrickKey> {
+    let range = move |a: usize| first.0[a]..=last.0[a];
+    range(0).flat_map(move |x| range(1).flat_map(move |y| range(2).map(move |z| BrickKey([x, y, z]))))
 }
 
-struct Brick<T> {
+/// A brick whose functions change.
+struct ChangedBrick<T> {
+    level: usize,
+    key: BrickKey,
     corrections: DenseCorrections<T>,
     /// Slots that changed, as in [`DenseCorrections::mask`].
     changed: [u64; BRICK],
 }
 
-impl<'a, T: Real> Pending<'a, T> {
-    fn new(field: &'a HierarchicalSpline<T>) -> Self {
+impl<T: Real> ChangedBrick<T> {
+    fn of(field: &HierarchicalSpline<T>, level: usize, key: BrickKey) -> Self {
+        let node = field.find(level, key);
+        let corrections = node.and_then(|n| n.corrections.as_deref());
         Self {
-            field,
-            bricks: BTreeMap::new(),
-            last: None,
+            level,
+            key,
+            corrections: corrections.map_or_else(DenseCorrections::empty, DenseCorrections::from),
+            changed: [0; BRICK],
         }
     }
 
-    fn brick(&mut self, place: (usize, BrickKey)) -> &mut Brick<T> {
-        if self.last.as_ref().is_none_or(|(last, _)| *last != place) {
-            if let Some((last, brick)) = self.last.take() {
-                self.bricks.insert(last, brick);
-            }
-            let brick = self.bricks.remove(&place).unwrap_or_else(|| {
-                let node = self.field.find(place.0, place.1);
-                let corrections = node.and_then(|n| n.corrections.as_deref());
-                Brick {
-                    corrections: corrections.map_or_else(DenseCorrections::empty, DenseCorrections::from),
-                    changed: [0; BRICK],
+    /// Does what a block asks of the brick's functions; `last` is the block's last.
+    fn put_block(&mut self, edit: &BlockEdit<T>, last: [u32; 3]) -> Result<(), EditError> {
+        let corner = self.key.0.map(|k| k * BRICK as u32);
+        let range = |a: usize| edit.first[a].max(corner[a])..=last[a].min(corner[a] + BRICK as u32 - 1);
+        for x in range(0) {
+            for y in range(1) {
+                for z in range(2) {
+                    let [i, j, k] =
+                        [x - edit.first[0], y - edit.first[1], z - edit.first[2]].map(|n| n as usize);
+                    let n = (i * edit.shape[1] + j) * edit.shape[2] + k;
+                    self.put([x, y, z], |old| match &edit.change {
+                        Change::Add(values) => Some(old.unwrap_or(T::zero()) + values[n]),
+                        Change::Set(values) => Some(values[n]),
+                        Change::Deactivate => None,
+                    })?;
                 }
-            });
-            self.last = Some((place, brick));
+            }
         }
-        &mut self.last.as_mut().expect("just set").1
+        Ok(())
     }
 
     /// Changes one function: from its coefficient, none if it is not active, to a new one.
+    #[inline]
     fn put(
         &mut self,
-        level: usize,
         function: [u32; 3],
         change: impl FnOnce(Option<T>) -> Option<T>,
     ) -> Result<(), EditError> {
-        let brick = self.brick((level, BrickKey(function.map(|s| s / BRICK as u32))));
         let slot = function.map(|s| s as usize % BRICK);
         let bit = 1 << (BRICK * slot[1] + slot[2]);
-        let is_active = brick.corrections.mask[slot[0]] & bit != 0;
-        let value = &mut brick.corrections.values[(slot[0] * BRICK + slot[1]) * BRICK + slot[2]];
+        let is_active = self.corrections.mask[slot[0]] & bit != 0;
+        let value = &mut self.corrections.values[(slot[0] * BRICK + slot[1]) * BRICK + slot[2]];
         let old = is_active.then_some(*value);
         let new = change(old);
         if let Some(new) = new.filter(|new| !new.is_finite()) {
             return Err(EditError::NotFinite {
-                level,
+                level: self.level,
                 function,
                 value: new.as_f64(),
             });
         }
         if old != new {
             *value = new.unwrap_or(T::zero());
-            brick.changed[slot[0]] |= bit;
-            brick.corrections.mask[slot[0]] &= !bit;
+            self.changed[slot[0]] |= bit;
+            self.corrections.mask[slot[0]] &= !bit;
             if new.is_some() {
-                brick.corrections.mask[slot[0]] |= bit;
+                self.corrections.mask[slot[0]] |= bit;
             }
         }
         Ok(())
     }
-
-    fn apply(mut self) -> HierarchicalSpline<T> {
-        self.bricks.extend(self.last.take());
-        let lattice = &self.field.lattice;
-        let mut grafts = Vec::new();
-        for ((level, key), brick) in self.bricks {
-            if brick.changed == [0; BRICK] {
-                continue;
-            }
-            let readers = readers(key, brick.changed);
-            grafts.extend(readers.map(|key| Graft::stale(lattice, level, key)));
-            let is_empty = brick.corrections.mask == [0; BRICK];
-            let functions = (!is_empty).then(|| Arc::new(brick.corrections.pack()));
-            grafts.push(Graft::functions(lattice, level, key, functions));
-        }
-        self.field.with_grafts(grafts)
-    }
 }
 
 impl<T: Real> HierarchicalSpline<T> {
+    fn with_bricks(&self, bricks: Vec<ChangedBrick<T>>) -> Self {
+        let mut grafts = Vec::new();
+        for brick in bricks.into_iter().filter(|b| b.changed != [0; BRICK]) {
+            let ChangedBrick { level, key, .. } = brick;
+            let readers = readers(key, brick.changed);
+            grafts.extend(readers.map(|key| Graft::stale(&self.lattice, level, key)));
+            let functions = Some(brick.corrections.pack()).filter(|c| c.count() > 0);
+            grafts.push(Graft::functions(
+                &self.lattice,
+                level,
+                key,
+                functions.map(Arc::new),
+            ));
+        }
+        self.with_grafts(grafts)
+    }
+
     /// The field with other functions in some bricks, whose readers are among the grafts.
     pub(super) fn with_grafts(&self, grafts: Vec<Graft<T>>) -> Self {
         if grafts.is_empty() {
