@@ -10,7 +10,7 @@ use super::graft::{Graft, grafted};
 use super::prolong::prolong;
 use super::renew::renewed;
 use super::{BrickKey, HierarchicalSpline, Lattice};
-use crate::Real;
+use crate::{KnotVector, Real, TensorSpline};
 
 /// Most levels that an edit may lead to.
 pub const MAX_LEVELS: usize = 21;
@@ -82,6 +82,12 @@ pub enum EditError {
         function: [u32; 3],
         /// What it would be.
         value: f64,
+    },
+    /// A patch does not stand on the functions of a level.
+    #[error("the patch's knots are none of the lattice's: {why}")]
+    NotDyadic {
+        /// What is different.
+        why: &'static str,
     },
     /// A block's values do not fit its shape.
     #[error("a block of {shape:?} functions takes as many values; there are {found}")]
@@ -219,6 +225,54 @@ impl<T: Real> HierarchicalSpline<T> {
         let mut totals = [T::zero(); HALO_LEN];
         prolong(&parent, key.octant(), &mut totals);
         Arc::new(totals)
+    }
+}
+
+impl<T: Real> BlockEdit<T> {
+    /// The edit that adds a patch to a field on `lattice`: a cubic one on uniform knots of one of its levels, placed as
+    /// it is. Exact where all functions of the patch lie within it, so with zeros in its outer three layers.
+    ///
+    /// # Errors
+    /// [`EditError::NotDyadic`]; [`EditError::Function`] if the patch reaches further than the lattice's functions.
+    pub fn adding(patch: &TensorSpline<T>, lattice: &Lattice) -> Result<Self, EditError> {
+        let not = |why| Err(EditError::NotDyadic { why });
+        if patch.world_from_parameter() != &lattice.world_from_lattice {
+            return not("it is placed by another map");
+        }
+        let axes = patch.knots();
+        let spacing = axes[0].knots()[1] - axes[0].knots()[0];
+        let level = (1.0 / spacing).log2().round();
+        if !(0.0..=MAX_LEVELS as f64).contains(&level) {
+            return not("they are further apart than those of level 0, or nearer than any");
+        }
+        let scale = level.exp2();
+        let mut first = [0; 3];
+        for (axis, first) in axes.iter().zip(&mut first) {
+            if axis.degree() != 3 {
+                return not("its degree is not 3 on every axis");
+            }
+            let places = axis.knots().iter().map(|knot| knot * scale);
+            let start = axis.knots()[0] * scale;
+            if places
+                .enumerate()
+                .any(|(i, place)| (place - start.round() - i as f64).abs() > 1e-9)
+            {
+                return not("they are not evenly spaced on those of one level");
+            }
+            // Function 0 is centred on the third knot; function `s` of a level on knot `s - 1`.
+            match u32::try_from(start.round() as i64 + 3) {
+                Ok(number) => *first = number,
+                Err(_) => return not("it reaches further than the lattice's functions"),
+            }
+        }
+        let edit = Self {
+            level: level as usize,
+            first,
+            shape: axes.each_ref().map(KnotVector::coefficient_count),
+            change: Change::Add(patch.coefficients().to_vec()),
+        };
+        check_function(lattice, edit.level, last_of(edit.first, edit.shape))?;
+        Ok(edit)
     }
 }
 

@@ -4,10 +4,9 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use super::bounds::{corners, local_box, own_part, shared};
+use super::bounds::{Roots, corners, local_box, own_part, shared};
 use super::brick::{BRICK, HALO, HALO_LEN};
 use super::node::Node;
-use super::spline::HierarchicalSpline;
 use crate::restrict::{RestrictedAxis, restricted_range};
 use crate::{Aabb, Interval, Real, vectorized, vectors};
 
@@ -16,21 +15,27 @@ use crate::{Aabb, Interval, Real, vectorized, vectors};
 const RESTRICTED: f64 = 4.0;
 
 /// Interval of each component of the gradient over a world box.
-pub(super) fn over_world_box<T: Real>(spline: &HierarchicalSpline<T>, b: &Aabb) -> [Interval; 3] {
-    let local = b.transformed(spline.lattice_from_world());
+pub(super) fn over_world_box<'a, T: Real>(
+    roots: Roots<'a, impl Iterator<Item = &'a Node<T>>>,
+    b: &Aabb,
+) -> [Interval; 3] {
+    let place = roots.place;
+    let local = b.transformed(&place.local_from_world);
     if !(local.min.is_finite() && local.max.is_finite()) {
         return [Interval::EVERYTHING; 3];
     }
-    let extent = spline.lattice().extent();
+    let extent = place.max;
     let inside = Aabb {
         min: local.min.clamp(DVec3::ZERO, extent),
         max: local.max.clamp(DVec3::ZERO, extent),
     };
     let mut hull: Option<[Interval; 3]> = None;
-    visit(&spline.root, &extent, &inside, &mut hull);
+    for node in roots.nodes {
+        visit(node, &extent, &inside, &mut hull);
+    }
     let slopes = hull.expect("a box has a part in some brick");
-    let world = vectors::transformed(spline.lattice_from_world().matrix3.transpose(), slopes);
-    spline.place.extend_slopes(world, &local, &inside)
+    let world = vectors::transformed(place.local_from_world.matrix3.transpose(), slopes);
+    place.extend_slopes(world, &local, &inside)
 }
 
 /// Adds the slopes of a node over the part of `b` in it.
