@@ -43,9 +43,10 @@ use bspline::{Field, Frame, HierarchicalSpline, KnotVector, Real};
 use glam::{DAffine3, DMat3, DVec3};
 
 use crate::integrators::{Integrator, StepReport};
-use crate::lattice::{Axis, Lattice, LatticeError, Rim};
+use crate::lattice::{Axis, Lattice, LatticeError, OnBox, Rim, SampleBox};
 use crate::matter::Matter;
 use crate::patch::{Patch, PatchError};
+use crate::response::{Against, Response};
 use crate::solve::SolverOptions;
 use crate::springs::{Law, Neighbours};
 
@@ -271,6 +272,63 @@ impl<T: Real> Region<T> {
     pub fn sample_position(&self, ijk: [usize; 3]) -> DVec3 {
         let samples = self.patch.lattice().sample_dims().map(|n| n as u64);
         frame(&self.field_lattice, &self.cells, samples).node(ijk.map(|i| i as i64))
+    }
+
+    /// World lengths of a place from the first sample along the axes: how samples, constraints and responses of the
+    /// [patch](Self::patch) are asked for.
+    pub fn local(&self, p: DVec3) -> [f64; 3] {
+        let lattice = self.patch.lattice();
+        let samples = lattice.sample_dims().map(|n| n as u64);
+        let grid = frame(&self.field_lattice, &self.cells, samples)
+            .world_from_grid
+            .inverse();
+        (grid.transform_point3(p) * DVec3::from_array(lattice.spacing())).to_array()
+    }
+
+    /// The least box with all samples within `radius` of a place in the world, up to the `1e-4` that axes may be off the
+    /// perpendicular; found without walking the others.
+    pub fn samples_near(&self, p: DVec3, radius: f64) -> SampleBox {
+        let slack = 1.0 + 2.0 * PERPENDICULAR;
+        self.patch.lattice().samples_near(self.local(p), slack * radius)
+    }
+
+    /// As [`Patch::respond`]; does not wake the region, and answers for the whole of it.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn respond(
+        &mut self,
+        integrator: Integrator,
+        dt: f64,
+        loads: &[OnBox<T>],
+    ) -> Result<Vec<Response<T>>, PatchError> {
+        self.patch.respond(integrator, dt, loads)
+    }
+
+    /// As [`Patch::static_response`]; does not wake the region.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn static_response(
+        &mut self,
+        against: Against,
+        loads: &[OnBox<T>],
+    ) -> Result<Vec<Response<T>>, PatchError> {
+        self.patch.static_response(against, loads)
+    }
+
+    /// [`Patch::stiffness_near`] a place in the world.
+    pub fn stiffness_near(&self, p: DVec3, radius: f64) -> Option<f64> {
+        self.patch.stiffness_near(self.local(p), radius)
+    }
+
+    /// [`Patch::compliance_at`] a place in the world; does not wake the region.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn compliance_at(&mut self, p: DVec3, radius: f64, against: Against) -> Result<f64, PatchError> {
+        let at = self.local(p);
+        self.patch.compliance_at(at, radius, against)
     }
 
     /// Moves the region by `dt` seconds; one that is asleep costs nothing and keeps its bits, and gives `None`.

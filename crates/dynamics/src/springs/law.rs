@@ -372,6 +372,24 @@ impl<T: Real> SpringNetwork<T> {
         report
     }
 
+    /// Multiplies the weights of springs by their tangent factors `max(τ, 0)` at the densities `d`.
+    pub(crate) fn scale_by_tangent(&self, d: &[T], springs: &mut [SpringWeights<f64>]) {
+        let sigma = self.sigma();
+        for (n, s) in springs.iter_mut().enumerate() {
+            let (h2, rest) = (self.lengths[n], &self.rest.differences[n]);
+            let mut weights = vec![0.0; d.len()];
+            rows_of(self.dims, s.direction.step, |from, to, count| {
+                for z in 0..count {
+                    let delta = sigma * (d[from + z].as_f64() - d[to + z].as_f64());
+                    let (rest, scale) = (rest[from + z].as_f64(), self.rest.scale.at(from + z).as_f64());
+                    let (_, _, t) = spring::<f64, true>(delta, rest, scale, h2);
+                    weights[from + z] = s.weights.at(from + z) * t.max(0.0);
+                }
+            });
+            s.weights = Weights::Each(weights);
+        }
+    }
+
     /// Of a spring of the unit of stiffness, twice, stretched by the unit of length.
     fn energy_unit(&self) -> f64 {
         self.stiffness_unit * self.length_unit * self.length_unit
