@@ -180,6 +180,11 @@ impl<T: Real> Patch<T> {
         self.cache.solver.lattice()
     }
 
+    /// How implicit steps are solved.
+    pub fn solver_options(&self) -> SolverOptions {
+        self.cache.solver.options()
+    }
+
     /// Finishes at once a factor that is being made beside the steps: what some hundred steps would do.
     pub fn settle(&mut self) {
         self.cache.solver.settle();

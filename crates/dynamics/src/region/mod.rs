@@ -26,13 +26,18 @@
 //! ```
 
 mod cells;
+mod change;
+mod moved;
 mod parts;
+mod scene;
 mod sleep;
 mod snapshot;
 mod tensor;
 mod watch;
 
 pub use cells::{Cells, MAX_EDGE, MAX_SIZE, MIN_CELLS};
+pub use change::{Change, Viewer};
+pub use scene::Scene;
 pub use sleep::{Schedule, Thresholds, Turn};
 pub use snapshot::RegionSnapshot;
 pub use tensor::{TensorOptions, TensorRegion};
@@ -135,6 +140,41 @@ pub enum RegionError {
     /// A tensor-product patch with coefficients that are not finite.
     #[error(transparent)]
     Tensor(#[from] TensorError),
+    /// Baked onto a field that has another shape where the region is.
+    #[error(
+        "the field is not as it was where the region was cut out: perhaps this change is in it already, and baking it twice would \
+         double it; bake onto the field that the region was cut from, or release the region"
+    )]
+    Changed,
+    /// Two regions on the same cells.
+    #[error(
+        "cells {:?} + {:?} of level {} overlap those of region {index}, {:?} + {:?} of level {}; move one of them, or cut one region \
+         that covers both", cells.first, cells.count, cells.level, with.first, with.count, with.level
+    )]
+    Overlaps {
+        /// Asked for.
+        cells: Cells,
+        /// Number of the other region.
+        index: usize,
+        /// Its cells.
+        with: Cells,
+    },
+    /// A number that no region has.
+    #[error("there is no region {index}; the scene has {count}, numbered from 0")]
+    NoRegion {
+        /// The number.
+        index: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// Moved to another level.
+    #[error("a region of level {from} cannot go on at level {to}; release it and cut another")]
+    OtherLevel {
+        /// Level of the region.
+        from: usize,
+        /// Level asked for.
+        to: usize,
+    },
     /// Baked onto a field on other knots.
     #[error("the region was cut out of a field on another lattice; bake it onto a version of that field")]
     OtherLattice,
@@ -181,6 +221,9 @@ impl RegionOptions {
 pub struct Region<T> {
     cells: Cells,
     field_lattice: FieldLattice,
+    samples_per_cell: [f64; 3],
+    /// Coefficients of the free functions in the field that the region was cut from.
+    origin: Vec<T>,
     patch: Patch<T>,
     thresholds: Thresholds,
     asleep: bool,
@@ -242,6 +285,8 @@ impl<T: Real> Region<T> {
         Ok(Self {
             cells,
             field_lattice: *field.lattice(),
+            samples_per_cell: options.samples_per_cell,
+            origin: coefficients(field, &cells)?,
             patch,
             thresholds: options.sleep,
             asleep: true,
@@ -348,15 +393,19 @@ impl<T: Real> Region<T> {
     /// knots.
     ///
     /// `onto` is the field that the region was cut from, or a version of it with other regions baked. It stays as it is,
-    /// and keeping it is how baking is undone, to the bit. Beside the region every value keeps its bits.
+    /// and keeping it is how baking is undone, to the bit. Beside the region every value keeps its bits. A field that has other
+    /// coefficients there is refused, so that no change is baked twice.
     ///
     /// # Errors
-    /// [`RegionError::OtherLattice`], [`RegionError::Spills`], [`RegionError::Edit`].
+    /// [`RegionError::OtherLattice`], [`RegionError::Changed`], [`RegionError::Spills`], [`RegionError::Edit`].
     pub fn bake(&self, onto: &HierarchicalSpline<T>) -> Result<HierarchicalSpline<T>, RegionError> {
         if *onto.lattice() != self.field_lattice {
             return Err(RegionError::OtherLattice);
         }
         spills(onto, &self.cells)?;
+        if coefficients(onto, &self.cells)? != self.origin {
+            return Err(RegionError::Changed);
+        }
         let [_, ny, nz] = self.patch.lattice().coefficient_dims();
         // Function s of the level has the support s - 3 .. s + 1: the first inside is number first + 3.
         let function = |i: usize| {
@@ -388,6 +437,7 @@ impl<T: Real> Region<T> {
     ) -> Result<HierarchicalSpline<T>, RegionError> {
         let baked = self.bake(onto)?;
         let samples = self.patch.lattice().sample_dims().map(|n| n as u64);
+        self.origin = coefficients(&baked, &self.cells)?;
         self.patch.rest_at(densities(&baked, &self.cells, samples));
         self.part = None;
         self.parts.forget();
@@ -414,6 +464,12 @@ fn spills<T: Real>(field: &HierarchicalSpline<T>, cells: &Cells) -> Result<(), R
         }),
         None => Ok(()),
     }
+}
+
+/// Coefficients of the functions that are free in a box of cells.
+fn coefficients<T: Real>(field: &HierarchicalSpline<T>, cells: &Cells) -> Result<Vec<T>, EditError> {
+    let first = cells.first.map(|f| f + 3);
+    field.level_coefficients(cells.level, first, cells.count.map(|c| c as usize - 3))
 }
 
 /// Refuses axes that are not perpendicular.

@@ -250,6 +250,31 @@ impl<T: Real> SpringNetwork<T> {
         }
     }
 
+    /// By how much the springs of each direction differ from their rest at the densities `d`, in units of lengths.
+    pub(crate) fn stretches(&self, d: &[T]) -> Vec<Vec<T>> {
+        let sigma = T::from_f64(self.sigma());
+        let mut all = self.rest.differences.clone();
+        for (list, s) in all.iter_mut().zip(&self.springs) {
+            rows_of(self.dims, s.direction.step, |from, to, count| {
+                for z in 0..count {
+                    list[from + z] = sigma * (d[from + z] - d[to + z]) - list[from + z];
+                }
+            });
+        }
+        all
+    }
+
+    /// Lets the springs of direction `n` rest where they differ by `stretch` at the densities `d`.
+    pub(crate) fn stretch(&mut self, n: usize, d: &[T], stretch: &[T]) {
+        let sigma = T::from_f64(self.sigma());
+        let rest = &mut self.rest.differences[n];
+        rows_of(self.dims, self.springs[n].direction.step, |from, to, count| {
+            for z in 0..count {
+                rest[from + z] = sigma * (d[from + z] - d[to + z]) - stretch[from + z];
+            }
+        });
+    }
+
     /// Adds the spring forces on the densities `d` to `force`.
     ///
     /// # Panics
