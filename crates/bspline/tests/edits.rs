@@ -5,7 +5,9 @@ mod common;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use bspline::hierarchical::{BrickKey, Corrections, EditError, Lattice, LevelCorrections, LevelEdit};
+use bspline::hierarchical::{
+    BlockEdit, BrickKey, Change, Corrections, DiffError, EditError, Lattice, LevelCorrections, LevelEdit,
+};
 use bspline::{Aabb, Field, HierarchicalSpline, KnotVector, Real, TensorSpline};
 use common::Random;
 use glam::{DAffine3, DMat3, DVec3};
@@ -24,7 +26,9 @@ fn set<T: Real>(level: &mut LevelCorrections<T>, s: [u32; 3], delta: T) {
         .entry(BrickKey(s.map(|s| s / 8)))
         .or_insert_with(|| Arc::new(Corrections::empty()));
     let slot = s.map(|s| s as usize % 8);
-    let old = brick.values[64 * slot[0] + 8 * slot[1] + slot[2]];
+    let old = brick
+        .get(64 * slot[0] + 8 * slot[1] + slot[2])
+        .unwrap_or(T::zero());
     Arc::make_mut(brick).set(slot, old + delta);
 }
 
@@ -273,4 +277,121 @@ fn bad_edits_are_refused_and_change_nothing() {
     assert!(field.level_coefficients(0, [18, 0, 0], [3, 1, 1]).is_err());
     assert_eq!(field.level_coefficients(0, [0; 3], [0, 1, 1]), Ok(vec![]));
     assert_eq!(field.edited(&[]).unwrap().unshared_brick_count(&field), 0);
+}
+
+/// All active functions with their coefficients: what edits are checked against.
+type Model = BTreeMap<(usize, [u32; 3]), f32>;
+
+fn built(model: &Model) -> HierarchicalSpline<f32> {
+    let mut levels = vec![LevelCorrections::new(); 6];
+    for ((level, function), value) in model {
+        set(&mut levels[*level], *function, *value);
+    }
+    HierarchicalSpline::from_corrections(lattice(), 0.5, levels)
+}
+
+/// A block of up to 9 functions on each axis, added, set, refined (added zeros), or deactivated; done to the model too.
+fn random_block(model: &mut Model, random: &mut Random) -> BlockEdit<f32> {
+    let level = random.below(5);
+    let count = lattice().cells_at(level).map(|n| n + 3);
+    let first = count.map(|n| random.below(n as usize) as u32);
+    let shape: [usize; 3] = std::array::from_fn(|a| 1 + random.below(9.min((count[a] - first[a]) as usize)));
+    let kind = random.below(5);
+    let mut values = Vec::new();
+    for i in 0..shape.iter().product::<usize>() {
+        let at = [i / shape[2] / shape[1], i / shape[2] % shape[1], i % shape[2]];
+        let place = (level, std::array::from_fn(|a| first[a] + at[a] as u32));
+        let value = match kind {
+            2 => 0.0,
+            _ => (2.0 * random.unit() - 1.0) as f32,
+        };
+        values.push(value);
+        match kind {
+            0 => drop(model.insert(place, value)),
+            1 | 2 => *model.entry(place).or_insert(0.0) += value,
+            _ => drop(model.remove(&place)),
+        }
+    }
+    BlockEdit {
+        level,
+        first,
+        shape,
+        change: match kind {
+            0 => Change::Set(values),
+            1 | 2 => Change::Add(values),
+            _ => Change::Deactivate,
+        },
+    }
+}
+
+#[test]
+fn a_thousand_edits_are_undone_and_redone_by_their_differences() {
+    let mut random = Random(11);
+    let mut model = Model::new();
+    let first = built(&model);
+    let mut field = first.clone();
+    let mut differences = Vec::new();
+    let mut hashes = vec![first.sha256()];
+    for round in 0..1000 {
+        let next = field
+            .edited_blocks(&[random_block(&mut model, &mut random)])
+            .unwrap();
+        differences.push(field.difference(&next).unwrap());
+        if round % 25 == 0 {
+            assert_same(&next, &built(&model), &mut random);
+        }
+        field = next;
+        hashes.push(field.sha256());
+    }
+    assert!(field.coefficient_count() > 2000);
+    let last = field.clone();
+    for (diff, hash) in differences.iter().zip(&hashes).rev() {
+        field = field.applied(&diff.reversed()).unwrap();
+        assert_eq!(field.sha256(), *hash);
+    }
+    assert_same(&field, &first, &mut random);
+    for (diff, hash) in differences.iter().zip(&hashes[1..]) {
+        field = field.applied(diff).unwrap();
+        assert_eq!(field.sha256(), *hash);
+    }
+    assert_same(&field, &last, &mut random);
+    // The whole way at once, and with another program's field: nothing is shared, the hashes have been asked for.
+    let loaded = built(&model);
+    let whole = first.difference(&loaded).unwrap();
+    assert_eq!(first.applied(&whole).unwrap().sha256(), last.sha256());
+    loaded.sha256();
+    assert_eq!(last.difference(&loaded).unwrap().bricks, []);
+    // A difference fits the version that it starts from, and no other.
+    let e = last.applied(&whole).unwrap_err();
+    assert!(matches!(e, DiffError::Version { .. }), "{e}");
+}
+
+#[test]
+fn deactivated_functions_take_their_bricks_with_them() {
+    let mut random = Random(13);
+    let field =
+        HierarchicalSpline::from_corrections(lattice(), 0.5, random_levels::<f32>(&lattice(), &mut random));
+    let level = field.level_count();
+    let (first, shape) = ([30, 20, 25], [12, 9, 10]);
+    let block = |change| BlockEdit {
+        level,
+        first,
+        shape,
+        change,
+    };
+    let zeros = vec![0.0; shape.iter().product()];
+    let refined = field.edited_blocks(&[block(Change::Add(zeros))]).unwrap();
+    assert_eq!(refined.level_count(), level + 1);
+    // Knots inserted change nothing but rounding: 8 ulp of the largest total.
+    let region = field.lattice().world_box();
+    for _ in 0..2000 {
+        let p = random.point(&region);
+        let bound = field.rounding_bound() / 8.0;
+        assert!((field.value(p) - refined.value(p)).abs() <= bound, "at {p}");
+    }
+    let back = refined.edited_blocks(&[block(Change::Deactivate)]).unwrap();
+    assert_same(&back, &field, &mut random);
+    assert_eq!(back.unshared_brick_count(&field), 0);
+    let wrong = field.edited_blocks(&[block(Change::Set(vec![1.0]))]).err();
+    assert_eq!(wrong, Some(EditError::Length { shape, found: 1 }));
 }

@@ -10,15 +10,15 @@ impl<T: Real> Field for HierarchicalSpline<T> {
     fn value(&self, p: DVec3) -> f64 {
         let (q, beyond) = self.place.clamp(p);
         let at = self.place(q);
-        kernel::value(&at.brick.totals, at.cell, at.t).as_f64() - self.slope() * beyond.length()
+        kernel::value(at.brick.own_totals(), at.cell, at.t).as_f64() - self.slope() * beyond.length()
     }
 
     fn value_gradient(&self, p: DVec3) -> (f64, DVec3) {
         let (q, beyond) = self.place.clamp(p);
         let at = self.place(q);
-        let (v, g) = kernel::value_gradient(&at.brick.totals, at.cell, at.t);
+        let (v, g) = kernel::value_gradient(at.brick.own_totals(), at.cell, at.t);
         self.place
-            .extend((v.as_f64(), self.world_gradient(at.level, g)), q, beyond)
+            .extend((v.as_f64(), self.world_gradient(at.brick, g)), q, beyond)
     }
 
     fn jet(&self, p: DVec3) -> Jet {
