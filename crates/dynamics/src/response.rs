@@ -301,7 +301,7 @@ impl<T: Real> Patch<T> {
         for i in near.indices(dims) {
             let ijk = [i / dims[2] / dims[1], i / dims[2] % dims[1], i % dims[2]];
             let weight = 1.0 - distance(lattice.sample_place(ijk), at) / radius;
-            if !(weight > 0.0) {
+            if weight <= 0.0 || weight.is_nan() {
                 continue;
             }
             for s in self.network.springs() {
@@ -360,7 +360,7 @@ impl<T: Real> Lattice<T> {
         };
         let mut weights: Vec<f64> = near.indices(dims).map(weight).collect();
         let sum: f64 = weights.iter().sum();
-        if !(sum > 0.0) {
+        if sum <= 0.0 || sum.is_nan() {
             return (SampleBox::default(), Vec::new());
         }
         weights.iter_mut().for_each(|w| *w /= sum);

@@ -108,7 +108,7 @@ impl<T: Real> Lattice<T> {
             let (h, last) = (axis.spacing(), (axis.sample_count() - 1) as f64);
             let low = ((at[a] - radius) / h).ceil().max(0.0);
             let high = ((at[a] + radius) / h).floor().min(last);
-            if !at[a].is_finite() || !(low <= high) {
+            if !at[a].is_finite() || radius.is_nan() || low > high {
                 return SampleBox::default();
             }
             near.first[a] = low as usize;
