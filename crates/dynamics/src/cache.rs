@@ -3,6 +3,7 @@
 use bspline::Real;
 use serde::{Deserialize, Serialize};
 
+use crate::response::StaticSolver;
 use crate::solve::StepSolver;
 use crate::springs::StepMatrix;
 
@@ -23,6 +24,8 @@ pub(crate) struct Cache<T> {
     pub changes: u64,
     /// Bound of explicit steps with the version it is of.
     pub limit: Option<(u64, f64)>,
+    /// Of static problems, painted and of reference; no bit depends on whether they are there.
+    pub statics: [Option<Box<StaticSolver>>; 2],
 }
 
 /// Key of the matrix that the solver was made for.
@@ -49,6 +52,7 @@ impl<T: Real> Cache<T> {
             prepared: None,
             changes: 0,
             limit: None,
+            statics: [None, None],
         }
     }
 

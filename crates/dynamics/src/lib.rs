@@ -44,6 +44,7 @@ pub mod matter;
 pub mod patch;
 mod patch_error;
 pub mod region;
+pub mod response;
 mod rest;
 pub mod snapshot;
 pub mod solve;

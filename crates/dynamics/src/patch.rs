@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::cache::Cache;
 use crate::constraints::Held;
-use crate::lattice::{Lattice, TensorWorkspace};
+use crate::lattice::{Lattice, OnBox, SampleBox, TensorWorkspace};
 use crate::matter::{Matter, Quantity, ScaledMatter};
 pub use crate::patch_error::PatchError;
 use crate::solve::{SolverOptions, StepSolver};
@@ -72,6 +72,8 @@ pub struct Patch<T> {
     /// Where the ground springs rest.
     pub(crate) anchor: Vec<T>,
     pub(crate) external: Vec<T>,
+    /// Where they are, if not 0.
+    pub(crate) pushed: SampleBox,
     /// Largest of them.
     pub(crate) external_size: f64,
     pub(crate) held: Option<Box<Held<T>>>,
@@ -152,6 +154,7 @@ impl<T: Real> Patch<T> {
             anchor: d.to_vec(),
             own_springs: false,
             external: zeros(m),
+            pushed: SampleBox::default(),
             external_size: 0.0,
             held: None,
             cache: Cache::new(StepSolver::new(lattice, &steps, options), matrix),
@@ -175,6 +178,11 @@ impl<T: Real> Patch<T> {
     /// The lattice.
     pub fn lattice(&self) -> &Lattice<T> {
         self.cache.solver.lattice()
+    }
+
+    /// How implicit steps are solved.
+    pub fn solver_options(&self) -> SolverOptions {
+        self.cache.solver.options()
     }
 
     /// Finishes at once a factor that is being made beside the steps: what some hundred steps would do.
@@ -309,9 +317,26 @@ impl<T: Real> Patch<T> {
         Ok(())
     }
 
+    /// The same of forces on a box of samples, all others none, at the cost of the box and the one before.
+    ///
+    /// # Errors
+    /// [`PatchError::Box`], [`PatchError::Length`], [`PatchError::NotFinite`]; the old forces then stay.
+    pub fn set_force_on(&mut self, force: OnBox<T>) -> Result<(), PatchError> {
+        self.check_load(&force)?;
+        let dims = self.lattice().sample_dims();
+        for row in self.pushed.rows(dims) {
+            self.external[row..row + self.pushed.count[2]].fill(T::zero());
+        }
+        force.at.paste(&mut self.external, dims, force.values);
+        self.pushed = force.at;
+        self.external_size = largest(force.values);
+        Ok(())
+    }
+
     /// Changes the external forces.
     pub(crate) fn write_force(&mut self, write: impl FnOnce(&mut [T])) {
         write(&mut self.external);
+        self.pushed = self.lattice().all_samples();
         self.external_size = largest(&self.external);
     }
 

@@ -76,7 +76,7 @@ impl<T: Real> Held<T> {
     }
 
     /// For a solver of steps in which the springs are implicit, or not.
-    pub fn border(&self, implicit: bool) -> Border<T> {
+    pub fn border<U: Real>(&self, implicit: bool) -> Border<U> {
         let springs = self.springs.iter().map(|s| s.0.clone()).collect();
         Border::new(self.moved[0].len(), springs, implicit, self.hard.rows.clone())
     }

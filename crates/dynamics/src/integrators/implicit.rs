@@ -50,7 +50,7 @@ impl<T: Real> Patch<T> {
 
     /// The power of two in whose units the matrix `M̃ + aD̃ + bK̃` is written: a factor that may still serve knows it in
     /// its own.
-    pub(super) fn matrix_unit(&self, damping: f64, stiffness: f64) -> f64 {
+    pub(crate) fn matrix_unit(&self, damping: f64, stiffness: f64) -> f64 {
         if let Some(p) = self.cache.prepared.filter(|p| self.is_near(p, stiffness)) {
             return p.unit;
         }
@@ -73,6 +73,17 @@ impl<T: Real> Patch<T> {
     ///
     /// [`forces`]: Self::forces
     pub(super) fn solve_step(&mut self, damping: f64, stiffness: f64) -> Result<SolveReport, PatchError> {
+        self.solve_step_to(damping, stiffness, None)
+    }
+
+    /// The same to a residual, if one is asked for, however many iterations that takes.
+    pub(crate) fn solve_step_to(
+        &mut self,
+        damping: f64,
+        stiffness: f64,
+        residual: Option<f64>,
+    ) -> Result<SolveReport, PatchError> {
+        let asked = residual;
         let (version, four_d) = (self.version(), matches!(self.network.law(), Law::FourD { .. }));
         let unit = self.matrix_unit(damping, stiffness);
         let same = self
@@ -95,10 +106,10 @@ impl<T: Real> Patch<T> {
                 self.cache.solver.prepare(&self.cache.matrix)?;
             }
             let work = &mut self.work;
-            let report = self
-                .cache
-                .solver
-                .solve(&self.cache.matrix, &work.g, &mut work.x, &mut work.dx);
+            let report =
+                self.cache
+                    .solver
+                    .solve_to(&self.cache.matrix, &work.g, &mut work.x, &mut work.dx, asked);
             let residual = report.iteration.residual;
             if fresh {
                 self.cache.prepared = Some(Prepared {

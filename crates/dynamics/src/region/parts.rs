@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::Region;
 use super::sleep::solves;
 use crate::integrators::{Integrator, StepReport};
-use crate::lattice::{Axis, Lattice, LatticeError, Rim};
+use crate::lattice::{Axis, Lattice, LatticeError, Rim, SampleBox};
 use crate::matter::{Matter, Quantity};
 use crate::patch::{Patch, PatchError};
 use crate::springs::{Plasticity, Weights};
@@ -140,27 +140,11 @@ impl Window {
 
 /// A box of a list, z fastest.
 fn crop<V: Copy>(from: &[V], dims: [usize; 3], first: [usize; 3], count: [usize; 3]) -> Vec<V> {
-    let mut out = Vec::with_capacity(count.iter().product());
-    rows(dims, first, count, |at| {
-        out.extend_from_slice(&from[at..at + count[2]])
-    });
-    out
+    SampleBox { first, count }.crop(from, dims)
 }
 
 fn paste<V: Copy>(into: &mut [V], dims: [usize; 3], first: [usize; 3], count: [usize; 3], from: &[V]) {
-    let mut row = 0;
-    rows(dims, first, count, |at| {
-        into[at..at + count[2]].copy_from_slice(&from[row..row + count[2]]);
-        row += count[2];
-    });
-}
-
-fn rows(dims: [usize; 3], first: [usize; 3], count: [usize; 3], mut f: impl FnMut(usize)) {
-    for x in first[0]..first[0] + count[0] {
-        for y in first[1]..first[1] + count[1] {
-            f((x * dims[1] + y) * dims[2] + first[2]);
-        }
-    }
+    SampleBox { first, count }.paste(into, dims, from);
 }
 
 fn greatest_common_divisor(a: usize, b: usize) -> usize {
@@ -257,8 +241,9 @@ impl<T: Real> Region<T> {
         Ok(report)
     }
 
-    /// Sets the forces of the part too. Those beside it are looked at before the next step if they may wake something.
-    pub(super) fn force_changed(&mut self, before: &[T]) {
+    /// Sets the forces of the part too. `before` are the forces of the samples whose force may have changed: those beside
+    /// the part are looked at before the next step if they may wake something.
+    pub(super) fn force_changed(&mut self, before: impl Iterator<Item = (usize, T)>) {
         let Some(part) = &mut self.part else { return };
         let m = self.patch.lattice().sample_dims();
         let external = &self.patch.external;
@@ -267,11 +252,11 @@ impl<T: Real> Region<T> {
             .write_force(|force| force.copy_from_slice(&crop(external, m, w.first_sample, w.samples)));
         let limit = self.thresholds.acceleration / self.patch.springs().law().scale();
         let mass = &self.patch.lumped.mass;
-        let wakes = external.iter().zip(before).enumerate().any(|(i, (now, then))| {
-            let change = (now.as_f64() - then.as_f64()).abs();
+        let wakes = |(i, then): (usize, T)| {
+            let change = (external[i].as_f64() - then.as_f64()).abs();
             change > limit * mass.value(i) && !w.has_sample([i / m[2] / m[1], i / m[2] % m[1], i % m[2]])
-        });
-        if wakes {
+        };
+        if { before }.any(wakes) {
             self.parts.steps_to_look = 0;
         }
     }

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Region;
 use crate::integrators::{Integrator, StepReport};
+use crate::lattice::OnBox;
 use crate::patch::PatchError;
 
 /// Below which motion a region falls asleep, in world lengths: densities times the scale of the law, so about the motion
@@ -54,8 +55,29 @@ impl<T: Real> Region<T> {
         let before = self.part.is_some().then(|| self.patch.external.clone());
         self.patch.set_force(force)?;
         if let Some(before) = before {
-            self.force_changed(&before);
+            self.force_changed(before.into_iter().enumerate());
         }
+        if self.asleep && !self.is_balanced() {
+            self.wake();
+        }
+        Ok(())
+    }
+
+    /// The same of forces on a box of samples, all others none, at the cost of the box and the one before.
+    ///
+    /// # Errors
+    /// As [`crate::patch::Patch::set_force_on`]; the old forces then stay.
+    pub fn set_force_on(&mut self, force: OnBox<T>) -> Result<(), PatchError> {
+        self.patch.check_load(&force)?;
+        let dims = self.patch.lattice().sample_dims();
+        let boxes = [self.patch.pushed, force.at];
+        let places = boxes.into_iter().flat_map(|b| b.indices(dims));
+        let before: Vec<(usize, T)> = places.map(|i| (i, self.patch.external[i])).collect();
+        self.patch.set_force_on(force)?;
+        if before.iter().all(|(i, then)| self.patch.external[*i] == *then) {
+            return Ok(());
+        }
+        self.force_changed(before.into_iter());
         if self.asleep && !self.is_balanced() {
             self.wake();
         }

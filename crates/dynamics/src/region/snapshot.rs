@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::parts::{Part, Parts, Window};
 use super::{Cells, MIN_CELLS, Region, RegionError, Thresholds, cells, perpendicular};
-use crate::patch::{Patch, PatchError};
+use crate::patch::{Patch, PatchError, finite};
 use crate::snapshot::PatchSnapshot;
 
 /// All of a region that later bits depend on, its part that is awake and the factors in work included.
@@ -17,6 +17,8 @@ pub struct RegionSnapshot<T> {
     /// Columns of the map from the field's lattice to the world.
     world_from_lattice: [f64; 12],
     field_cells: [u32; 3],
+    samples_per_cell: [f64; 3],
+    origin: Vec<T>,
     patch: PatchSnapshot<T>,
     thresholds: Thresholds,
     asleep: bool,
@@ -43,6 +45,8 @@ impl<T: Real> Region<T> {
             cells: self.cells,
             world_from_lattice: self.field_lattice.world_from_lattice.to_cols_array(),
             field_cells: self.field_lattice.cells,
+            samples_per_cell: self.samples_per_cell,
+            origin: self.origin.clone(),
             patch: self.patch.snapshot(),
             thresholds: self.thresholds,
             asleep: self.asleep,
@@ -78,6 +82,7 @@ impl<T: Real> Region<T> {
         };
         let patch = Patch::restore(&s.patch)?;
         let dims = patch.lattice().coefficient_dims();
+        finite("coefficient", &s.origin, patch.lattice().coefficient_count())?;
         if !(0..3).all(|a| inside(a) && dims[a] == s.cells.count[a] as usize - 3) {
             return Err(damaged("its cells are not those of its patch").into());
         }
@@ -101,6 +106,8 @@ impl<T: Real> Region<T> {
         Ok(Self {
             cells: s.cells,
             field_lattice,
+            samples_per_cell: s.samples_per_cell,
+            origin: s.origin.clone(),
             patch,
             thresholds: s.thresholds,
             asleep: s.asleep,

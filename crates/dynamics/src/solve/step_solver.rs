@@ -24,6 +24,9 @@ const EXACT: f64 = 64.0;
 /// by a few units.
 const DIAGONALIZED: f64 = 4096.0;
 
+/// Most iterations of a solve that is asked for more than a step needs.
+const MOST_ITERATIONS: usize = 64;
+
 /// Impulses whose squares, and those of their residuals, are far from the ends of the range of single precision.
 const ORDINARY: std::ops::Range<f64> = 1e-6..1e12;
 
@@ -335,15 +338,23 @@ impl<T: Real> StepSolver<T> {
     /// # Panics
     /// If a length is wrong.
     pub fn solve(&mut self, s: &StepMatrix<T>, g: &[T], x: &mut [T], dx: &mut [T]) -> SolveReport {
-        let tolerance = self.options.tolerance.unwrap_or(match self.method {
-            Method::VCycle | Method::SampleMultigrid => ITERATED,
-            Method::Direct if matches!(self.painted, Painted::Background(_)) => ITERATED,
-            // Double precision is for references: there coefficients that hardly move a sample count too.
-            _ if T::UNIT_ROUND_OFF < 1e-10 => 16.0 * T::UNIT_ROUND_OFF,
-            Method::FastDiagonalization => DIAGONALIZED * T::UNIT_ROUND_OFF,
-            _ => EXACT * T::UNIT_ROUND_OFF,
-        });
-        let cap = self.options.iterations;
+        self.solve_to(s, g, x, dx, None)
+    }
+
+    /// The same to a residual, if one is asked for that is less than what a step needs.
+    pub(crate) fn solve_to(
+        &mut self,
+        s: &StepMatrix<T>,
+        g: &[T],
+        x: &mut [T],
+        dx: &mut [T],
+        asked: Option<f64>,
+    ) -> SolveReport {
+        let usual = self.tolerance();
+        let (tolerance, cap) = match asked {
+            Some(asked) if asked < usual => (asked, MOST_ITERATIONS.max(self.options.iterations)),
+            _ => (usual, self.options.iterations),
+        };
         if self.inverse.is_some() {
             self.b.copy_from_slice(g);
         } else {
@@ -408,6 +419,18 @@ impl<T: Real> StepSolver<T> {
             method: solved_by,
             iteration,
         }
+    }
+
+    /// Residual at which steps stop.
+    fn tolerance(&self) -> f64 {
+        self.options.tolerance.unwrap_or(match self.method {
+            Method::VCycle | Method::SampleMultigrid => ITERATED,
+            Method::Direct if matches!(self.painted, Painted::Background(_)) => ITERATED,
+            // Double precision is for references: there coefficients that hardly move a sample count too.
+            _ if T::UNIT_ROUND_OFF < 1e-10 => 16.0 * T::UNIT_ROUND_OFF,
+            Method::FastDiagonalization => DIAGONALIZED * T::UNIT_ROUND_OFF,
+            _ => EXACT * T::UNIT_ROUND_OFF,
+        })
     }
 
     /// The power of two that the impulses are divided by; 1 where they are of ordinary size, which saves two passes and

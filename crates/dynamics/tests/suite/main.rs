@@ -11,6 +11,7 @@ mod motion;
 mod plasticity;
 mod region;
 mod replay;
+mod response;
 mod solve;
 mod springs;
 mod stability;

@@ -2,6 +2,7 @@
 
 mod baking;
 mod cutting;
+mod moving;
 mod parts;
 mod random_events;
 mod sleep;
