@@ -263,26 +263,33 @@ fn operations_are_symmetric_and_follow_de_morgan() {
 
 fn random_hierarchy() -> HierarchicalSpline<f64> {
     let mut random = Random(9);
-    let mut level = |bricks: &[[u32; 3]], size: f64| {
+    let cells = [6, 6, 9];
+    let mut level = |number: u32, bricks: &[[u32; 3]], size: f64| {
         let mut made = BTreeMap::new();
         for &key in bricks {
             let mut corrections = Corrections::empty();
             for slot in 0..BRICK_LEN {
                 let at = [slot / 64, slot / 8 % 8, slot % 8];
-                corrections.set(at, size * (2.0 * random.unit() - 1.0));
+                let c = size * (2.0 * random.unit() - 1.0);
+                if (0..3).all(|a| 8 * key[a] + (at[a] as u32) < (cells[a] << number) + 3) {
+                    corrections.set(at, c);
+                }
             }
             made.insert(BrickKey(key), Arc::new(corrections));
         }
         made
     };
-    let levels = vec![level(&[[0; 3], [0, 0, 1]], 1.0), level(&[[0; 3], [1, 0, 0]], 0.3)];
+    let levels = vec![
+        level(0, &[[0; 3], [0, 0, 1]], 1.0),
+        level(1, &[[0; 3], [1, 0, 0]], 0.3),
+    ];
     let lattice = Lattice {
         world_from_lattice: DAffine3::from_scale_rotation_translation(
             DVec3::new(0.9, 0.8, 0.7),
             glam::DQuat::from_rotation_z(0.4),
             dvec3(-1.0, -3.5, -2.7),
         ),
-        cells: [6, 6, 9],
+        cells,
     };
     HierarchicalSpline::from_corrections(lattice, 1.0, levels)
 }

@@ -36,6 +36,7 @@
 //!
 //! What it cannot do yet: use more than one thread.
 
+mod cache;
 pub mod constraints;
 pub mod integrators;
 pub mod lattice;
@@ -43,7 +44,9 @@ pub mod matter;
 pub mod patch;
 mod patch_error;
 pub mod region;
+pub mod response;
 mod rest;
+pub mod snapshot;
 pub mod solve;
 pub mod springs;
 pub mod study;

@@ -4,13 +4,14 @@
 //! is the volume of a sample, so that the same matter sampled more finely moves alike.
 
 use bspline::Real;
+use serde::{Deserialize, Serialize};
 
 use crate::lattice::Lattice;
 use crate::springs::{Neighbours, SpringWeights, Weights};
 use crate::units::InUnits;
 
 /// One quantity over the samples of a patch.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Quantity {
     /// The same everywhere.
     Constant(f64),
@@ -120,7 +121,7 @@ pub enum MatterError {
 }
 
 /// What a patch is made of.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Matter {
     /// Stiffness κ per volume (the source paper's ρ).
     pub stiffness: Quantity,

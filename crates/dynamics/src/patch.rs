@@ -1,9 +1,11 @@
 //! A dynamic patch: a lattice, its matter and springs, and how they move.
 
 use bspline::Real;
+use serde::{Deserialize, Serialize};
 
+use crate::cache::Cache;
 use crate::constraints::Held;
-use crate::lattice::{Lattice, TensorWorkspace};
+use crate::lattice::{Lattice, OnBox, SampleBox, TensorWorkspace};
 use crate::matter::{Matter, Quantity, ScaledMatter};
 pub use crate::patch_error::PatchError;
 use crate::solve::{SolverOptions, StepSolver};
@@ -32,7 +34,7 @@ impl Energy {
 
 /// The numbers that a state consists of: changes of the coefficients since the patch was made and their velocities,
 /// with the densities and velocities of the samples.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct State<T> {
     /// Change of the free coefficients.
     pub p: Vec<T>,
@@ -61,41 +63,23 @@ pub struct Patch<T> {
     pub(crate) matter: Matter,
     pub(crate) lumped: ScaledMatter<T>,
     pub(crate) network: SpringNetwork<T>,
+    /// Whether the springs were set beside the matter.
+    pub(crate) own_springs: bool,
     pub(crate) plasticity: Plasticity<T>,
     pub(crate) state: State<T>,
-    /// Densities of the field the patch was cut from, and where the ground springs rest.
+    /// Densities of the field the patch was cut from.
     pub(crate) base: Vec<T>,
+    /// Where the ground springs rest.
+    pub(crate) anchor: Vec<T>,
     pub(crate) external: Vec<T>,
+    /// Where they are, if not 0.
+    pub(crate) pushed: SampleBox,
     /// Largest of them.
     pub(crate) external_size: f64,
     pub(crate) held: Option<Box<Held<T>>>,
-    pub(crate) solver: StepSolver<T>,
-    /// For the mass alone, made by the first explicit step.
-    pub(crate) mass_solver: Option<Box<StepSolver<T>>>,
-    /// `M + ΔtD` with the version and the step it was made for.
-    pub(crate) mass_matrix: Option<(u64, f64, StepMatrix<T>)>,
-    pub(crate) matrix: StepMatrix<T>,
-    /// Version, damping, stiffness and unit that the matrix holds.
-    pub(crate) filled: Option<(u64, f64, f64, f64)>,
-    /// What the solver was made for.
-    pub(crate) prepared: Option<Prepared>,
-    /// Counts changes of matter and constraints.
-    pub(crate) changes: u64,
-    pub(crate) limit: Option<(u64, f64)>,
+    pub(crate) cache: Cache<T>,
     pub(crate) work: Scratch<T>,
     pub(crate) workspace: TensorWorkspace<T>,
-}
-
-/// Key of the matrix that the solver was made for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Prepared {
-    pub version: u64,
-    pub damping: f64,
-    pub stiffness: f64,
-    /// Of the matrix.
-    pub unit: f64,
-    /// Residual of the first solve with it.
-    pub residual: f64,
 }
 
 /// Vectors of a step.
@@ -167,17 +151,13 @@ impl<T: Real> Patch<T> {
             network,
             plasticity: Plasticity::Elastic,
             base: d.to_vec(),
+            anchor: d.to_vec(),
+            own_springs: false,
             external: zeros(m),
+            pushed: SampleBox::default(),
             external_size: 0.0,
             held: None,
-            solver: StepSolver::new(lattice, &steps, options),
-            mass_solver: None,
-            mass_matrix: None,
-            matrix,
-            filled: None,
-            prepared: None,
-            changes: 0,
-            limit: None,
+            cache: Cache::new(StepSolver::new(lattice, &steps, options), matrix),
             work: Scratch {
                 g: zeros(m),
                 force: zeros(m),
@@ -197,7 +177,22 @@ impl<T: Real> Patch<T> {
 
     /// The lattice.
     pub fn lattice(&self) -> &Lattice<T> {
-        self.solver.lattice()
+        self.cache.solver.lattice()
+    }
+
+    /// How implicit steps are solved.
+    pub fn solver_options(&self) -> SolverOptions {
+        self.cache.solver.options()
+    }
+
+    /// Finishes at once a factor that is being made beside the steps: what some hundred steps would do.
+    pub fn settle(&mut self) {
+        self.cache.solver.settle();
+    }
+
+    /// Factors and cycles that implicit steps have made so far.
+    pub fn factorizations(&self) -> usize {
+        self.cache.solver.factorizations()
     }
 
     /// Where everything is and how fast it moves.
@@ -255,7 +250,7 @@ impl<T: Real> Patch<T> {
 
     /// Densities and rates of the samples from the coefficients.
     pub(crate) fn sample_state(&mut self) {
-        let (lattice, state) = (self.solver.lattice(), &mut self.state);
+        let (lattice, state) = (self.cache.solver.lattice(), &mut self.state);
         lattice.sample(&state.p, &mut state.d, &mut self.workspace);
         for (d, b) in state.d.iter_mut().zip(&self.base) {
             *d += *b;
@@ -273,11 +268,12 @@ impl<T: Real> Patch<T> {
     /// # Errors
     /// [`PatchError::Matter`]; the old matter then stays.
     pub fn set_matter(&mut self, matter: Matter) -> Result<(), PatchError> {
-        let (lumped, springs) = matter.in_units(self.solver.lattice(), self.neighbours)?;
+        let (lumped, springs) = matter.in_units(self.cache.solver.lattice(), self.neighbours)?;
         self.lumped = lumped;
         self.matter = matter;
         self.network.set_springs(&springs);
-        self.changes += 1;
+        self.own_springs = false;
+        self.cache.changes += 1;
         Ok(())
     }
 
@@ -302,12 +298,13 @@ impl<T: Real> Patch<T> {
             values.check("spring stiffness", self.base.len(), true)?;
         }
         self.network.set_springs(springs);
+        self.own_springs = true;
         Ok(())
     }
 
     /// Counts all that the matrix of a step depends on.
     pub(crate) fn version(&self) -> u64 {
-        self.changes + self.network.changes()
+        self.cache.changes + self.network.changes()
     }
 
     /// Sets the external forces on the densities of the samples, which hold until they are set again.
@@ -320,9 +317,26 @@ impl<T: Real> Patch<T> {
         Ok(())
     }
 
+    /// The same of forces on a box of samples, all others none, at the cost of the box and the one before.
+    ///
+    /// # Errors
+    /// [`PatchError::Box`], [`PatchError::Length`], [`PatchError::NotFinite`]; the old forces then stay.
+    pub fn set_force_on(&mut self, force: OnBox<T>) -> Result<(), PatchError> {
+        self.check_load(&force)?;
+        let dims = self.lattice().sample_dims();
+        for row in self.pushed.rows(dims) {
+            self.external[row..row + self.pushed.count[2]].fill(T::zero());
+        }
+        force.at.paste(&mut self.external, dims, force.values);
+        self.pushed = force.at;
+        self.external_size = largest(force.values);
+        Ok(())
+    }
+
     /// Changes the external forces.
     pub(crate) fn write_force(&mut self, write: impl FnOnce(&mut [T])) {
         write(&mut self.external);
+        self.pushed = self.lattice().all_samples();
         self.external_size = largest(&self.external);
     }
 
@@ -362,7 +376,7 @@ impl<T: Real> Patch<T> {
             return 0.0;
         }
         let sigma2 = self.network.law().scale().powi(2);
-        let away = self.state.d.iter().zip(&self.base).enumerate();
+        let away = self.state.d.iter().zip(&self.anchor).enumerate();
         let terms = away.map(|(i, (d, b))| self.lumped.ground.at(i).as_f64() * (*d - *b).as_f64().powi(2));
         0.5 * sigma2 * self.lumped.ground.unit * terms.sum::<f64>()
     }

@@ -1,4 +1,5 @@
 use crate::constraints::ConstraintError;
+use crate::lattice::SampleBox;
 use crate::matter::MatterError;
 use crate::solve::SolveError;
 
@@ -57,6 +58,54 @@ pub enum PatchError {
         value: f64,
         /// Name of the precision.
         precision: &'static str,
+    },
+    /// A box that does not lie in the lattice.
+    #[error(
+        "the box of {:?} samples from {:?} on does not lie in the patch, which has {dims:?}; cut it at the last sample",
+        at.count, at.first
+    )]
+    Box {
+        /// The box.
+        at: SampleBox,
+        /// Samples of the patch.
+        dims: [usize; 3],
+    },
+    /// A response asked for of a scheme that solves nothing with the springs.
+    #[error("a step of {scheme} does not answer a force by its springs; ask for paper or tr-bdf2")]
+    Explicit {
+        /// Name of the scheme.
+        scheme: &'static str,
+    },
+    /// A static problem that has no solution.
+    #[error(
+        "nothing holds the densities: under a lasting force they would drift for ever; fix the rim, or give the matter some \
+         ground stiffness"
+    )]
+    Unheld,
+    /// A static problem that is not solved.
+    #[error(
+        "the static solve leaves {residual:.1e} of the force; parts without any stiffness hang on nothing: give them some, or \
+         take less contrast"
+    )]
+    Static {
+        /// Residual relative to the force.
+        residual: f64,
+    },
+    /// A place without samples.
+    #[error(
+        "no sample lies near {at:?} within the reach of {radius}; take a place in the patch, or a larger radius"
+    )]
+    Nowhere {
+        /// Lengths along the axes from the first sample.
+        at: [f64; 3],
+        /// Radius asked for.
+        radius: f64,
+    },
+    /// A snapshot that no patch can have made.
+    #[error("the snapshot cannot be restored: {what}; take another one")]
+    Snapshot {
+        /// What is wrong with it.
+        what: String,
     },
     /// Springs of other directions than those of the patch.
     #[error("springs along {found:?}; the patch needs {needed:?}, in this order")]

@@ -6,17 +6,28 @@ use crate::patch::Patch;
 use crate::springs::Weights;
 
 impl<T: Real> Patch<T> {
-    /// Makes the present densities the ones the patch was cut at: rest := current with rest scale 1, also of the ground
-    /// springs, velocity := 0, force := 0, `p` := 0. Constraints are let go: they were made for the field as it was.
+    /// Makes the present densities the ones the patch was cut at, as [`rest_at`](Self::rest_at) does.
+    pub fn rest_here(&mut self) {
+        let d = std::mem::take(&mut self.state.d);
+        self.rest_at(d);
+    }
+
+    /// What a patch is that is cut at the densities `d` with the same matter: rest := `d` with rest scale 1, also of the
+    /// ground springs, velocity := 0, force := 0, `p` := 0, and nothing left of the solves before. Constraints are let go:
+    /// they were made for the field as it was. Matter, springs and plasticity stay.
     ///
     /// No force is left, exactly, so later steps change no bit.
-    pub fn rest_here(&mut self) {
+    pub(crate) fn rest_at(&mut self, d: Vec<T>) {
         if !self.constraints().is_empty() {
-            self.set_constraints(&[]).expect("no constraint contradicts none");
+            self.held = None;
+            self.cache.changes += 1;
         }
+        self.cache.begin_again();
         self.network.rest_mut().scale = Weights::Constant(T::one());
-        self.network.rest_at(&self.state.d);
-        self.base.copy_from_slice(&self.state.d);
+        self.network.rest_at(&d);
+        self.base.copy_from_slice(&d);
+        self.anchor.copy_from_slice(&d);
+        self.state.d = d;
         self.state.p.fill(T::zero());
         self.write_force(|external| external.fill(T::zero()));
         self.stop();
@@ -59,7 +70,7 @@ impl<T: Real> Patch<T> {
         if self.lattice().is_square() {
             self.balance(unit, &mut force);
         }
-        let lattice = self.solver.lattice();
+        let lattice = self.cache.solver.lattice();
         lattice.gather(&force, &mut gathered, &mut self.workspace);
         if !lattice.is_square() {
             self.balance(unit, &mut gathered);
@@ -69,7 +80,7 @@ impl<T: Real> Patch<T> {
         for (i, m) in work.first_dx.iter_mut().enumerate() {
             *m = self.lumped.mass.at(i);
         }
-        let lattice = self.solver.lattice();
+        let lattice = self.cache.solver.lattice();
         lattice.gather(&work.first_dx, &mut work.x, &mut self.workspace);
         let pairs = work.first_x.iter().zip(&work.x);
         let factor = unit / self.lumped.mass.unit;
@@ -78,7 +89,7 @@ impl<T: Real> Patch<T> {
 
     /// Rates of the samples from those of the coefficients.
     pub(crate) fn sample_velocities(&mut self) {
-        let (lattice, state) = (self.solver.lattice(), &mut self.state);
+        let (lattice, state) = (self.cache.solver.lattice(), &mut self.state);
         lattice.sample(&state.v, &mut state.w, &mut self.workspace);
     }
 }

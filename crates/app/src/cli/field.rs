@@ -150,9 +150,7 @@ impl OpenField {
 
     /// Active functions on each level.
     pub fn per_level(&self) -> Vec<usize> {
-        (0..self.level_count())
-            .map(|l| either!(&self.loaded.field, f => f.corrections(l).values().map(|c| c.count()).sum()))
-            .collect()
+        either!(&self.loaded.field, f => f.coefficient_counts())
     }
 
     /// Bricks over all levels.

@@ -22,12 +22,18 @@ impl<T: Real> HierarchicalSpline<T> {
             "points are numbered with 32 bits"
         );
         let mut last = None;
-        let mut keyed: Vec<(u64, u32)> = Vec::with_capacity(points.len());
+        let mut keyed: Vec<(u128, u32)> = Vec::with_capacity(points.len());
         for (i, p) in points.iter().enumerate() {
             let at = self.place_after(last.as_ref(), self.place.clamp(*p).0);
-            let brick = (at.level as u64) << 32 | u64::from(at.index);
+            let start = at.brick.level as u128;
+            let brick = at
+                .brick
+                .key
+                .0
+                .iter()
+                .fold(start, |key, &k| key << 32 | u128::from(k));
             let cell = (at.cell[0] * BRICK + at.cell[1]) * BRICK + at.cell[2];
-            keyed.push((brick << (3 * BRICK.ilog2()) | cell as u64, i as u32));
+            keyed.push((brick << (3 * BRICK.ilog2()) | cell as u128, i as u32));
             last = Some(at);
         }
         keyed.sort_unstable();
@@ -46,10 +52,7 @@ pub(super) fn values_gradients<T: Real>(
     for (p, o) in points.iter().zip(out) {
         let (q, beyond) = f.place.clamp(*p);
         let at = f.place_after(last.as_ref(), q);
-        let (v, g) = kernel::value_gradient(&at.brick.totals, at.cell, at.t);
-        *o = f
-            .place
-            .extend((v.as_f64(), f.world_gradient(at.level, g)), q, beyond);
+        *o = f.place.extend(at.value_gradient(&f.place), q, beyond);
         last = Some(at);
     }
 }
@@ -74,17 +77,17 @@ pub(super) fn jet_after<'a, T: Real>(
 ) -> (Jet, Place<'a, T>) {
     let (q, beyond) = f.place.clamp(p);
     let at = f.place_after(last, q);
-    let (value, gradient, second) = kernel::jet(&at.brick.totals, at.cell, at.t);
+    let (value, gradient, second) = kernel::jet(at.brick.own_totals(), at.cell, at.t);
     let [xx, yy, zz, xy, xz, yz] = second.map(T::as_f64);
     let h = DMat3::from_cols(
         DVec3::new(xx, xy, xz),
         DVec3::new(xy, yy, yz),
         DVec3::new(xz, yz, zz),
     );
-    let m = f.lattice_from_world().matrix3 * (1u64 << at.level) as f64;
+    let m = f.lattice_from_world().matrix3 * at.brick.scale();
     let inside = Jet {
         value: value.as_f64(),
-        gradient: f.world_gradient(at.level, gradient),
+        gradient: at.world_gradient(&f.place, gradient),
         hessian: m.transpose() * h * m,
     };
     (f.place.extend_jet(inside, q, beyond), at)

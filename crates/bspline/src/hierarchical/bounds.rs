@@ -2,13 +2,33 @@
 
 use glam::DVec3;
 
-use super::brick::{BRICK, Brick, HALO, NONE};
+use super::brick::{BRICK, HALO};
+use super::node::Node;
 use super::spline::HierarchicalSpline;
+use crate::placed_box::PlacedBox;
 use crate::restrict::{RestrictedAxis, restricted_range};
 use crate::{Aabb, Interval, Real};
 
 /// Distance, in cells of the finest level, within which the end of a box counts as lying on a knot plane.
 const ON_KNOT: f64 = 1e-9;
+
+/// What bounds are taken of: nodes that together hold the box's cells, wherever a question reaches.
+pub(super) struct Roots<'a, I> {
+    pub place: &'a PlacedBox,
+    /// Finest level.
+    pub finest: usize,
+    pub nodes: I,
+}
+
+impl<T: Real> HierarchicalSpline<T> {
+    pub(super) fn roots(&self) -> Roots<'_, std::iter::Once<&Node<T>>> {
+        Roots {
+            place: &self.place,
+            finest: self.level_count() - 1,
+            nodes: std::iter::once(&*self.root),
+        }
+    }
+}
 
 /// Moves the ends of a box that lie next to a knot plane of the finest level onto it, and says by how much in
 /// cells, all ends together.
@@ -16,8 +36,8 @@ const ON_KNOT: f64 = 1e-9;
 /// Boxes laid along the knots, as a mesher asks for, miss them by a rounding and would reach slivers of up to 26 more
 /// bricks. In such a sliver of thickness `d` the one function that the cells on this side do not read has the
 /// weight `d³/6 <= 2e-28`; that of the others changes the field by less than `2d` of the largest coefficient.
-pub(super) fn onto_knots<T: Real>(spline: &HierarchicalSpline<T>, b: &Aabb) -> (Aabb, f64) {
-    let scale = (1u64 << (spline.level_count() - 1)) as f64;
+pub(super) fn onto_knots(finest: usize, b: &Aabb) -> (Aabb, f64) {
+    let scale = (1u64 << finest) as f64;
     let mut moved = 0.0;
     let mut snap = |q: f64| {
         let knot = (q * scale).round();
@@ -39,21 +59,21 @@ pub(super) fn onto_knots<T: Real>(spline: &HierarchicalSpline<T>, b: &Aabb) -> (
 ///
 /// With a `level`, only as tight as it takes to tell on which side of it the field lies; the whole line as soon as
 /// that cannot be told.
-pub(super) fn over_lattice_box<T: Real>(
-    spline: &HierarchicalSpline<T>,
+pub(super) fn over_lattice_box<'a, T: Real>(
+    roots: Roots<'a, impl Iterator<Item = &'a Node<T>>>,
     b: &Aabb,
     level: Option<f64>,
 ) -> Interval {
     if !(b.min.is_finite() && b.max.is_finite()) {
         return Interval::EVERYTHING;
     }
-    let extent = spline.lattice().extent();
+    let extent = roots.place.max;
     let inside = Aabb {
         min: b.min.clamp(DVec3::ZERO, extent),
         max: b.max.clamp(DVec3::ZERO, extent),
     };
-    let (snapped, moved) = onto_knots(spline, &inside);
-    let fall = spline.place.fall(b, &inside);
+    let (snapped, moved) = onto_knots(roots.finest, &inside);
+    let fall = roots.place.fall(b, &inside);
     let mut hull = Hull {
         lo: f64::INFINITY,
         hi: f64::NEG_INFINITY,
@@ -61,18 +81,8 @@ pub(super) fn over_lattice_box<T: Real>(
         // The fall may decide what the inside does not.
         level: level.filter(|_| fall == Interval::point(0.0)),
     };
-    let counts = spline.lattice().cells.map(|n| n.div_ceil(BRICK as u32));
-    let range = |a: usize| {
-        let brick = |q: f64| (q as u32 / BRICK as u32).min(counts[a] - 1);
-        brick(snapped.min[a])..=brick(snapped.max[a])
-    };
-    for x in range(0) {
-        for y in range(1) {
-            for z in range(2) {
-                let root = ((x * counts[1] + y) * counts[2] + z) as usize;
-                visit(spline, 0, root, &snapped, &mut hull);
-            }
-        }
+    for node in roots.nodes {
+        visit(node, &extent, &snapped, &mut hull);
     }
     if hull.is_undecided() {
         return Interval::EVERYTHING;
@@ -101,8 +111,8 @@ impl Hull {
     }
 
     /// Adds the part of a brick in the box `b`.
-    fn add_part<T: Real>(&mut self, brick: &Brick<T>, level: usize, b: &Aabb) {
-        let within = local_box(brick, level, b);
+    fn add_part<T: Real>(&mut self, brick: &Node<T>, b: &Aabb) {
+        let within = local_box(brick, b);
         if self.level.is_some() {
             // Looking at the coefficients as they are costs a tenth of restricting them.
             let read = read_range(brick, &within);
@@ -111,7 +121,7 @@ impl Hull {
             }
         }
         let axes = within.map(|[a, b]| RestrictedAxis::new(a, b));
-        let (lo, hi) = restricted_range(&brick.totals, &axes);
+        let (lo, hi) = restricted_range(brick.own_totals(), &axes);
         self.add([lo.as_f64(), hi.as_f64()]);
     }
 
@@ -126,39 +136,50 @@ impl Hull {
     }
 }
 
-/// Adds the range of brick `index` of `level`, over the part of `b` in it.
-fn visit<T: Real>(spline: &HierarchicalSpline<T>, level: usize, index: usize, b: &Aabb, hull: &mut Hull) {
-    let brick = &spline.levels[level][index];
-    let [least, most] = brick.hull.map(T::as_f64);
-    hull.magnitude = hull.magnitude.max(least.abs()).max(most.abs());
+/// Adds the range of a node over the part of `b` in it.
+fn visit<T: Real>(node: &Node<T>, extent: &DVec3, b: &Aabb, hull: &mut Hull) {
+    let [least, most] = node.hull.map(T::as_f64);
+    if node.level >= 0 {
+        hull.magnitude = hull.magnitude.max(least.abs()).max(most.abs());
+    }
     // Nothing in this brick can widen the hull: the usual case in large boxes.
     if hull.lo <= least && most <= hull.hi || hull.is_undecided() {
         return;
     }
-    let width = BRICK as f64 / (1u64 << level) as f64;
-    let corner = DVec3::from_array(brick.key.0.map(|k| k as f64 * width));
-    let end = (corner + width).min(spline.lattice().extent());
+    let (corner, end) = corners(node, extent);
     let Some(part) = shared(b, corner, end) else {
         return;
     };
     if part.min == corner && part.max == end || hull.is_told_by([least, most]) {
+        hull.magnitude = hull.magnitude.max(least.abs()).max(most.abs());
         return hull.add([least, most]);
     }
-    if !brick.has_children() {
-        return hull.add_part(brick, level, &part);
+    if !node.has_children() {
+        return hull.add_part(node, &part);
     }
     for octant in 0..8usize {
-        let child = brick.children[octant];
-        if child != NONE {
-            visit(spline, level + 1, child as usize, b, hull);
-            continue;
-        }
-        let half = |a: usize| (octant >> (2 - a) & 1) as f64 * width / 2.0;
-        let low = corner + DVec3::from_array(std::array::from_fn(half));
-        if let Some(part) = shared(b, low, (low + width / 2.0).min(end)) {
-            hull.add_part(brick, level, &part);
+        if let Some(child) = node.child(octant) {
+            visit(child, extent, b, hull);
+        } else if let Some(part) = own_part(node, octant, extent, b) {
+            hull.add_part(node, &part);
         }
     }
+}
+
+/// The box of a node's cells, in lattice coordinates.
+pub(super) fn corners<T: Real>(node: &Node<T>, extent: &DVec3) -> (DVec3, DVec3) {
+    let width = node.width();
+    let corner = DVec3::from_array(node.key.0.map(|k| k as f64 * width));
+    (corner, (corner + width).min(*extent))
+}
+
+/// The part of `b` in an octant that a brick evaluates itself.
+pub(super) fn own_part<T: Real>(node: &Node<T>, octant: usize, extent: &DVec3, b: &Aabb) -> Option<Aabb> {
+    node.totals.as_ref()?;
+    let (corner, end) = corners(node, extent);
+    let half = node.width() / 2.0;
+    let low = corner + DVec3::from_array([2, 1, 0].map(|a| (octant >> a & 1) as f64 * half));
+    shared(b, low, (low + half).min(end))
 }
 
 /// The part of `b` between `low` and `high`. None where they share just a face, which the brick on its other side
@@ -174,8 +195,8 @@ pub(super) fn shared(b: &Aabb, low: DVec3, high: DVec3) -> Option<Aabb> {
 }
 
 /// A box in the cells of a brick, `0 ..= 8` on each axis.
-pub(super) fn local_box<T>(brick: &Brick<T>, level: usize, b: &Aabb) -> [[f64; 2]; 3] {
-    let scale = (1u64 << level) as f64;
+pub(super) fn local_box<T: Real>(brick: &Node<T>, b: &Aabb) -> [[f64; 2]; 3] {
+    let scale = brick.scale();
     std::array::from_fn(|a| {
         let first = (BRICK as u32 * brick.key.0[a]) as f64;
         [b.min[a], b.max[a]].map(|q| (q * scale - first).clamp(0.0, BRICK as f64))
@@ -183,17 +204,18 @@ pub(super) fn local_box<T>(brick: &Brick<T>, level: usize, b: &Aabb) -> [[f64; 2
 }
 
 /// Smallest and largest of the coefficients that the cells of a box read.
-fn read_range<T: Real>(brick: &Brick<T>, within: &[[f64; 2]; 3]) -> [f64; 2] {
+fn read_range<T: Real>(brick: &Node<T>, within: &[[f64; 2]; 3]) -> [f64; 2] {
     let [x, y, z] = within.map(|[a, b]| {
         let first = (a as usize).min(BRICK - 1);
         first..(b.ceil() as usize).max(first + 1) + 3
     });
     // Comparisons as written here turn into vector instructions; `Float::min` does not.
+    let totals = brick.own_totals();
     let (mut lo, mut hi) = (T::infinity(), T::neg_infinity());
     for x in x {
         for y in y.clone() {
             let row = (x * HALO + y) * HALO;
-            for &c in &brick.totals[row + z.start..row + z.end] {
+            for &c in &totals[row + z.start..row + z.end] {
                 lo = if c < lo { c } else { lo };
                 hi = if c > hi { c } else { hi };
             }

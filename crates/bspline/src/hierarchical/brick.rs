@@ -1,5 +1,5 @@
 use std::collections::BTreeMap;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use crate::Real;
 
@@ -20,9 +20,21 @@ pub const HALO_LEN: usize = HALO * HALO * HALO;
 pub struct BrickKey(pub [u32; 3]);
 
 impl BrickKey {
+    /// The brick in which a function's coefficient stands.
+    pub fn of(function: [u32; 3]) -> Self {
+        Self(function.map(|s| s / BRICK as u32))
+    }
+
     /// The brick of the next coarser level that covers this one's cells.
     pub fn parent(self) -> Self {
         Self(self.0.map(|b| b >> 1))
+    }
+
+    /// The brick of the next finer level in octant `4x + 2y + z`.
+    pub fn child(self, octant: usize) -> Self {
+        Self(std::array::from_fn(|a| {
+            2 * self.0[a] + (octant >> (2 - a) & 1) as u32
+        }))
     }
 
     /// Which half of its parent the brick is, on each axis.
@@ -31,16 +43,133 @@ impl BrickKey {
     }
 }
 
-/// The active functions of one brick and their coefficients. Inactive slots are zero.
+/// The active functions of one brick and their coefficients. A coefficient of −0 is kept as +0, so that equal functions
+/// have equal bits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Corrections<T> {
     /// One bit per slot: word `x`, bit `8y + z`.
+    mask: [u64; BRICK],
+    /// Coefficients of the active slots, in the order of their numbers `64x + 8y + z`.
+    values: Vec<T>,
+}
+
+impl<T: Real> Corrections<T> {
+    /// No function active.
+    pub fn empty() -> Self {
+        Self {
+            mask: [0; BRICK],
+            values: Vec::new(),
+        }
+    }
+
+    /// The functions of `mask`, with `values` in the order of their slots.
+    ///
+    /// # Panics
+    /// If there are not as many values as functions.
+    pub fn new(mask: [u64; BRICK], mut values: Vec<T>) -> Self {
+        values.iter_mut().for_each(|v| *v += T::zero());
+        let found = Self { mask, values };
+        assert_eq!(found.values.len(), found.count(), "a value for each function");
+        found
+    }
+
+    /// Makes slot `(x, y, z)` active with coefficient `c`.
+    pub fn set(&mut self, slot: [usize; 3], c: T) {
+        let number = (slot[0] * BRICK + slot[1]) * BRICK + slot[2];
+        let (rank, c) = (self.rank(number), c + T::zero());
+        if self.is_active(number) {
+            self.values[rank] = c;
+        } else {
+            self.mask[slot[0]] |= 1 << (number % 64);
+            self.values.insert(rank, c);
+        }
+    }
+
+    /// One bit per slot: word `x`, bit `8y + z`.
+    pub fn mask(&self) -> &[u64; BRICK] {
+        &self.mask
+    }
+
+    /// Coefficients of the active slots, in the order of their numbers.
+    pub fn values(&self) -> &[T] {
+        &self.values
+    }
+
+    /// Coefficient of slot number `64x + 8y + z`, if it is active.
+    pub fn get(&self, slot: usize) -> Option<T> {
+        self.is_active(slot).then(|| self.values[self.rank(slot)])
+    }
+
+    /// Numbers of the active slots with their coefficients, in order.
+    pub fn iter(&self) -> impl Iterator<Item = (usize, T)> {
+        active_slots(&self.mask).zip(self.values.iter().copied())
+    }
+
+    /// Number of active functions.
+    pub fn count(&self) -> usize {
+        self.mask.iter().map(|w| w.count_ones() as usize).sum()
+    }
+
+    /// Whether slot number `64x + 8y + z` is active.
+    pub fn is_active(&self, slot: usize) -> bool {
+        self.mask[slot / 64] >> (slot % 64) & 1 == 1
+    }
+
+    /// Active slots before one.
+    fn rank(&self, slot: usize) -> usize {
+        let (word, bit) = (slot / 64, slot % 64);
+        let before: u32 = self.mask[..word].iter().map(|w| w.count_ones()).sum();
+        (before + (self.mask[word] & ((1 << bit) - 1)).count_ones()) as usize
+    }
+
+    /// [`reaches`] for the active functions.
+    pub(crate) fn reaches(&self, back: [usize; 3]) -> bool {
+        reaches(&self.mask, back)
+    }
+
+    /// Adds the coefficients of the slots below `count` on each axis to `target`, 11 wide, from `start` on.
+    pub(super) fn add_to(&self, count: [usize; 3], target: &mut [T; HALO_LEN], start: usize) {
+        let mut rank = 0;
+        for (x, &word) in self.mask.iter().enumerate().take(count[0]) {
+            let mut values = &self.values[rank..];
+            rank += word.count_ones() as usize;
+            let mut rows = word;
+            for y in 0..count[1] {
+                if rows == 0 {
+                    break;
+                }
+                let mut row = rows as u8;
+                rows >>= BRICK;
+                let (own, rest) = values.split_at(row.count_ones() as usize);
+                values = rest;
+                let to = start + (x * HALO + y) * HALO;
+                let to = &mut target[to..to + count[2]];
+                if row == 0xff {
+                    to.iter_mut().zip(own).for_each(|(t, v)| *t += *v);
+                    continue;
+                }
+                for value in own {
+                    let Some(t) = to.get_mut(row.trailing_zeros() as usize) else {
+                        break;
+                    };
+                    *t += *value;
+                    row &= row - 1;
+                }
+            }
+        }
+    }
+}
+
+/// [`Corrections`] while they change: a place for every slot.
+#[derive(Clone, Debug)]
+pub struct DenseCorrections<T> {
+    /// As in [`Corrections::mask`].
     pub mask: [u64; BRICK],
     /// Coefficient of slot `(x, y, z)` at `64x + 8y + z`.
     pub values: Box<[T; BRICK_LEN]>,
 }
 
-impl<T: Real> Corrections<T> {
+impl<T: Real> DenseCorrections<T> {
     /// No function active.
     pub fn empty() -> Self {
         Self {
@@ -55,49 +184,40 @@ impl<T: Real> Corrections<T> {
         self.values[(slot[0] * BRICK + slot[1]) * BRICK + slot[2]] = c;
     }
 
-    /// Number of active functions.
-    pub fn count(&self) -> usize {
-        self.mask.iter().map(|w| w.count_ones() as usize).sum()
+    /// The active functions alone.
+    pub fn pack(&self) -> Corrections<T> {
+        let values = active_slots(&self.mask).map(|slot| self.values[slot]).collect();
+        Corrections::new(self.mask, values)
     }
+}
 
-    /// Whether slot number `64x + 8y + z` is active.
-    pub fn is_active(&self, slot: usize) -> bool {
-        self.mask[slot / 64] >> (slot % 64) & 1 == 1
+impl<T: Real> From<&Corrections<T>> for DenseCorrections<T> {
+    fn from(packed: &Corrections<T>) -> Self {
+        let mut dense = Self::empty();
+        dense.mask = packed.mask;
+        packed.iter().for_each(|(slot, value)| dense.values[slot] = value);
+        dense
     }
+}
 
-    /// Whether the support of an active function reaches into the brick `back` bricks behind on each axis
-    /// (0 or 1): the functions in slots 0, 1 and 2 do.
-    pub(crate) fn reaches(&self, back: [usize; 3]) -> bool {
-        const Y_LOW: u64 = 0x00ff_ffff;
-        const Z_LOW: u64 = 0x0707_0707_0707_0707;
-        let planes = if back[0] == 1 { 3 } else { BRICK };
-        let rows = if back[1] == 1 { Y_LOW } else { !0 } & if back[2] == 1 { Z_LOW } else { !0 };
-        self.mask[..planes].iter().any(|w| w & rows != 0)
-    }
+/// Numbers of the slots of a mask, in order.
+pub fn active_slots(mask: &[u64; BRICK]) -> impl Iterator<Item = usize> {
+    mask.iter().enumerate().flat_map(|(word, &bits)| {
+        let next = |bits: &u64| Some(bits & (bits - 1)).filter(|rest| *rest != 0);
+        std::iter::successors(Some(bits).filter(|bits| *bits != 0), next)
+            .map(move |bits| 64 * word + bits.trailing_zeros() as usize)
+    })
+}
+
+/// Whether the support of one of the functions `mask` reaches into the brick `back` bricks behind on each axis
+/// (0 or 1): the functions in slots 0, 1 and 2 do.
+pub(super) fn reaches(mask: &[u64; BRICK], back: [usize; 3]) -> bool {
+    const Y_LOW: u64 = 0x00ff_ffff;
+    const Z_LOW: u64 = 0x0707_0707_0707_0707;
+    let planes = if back[0] == 1 { 3 } else { BRICK };
+    let rows = if back[1] == 1 { Y_LOW } else { !0 } & if back[2] == 1 { Z_LOW } else { !0 };
+    mask[..planes].iter().any(|w| w & rows != 0)
 }
 
 /// The stored part of a level: bricks with active functions, in key order.
 pub type LevelCorrections<T> = BTreeMap<BrickKey, Arc<Corrections<T>>>;
-
-/// What evaluation reads of one brick, and what lies below it.
-#[derive(Clone, Debug)]
-pub(crate) struct Brick<T> {
-    pub key: BrickKey,
-    /// `C_ℓ` = prolonged `C_{ℓ-1}` + corrections, functions `8b-1 ..= 8b+9` on each axis.
-    pub totals: Arc<[T; HALO_LEN]>,
-    /// Least and largest coefficient that the evaluation of any point of the brick reads, here or below.
-    pub hull: [T; 2],
-    /// Bound of the Hessian over the brick's cells, here or below, once somebody has asked.
-    pub bend: OnceLock<f64>,
-    /// Indices of the eight bricks of the next level, octant `4x + 2y + z`; [`NONE`] where there is none.
-    pub children: [u32; 8],
-}
-
-/// No child.
-pub(crate) const NONE: u32 = u32::MAX;
-
-impl<T> Brick<T> {
-    pub fn has_children(&self) -> bool {
-        self.children.iter().any(|&c| c != NONE)
-    }
-}

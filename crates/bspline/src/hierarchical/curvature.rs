@@ -4,8 +4,9 @@ use std::ops::Range;
 
 use glam::{DMat3, DVec3};
 
-use super::bounds::{local_box, onto_knots, shared};
-use super::brick::{BRICK, Brick, HALO, HALO_LEN, NONE};
+use super::bounds::{corners, local_box, onto_knots, own_part, shared};
+use super::brick::{BRICK, HALO, HALO_LEN};
+use super::node::Node;
 use super::spline::HierarchicalSpline;
 use crate::{Aabb, Real, vectorized};
 
@@ -28,21 +29,8 @@ pub(super) fn over_world_box<T: Real>(spline: &HierarchicalSpline<T>, b: &Aabb) 
         min: local.min.clamp(DVec3::ZERO, extent),
         max: local.max.clamp(DVec3::ZERO, extent),
     };
-    let (snapped, moved) = onto_knots(spline, &inside);
-    let counts = spline.lattice().cells.map(|n| n.div_ceil(BRICK as u32));
-    let range = |a: usize| {
-        let brick = |q: f64| (q as u32 / BRICK as u32).min(counts[a] - 1);
-        brick(snapped.min[a])..=brick(snapped.max[a])
-    };
-    let mut most = 0f64;
-    for x in range(0) {
-        for y in range(1) {
-            for z in range(2) {
-                let root = ((x * counts[1] + y) * counts[2] + z) as usize;
-                most = most.max(over_brick(spline, 0, root, &snapped));
-            }
-        }
-    }
+    let (snapped, moved) = onto_knots(spline.level_count() - 1, &inside);
+    let most = over_node(spline, &spline.root, &snapped);
     // Second derivatives are continuous and, cell by cell, linear along each axis: a move of `d` cells changes them by
     // at most `4d` of the largest second difference in reach; over a million times what `moved` can be.
     most * (1.0 + 1e-6 + 4.0 * moved)
@@ -60,46 +48,29 @@ fn in_world(m: DMat3, [xx, yy, zz, xy, xz, yz]: Second) -> f64 {
     world.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// Bound over the part of `b` in brick `index` of `level`.
-fn over_brick<T: Real>(spline: &HierarchicalSpline<T>, level: usize, index: usize, b: &Aabb) -> f64 {
-    let brick = &spline.levels[level][index];
-    let width = BRICK as f64 / (1u64 << level) as f64;
-    let corner = DVec3::from_array(brick.key.0.map(|k| k as f64 * width));
-    let end = (corner + width).min(spline.lattice().extent());
+/// Bound over the part of `b` in a node.
+fn over_node<T: Real>(spline: &HierarchicalSpline<T>, node: &Node<T>, b: &Aabb) -> f64 {
+    let (corner, end) = corners(node, &spline.lattice().extent());
     let Some(part) = shared(b, corner, end) else {
         return 0.0;
     };
     if part.min == corner && part.max == end {
-        return *brick
-            .bend
-            .get_or_init(|| over_parts(spline, level, brick, &part, width));
+        return *node.bend.get_or_init(|| over_parts(spline, node, &part));
     }
-    over_parts(spline, level, brick, &part, width)
+    over_parts(spline, node, &part)
 }
 
-fn over_parts<T: Real>(
-    spline: &HierarchicalSpline<T>,
-    level: usize,
-    brick: &Brick<T>,
-    part: &Aabb,
-    width: f64,
-) -> f64 {
-    let own = |part: &Aabb| in_world(spline.lattice_from_world().matrix3, of_part(brick, level, part));
-    if !brick.has_children() {
+fn over_parts<T: Real>(spline: &HierarchicalSpline<T>, node: &Node<T>, part: &Aabb) -> f64 {
+    let own = |part: &Aabb| in_world(spline.lattice_from_world().matrix3, of_part(node, part));
+    if !node.has_children() {
         return own(part);
     }
-    let corner = DVec3::from_array(brick.key.0.map(|k| k as f64 * width));
-    let end = (corner + width).min(spline.lattice().extent());
+    let extent = spline.lattice().extent();
     let mut most = 0f64;
-    for octant in 0..8usize {
-        let child = brick.children[octant];
-        if child != NONE {
-            most = most.max(over_brick(spline, level + 1, child as usize, part));
-            continue;
-        }
-        let half = |a: usize| (octant >> (2 - a) & 1) as f64 * width / 2.0;
-        let low = corner + DVec3::from_array(std::array::from_fn(half));
-        if let Some(part) = shared(part, low, (low + width / 2.0).min(end)) {
+    for octant in 0..8 {
+        if let Some(child) = node.child(octant) {
+            most = most.max(over_node(spline, child, part));
+        } else if let Some(part) = own_part(node, octant, &extent, part) {
             most = most.max(own(&part));
         }
     }
@@ -107,8 +78,8 @@ fn over_parts<T: Real>(
 }
 
 /// Second derivatives are convex combinations of the second differences of the coefficients that the box reads.
-fn of_part<T: Real>(brick: &Brick<T>, level: usize, part: &Aabb) -> Second {
-    let [x, y, z] = local_box(brick, level, part).map(|[a, b]| {
+fn of_part<T: Real>(brick: &Node<T>, part: &Aabb) -> Second {
+    let [x, y, z] = local_box(brick, part).map(|[a, b]| {
         let first = (a as usize).min(BRICK - 1);
         first..(b.ceil() as usize).max(first + 1) + 3
     });
@@ -124,7 +95,7 @@ fn of_part<T: Real>(brick: &Brick<T>, level: usize, part: &Aabb) -> Second {
     );
     // Rounding of the differences here and of the evaluation, whose weights sum to 4 in magnitude.
     let rounding = 128.0 * T::UNIT_ROUND_OFF * largest.as_f64();
-    let scale = ((1u64 << level) as f64).powi(2);
+    let scale = brick.scale().powi(2);
     found.map(|d| (d.as_f64() + rounding) * scale)
 }
 
@@ -155,7 +126,7 @@ fn raise<T: Real, const L: usize>(most: &mut [T; L], by: &[T; L]) {
 /// A lane for each coefficient along `z`. What the lanes beyond the range find nobody looks at.
 #[inline(always)]
 fn second_differences<T: Real, const L: usize>(
-    brick: &Brick<T>,
+    brick: &Node<T>,
     x: &Range<usize>,
     y: &Range<usize>,
     z: &Range<usize>,
@@ -166,7 +137,7 @@ fn second_differences<T: Real, const L: usize>(
         let mut last_rise = zero;
         for i in x.clone() {
             let at = |i: usize, j: usize, k: usize| {
-                lanes::<T, L>(&brick.totals, (i * HALO + j) * HALO + z.start + k)
+                lanes::<T, L>(brick.own_totals(), (i * HALO + j) * HALO + z.start + k)
             };
             let (own, up) = (at(i, j, 0), at(i, j, 1));
             let along = minus(&up, &own);

@@ -5,7 +5,8 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use super::brick::{BRICK, Brick, HALO, HALO_LEN, NONE};
+use super::brick::{BRICK, HALO, HALO_LEN};
+use super::node::Node;
 use super::spline::HierarchicalSpline;
 use crate::field::values_node_by_node;
 use crate::{Frame, Real, cubic};
@@ -35,7 +36,8 @@ pub(super) fn frame_values<T: Real>(
         out,
         scratch: Scratch::default(),
     };
-    block.visit_roots();
+    let whole = axes.each_ref().map(|a| 0..a.cell.len());
+    block.visit(&spline.root, whole);
     if axes.iter().any(|a| a.leaves_box) {
         block.fall_outside();
     }
@@ -96,29 +98,13 @@ struct Scratch<T> {
 }
 
 impl<T: Real> Block<'_, T> {
-    fn visit_roots(&mut self) {
-        let finest = self.spline.level_count() - 1;
-        let runs = self.axes.each_ref().map(|axis| runs_by(&axis.cell, finest + 3));
-        let counts = self.spline.lattice().cells.map(|n| n.div_ceil(BRICK as u32));
-        for (bx, x) in &runs[0] {
-            for (by, y) in &runs[1] {
-                for (bz, z) in &runs[2] {
-                    let root = (bx * counts[1] + by) * counts[2] + bz;
-                    self.visit(0, root as usize, [x.clone(), y.clone(), z.clone()]);
-                }
-            }
-        }
-    }
-
-    /// Evaluates the nodes `ranges`, all of which lie in brick `index` of `level`.
-    fn visit(&mut self, level: usize, index: usize, ranges: [Range<usize>; 3]) {
-        let spline = self.spline;
-        let brick = &spline.levels[level][index];
+    /// Evaluates the nodes `ranges`, all of which lie in `brick`.
+    fn visit(&mut self, brick: &Node<T>, ranges: [Range<usize>; 3]) {
         if !brick.has_children() {
-            return self.evaluate(level, brick, ranges);
+            return self.evaluate(brick, ranges);
         }
-        let finest = spline.level_count() - 1;
-        let shift = finest - level - 1 + 3;
+        let finest = self.spline.level_count() as i32 - 1;
+        let shift = finest - i32::from(brick.level) - 1 + BRICK.ilog2() as i32;
         let middle: [usize; 3] = std::array::from_fn(|a| {
             let cells = &self.axes[a].cell[ranges[a].clone()];
             ranges[a].start + cells.partition_point(|c| c >> shift & 1 == 0)
@@ -131,17 +117,17 @@ impl<T: Real> Block<'_, T> {
             if half.iter().any(Range::is_empty) {
                 continue;
             }
-            match brick.children[octant] {
-                NONE => self.evaluate(level, brick, half),
-                child => self.visit(level + 1, child as usize, half),
+            match brick.child(octant) {
+                None => self.evaluate(brick, half),
+                Some(child) => self.visit(child, half),
             }
         }
     }
 
     /// `Σ_c w_c Σ_b w_b Σ_a w_a C_abc` in the order of `kernel::value`, so with its bits.
-    fn evaluate(&mut self, level: usize, brick: &Brick<T>, ranges: [Range<usize>; 3]) {
-        let shift = self.spline.level_count() - 1 - level;
-        let scale = (1u64 << level) as f64;
+    fn evaluate(&mut self, brick: &Node<T>, ranges: [Range<usize>; 3]) {
+        let shift = self.spline.level_count() - 1 - brick.level as usize;
+        let scale = brick.scale();
         for a in 0..3 {
             let axis = &self.axes[a];
             let nodes = &mut self.scratch.nodes[a];
@@ -157,7 +143,7 @@ impl<T: Real> Block<'_, T> {
             ranges.map(|r| r.start),
         );
         let (out, scratch) = (&mut *self.out, &mut self.scratch);
-        let totals: &[T; HALO_LEN] = &brick.totals;
+        let totals: &[T; HALO_LEN] = brick.own_totals();
         vectorized(
             #[inline(always)]
             || tensor(totals, scratch, counts, offsets, out),
@@ -225,16 +211,4 @@ fn blend<T: Real>(w: &[T; 4], rows: [&[T]; 4], target: &mut [T]) {
     for z in 0..n {
         target[z] = ((w[0] * a[z] + w[1] * b[z]) + w[2] * c[z]) + w[3] * d[z];
     }
-}
-
-/// Runs of equal `cell >> shift`, with their index ranges.
-fn runs_by(cells: &[u32], shift: usize) -> Vec<(u32, Range<usize>)> {
-    let mut runs: Vec<(u32, Range<usize>)> = Vec::new();
-    for (i, c) in cells.iter().enumerate() {
-        match runs.last_mut() {
-            Some((b, range)) if *b == c >> shift => range.end = i + 1,
-            _ => runs.push((c >> shift, i..i + 1)),
-        }
-    }
-    runs
 }

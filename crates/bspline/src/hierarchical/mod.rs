@@ -6,26 +6,45 @@
 //! the file format all rest on 3. Other degrees, 1 to 5 and another on each axis, are
 //! [`TensorSpline`](crate::TensorSpline)'s.
 //!
-//! A field never changes: [`HierarchicalSpline::edited`] makes a new one that shares the bricks it leaves alone.
+//! A field never changes: [`HierarchicalSpline::edited`] makes a new one that shares the bricks it leaves alone. The
+//! bricks are nodes of one tree (`node`); an edit copies the paths to what it changes (`graft`), then makes the totals
+//! and summaries on them anew (`renew`).
 
+mod along;
 mod batch;
 mod bounds;
 mod brick;
 mod build;
 mod curvature;
+mod difference;
+mod digest;
 mod edit;
 mod evaluate;
+mod graft;
 mod grid;
 mod kernel;
 mod lattice;
+mod local;
+mod motion;
+mod node;
 mod prolong;
+mod renew;
 mod slopes;
 mod spline;
 mod surface;
+mod totals;
 mod versions;
+mod view;
+mod window;
 
-pub use brick::{BRICK, BRICK_LEN, BrickKey, Corrections, HALO, HALO_LEN, LevelCorrections};
-pub use edit::{EditError, LevelEdit, MAX_LEVELS};
+pub use brick::{
+    BRICK, BRICK_LEN, BrickKey, Corrections, DenseCorrections, HALO, HALO_LEN, LevelCorrections, active_slots,
+};
+pub use difference::{BrickChange, BrickDiff, DiffError};
+pub use edit::{BlockEdit, Change, EditError, LevelEdit, MAX_LEVELS};
 pub use lattice::Lattice;
+pub use local::{LocalField, LocalFields};
+pub use motion::Motion;
 pub use prolong::refine_block;
 pub use spline::HierarchicalSpline;
+pub use view::Brick;

@@ -3,9 +3,10 @@ use std::sync::Arc;
 use glam::{DAffine3, DVec3};
 use sha2::{Digest, Sha256};
 
-use super::brick::{BRICK, Brick, HALO_LEN, NONE};
-use super::build::build_levels;
-use super::{BrickKey, Lattice, LevelCorrections};
+use super::brick::{BRICK, HALO_LEN};
+use super::edit::{EditError, check_function};
+use super::node::{Node, octant};
+use super::{BrickKey, Corrections, Lattice, LevelCorrections, build, kernel};
 use crate::Real;
 use crate::placed_box::PlacedBox;
 
@@ -15,20 +16,19 @@ use crate::placed_box::PlacedBox;
 /// is evaluated from the 64 coefficients of one level however deep the hierarchy is.
 /// Outside the box, `f(clamp x) - g·|x - clamp x|` (clamped in lattice coordinates, world distance, `g` the
 /// [slope](Self::slope)).
+///
+/// The bricks form a tree whose nodes are shared between versions, so that a copy costs nothing and an edit the paths
+/// to what it changes.
 #[derive(Clone, Debug)]
 pub struct HierarchicalSpline<T> {
     pub(super) lattice: Lattice,
     pub(super) place: PlacedBox,
-    pub(super) corrections: Vec<Arc<LevelCorrections<T>>>,
-    pub(super) levels: Vec<Vec<Brick<T>>>,
+    pub(super) root: Arc<Node<T>>,
 }
 
 /// A point of the box, found: which brick evaluates it, which cell of that brick, where in the cell.
 pub(super) struct Place<'a, T> {
-    pub brick: &'a Brick<T>,
-    pub level: usize,
-    /// Place of the brick among those of its level.
-    pub index: u32,
+    pub brick: &'a Node<T>,
     pub cell: [usize; 3],
     pub t: [T; 3],
 }
@@ -39,9 +39,28 @@ impl<T: Real> HierarchicalSpline<T> {
     /// `slope > 0` is the fall of the field per world length outside the box.
     ///
     /// # Panics
-    /// If `levels` is empty, the box has no cells, or the lattice's map cannot be inverted.
+    /// Where [`Self::try_from_corrections`] has an error; if the box has no cells, or the lattice's map cannot be
+    /// inverted.
     pub fn from_corrections(lattice: Lattice, slope: f64, levels: Vec<LevelCorrections<T>>) -> Self {
-        assert!(!levels.is_empty(), "a hierarchy has at least one level");
+        match Self::try_from_corrections(lattice, slope, levels) {
+            Ok(field) => field,
+            Err(error) => panic!("{error}"),
+        }
+    }
+
+    /// [`Self::from_corrections`] of numbers that nobody has checked.
+    ///
+    /// # Errors
+    /// [`EditError::Level`], [`EditError::Function`], [`EditError::NotFinite`] for an active function that the lattice
+    /// does not have, or whose coefficient is no number.
+    ///
+    /// # Panics
+    /// If the box has no cells, or the lattice's map cannot be inverted.
+    pub fn try_from_corrections(
+        lattice: Lattice,
+        slope: f64,
+        levels: Vec<LevelCorrections<T>>,
+    ) -> Result<Self, EditError> {
         assert!(
             lattice.cells.iter().all(|&n| n > 0),
             "a box has at least one cell on each axis"
@@ -51,9 +70,12 @@ impl<T: Real> HierarchicalSpline<T> {
             lattice_from_world.is_finite(),
             "the map from lattice to world can be inverted"
         );
-        let levels: Vec<_> = levels.into_iter().map(Arc::new).collect();
-        let bricks = build_levels(&lattice, &levels);
-        Self {
+        for (level, bricks) in levels.iter().enumerate() {
+            for (key, functions) in bricks {
+                check_functions(&lattice, level, *key, functions)?;
+            }
+        }
+        Ok(Self {
             lattice,
             place: PlacedBox {
                 min: DVec3::ZERO,
@@ -62,17 +84,20 @@ impl<T: Real> HierarchicalSpline<T> {
                 local_from_world: lattice_from_world,
                 slope,
             },
-            corrections: levels,
-            levels: bricks,
-        }
+            root: build::tree(&lattice, levels),
+        })
     }
 
-    /// Bricks of `level` that hold active functions, in key order.
-    ///
-    /// # Panics
-    /// If there is no such level.
-    pub fn corrections(&self, level: usize) -> &LevelCorrections<T> {
-        &self.corrections[level]
+    /// Bricks of `level` that hold active functions, in key order. Takes time in proportion to their number.
+    pub fn corrections(&self, level: usize) -> LevelCorrections<T> {
+        let mut found = Vec::new();
+        self.root.walk(&mut |node| {
+            if node.level as usize == level {
+                found.extend(node.corrections.clone().map(|c| (node.key, c)));
+            }
+            i64::from(node.level) < level as i64 && usize::from(node.level_count) > level
+        });
+        found.into_iter().collect()
     }
 
     /// Grids the field stands on.
@@ -90,23 +115,31 @@ impl<T: Real> HierarchicalSpline<T> {
         self.place.slope
     }
 
-    /// Number of levels, at least 1.
+    /// Number of levels down to the finest with an active function, at least 1.
     pub fn level_count(&self) -> usize {
-        self.levels.len()
+        usize::from(self.root.level_count).max(1)
     }
 
     /// Active functions over all levels.
     pub fn coefficient_count(&self) -> usize {
-        self.corrections
-            .iter()
-            .flat_map(|l| l.values())
-            .map(|c| c.count())
-            .sum()
+        self.root.count as usize
+    }
+
+    /// Active functions of each level. Takes time in proportion to all bricks.
+    pub fn coefficient_counts(&self) -> Vec<usize> {
+        let mut counts = vec![0; self.level_count()];
+        self.root.walk(&mut |node| {
+            if let Some(c) = &node.corrections {
+                counts[node.level as usize] += c.count();
+            }
+            node.count > 0
+        });
+        counts
     }
 
     /// Bricks of totals over all levels.
     pub fn brick_count(&self) -> usize {
-        self.levels.iter().map(Vec::len).sum()
+        self.root.brick_count as usize
     }
 
     /// Bytes of the totals that evaluation reads.
@@ -114,11 +147,13 @@ impl<T: Real> HierarchicalSpline<T> {
         self.brick_count() * HALO_LEN * size_of::<T>()
     }
 
-    /// SHA-256 of what the field is: precision, box, map, slope, and the corrections of every level. Neither
-    /// time, compression nor provenance enter (`docs/format.md`).
+    /// SHA-256 of what the field is: precision, box, map, slope, and the active functions with their coefficients, as a
+    /// tree of digests. Neither time, compression nor provenance enter (`docs/format.md`).
+    ///
+    /// The first time takes as long as hashing all coefficients; of a version made by an edit, as the edit.
     pub fn sha256(&self) -> [u8; 32] {
         let mut hash = Sha256::new();
-        hash.update(b"isoclay-field-1");
+        hash.update(b"isoclay-field-2");
         hash.update(T::NAME);
         for n in self.lattice.cells {
             hash.update(n.to_le_bytes());
@@ -127,21 +162,7 @@ impl<T: Real> HierarchicalSpline<T> {
             hash.update(x.to_le_bytes());
         }
         hash.update(self.place.slope.to_le_bytes());
-        hash.update((self.corrections.len() as u32).to_le_bytes());
-        let mut bytes = Vec::new();
-        for level in &self.corrections {
-            hash.update((level.len() as u32).to_le_bytes());
-            for (key, c) in level.as_ref() {
-                bytes.clear();
-                key.0.iter().for_each(|k| bytes.extend(k.to_le_bytes()));
-                c.mask.iter().for_each(|m| bytes.extend(m.to_le_bytes()));
-                for slot in (0..c.values.len()).filter(|&s| c.is_active(s)) {
-                    // Adding +0 turns -0 into +0: both are the same field.
-                    (c.values[slot] + T::zero()).extend_le_bytes(&mut bytes);
-                }
-                hash.update(&bytes);
-            }
-        }
+        hash.update(self.root.digest());
         hash.finalize().into()
     }
 
@@ -149,16 +170,21 @@ impl<T: Real> HierarchicalSpline<T> {
     ///
     /// 4 + 4 + 4 products and sums, and the rounding of the weights, against the largest coefficient.
     pub fn rounding_bound(&self) -> f64 {
-        let largest = self.levels[0]
-            .iter()
-            .map(|b| b.hull[0].as_f64().abs().max(b.hull[1].as_f64().abs()))
-            .fold(0.0, f64::max);
-        64.0 * T::UNIT_ROUND_OFF * largest
+        let [lo, hi] = self.root.hull.map(|c| c.as_f64().abs());
+        64.0 * T::UNIT_ROUND_OFF * lo.max(hi)
     }
 
-    /// Index of brick `key` of `level`, if there is one.
-    pub(super) fn find(&self, level: usize, key: BrickKey) -> Option<u32> {
-        find(&self.lattice, &self.levels, level, key)
+    /// Node of brick `key` of `level`, if there is one.
+    pub(super) fn find(&self, level: usize, key: BrickKey) -> Option<&Node<T>> {
+        let level = i8::try_from(level).ok()?;
+        let depth = level as u32 + u32::from(self.root.level.unsigned_abs());
+        let is_spanned = key.0.into_iter().all(|k| u64::from(k) >> depth == 0);
+        is_spanned.then(|| self.root.find(level, key))?
+    }
+
+    /// Least world length of a knot interval of the finest level.
+    pub fn finest_spacing(&self) -> f64 {
+        self.lattice.spacing(self.level_count() - 1).min_element()
     }
 
     /// Where lattice point `q`, inside the box, is evaluated: in the finest brick that covers it.
@@ -170,88 +196,109 @@ impl<T: Real> HierarchicalSpline<T> {
     /// [`Self::place`], without the way down from the coarsest level if `q` lies in the same brick as `last`.
     #[inline]
     pub(super) fn place_after<'a>(&'a self, last: Option<&Place<'a, T>>, q: DVec3) -> Place<'a, T> {
-        let finest = self.levels.len() - 1;
-        let limit = self.lattice.cells_at(finest);
-        let scaled = q * (1u64 << finest) as f64;
-        let cell: [u32; 3] = std::array::from_fn(|a| (scaled[a] as u32).min(limit[a] - 1));
-        let (level, index) = match last {
-            Some(last) if self.is_finest_over(last, cell) => (last.level, last.index),
-            _ => self.brick_of(cell),
+        let finest = self.level_count() - 1;
+        let cell = finest_cell(&self.lattice, finest, q);
+        let brick = match last {
+            Some(last) if is_finest_over(last.brick, finest, cell) => last.brick,
+            _ => finest_over(&self.root, finest, cell),
         };
-        let shift = finest - level;
-        let scale = (1u64 << level) as f64;
-        Place {
-            brick: &self.levels[level][index as usize],
-            level,
-            index,
+        Place::new(brick, finest, cell, q)
+    }
+}
+
+impl<'a, T: Real> Place<'a, T> {
+    /// Point `q` in `cell` of level `finest`, which `brick` evaluates.
+    #[inline]
+    pub fn new(brick: &'a Node<T>, finest: usize, cell: [u32; 3], q: DVec3) -> Self {
+        let shift = finest - brick.level as usize;
+        let scale = brick.scale();
+        Self {
+            brick,
             cell: cell.map(|c| (c >> shift) as usize % BRICK),
             t: std::array::from_fn(|a| T::from_f64(q[a] * scale - (cell[a] >> shift) as f64)),
         }
     }
 
-    /// Whether the brick of `place` is the one that evaluates a cell of the finest level.
+    /// Value and gradient by world coordinates, before the fall outside.
     #[inline]
-    fn is_finest_over(&self, place: &Place<'_, T>, cell: [u32; 3]) -> bool {
-        let shift = self.levels.len() - 1 - place.level;
-        let key = cell.map(|c| c >> shift >> BRICK.ilog2());
-        if key != place.brick.key.0 {
-            return false;
-        }
-        shift == 0 || place.brick.children[octant(cell, shift - 1)] == NONE
+    pub fn value_gradient(&self, place: &PlacedBox) -> (f64, DVec3) {
+        let (value, g) = kernel::value_gradient(self.brick.own_totals(), self.cell, self.t);
+        (value.as_f64(), self.world_gradient(place, g))
     }
 
-    /// The finest brick over a cell of the finest level: its level and its index there.
+    /// Gradient by cell coordinates to gradient by world coordinates.
     #[inline]
-    fn brick_of(&self, cell: [u32; 3]) -> (usize, u32) {
-        let finest = self.levels.len() - 1;
-        let counts = self.lattice.cells.map(|n| n.div_ceil(BRICK as u32));
-        let b: [u32; 3] = cell.map(|c| c >> (finest + 3));
-        let mut index = (b[0] * counts[1] + b[1]) * counts[2] + b[2];
-        for level in 1..=finest {
-            let child = self.levels[level - 1][index as usize].children[octant(cell, finest - level)];
-            if child == NONE {
-                return (level - 1, index);
-            }
-            index = child;
-        }
-        (finest, index)
-    }
-
-    /// Gradient by cell coordinates of `level` to gradient by world coordinates.
-    #[inline]
-    pub(super) fn world_gradient(&self, level: usize, g: [T; 3]) -> DVec3 {
-        let scale = (1u64 << level) as f64;
-        let g = DVec3::new(g[0].as_f64(), g[1].as_f64(), g[2].as_f64()) * scale;
-        self.place.local_from_world.matrix3.transpose() * g
+    pub fn world_gradient(&self, place: &PlacedBox, g: [T; 3]) -> DVec3 {
+        let g = DVec3::new(g[0].as_f64(), g[1].as_f64(), g[2].as_f64()) * self.brick.scale();
+        place.local_from_world.matrix3.transpose() * g
     }
 }
 
-/// Index of brick `key` of `level` by the way down from level 0; only the levels above have to be linked.
-pub(super) fn find<T>(
+/// The cell of level `finest` that holds a point of the box.
+#[inline]
+pub(super) fn finest_cell(lattice: &Lattice, finest: usize, q: DVec3) -> [u32; 3] {
+    let limit = lattice.cells_at(finest);
+    let scaled = q * (1u64 << finest) as f64;
+    std::array::from_fn(|a| (scaled[a] as u32).min(limit[a] - 1))
+}
+
+/// Whether a brick is the one that evaluates a cell of level `finest`.
+#[inline]
+pub(super) fn is_finest_over<T: Real>(brick: &Node<T>, finest: usize, cell: [u32; 3]) -> bool {
+    let shift = finest - brick.level as usize;
+    let key = cell.map(|c| c >> shift >> BRICK.ilog2());
+    if key != brick.key.0 {
+        return false;
+    }
+    shift == 0 || brick.children[octant_of(cell, shift - 1)].is_none()
+}
+
+/// The finest brick over a cell of level `finest`. Where the box has cells every node has totals.
+#[inline]
+pub(super) fn finest_over<T: Real>(root: &Node<T>, finest: usize, cell: [u32; 3]) -> &Node<T> {
+    let mut node = root;
+    let mut shift = (finest as i32 - i32::from(root.level)) as usize;
+    while shift > 0 {
+        shift -= 1;
+        match node.children[octant_of(cell, shift)].as_deref() {
+            Some(child) => node = child,
+            None => break,
+        }
+    }
+    node
+}
+
+/// Which child of a node holds a cell of the finest level, `shift` levels above it.
+#[inline]
+fn octant_of(cell: [u32; 3], shift: usize) -> usize {
+    octant(cell, shift + BRICK.ilog2() as usize)
+}
+
+/// Whether a lattice has the functions of a brick, and their coefficients are numbers.
+pub(super) fn check_functions<T: Real>(
     lattice: &Lattice,
-    levels: &[Vec<Brick<T>>],
     level: usize,
     key: BrickKey,
-) -> Option<u32> {
-    let counts = lattice.cells.map(|n| n.div_ceil(BRICK as u32));
-    let root = key.0.map(|k| k.checked_shr(level as u32).unwrap_or(0));
-    if (0..3).any(|a| root[a] >= counts[a]) {
-        return None;
-    }
-    let mut index = (root[0] * counts[1] + root[1]) * counts[2] + root[2];
-    for above in 0..level {
-        let half = key.0.map(|k| (k >> (level - 1 - above) & 1) as usize);
-        index = levels.get(above)?[index as usize].children[4 * half[0] + 2 * half[1] + half[2]];
-        if index == NONE {
-            return None;
+    functions: &Corrections<T>,
+) -> Result<(), EditError> {
+    let function = |slot: usize| -> [u32; 3] {
+        let at = [slot / BRICK / BRICK, slot / BRICK % BRICK, slot % BRICK];
+        std::array::from_fn(|a| key.0[a].saturating_mul(BRICK as u32).saturating_add(at[a] as u32))
+    };
+    let mut last = [0; 3];
+    for (slot, value) in functions.iter() {
+        let at = function(slot);
+        last = std::array::from_fn(|a| at[a].max(last[a]));
+        if !value.is_finite() {
+            return Err(EditError::NotFinite {
+                level,
+                function: at,
+                value: value.as_f64(),
+            });
         }
     }
-    Some(index)
-}
-
-/// Which child holds a cell of the finest level, `shift` levels above it.
-#[inline]
-fn octant(cell: [u32; 3], shift: usize) -> usize {
-    let o = cell.map(|c| (c >> shift >> BRICK.ilog2() & 1) as usize);
-    4 * o[0] + 2 * o[1] + o[2]
+    match functions.count() {
+        0 => Ok(()),
+        _ => check_function(lattice, level, last),
+    }
 }

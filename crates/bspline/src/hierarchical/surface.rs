@@ -2,7 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::brick::{BRICK, Brick, HALO, HALO_LEN, NONE};
+use super::brick::{BRICK, HALO, HALO_LEN};
+use super::node::Node;
 use super::spline::HierarchicalSpline;
 use crate::Real;
 
@@ -15,7 +16,14 @@ impl<T: Real> HierarchicalSpline<T> {
     /// A cell counts as crossed if `f > iso` at some of its corners, but not at all. Costs one value at each knot of the
     /// bricks that their hulls cannot exclude.
     pub fn crossed_cells(&self, iso: f64) -> Vec<u64> {
-        self.levels
+        let mut levels: Vec<Vec<&Node<T>>> = vec![Vec::new(); self.level_count()];
+        self.root.walk(&mut |node| {
+            if node.totals.is_some() {
+                levels[node.level as usize].push(node);
+            }
+            node.holds_cells()
+        });
+        levels
             .iter()
             .enumerate()
             .map(|(level, bricks)| {
@@ -54,13 +62,13 @@ impl<T: Real> HierarchicalSpline<T> {
 }
 
 /// Crossed cells of a brick that it evaluates itself.
-fn crossed_in<T: Real>(brick: &Brick<T>, limit: [u32; 3], iso: f64) -> u64 {
+fn crossed_in<T: Real>(brick: &Node<T>, limit: [u32; 3], iso: f64) -> u64 {
     let iso = T::from_f64(iso);
-    let is_covered = brick.children.iter().all(|c| *c != NONE);
+    let is_covered = (0..8).all(|octant| brick.child(octant).is_some());
     if is_covered || brick.hull[1] <= iso || brick.hull[0] > iso {
         return 0;
     }
-    let inside = knots_inside(&brick.totals, iso);
+    let inside = knots_inside(brick.own_totals(), iso);
     let cells: [usize; 3] =
         std::array::from_fn(|a| (limit[a] - BRICK as u32 * brick.key.0[a]).min(BRICK as u32) as usize);
     let mut crossed = 0;
@@ -72,7 +80,7 @@ fn crossed_in<T: Real>(brick: &Brick<T>, limit: [u32; 3], iso: f64) -> u64 {
             let open = (any | any >> 1) & !(all & all >> 1);
             for z in 0..cells[2] {
                 let octant = 4 * (x / 4) + 2 * (y / 4) + z / 4;
-                crossed += u64::from(open >> z & 1 == 1 && brick.children[octant] == NONE);
+                crossed += u64::from(open >> z & 1 == 1 && brick.child(octant).is_none());
             }
         }
     }

@@ -138,13 +138,17 @@ impl Field for Trilinear {
 /// Full coarse level and a finer one in part of the box, random.
 pub fn random_spline(seed: u64, world_from_lattice: DAffine3) -> HierarchicalSpline<f32> {
     let mut random = Random(seed);
-    let mut level = |bricks: &[[u32; 3]], size: f64| {
+    let cells = [10, 9, 12];
+    let mut level = |number: u32, bricks: &[[u32; 3]], size: f64| {
         let mut made = BTreeMap::new();
         for &key in bricks {
             let mut corrections = Corrections::empty();
             for slot in 0..BRICK_LEN {
                 let at = [slot / 64, slot / 8 % 8, slot % 8];
-                corrections.set(at, (size * (2.0 * random.unit() - 1.0)) as f32);
+                let c = (size * (2.0 * random.unit() - 1.0)) as f32;
+                if (0..3).all(|a| 8 * key[a] + (at[a] as u32) < (cells[a] << number) + 3) {
+                    corrections.set(at, c);
+                }
             }
             made.insert(BrickKey(key), Arc::new(corrections));
         }
@@ -152,12 +156,12 @@ pub fn random_spline(seed: u64, world_from_lattice: DAffine3) -> HierarchicalSpl
     };
     let coarse: Vec<[u32; 3]> = (0..8).map(|n| [n >> 2, n >> 1 & 1, n & 1]).collect();
     let levels = vec![
-        level(&coarse, 1.0),
-        level(&[[0, 0, 0], [1, 1, 0], [1, 2, 1]], 0.5),
+        level(0, &coarse, 1.0),
+        level(1, &[[0, 0, 0], [1, 1, 0], [1, 2, 1]], 0.5),
     ];
     let lattice = Lattice {
         world_from_lattice,
-        cells: [10, 9, 12],
+        cells,
     };
     HierarchicalSpline::from_corrections(lattice, 1.0, levels)
 }

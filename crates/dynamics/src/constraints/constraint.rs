@@ -1,9 +1,10 @@
 use bspline::{Basis, Real};
+use serde::{Deserialize, Serialize};
 
 use crate::lattice::Lattice;
 
 /// What a constraint speaks of.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum On {
     /// The density at a point.
     Point {
@@ -17,7 +18,7 @@ pub enum On {
 }
 
 /// How a constraint acts.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Hold {
     /// A spring of stiffness `k`: it pulls with `σ²k` times what is missing, as the springs of the patch do.
     Spring(f64),
@@ -26,7 +27,7 @@ pub enum Hold {
 }
 
 /// A linear constraint on the densities.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Constraint {
     /// Name in errors.
     pub label: String,

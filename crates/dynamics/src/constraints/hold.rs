@@ -24,7 +24,7 @@ pub(crate) struct Held<T> {
 }
 
 impl<T: Real> Held<T> {
-    fn new(
+    pub fn new(
         constraints: &[Constraint],
         lattice: &Lattice<T>,
         base: &[T],
@@ -76,7 +76,7 @@ impl<T: Real> Held<T> {
     }
 
     /// For a solver of steps in which the springs are implicit, or not.
-    pub fn border(&self, implicit: bool) -> Border<T> {
+    pub fn border<U: Real>(&self, implicit: bool) -> Border<U> {
         let springs = self.springs.iter().map(|s| s.0.clone()).collect();
         Border::new(self.moved[0].len(), springs, implicit, self.hard.rows.clone())
     }
@@ -101,7 +101,7 @@ impl<T: Real> Patch<T> {
         let sigma2 = self.network.law().scale().powi(2);
         let (coefficients, limit) = (
             self.lattice().coefficient_count(),
-            self.solver.options().sample_direct_limit(),
+            self.cache.solver.options().sample_direct_limit(),
         );
         // Multigrid solves to 3e-4, and A⁻¹ of a bordered solve as rough as that was seen to grow from step to step.
         if !constraints.is_empty() && self.lattice().is_square() && coefficients > limit {
@@ -111,16 +111,20 @@ impl<T: Real> Patch<T> {
             [] => None,
             list => Some(Box::new(Held::new(
                 list,
-                self.solver.lattice(),
+                self.cache.solver.lattice(),
                 &self.base,
                 sigma2,
             )?)),
         };
-        self.solver.set_border(held.as_ref().map(|h| h.border(true)));
+        self.cache
+            .solver
+            .set_border(held.as_ref().map(|h| h.border(true)));
         self.held = held;
-        self.mass_solver = None;
-        self.mass_matrix = None;
-        self.changes += 1;
+        if let Some(solver) = &mut self.cache.mass_solver {
+            solver.set_border(None);
+        }
+        self.cache.mass_matrix = None;
+        self.cache.changes += 1;
         self.meet_constraints();
         Ok(())
     }
@@ -251,7 +255,7 @@ impl<T: Real> Patch<T> {
 
     /// Hands the constraints to the solver of implicit steps; `stiffness` is that of the springs in its matrix.
     pub(crate) fn aim_implicit(&mut self, stiffness: f64) {
-        if let (Some(held), Some(border)) = (&self.held, self.solver.border_mut()) {
+        if let (Some(held), Some(border)) = (&self.held, self.cache.solver.border_mut()) {
             border.set_weights(held.springs.iter().map(|(_, k)| stiffness * k));
             held.aim(border);
         }

@@ -117,7 +117,7 @@ impl<T: Real> Patch<T> {
                     next_dt: next.clamp(options.shortest, options.longest),
                 });
             }
-            self.restore();
+            self.take_back();
             rejected += 1;
             let factor = if !balanced || !error.is_finite() {
                 0.5
@@ -150,7 +150,7 @@ impl<T: Real> Patch<T> {
         if ground.unit > 0.0 {
             let (mut held, mut size) = (0.0, 0.0);
             for (i, (d, moved)) in before.d.iter().zip(moved).enumerate() {
-                let (g, d, base) = (ground.at(i).as_f64(), d.as_f64(), self.base[i].as_f64());
+                let (g, d, base) = (ground.at(i).as_f64(), d.as_f64(), self.anchor[i].as_f64());
                 held += g * moved * (0.5 * moved + (d - base));
                 size += g * moved.abs() * (d.abs() + base.abs());
             }

@@ -147,7 +147,7 @@ impl<T: Real> Patch<T> {
     pub(crate) fn operations_on(&self, coefficients: [usize; 3], samples: [usize; 3]) -> Operations {
         let work = Work::on(coefficients, samples, self.network.springs().len());
         let count: usize = coefficients.iter().product();
-        let options = self.solver.options();
+        let options = self.cache.solver.options();
         let method = self.method(self.is_even(), count, coefficients == samples);
         let factor = count <= options.background_limit;
         // A factor beside the steps takes the place of the cycle.
@@ -169,7 +169,9 @@ impl<T: Real> Patch<T> {
 
     /// Whether there is a solver for the matter as it is.
     pub(crate) fn has_solver(&self) -> bool {
-        self.mass_solver.is_some() || self.prepared.is_some_and(|p| p.version == self.version())
+        let now = self.version();
+        let of_mass = self.cache.mass_matrix.as_ref().is_some_and(|m| m.0 == now);
+        of_mass || self.cache.prepared.is_some_and(|p| p.version == now)
     }
 
     /// Whether the matrix of a step is the same everywhere.
@@ -189,7 +191,7 @@ impl<T: Real> Patch<T> {
 
     /// The method that a matrix takes on so many coefficients.
     fn method(&self, uniform: bool, coefficients: usize, square: bool) -> Method {
-        let few = coefficients <= self.solver.options().direct_limit;
+        let few = coefficients <= self.cache.solver.options().direct_limit;
         match (uniform, square, few) {
             (true, ..) => Method::FastDiagonalization,
             (_, true, true) => Method::SampleDirect,

@@ -79,7 +79,7 @@ impl<T: Real> Patch<T> {
     }
 
     /// The matrix `M + aD`, in its unit.
-    fn mass_matrix(&self, damping: f64) -> StepMatrix<T> {
+    pub(crate) fn mass_matrix(&self, damping: f64) -> StepMatrix<T> {
         let springs = self.network.springs().iter().take(3).map(|s| SpringWeights {
             direction: s.direction,
             weights: Weights::Constant(T::zero()),
@@ -93,16 +93,16 @@ impl<T: Real> Patch<T> {
         } else {
             Weights::Each((0..self.base.len()).map(one).collect())
         };
-        StepMatrix::new(self.matrix.dims(), mass, springs.collect())
+        StepMatrix::new(self.cache.matrix.dims(), mass, springs.collect())
     }
 
-    fn mass_solver(&mut self) -> Box<StepSolver<T>> {
-        self.mass_solver.take().unwrap_or_else(|| {
+    pub(crate) fn mass_solver(&mut self) -> Box<StepSolver<T>> {
+        self.cache.mass_solver.take().unwrap_or_else(|| {
             let steps = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
             Box::new(StepSolver::new(
-                self.solver.lattice().clone(),
+                self.cache.solver.lattice().clone(),
                 &steps,
-                self.solver.options(),
+                self.cache.solver.options(),
             ))
         })
     }
@@ -114,7 +114,7 @@ impl<T: Real> Patch<T> {
     /// [`PatchError::Solve`].
     pub fn explicit_limit(&mut self) -> Result<f64, PatchError> {
         let now = self.version();
-        if let Some((version, limit)) = self.limit
+        if let Some((version, limit)) = self.cache.limit
             && version == now
         {
             return Ok(limit);
@@ -126,7 +126,7 @@ impl<T: Real> Patch<T> {
         let ground = &self.lumped.ground;
         let unit = binary_unit(self.network.stiffness_unit().max(ground.unit).max(stiffest));
         if unit == 0.0 {
-            self.limit = Some((now, f64::INFINITY));
+            self.cache.limit = Some((now, f64::INFINITY));
             return Ok(f64::INFINITY);
         }
         let springs = self.network.springs().iter().map(|s| SpringWeights {
@@ -134,17 +134,17 @@ impl<T: Real> Patch<T> {
             weights: s.weights.scaled(self.network.stiffness_unit() / unit),
         });
         let stiffness = StepMatrix::new(
-            self.matrix.dims(),
+            self.cache.matrix.dims(),
             ground.weights.scaled(ground.unit / unit),
             springs.collect(),
         );
         let held = held.iter().map(|(row, k)| (row.clone(), k / (sigma2 * unit)));
         let held: Vec<_> = held.collect();
         let mut solver = self.mass_solver();
-        self.mass_matrix = None;
+        self.cache.mass_matrix = None;
         solver.prepare(&mass)?;
         let largest = largest_frequency(&stiffness, &held, &mass, &mut solver);
-        self.mass_solver = Some(solver);
+        self.cache.mass_solver = Some(solver);
         // (λ in units of its own) · σ²·(unit of stiffness)/(unit of mass)
         let largest = largest * (sigma2 * unit / self.mass_unit(0.0)).sqrt();
         let limit = if largest > 0.0 {
@@ -152,7 +152,7 @@ impl<T: Real> Patch<T> {
         } else {
             f64::INFINITY
         };
-        self.limit = Some((now, limit));
+        self.cache.limit = Some((now, limit));
         Ok(limit)
     }
 
@@ -239,13 +239,14 @@ impl<T: Real> Patch<T> {
         let mut solver = self.mass_solver();
         if let (Some(held), None) = (&self.held, solver.border_mut()) {
             solver.set_border(Some(held.border(false)));
-            self.mass_matrix = None;
+            self.cache.mass_matrix = None;
         }
         if let (Some(held), Some(border)) = (&self.held, solver.border_mut()) {
             held.aim(border);
         }
         let version = self.version();
         let kept = self
+            .cache
             .mass_matrix
             .take()
             .filter(|m| (m.0, m.1) == (version, damping));
@@ -259,9 +260,9 @@ impl<T: Real> Patch<T> {
         };
         let work = &mut self.work;
         let report = prepared.map(|()| solver.solve(&matrix, &work.g, &mut work.x, &mut work.dx));
-        self.mass_solver = Some(solver);
+        self.cache.mass_solver = Some(solver);
         let report = report?;
-        self.mass_matrix = Some((version, damping, matrix));
+        self.cache.mass_matrix = Some((version, damping, matrix));
         let state = &mut self.state;
         for (v, x) in state.v.iter_mut().zip(&work.x) {
             *v += *x;

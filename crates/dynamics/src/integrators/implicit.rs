@@ -1,6 +1,7 @@
 use bspline::Real;
 
-use crate::patch::{Patch, PatchError, Prepared};
+use crate::cache::Prepared;
+use crate::patch::{Patch, PatchError};
 use crate::solve::{ITERATED, Method, SolveReport};
 use crate::springs::{Law, Weights};
 use crate::units::binary_unit;
@@ -34,14 +35,14 @@ impl<T: Real> Patch<T> {
             *f = T::from_f64(e.as_f64() * inverse);
         }
         let tangent = match self.network.law() {
-            Law::FourD { .. } => tangent.map(|t| (t, &mut self.matrix.springs[..])),
+            Law::FourD { .. } => tangent.map(|t| (t, &mut self.cache.matrix.springs[..])),
             Law::Linear { .. } => None,
         };
         let clamped = self.network.add_forces_in(unit, d, force, tangent);
         if ground.unit > 0.0 {
             let factor = T::from_f64(sigma2 * ground.unit * inverse);
             for (i, f) in force.iter_mut().enumerate() {
-                *f -= factor * ground.at(i) * (d[i] - self.base[i]);
+                *f -= factor * ground.at(i) * (d[i] - self.anchor[i]);
             }
         }
         clamped
@@ -49,8 +50,8 @@ impl<T: Real> Patch<T> {
 
     /// The power of two in whose units the matrix `M̃ + aD̃ + bK̃` is written: a factor that may still serve knows it in
     /// its own.
-    pub(super) fn matrix_unit(&self, damping: f64, stiffness: f64) -> f64 {
-        if let Some(p) = self.prepared.filter(|p| self.is_near(p, stiffness)) {
+    pub(crate) fn matrix_unit(&self, damping: f64, stiffness: f64) -> f64 {
+        if let Some(p) = self.cache.prepared.filter(|p| self.is_near(p, stiffness)) {
             return p.unit;
         }
         let sigma2 = self.network.law().scale().powi(2);
@@ -72,33 +73,46 @@ impl<T: Real> Patch<T> {
     ///
     /// [`forces`]: Self::forces
     pub(super) fn solve_step(&mut self, damping: f64, stiffness: f64) -> Result<SolveReport, PatchError> {
+        self.solve_step_to(damping, stiffness, None)
+    }
+
+    /// The same to a residual, if one is asked for, however many iterations that takes.
+    pub(crate) fn solve_step_to(
+        &mut self,
+        damping: f64,
+        stiffness: f64,
+        residual: Option<f64>,
+    ) -> Result<SolveReport, PatchError> {
+        let asked = residual;
         let (version, four_d) = (self.version(), matches!(self.network.law(), Law::FourD { .. }));
         let unit = self.matrix_unit(damping, stiffness);
         let same = self
+            .cache
             .prepared
             .is_some_and(|p| p.version == version && p.damping == damping && p.stiffness == stiffness);
         // An old factor may solve for the matrix of another step.
         let filled = Some((version, damping, stiffness, unit));
-        if four_d || self.filled != filled {
+        if four_d || self.cache.filled != filled {
             self.fill_matrix(damping, stiffness, unit);
-            self.filled = filled;
+            self.cache.filled = filled;
         }
-        let near = self.prepared.is_some_and(|p| self.is_near(&p, stiffness));
+        let near = self.cache.prepared.is_some_and(|p| self.is_near(&p, stiffness));
         self.aim_implicit(stiffness / unit);
         // The diagonalization of constant material costs nothing to renew.
-        let mut fresh = !near || (!same && self.matrix.is_uniform());
+        let mut fresh = !near || (!same && self.cache.matrix.is_uniform());
         loop {
             if fresh {
-                self.prepared = None;
-                self.solver.prepare(&self.matrix)?;
+                self.cache.prepared = None;
+                self.cache.solver.prepare(&self.cache.matrix)?;
             }
             let work = &mut self.work;
-            let report = self
-                .solver
-                .solve(&self.matrix, &work.g, &mut work.x, &mut work.dx);
+            let report =
+                self.cache
+                    .solver
+                    .solve_to(&self.cache.matrix, &work.g, &mut work.x, &mut work.dx, asked);
             let residual = report.iteration.residual;
             if fresh {
-                self.prepared = Some(Prepared {
+                self.cache.prepared = Some(Prepared {
                     version,
                     damping,
                     stiffness,
@@ -107,7 +121,7 @@ impl<T: Real> Patch<T> {
                 });
                 return Ok(report.checked()?);
             }
-            let known = self.prepared.map_or(0.0, |p| p.residual);
+            let known = self.cache.prepared.map_or(0.0, |p| p.residual);
             // Those that iterate stop there.
             let trusted = match report.method {
                 Method::VCycle | Method::SampleMultigrid => 3.0 * ITERATED,
@@ -121,7 +135,7 @@ impl<T: Real> Patch<T> {
     }
 
     /// Writes `M + aD + bG` and, of the linear law, `bσ²k` into the matrix, as multiples of `unit`.
-    fn fill_matrix(&mut self, damping: f64, stiffness: f64, unit: f64) {
+    pub(crate) fn fill_matrix(&mut self, damping: f64, stiffness: f64, unit: f64) {
         let scale = stiffness * self.network.law().scale().powi(2);
         let lumped = &self.lumped;
         let parts = [
@@ -135,17 +149,17 @@ impl<T: Real> Patch<T> {
             let [m, d, g] = parts.each_ref().map(|(w, factor)| *factor * w.at(i));
             m + d + g
         };
-        write(&mut self.matrix.mass, constant, self.base.len(), diagonal);
+        write(&mut self.cache.matrix.mass, constant, self.base.len(), diagonal);
         if let Law::Linear { .. } = self.network.law() {
             let b = T::from_f64(scale * self.network.stiffness_unit() / unit);
-            for (to, from) in self.matrix.springs.iter_mut().zip(self.network.springs()) {
+            for (to, from) in self.cache.matrix.springs.iter_mut().zip(self.network.springs()) {
                 let constant = matches!(from.weights, Weights::Constant(_));
                 write(&mut to.weights, constant, self.base.len(), |i| {
                     b * from.weights.at(i)
                 });
             }
         }
-        self.matrix.refresh();
+        self.cache.matrix.refresh();
     }
 
     /// [Hua04 eq. 12] in displacement and velocity: with `p_{i-1} = p_i - Δt v` it reads

@@ -78,7 +78,7 @@ impl<T: Real> Patch<T> {
         Ok(report)
     }
 
-    /// A step that can be [taken back](Self::restore): rest lengths do not follow yet.
+    /// A step that can be [taken back](Self::take_back): rest lengths do not follow yet.
     fn try_step(&mut self, integrator: Integrator, dt: f64) -> Result<StepReport, PatchError> {
         if !(dt.is_finite() && dt > 0.0) {
             return Err(PatchError::TimeStep { dt });
@@ -99,7 +99,7 @@ impl<T: Real> Patch<T> {
             Integrator::TrBdf2 | Integrator::Auto => self.tr_bdf2_step(dt),
         };
         if moved.is_err() {
-            self.restore();
+            self.take_back();
         }
         let (solve, clamped, error) = moved?;
         self.keep_if_finite()?;
@@ -115,7 +115,7 @@ impl<T: Real> Patch<T> {
     }
 
     /// Back to the state before the step.
-    fn restore(&mut self) {
+    fn take_back(&mut self) {
         self.state.copy_from(&self.work.before);
     }
 }

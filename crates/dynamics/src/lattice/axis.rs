@@ -1,12 +1,13 @@
 use bspline::knots::KnotError;
 use bspline::{Basis, KnotVector};
 use nalgebra::{Cholesky, DMatrix};
+use serde::{Deserialize, Serialize};
 
 use super::banded::Banded;
 use super::dense::transposed_product;
 
 /// Which coefficients at the ends of an axis keep their values.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Rim {
     /// All coefficients may move.
     Free,
@@ -94,6 +95,20 @@ impl Axis {
         world_length: f64,
     ) -> Result<Self, LatticeError> {
         let spacing = world_length / samples.saturating_sub(1).max(1) as f64;
+        Self::with_spacing(axis, knots, rim, samples, spacing)
+    }
+
+    /// The same with samples at the distance `spacing`.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub(crate) fn with_spacing(
+        axis: usize,
+        knots: KnotVector,
+        rim: Rim,
+        samples: usize,
+        spacing: f64,
+    ) -> Result<Self, LatticeError> {
         if !(spacing.is_finite() && spacing > 0.0) {
             return Err(LatticeError::Spacing { axis, spacing });
         }

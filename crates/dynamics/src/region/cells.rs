@@ -2,6 +2,7 @@
 
 use bspline::hierarchical::{BRICK, BrickKey};
 use bspline::{HierarchicalSpline, Real};
+use serde::{Deserialize, Serialize};
 
 use super::RegionError;
 
@@ -13,7 +14,7 @@ pub const MAX_SIZE: u64 = 1 << 24;
 pub const MAX_EDGE: u64 = 512;
 
 /// A box of cells of one level of a hierarchy.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Cells {
     /// Level, 0 the coarsest; may be finer than the field was so far.
     pub level: usize,
@@ -85,7 +86,7 @@ impl Cells {
                 for y in range(1) {
                     for z in range(2) {
                         let key = [x, y, z];
-                        if field.has_brick(level, BrickKey(key)) {
+                        if field.brick(level, BrickKey(key)).is_some() {
                             continue;
                         }
                         let low = key.map(|k| (u64::from(k) * width) as u32);

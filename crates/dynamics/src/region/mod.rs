@@ -26,13 +26,20 @@
 //! ```
 
 mod cells;
+mod change;
+mod moved;
 mod parts;
+mod scene;
 mod sleep;
+mod snapshot;
 mod tensor;
 mod watch;
 
 pub use cells::{Cells, MAX_EDGE, MAX_SIZE, MIN_CELLS};
+pub use change::{Change, Viewer};
+pub use scene::Scene;
 pub use sleep::{Schedule, Thresholds, Turn};
+pub use snapshot::RegionSnapshot;
 pub use tensor::{TensorOptions, TensorRegion};
 
 use bspline::hierarchical::{EditError, Lattice as FieldLattice, LevelEdit};
@@ -41,9 +48,10 @@ use bspline::{Field, Frame, HierarchicalSpline, KnotVector, Real};
 use glam::{DAffine3, DMat3, DVec3};
 
 use crate::integrators::{Integrator, StepReport};
-use crate::lattice::{Axis, Lattice, LatticeError, Rim};
+use crate::lattice::{Axis, Lattice, LatticeError, OnBox, Rim, SampleBox};
 use crate::matter::Matter;
 use crate::patch::{Patch, PatchError};
+use crate::response::{Against, Response};
 use crate::solve::SolverOptions;
 use crate::springs::{Law, Neighbours};
 
@@ -132,6 +140,41 @@ pub enum RegionError {
     /// A tensor-product patch with coefficients that are not finite.
     #[error(transparent)]
     Tensor(#[from] TensorError),
+    /// Baked onto a field that has another shape where the region is.
+    #[error(
+        "the field is not as it was where the region was cut out: perhaps this change is in it already, and baking it twice would \
+         double it; bake onto the field that the region was cut from, or release the region"
+    )]
+    Changed,
+    /// Two regions on the same cells.
+    #[error(
+        "cells {:?} + {:?} of level {} overlap those of region {index}, {:?} + {:?} of level {}; move one of them, or cut one region \
+         that covers both", cells.first, cells.count, cells.level, with.first, with.count, with.level
+    )]
+    Overlaps {
+        /// Asked for.
+        cells: Cells,
+        /// Number of the other region.
+        index: usize,
+        /// Its cells.
+        with: Cells,
+    },
+    /// A number that no region has.
+    #[error("there is no region {index}; the scene has {count}, numbered from 0")]
+    NoRegion {
+        /// The number.
+        index: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// Moved to another level.
+    #[error("a region of level {from} cannot go on at level {to}; release it and cut another")]
+    OtherLevel {
+        /// Level of the region.
+        from: usize,
+        /// Level asked for.
+        to: usize,
+    },
     /// Baked onto a field on other knots.
     #[error("the region was cut out of a field on another lattice; bake it onto a version of that field")]
     OtherLattice,
@@ -178,6 +221,9 @@ impl RegionOptions {
 pub struct Region<T> {
     cells: Cells,
     field_lattice: FieldLattice,
+    samples_per_cell: [f64; 3],
+    /// Coefficients of the free functions in the field that the region was cut from.
+    origin: Vec<T>,
     patch: Patch<T>,
     thresholds: Thresholds,
     asleep: bool,
@@ -239,6 +285,8 @@ impl<T: Real> Region<T> {
         Ok(Self {
             cells,
             field_lattice: *field.lattice(),
+            samples_per_cell: options.samples_per_cell,
+            origin: coefficients(field, &cells)?,
             patch,
             thresholds: options.sleep,
             asleep: true,
@@ -271,6 +319,63 @@ impl<T: Real> Region<T> {
         frame(&self.field_lattice, &self.cells, samples).node(ijk.map(|i| i as i64))
     }
 
+    /// World lengths of a place from the first sample along the axes: how samples, constraints and responses of the
+    /// [patch](Self::patch) are asked for.
+    pub fn local(&self, p: DVec3) -> [f64; 3] {
+        let lattice = self.patch.lattice();
+        let samples = lattice.sample_dims().map(|n| n as u64);
+        let grid = frame(&self.field_lattice, &self.cells, samples)
+            .world_from_grid
+            .inverse();
+        (grid.transform_point3(p) * DVec3::from_array(lattice.spacing())).to_array()
+    }
+
+    /// The least box with all samples within `radius` of a place in the world, up to the `1e-4` that axes may be off the
+    /// perpendicular; found without walking the others.
+    pub fn samples_near(&self, p: DVec3, radius: f64) -> SampleBox {
+        let slack = 1.0 + 2.0 * PERPENDICULAR;
+        self.patch.lattice().samples_near(self.local(p), slack * radius)
+    }
+
+    /// As [`Patch::respond`]; does not wake the region, and answers for the whole of it.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn respond(
+        &mut self,
+        integrator: Integrator,
+        dt: f64,
+        loads: &[OnBox<T>],
+    ) -> Result<Vec<Response<T>>, PatchError> {
+        self.patch.respond(integrator, dt, loads)
+    }
+
+    /// As [`Patch::static_response`]; does not wake the region.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn static_response(
+        &mut self,
+        against: Against,
+        loads: &[OnBox<T>],
+    ) -> Result<Vec<Response<T>>, PatchError> {
+        self.patch.static_response(against, loads)
+    }
+
+    /// [`Patch::stiffness_near`] a place in the world.
+    pub fn stiffness_near(&self, p: DVec3, radius: f64) -> Option<f64> {
+        self.patch.stiffness_near(self.local(p), radius)
+    }
+
+    /// [`Patch::compliance_at`] a place in the world; does not wake the region.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn compliance_at(&mut self, p: DVec3, radius: f64, against: Against) -> Result<f64, PatchError> {
+        let at = self.local(p);
+        self.patch.compliance_at(at, radius, against)
+    }
+
     /// Moves the region by `dt` seconds; one that is asleep costs nothing and keeps its bits, and gives `None`.
     ///
     /// # Errors
@@ -288,15 +393,19 @@ impl<T: Real> Region<T> {
     /// knots.
     ///
     /// `onto` is the field that the region was cut from, or a version of it with other regions baked. It stays as it is,
-    /// and keeping it is how baking is undone, to the bit. Beside the region every value keeps its bits.
+    /// and keeping it is how baking is undone, to the bit. Beside the region every value keeps its bits. A field that has other
+    /// coefficients there is refused, so that no change is baked twice.
     ///
     /// # Errors
-    /// [`RegionError::OtherLattice`], [`RegionError::Spills`], [`RegionError::Edit`].
+    /// [`RegionError::OtherLattice`], [`RegionError::Changed`], [`RegionError::Spills`], [`RegionError::Edit`].
     pub fn bake(&self, onto: &HierarchicalSpline<T>) -> Result<HierarchicalSpline<T>, RegionError> {
         if *onto.lattice() != self.field_lattice {
             return Err(RegionError::OtherLattice);
         }
         spills(onto, &self.cells)?;
+        if coefficients(onto, &self.cells)? != self.origin {
+            return Err(RegionError::Changed);
+        }
         let [_, ny, nz] = self.patch.lattice().coefficient_dims();
         // Function s of the level has the support s - 3 .. s + 1: the first inside is number first + 3.
         let function = |i: usize| {
@@ -316,8 +425,9 @@ impl<T: Real> Region<T> {
     }
 
     /// Lets clay go: bakes it, and makes the present shape the rest. Rest := current, velocity := 0, force := 0, no
-    /// constraints; the region sleeps. From then on it is a region of the field returned, to which it adds nothing until it is moved again:
-    /// the shape stays, to the bit.
+    /// constraints; the region sleeps. From then on it is, to the bit, the region that [`new`](Self::new) cuts out of the field
+    /// returned with this matter, plasticity and choice of parts: nothing is left of the steps before, in densities or solvers. Factors
+    /// that would come out the same are not made again.
     ///
     /// # Errors
     /// As [`Self::bake`]; nothing has changed then.
@@ -326,7 +436,9 @@ impl<T: Real> Region<T> {
         onto: &HierarchicalSpline<T>,
     ) -> Result<HierarchicalSpline<T>, RegionError> {
         let baked = self.bake(onto)?;
-        self.patch.rest_here();
+        let samples = self.patch.lattice().sample_dims().map(|n| n as u64);
+        self.origin = coefficients(&baked, &self.cells)?;
+        self.patch.rest_at(densities(&baked, &self.cells, samples));
         self.part = None;
         self.parts.forget();
         self.asleep = true;
@@ -352,6 +464,12 @@ fn spills<T: Real>(field: &HierarchicalSpline<T>, cells: &Cells) -> Result<(), R
         }),
         None => Ok(()),
     }
+}
+
+/// Coefficients of the functions that are free in a box of cells.
+fn coefficients<T: Real>(field: &HierarchicalSpline<T>, cells: &Cells) -> Result<Vec<T>, EditError> {
+    let first = cells.first.map(|f| f + 3);
+    field.level_coefficients(cells.level, first, cells.count.map(|c| c as usize - 3))
 }
 
 /// Refuses axes that are not perpendicular.

@@ -1,14 +1,15 @@
 //! Parts of a region that sleep: only a box of cells round what moves is stepped, the rest is its rim.
 
 use bspline::{KnotVector, Real};
+use serde::{Deserialize, Serialize};
 
 use super::Region;
 use super::sleep::solves;
 use crate::integrators::{Integrator, StepReport};
-use crate::lattice::{Axis, Lattice, LatticeError, Rim};
+use crate::lattice::{Axis, Lattice, LatticeError, Rim, SampleBox};
 use crate::matter::{Matter, Quantity};
 use crate::patch::{Patch, PatchError};
-use crate::springs::{Plasticity, SpringWeights, Weights};
+use crate::springs::{Plasticity, Weights};
 
 /// Steps between two looks at the whole region, whose cost is that of its forces; up to eight times as many while looks
 /// find nothing to cut.
@@ -28,16 +29,16 @@ const SHRINK: f64 = 0.5;
 #[derive(Clone, Debug)]
 pub(super) struct Part<T> {
     pub patch: Patch<T>,
-    window: Window,
+    pub window: Window,
     /// Operations that it saved, less what it cost.
-    earned: f64,
+    pub earned: f64,
 }
 
 /// Whether parts sleep, and what that costs and saves, in operations.
 ///
 /// A part is cut when what it costs has been saved before: by other parts, or by what this one would have saved while it
 /// was waited for. So a motion that outgrows every part costs hardly more than one without parts.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Parts {
     pub on: bool,
     pub steps_to_look: usize,
@@ -72,6 +73,11 @@ impl Default for Parts {
 }
 
 impl Parts {
+    /// Whether looks can come of it.
+    pub fn is_sound(&self) -> bool {
+        self.misses <= MOST_MISSES && self.growths <= MOST_GROWTHS
+    }
+
     /// All that was learnt of one matter says nothing of another.
     pub fn forget(&mut self) {
         *self = Self {
@@ -84,8 +90,8 @@ impl Parts {
 }
 
 /// A box of cells whose ends are samples.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Window {
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct Window {
     /// First free coefficient, which is also the first cell, and cells.
     first: [usize; 3],
     cells: [usize; 3],
@@ -111,6 +117,21 @@ impl Window {
         })
     }
 
+    /// Whether it is one of `whole`, and `part` lies on it.
+    pub fn fits<T: Real>(&self, whole: &Lattice<T>, part: &Lattice<T>) -> bool {
+        let (n, m) = (whole.coefficient_dims(), whole.sample_dims());
+        let lies = |k: usize| {
+            let cells = self.first[k].checked_add(self.cells[k]);
+            let samples = self.first_sample[k].checked_add(self.samples[k]);
+            self.cells[k] > 3
+                && cells.is_some_and(|end| end <= n[k] + 3)
+                && samples.is_some_and(|end| end <= m[k])
+        };
+        (0..3).all(lies)
+            && part.coefficient_dims() == self.coefficients()
+            && part.sample_dims() == self.samples
+    }
+
     /// Whether a sample lies in it.
     fn has_sample(&self, at: [usize; 3]) -> bool {
         (0..3).all(|k| (self.first_sample[k]..self.first_sample[k] + self.samples[k]).contains(&at[k]))
@@ -119,27 +140,11 @@ impl Window {
 
 /// A box of a list, z fastest.
 fn crop<V: Copy>(from: &[V], dims: [usize; 3], first: [usize; 3], count: [usize; 3]) -> Vec<V> {
-    let mut out = Vec::with_capacity(count.iter().product());
-    rows(dims, first, count, |at| {
-        out.extend_from_slice(&from[at..at + count[2]])
-    });
-    out
+    SampleBox { first, count }.crop(from, dims)
 }
 
 fn paste<V: Copy>(into: &mut [V], dims: [usize; 3], first: [usize; 3], count: [usize; 3], from: &[V]) {
-    let mut row = 0;
-    rows(dims, first, count, |at| {
-        into[at..at + count[2]].copy_from_slice(&from[row..row + count[2]]);
-        row += count[2];
-    });
-}
-
-fn rows(dims: [usize; 3], first: [usize; 3], count: [usize; 3], mut f: impl FnMut(usize)) {
-    for x in first[0]..first[0] + count[0] {
-        for y in first[1]..first[1] + count[1] {
-            f((x * dims[1] + y) * dims[2] + first[2]);
-        }
-    }
+    SampleBox { first, count }.paste(into, dims, from);
 }
 
 fn greatest_common_divisor(a: usize, b: usize) -> usize {
@@ -205,7 +210,7 @@ impl<T: Real> Region<T> {
         self.parts.savings += solves * (saved - taken);
         self.parts.operations += solves * taken;
         let (w, state) = (part.window, &mut self.patch.state);
-        let lattice = self.patch.solver.lattice();
+        let lattice = self.patch.cache.solver.lattice();
         let (n, m) = (lattice.coefficient_dims(), lattice.sample_dims());
         let from = part.patch.state();
         paste(&mut state.p, n, w.first, w.coefficients(), &from.p);
@@ -236,8 +241,9 @@ impl<T: Real> Region<T> {
         Ok(report)
     }
 
-    /// Sets the forces of the part too. Those beside it are looked at before the next step if they may wake something.
-    pub(super) fn force_changed(&mut self, before: &[T]) {
+    /// Sets the forces of the part too. `before` are the forces of the samples whose force may have changed: those beside
+    /// the part are looked at before the next step if they may wake something.
+    pub(super) fn force_changed(&mut self, before: impl Iterator<Item = (usize, T)>) {
         let Some(part) = &mut self.part else { return };
         let m = self.patch.lattice().sample_dims();
         let external = &self.patch.external;
@@ -246,11 +252,11 @@ impl<T: Real> Region<T> {
             .write_force(|force| force.copy_from_slice(&crop(external, m, w.first_sample, w.samples)));
         let limit = self.thresholds.acceleration / self.patch.springs().law().scale();
         let mass = &self.patch.lumped.mass;
-        let wakes = external.iter().zip(before).enumerate().any(|(i, (now, then))| {
-            let change = (now.as_f64() - then.as_f64()).abs();
+        let wakes = |(i, then): (usize, T)| {
+            let change = (external[i].as_f64() - then.as_f64()).abs();
             change > limit * mass.value(i) && !w.has_sample([i / m[2] / m[1], i / m[2] % m[1], i % m[2]])
-        });
-        if wakes {
+        };
+        if { before }.any(wakes) {
             self.parts.steps_to_look = 0;
         }
     }
@@ -411,26 +417,22 @@ impl<T: Real> Region<T> {
         };
         let law = whole.springs().law();
         let d = samples(&whole.state.d);
-        let options = whole.solver.options();
+        let options = whole.cache.solver.options();
         let mut part = Patch::new(lattice, matter, law, whole.neighbours, &d, options)?;
         part.base = samples(&whole.base);
+        part.anchor = samples(&whole.anchor);
         part.write_force(|force| force.copy_from_slice(&samples(&whole.external)));
         let n = whole.lattice().coefficient_dims();
         part.state.p = crop(&whole.state.p, n, w.first, w.coefficients());
         part.state.v = crop(&whole.state.v, n, w.first, w.coefficients());
         part.state.w = samples(&whole.state.w);
-        let network = whole.springs();
-        let springs = network.springs().iter().map(|s| SpringWeights {
-            direction: s.direction,
-            weights: match &s.weights {
-                Weights::Constant(k) => Weights::Constant(network.stiffness_unit() * k.as_f64()),
-                Weights::Each(k) => {
-                    let inside = samples(k).into_iter();
-                    Weights::Each(inside.map(|k| network.stiffness_unit() * k.as_f64()).collect())
-                }
-            },
-        });
-        part.network.set_springs(&springs.collect::<Vec<_>>());
+        let mut springs = whole.exact_springs();
+        for s in &mut springs {
+            if let Weights::Each(k) = &mut s.weights {
+                *k = crop(k, m, w.first_sample, w.samples);
+            }
+        }
+        part.network.set_springs(&springs);
         let rest = part.network.rest_mut();
         let from = whole.springs().rest();
         rest.differences = from.differences.iter().map(|r| samples(r)).collect();

@@ -1,9 +1,11 @@
 //! Sleep and wake of regions, and how much of them may move at a time.
 
 use bspline::Real;
+use serde::{Deserialize, Serialize};
 
 use super::Region;
 use crate::integrators::{Integrator, StepReport};
+use crate::lattice::OnBox;
 use crate::patch::PatchError;
 
 /// Below which motion a region falls asleep, in world lengths: densities times the scale of the law, so about the motion
@@ -12,7 +14,7 @@ use crate::patch::PatchError;
 /// Both have to hold, so neither a turning point nor a pass through balance puts a region to sleep. What it is off its
 /// balance then is about `acceleration/ω²`, `ω` its lowest frequency. In single precision a stiff solid cannot get below
 /// the rounding of its forces, about `1e-7·(κ/μh²)` of the densities; thresholds below that keep it awake.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Thresholds {
     /// Speed of the mean kinetic energy, `σ√(2E/M)`, in lengths per second.
     pub speed: f64,
@@ -33,6 +35,14 @@ impl<T: Real> Region<T> {
         self.parts.steps_to_look = 0;
     }
 
+    /// Finishes at once the factors that are being made beside the steps.
+    pub fn settle(&mut self) {
+        self.patch.settle();
+        if let Some(part) = &mut self.part {
+            part.patch.settle();
+        }
+    }
+
     /// Sets the external forces on the samples. A region asleep wakes if they leave more unbalanced than the threshold;
     /// the forces it has already cost one comparison.
     ///
@@ -45,8 +55,29 @@ impl<T: Real> Region<T> {
         let before = self.part.is_some().then(|| self.patch.external.clone());
         self.patch.set_force(force)?;
         if let Some(before) = before {
-            self.force_changed(&before);
+            self.force_changed(before.into_iter().enumerate());
         }
+        if self.asleep && !self.is_balanced() {
+            self.wake();
+        }
+        Ok(())
+    }
+
+    /// The same of forces on a box of samples, all others none, at the cost of the box and the one before.
+    ///
+    /// # Errors
+    /// As [`crate::patch::Patch::set_force_on`]; the old forces then stay.
+    pub fn set_force_on(&mut self, force: OnBox<T>) -> Result<(), PatchError> {
+        self.patch.check_load(&force)?;
+        let dims = self.patch.lattice().sample_dims();
+        let boxes = [self.patch.pushed, force.at];
+        let places = boxes.into_iter().flat_map(|b| b.indices(dims));
+        let before: Vec<(usize, T)> = places.map(|i| (i, self.patch.external[i])).collect();
+        self.patch.set_force_on(force)?;
+        if before.iter().all(|(i, then)| self.patch.external[*i] == *then) {
+            return Ok(());
+        }
+        self.force_changed(before.into_iter());
         if self.asleep && !self.is_balanced() {
             self.wake();
         }
@@ -105,8 +136,15 @@ pub enum Turn {
     Failed(PatchError),
 }
 
+impl Turn {
+    /// Whether the region had its turn. How many had is all that has to be journaled of [`Schedule::step_while`].
+    pub fn was_taken(&self) -> bool {
+        matches!(self, Self::Stepped(_) | Self::Failed(_))
+    }
+}
+
 /// Steps of many regions within a budget of work, in turns.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Schedule {
     next: usize,
 }
@@ -126,6 +164,23 @@ impl Schedule {
         self.step_while(regions, integrator, dt, |work| {
             spent = spent.saturating_add(work);
             spent <= budget
+        })
+    }
+
+    /// What [`step_while`](Self::step_while) did when `taken` regions had their turn, whatever made it stop there: a session
+    /// whose budget was one of time is replayed by it to the same bits.
+    pub fn replay<T: Real>(
+        &mut self,
+        regions: &mut [Region<T>],
+        integrator: Integrator,
+        dt: f64,
+        taken: usize,
+    ) -> Vec<Turn> {
+        let mut left = taken;
+        self.step_while(regions, integrator, dt, |_| {
+            let may = left > 0;
+            left = left.saturating_sub(1);
+            may
         })
     }
 

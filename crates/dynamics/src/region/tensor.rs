@@ -9,6 +9,7 @@ use crate::integrators::{Integrator, StepReport};
 use crate::lattice::{Axis, Lattice, Rim};
 use crate::matter::Matter;
 use crate::patch::{Patch, PatchError};
+use crate::snapshot::PatchSnapshot;
 use crate::solve::SolverOptions;
 use crate::springs::{Law, Neighbours};
 
@@ -57,12 +58,27 @@ impl<T: Real> TensorRegion<T> {
             Axis::new(a, knots, options.rim, options.samples[a], length)
         };
         let lattice = Lattice::<T>::new([axis(0)?, axis(1)?, axis(2)?]);
-        let [_, my, mz] = options.samples;
-        let count = lattice.sample_count();
-        let at = |i: usize| sample_position(field, &lattice, [i / mz / my, i / mz % my, i % mz]);
-        let d: Vec<T> = (0..count).map(|i| T::from_f64(field.value(at(i)))).collect();
+        let d = densities(field, &lattice);
         let (law, neighbours) = (options.law, options.neighbours);
         let patch = Patch::new(lattice, matter, law, neighbours, &d, options.solver)?;
+        Ok(Self {
+            field: field.clone(),
+            patch,
+        })
+    }
+
+    /// The region of `field` that moves as a [snapshot](Patch::snapshot) of its patch says.
+    ///
+    /// # Errors
+    /// [`RegionError::Patch`] of a snapshot that is damaged or of another spline.
+    pub fn restore(field: &TensorSpline<T>, snapshot: &PatchSnapshot<T>) -> Result<Self, RegionError> {
+        cells::size("samples", snapshot.samples())?;
+        let patch = Patch::restore(snapshot)?;
+        let knots = |a: usize| patch.lattice().axes()[a].knots() == &field.knots()[a];
+        if !(0..3).all(knots) {
+            let what = "it is of a spline on other knots".to_owned();
+            return Err(PatchError::Snapshot { what }.into());
+        }
         Ok(Self {
             field: field.clone(),
             patch,
@@ -116,12 +132,13 @@ impl<T: Real> TensorRegion<T> {
     }
 
     /// Lets clay go: bakes it, and makes the present shape the rest; velocity := 0, force := 0. Later steps change no bit.
+    /// It is then, to the bit, the region of the spline returned with this matter and plasticity.
     ///
     /// # Errors
     /// As [`Self::bake`]; nothing has changed then.
     pub fn release_clay(&mut self) -> Result<TensorSpline<T>, RegionError> {
         self.field = self.bake()?;
-        self.patch.rest_here();
+        self.patch.rest_at(densities(&self.field, self.patch.lattice()));
         Ok(self.field.clone())
     }
 }
@@ -131,4 +148,12 @@ fn sample_position<T: Real>(field: &TensorSpline<T>, lattice: &Lattice<T>, ijk: 
     field
         .world_from_parameter()
         .transform_point3(DVec3::from_array(q))
+}
+
+/// Values of the field at the samples.
+fn densities<T: Real>(field: &TensorSpline<T>, lattice: &Lattice<T>) -> Vec<T> {
+    let [_, my, mz] = lattice.sample_dims();
+    let at = |i: usize| sample_position(field, lattice, [i / mz / my, i / mz % my, i % mz]);
+    let count = lattice.sample_count();
+    (0..count).map(|i| T::from_f64(field.value(at(i)))).collect()
 }

@@ -7,7 +7,7 @@ use super::galerkin::Galerkin;
 use super::pcg::{PcgReport, Preconditioner};
 use super::v_cycle::{VCycle, VCycleOptions};
 use crate::lattice::Lattice;
-use crate::springs::{StepMatrix, Weights};
+use crate::springs::StepMatrix;
 
 /// Iterations with a factor, made for an earlier matrix, that cost as much as a V-cycle's.
 const SLOW: usize = 2;
@@ -16,20 +16,24 @@ const PATIENCE: usize = 4;
 
 /// A V-cycle without blocks, and the factor that takes its place. The work on the factor is a fixed part per solve, so
 /// that no step stalls and the same steps give the same bits.
+///
+/// How far it is for the steps, and how far the factor in memory is, are two things: a solver that begins anew with the
+/// same matrix walks the same way through the same bits, but finds the rows there.
 #[derive(Clone, Debug)]
 pub(super) struct Background<T> {
     cycle: VCycle<T>,
     galerkin: Galerkin,
     factor: BandCholesky<T>,
-    /// What the factor is of.
-    matrix: StepMatrix<T>,
     work: Work,
+    made: Work,
+    /// Row at which there is no factor.
+    failed: Option<usize>,
     slow: usize,
 }
 
-/// What comes next.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Work {
+/// What comes next, in the order of time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
+pub(super) enum Work {
     /// Nothing in the solve for which the V-cycle was prepared.
     Prepared,
     Assembly,
@@ -40,20 +44,23 @@ enum Work {
     Impossible,
 }
 
+/// How far a [`Background`] is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub(super) struct Progress {
+    work: Work,
+    slow: usize,
+}
+
 impl<T: Real> Background<T> {
-    pub fn new(
-        lattice: &Lattice<T>,
-        s: &StepMatrix<T>,
-        steps: &[[isize; 3]],
-        options: VCycleOptions,
-    ) -> Self {
+    pub fn new(lattice: &Lattice<T>, steps: &[[isize; 3]], options: VCycleOptions) -> Self {
         let galerkin = Galerkin::new(lattice, steps);
         Self {
             cycle: VCycle::new(lattice, steps, VCycleOptions { blocks: 0, ..options }),
             factor: BandCholesky::new(lattice.coefficient_count(), galerkin.band()),
             galerkin,
-            matrix: s.clone(),
             work: Work::Prepared,
+            made: Work::Prepared,
+            failed: None,
             slow: 0,
         }
     }
@@ -63,18 +70,24 @@ impl<T: Real> Background<T> {
     /// # Errors
     /// [`NotPositive`] if the V-cycle cannot be prepared.
     pub fn prepare(&mut self, s: &StepMatrix<T>) -> Result<(), NotPositive> {
-        // A solve that left too much asks for a fresh start: of the same matrix the factor is what helps.
-        if self.matrix == *s && self.work != Work::Prepared {
-            return Ok(());
-        }
-        copy(&mut self.matrix.mass, &s.mass);
-        for (to, from) in self.matrix.springs.iter_mut().zip(&s.springs) {
-            copy(&mut to.weights, &from.weights);
-        }
-        self.matrix.refresh();
+        self.cycle.prepare(s)?;
+        self.made = Work::Prepared;
+        self.failed = None;
+        self.begin_again();
+        Ok(())
+    }
+
+    /// Stays with the matrix that it was prepared for, after another was refused.
+    pub fn keep(&mut self, matrix: &StepMatrix<T>) {
+        self.cycle
+            .prepare(matrix)
+            .expect("it was prepared for this matrix before");
+    }
+
+    /// Begins anew with the matrix that it was prepared for.
+    pub fn begin_again(&mut self) {
         self.work = Work::Prepared;
         self.slow = 0;
-        self.cycle.prepare(s)
     }
 
     /// Whether the factor is done.
@@ -82,45 +95,64 @@ impl<T: Real> Background<T> {
         self.work == Work::Done
     }
 
-    /// After a solve of `s`: the next part of the work, or a new factor if this one is too old.
-    pub fn advance(&mut self, s: &StepMatrix<T>, report: PcgReport) {
-        match self.work {
-            Work::Prepared => self.work = Work::Assembly,
-            Work::Assembly => {
-                self.galerkin.assemble(&self.matrix, &mut self.factor);
-                self.work = Work::Rows(0);
-            }
-            Work::Rows(row) => {
-                self.work = match self.factor.factorize_slice(row) {
-                    Err(_) => Work::Impossible,
-                    Ok(()) if row + SLICE >= self.factor.len() => Work::Done,
-                    Ok(()) => Work::Rows(row + SLICE),
-                }
-            }
-            Work::Done if report.iterations > SLOW => {
-                self.slow += 1;
-                if self.slow >= PATIENCE && self.prepare(s).is_err() {
-                    self.work = Work::Done;
-                }
-            }
-            Work::Done => self.slow = 0,
-            Work::Impossible => (),
+    /// How far it is.
+    pub fn progress(&self) -> Progress {
+        Progress {
+            work: self.work,
+            slow: self.slow,
         }
+    }
+
+    /// After a solve: the next part of the work on the factor of `matrix`, which it was prepared for. Says whether a new
+    /// factor is needed since this one is too old.
+    #[must_use]
+    pub fn advance(&mut self, matrix: &StepMatrix<T>, report: PcgReport) -> bool {
+        match self.work {
+            Work::Done if report.iterations > SLOW => self.slow += 1,
+            Work::Done => self.slow = 0,
+            _ => self.work = self.next(matrix),
+        }
+        self.slow >= PATIENCE
+    }
+
+    /// What follows on the work that is next now, which is done where it is not yet.
+    fn next(&mut self, matrix: &StepMatrix<T>) -> Work {
+        let next = match self.work {
+            Work::Prepared => Work::Assembly,
+            Work::Assembly => Work::Rows(0),
+            Work::Rows(row) if self.failed == Some(row) => Work::Impossible,
+            Work::Rows(row) if row + SLICE >= self.factor.len() => Work::Done,
+            Work::Rows(row) => Work::Rows(row + SLICE),
+            Work::Done | Work::Impossible => self.work,
+        };
+        if self.made >= next {
+            return next;
+        }
+        self.made = next;
+        match self.work {
+            Work::Assembly => self.galerkin.assemble(matrix, &mut self.factor),
+            Work::Rows(row) if self.factor.factorize_slice(row).is_err() => {
+                self.failed = Some(row);
+                self.made = Work::Impossible;
+            }
+            _ => (),
+        }
+        self.made
     }
 
     /// All the work at once.
-    pub fn finish(&mut self) {
+    pub fn finish(&mut self, matrix: &StepMatrix<T>) {
         while !matches!(self.work, Work::Done | Work::Impossible) {
-            let matrix = self.matrix.clone();
-            self.advance(&matrix, PcgReport::default());
+            self.work = self.next(matrix);
         }
     }
-}
 
-fn copy<T: Real>(to: &mut Weights<T>, from: &Weights<T>) {
-    match (to, from) {
-        (Weights::Each(to), Weights::Each(from)) => to.copy_from_slice(from),
-        (to, from) => *to = from.clone(),
+    /// Goes to where another one was.
+    pub fn resume(&mut self, matrix: &StepMatrix<T>, progress: Progress) {
+        while self.work < progress.work && !matches!(self.work, Work::Done | Work::Impossible) {
+            self.work = self.next(matrix);
+        }
+        self.slow = progress.slow;
     }
 }
 

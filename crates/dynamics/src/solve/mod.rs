@@ -26,5 +26,6 @@ pub use pcg::{CoefficientSystem, ConjugateGradients, PcgReport, Preconditioner, 
 pub use report::{ITERATED, Method, SolveError, SolveReport, SolverOptions};
 pub use sample_multigrid::SampleMultigrid;
 pub use schwarz::Schwarz;
+pub(crate) use step_solver::SolverHistory;
 pub use step_solver::StepSolver;
 pub use v_cycle::{VCycle, VCycleOptions};

@@ -3,9 +3,10 @@
 use super::band_cholesky::NotPositive;
 use super::pcg::PcgReport;
 use super::v_cycle::VCycleOptions;
+use serde::{Deserialize, Serialize};
 
 /// Limits of a solve.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SolverOptions {
     /// Most iterations of conjugate gradients.
     pub iterations: usize,

@@ -2,8 +2,8 @@
 
 use bspline::Real;
 
-use super::background::Background;
-use super::band_cholesky::BandCholesky;
+use super::background::{Background, Progress};
+use super::band_cholesky::{BandCholesky, NotPositive};
 use super::border::Border;
 use super::dot::dot;
 use super::fast_diagonalization::FastDiagonalization;
@@ -13,7 +13,7 @@ use super::report::{ITERATED, Method, SolveError, SolveReport, SolverOptions};
 use super::sample_multigrid::SampleMultigrid;
 use super::v_cycle::VCycle;
 use crate::lattice::{Lattice, TensorProduct, TensorWorkspace};
-use crate::springs::StepMatrix;
+use crate::springs::{SpringWeights, StepMatrix, Weights};
 use crate::units::{binary_unit, largest};
 
 /// Residual, in units of rounding of single precision, at which solves by a factor stop.
@@ -23,6 +23,9 @@ const EXACT: f64 = 64.0;
 /// sample: one iteration leaves up to 2000 units of it in single precision, and increments of the samples that are wrong
 /// by a few units.
 const DIAGONALIZED: f64 = 4096.0;
+
+/// Most iterations of a solve that is asked for more than a step needs.
+const MOST_ITERATIONS: usize = 64;
 
 /// Impulses whose squares, and those of their residuals, are far from the ends of the range of single precision.
 const ORDINARY: std::ops::Range<f64> = 1e-6..1e12;
@@ -43,9 +46,14 @@ pub struct StepSolver<T> {
     method: Method,
     diagonalization: FastDiagonalization<T>,
     painted: Painted<T>,
+    /// What `painted` was made for.
+    painted_for: Option<StepMatrix<T>>,
+    /// Whether the solver was prepared since it began anew.
+    begun: bool,
     inverse: Option<SampleInverse>,
     iteration: ConjugateGradients<T>,
     border: Option<Box<Border<T>>>,
+    factorizations: usize,
     b: Vec<T>,
     samples: [Vec<T>; 2],
     workspace: TensorWorkspace<T>,
@@ -60,6 +68,31 @@ enum Painted<T> {
     VCycle(Box<VCycle<T>>),
     SampleDirect(BandCholesky<T>),
     SampleMultigrid(Box<SampleMultigrid<T>>),
+}
+
+/// All of a solver that is neither its lattice nor made from the matrix at hand: the matrix that it was prepared for, and
+/// how far the factor is that is made beside the steps.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub(crate) struct SolverHistory<T> {
+    mass: Weights<T>,
+    springs: Vec<Weights<T>>,
+    progress: Option<Progress>,
+}
+
+impl<T> SolverHistory<T> {
+    /// Whether all lists have `samples` numbers.
+    pub fn fits(&self, samples: usize) -> bool {
+        let fit = |w: &Weights<T>| match w {
+            Weights::Constant(_) => true,
+            Weights::Each(list) => list.len() == samples,
+        };
+        fit(&self.mass) && self.springs.iter().all(fit)
+    }
+
+    /// Directions of its springs.
+    pub fn directions(&self) -> usize {
+        self.springs.len()
+    }
 }
 
 /// `A⁻¹` in double precision.
@@ -101,6 +134,8 @@ impl<T: Real> StepSolver<T> {
                 FastDiagonalization::new(&lattice)
             },
             painted: Painted::None,
+            painted_for: None,
+            begun: false,
             inverse: square.then(|| SampleInverse {
                 product: lattice.inverse(),
                 d: vec![0.0; m],
@@ -109,6 +144,7 @@ impl<T: Real> StepSolver<T> {
             }),
             iteration: ConjugateGradients::new(lattice.coefficient_count()),
             border: None,
+            factorizations: 0,
             b: zeros(lattice.coefficient_count()),
             samples: [zeros(m), zeros(m)],
             workspace: TensorWorkspace::new(),
@@ -135,6 +171,10 @@ impl<T: Real> StepSolver<T> {
 
     /// Makes ready for a matrix.
     ///
+    /// What is there for the same matrix already serves on: a factor has the same bits whenever it is made. Of a factor
+    /// that is made beside the steps the work goes on, but begins anew after [`begin_again`](Self::begin_again) and
+    /// after constant material.
+    ///
     /// # Errors
     /// [`SolveError`] if it is not positive definite.
     pub fn prepare(&mut self, s: &StepMatrix<T>) -> Result<(), SolveError> {
@@ -142,42 +182,105 @@ impl<T: Real> StepSolver<T> {
         if s.is_uniform() && s.springs.len() == 3 {
             self.diagonalization.set_constant(s);
             self.method = Method::FastDiagonalization;
+            self.begun = false;
             self.prepare_border(s);
             return Ok(());
         }
         if matches!(self.painted, Painted::None) {
-            self.painted = self.make_painted(s);
+            self.painted = self.make_painted();
         }
-        self.method = match &mut self.painted {
-            Painted::None => unreachable!("made above"),
+        if self.painted_for.as_ref() != Some(s) {
+            self.painted_for = None;
+            self.make(s)?;
+            self.painted_for = Some(s.clone());
+        } else if let (Painted::Background(background), false) = (&mut self.painted, self.begun) {
+            background.begin_again();
+        }
+        self.begun = true;
+        self.settle_method();
+        self.prepare_border(s);
+        Ok(())
+    }
+
+    /// Makes factors and cycles for a matrix.
+    fn make(&mut self, s: &StepMatrix<T>) -> Result<(), NotPositive> {
+        self.factorizations += 1;
+        match &mut self.painted {
+            Painted::None => unreachable!("made before it is prepared"),
             Painted::Direct(direct) => {
                 let (galerkin, factor) = &mut **direct;
-                galerkin.factorize(s, factor)?;
-                Method::Direct
+                galerkin.factorize(s, factor)
             }
-            Painted::Background(background) => {
-                background.prepare(s)?;
-                if background.is_done() {
-                    Method::Direct
-                } else {
-                    Method::VCycle
-                }
-            }
-            Painted::VCycle(cycle) => {
-                cycle.prepare(s)?;
-                Method::VCycle
-            }
+            Painted::Background(background) => background.prepare(s),
+            Painted::VCycle(cycle) => cycle.prepare(s),
             Painted::SampleDirect(factor) => {
                 fill_band(s, factor);
-                factor.factorize()?;
-                Method::SampleDirect
+                factor.factorize()
             }
-            Painted::SampleMultigrid(multigrid) => {
-                multigrid.prepare(s)?;
-                Method::SampleMultigrid
-            }
-        };
-        self.prepare_border(s);
+            Painted::SampleMultigrid(multigrid) => multigrid.prepare(s),
+        }
+    }
+
+    /// Makes factors and cycles for another matrix; where that cannot be, the old ones stay, which still solve.
+    fn renew(&mut self, s: &StepMatrix<T>) {
+        if self.make(s).is_ok() {
+            self.painted_for = Some(s.clone());
+        } else if let (Painted::Background(background), Some(matrix)) = (&mut self.painted, &self.painted_for)
+        {
+            background.keep(matrix);
+        }
+    }
+
+    /// Forgets what was solved before, but for factors and cycles that would come out the same: after the next
+    /// [`prepare`](Self::prepare) all bits are those of a new solver.
+    pub(crate) fn begin_again(&mut self) {
+        self.begun = false;
+        self.border = None;
+    }
+
+    /// Factors and cycles that were made so far, each of a background once.
+    pub fn factorizations(&self) -> usize {
+        self.factorizations
+    }
+
+    /// What the next solves depend on beside the matrix; nothing before the first [`prepare`](Self::prepare) and of
+    /// constant material.
+    pub(crate) fn history(&self) -> Option<SolverHistory<T>> {
+        let matrix = self.painted_for.as_ref().filter(|_| self.begun)?;
+        Some(SolverHistory {
+            mass: matrix.mass.clone(),
+            springs: matrix.springs.iter().map(|s| s.weights.clone()).collect(),
+            progress: match &self.painted {
+                Painted::Background(background) => Some(background.progress()),
+                _ => None,
+            },
+        })
+    }
+
+    /// Goes to where another solver was, of whose matrix `like` has the springs; its constraints follow with
+    /// [`set_border`](Self::set_border), those of the time included.
+    ///
+    /// # Errors
+    /// [`SolveError`] if the matrix of a damaged history is not positive definite.
+    pub(crate) fn resume(
+        &mut self,
+        history: &SolverHistory<T>,
+        like: &StepMatrix<T>,
+    ) -> Result<(), SolveError> {
+        let springs = like.springs.iter().zip(&history.springs);
+        let springs = springs.map(|(s, w)| SpringWeights {
+            direction: s.direction,
+            weights: w.clone(),
+        });
+        let s = StepMatrix::new(like.dims(), history.mass.clone(), springs.collect());
+        let border = self.border.take();
+        self.prepare(&s)?;
+        if let (Painted::Background(background), Some(progress)) = (&mut self.painted, history.progress) {
+            background.resume(&s, progress);
+        }
+        self.settle_method();
+        self.border = border;
+        self.prepare_border(&s);
         Ok(())
     }
 
@@ -199,7 +302,7 @@ impl<T: Real> StepSolver<T> {
         self.border.as_deref_mut()
     }
 
-    fn make_painted(&self, s: &StepMatrix<T>) -> Painted<T> {
+    fn make_painted(&self) -> Painted<T> {
         let [_, my, mz] = self.lattice.sample_dims();
         let (n, m) = (self.lattice.coefficient_count(), self.lattice.sample_count());
         let few = n
@@ -219,7 +322,7 @@ impl<T: Real> StepSolver<T> {
                 Painted::Direct(Box::new((galerkin, factor)))
             }
             (false, false) if n <= self.options.background_limit => Painted::Background(Box::new(
-                Background::new(&self.lattice, s, &self.steps, self.options.v_cycle),
+                Background::new(&self.lattice, &self.steps, self.options.v_cycle),
             )),
             (false, false) => Painted::VCycle(Box::new(VCycle::new(
                 &self.lattice,
@@ -235,15 +338,23 @@ impl<T: Real> StepSolver<T> {
     /// # Panics
     /// If a length is wrong.
     pub fn solve(&mut self, s: &StepMatrix<T>, g: &[T], x: &mut [T], dx: &mut [T]) -> SolveReport {
-        let tolerance = self.options.tolerance.unwrap_or(match self.method {
-            Method::VCycle | Method::SampleMultigrid => ITERATED,
-            Method::Direct if matches!(self.painted, Painted::Background(_)) => ITERATED,
-            // Double precision is for references: there coefficients that hardly move a sample count too.
-            _ if T::UNIT_ROUND_OFF < 1e-10 => 16.0 * T::UNIT_ROUND_OFF,
-            Method::FastDiagonalization => DIAGONALIZED * T::UNIT_ROUND_OFF,
-            _ => EXACT * T::UNIT_ROUND_OFF,
-        });
-        let cap = self.options.iterations;
+        self.solve_to(s, g, x, dx, None)
+    }
+
+    /// The same to a residual, if one is asked for that is less than what a step needs.
+    pub(crate) fn solve_to(
+        &mut self,
+        s: &StepMatrix<T>,
+        g: &[T],
+        x: &mut [T],
+        dx: &mut [T],
+        asked: Option<f64>,
+    ) -> SolveReport {
+        let usual = self.tolerance();
+        let (tolerance, cap) = match asked {
+            Some(asked) if asked < usual => (asked, MOST_ITERATIONS.max(self.options.iterations)),
+            _ => (usual, self.options.iterations),
+        };
         if self.inverse.is_some() {
             self.b.copy_from_slice(g);
         } else {
@@ -285,7 +396,13 @@ impl<T: Real> StepSolver<T> {
             if let (Painted::Background(background), None) = (&mut self.painted, &self.border)
                 && solved_by != Method::FastDiagonalization
             {
-                background.advance(s, report);
+                let matrix = self
+                    .painted_for
+                    .as_ref()
+                    .expect("prepared before the first solve");
+                if background.advance(matrix, report) {
+                    self.renew(s);
+                }
                 self.settle_method();
             }
             report
@@ -304,6 +421,18 @@ impl<T: Real> StepSolver<T> {
         }
     }
 
+    /// Residual at which steps stop.
+    fn tolerance(&self) -> f64 {
+        self.options.tolerance.unwrap_or(match self.method {
+            Method::VCycle | Method::SampleMultigrid => ITERATED,
+            Method::Direct if matches!(self.painted, Painted::Background(_)) => ITERATED,
+            // Double precision is for references: there coefficients that hardly move a sample count too.
+            _ if T::UNIT_ROUND_OFF < 1e-10 => 16.0 * T::UNIT_ROUND_OFF,
+            Method::FastDiagonalization => DIAGONALIZED * T::UNIT_ROUND_OFF,
+            _ => EXACT * T::UNIT_ROUND_OFF,
+        })
+    }
+
     /// The power of two that the impulses are divided by; 1 where they are of ordinary size, which saves two passes and
     /// changes no bit.
     fn impulse_unit(&self) -> f64 {
@@ -316,21 +445,22 @@ impl<T: Real> StepSolver<T> {
     }
 
     fn settle_method(&mut self) {
-        if let Painted::Background(background) = &self.painted {
-            self.method = if background.is_done() {
-                Method::Direct
-            } else {
-                Method::VCycle
-            };
-        }
+        self.method = match &self.painted {
+            Painted::None => Method::FastDiagonalization,
+            Painted::Direct(_) => Method::Direct,
+            Painted::Background(background) if background.is_done() => Method::Direct,
+            Painted::Background(_) | Painted::VCycle(_) => Method::VCycle,
+            Painted::SampleDirect(_) => Method::SampleDirect,
+            Painted::SampleMultigrid(_) => Method::SampleMultigrid,
+        };
     }
 
     /// Finishes a factor that is being made beside the steps: what some hundred steps would do.
     pub fn settle(&mut self) {
-        if let (Painted::Background(background), None, Method::VCycle) =
-            (&mut self.painted, &self.border, self.method)
+        if let (Painted::Background(background), Some(matrix), None, Method::VCycle) =
+            (&mut self.painted, &self.painted_for, &self.border, self.method)
         {
-            background.finish();
+            background.finish(matrix);
             self.settle_method();
         }
     }

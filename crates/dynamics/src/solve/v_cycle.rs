@@ -1,6 +1,7 @@
 //! The V-cycle for painted material: scaled fast diagonalization as smoother, every other knot as coarse space.
 
 use bspline::Real;
+use serde::{Deserialize, Serialize};
 
 use super::band_cholesky::{BandCholesky, NotPositive};
 use super::fast_diagonalization::FastDiagonalization;
@@ -15,7 +16,7 @@ use crate::springs::{StepMatrix, Weights};
 const LOWER: f64 = 1.0 / 12.0;
 
 /// How a [`VCycle`] is made.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct VCycleOptions {
     /// Degree of the Chebyshev polynomial of the smoother, one more where there are no blocks.
     pub degree: usize,

@@ -4,12 +4,13 @@
 
 use bspline::Real;
 use bspline::vectorized;
+use serde::{Deserialize, Serialize};
 
 use super::stencil::{SpringWeights, Weights};
 use crate::units::{binary_unit, springs_in_units};
 
 /// Which law, with its scale `σ`, a length per density: without it a density could not be added to a distance.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Law {
     /// `½k(Δ - Δ₀)²`: always convex.
     Linear {
@@ -82,7 +83,7 @@ fn spring<T: Real, const FOUR_D: bool>(delta: T, rest: T, rest_scale: T, h2: T) 
 }
 
 /// Rest of all springs: `Δ₀` per direction and starting sample, and how much each is scaled.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Rest<T> {
     /// `Δ₀` of each spring, per direction, in units of [`SpringNetwork::length_unit`].
     pub differences: Vec<Vec<T>>,
@@ -249,6 +250,31 @@ impl<T: Real> SpringNetwork<T> {
         }
     }
 
+    /// By how much the springs of each direction differ from their rest at the densities `d`, in units of lengths.
+    pub(crate) fn stretches(&self, d: &[T]) -> Vec<Vec<T>> {
+        let sigma = T::from_f64(self.sigma());
+        let mut all = self.rest.differences.clone();
+        for (list, s) in all.iter_mut().zip(&self.springs) {
+            rows_of(self.dims, s.direction.step, |from, to, count| {
+                for z in 0..count {
+                    list[from + z] = sigma * (d[from + z] - d[to + z]) - list[from + z];
+                }
+            });
+        }
+        all
+    }
+
+    /// Lets the springs of direction `n` rest where they differ by `stretch` at the densities `d`.
+    pub(crate) fn stretch(&mut self, n: usize, d: &[T], stretch: &[T]) {
+        let sigma = T::from_f64(self.sigma());
+        let rest = &mut self.rest.differences[n];
+        rows_of(self.dims, self.springs[n].direction.step, |from, to, count| {
+            for z in 0..count {
+                rest[from + z] = sigma * (d[from + z] - d[to + z]) - stretch[from + z];
+            }
+        });
+    }
+
     /// Adds the spring forces on the densities `d` to `force`.
     ///
     /// # Panics
@@ -369,6 +395,24 @@ impl<T: Real> SpringNetwork<T> {
         );
         report.energy *= 0.5 * self.energy_unit();
         report
+    }
+
+    /// Multiplies the weights of springs by their tangent factors `max(τ, 0)` at the densities `d`.
+    pub(crate) fn scale_by_tangent(&self, d: &[T], springs: &mut [SpringWeights<f64>]) {
+        let sigma = self.sigma();
+        for (n, s) in springs.iter_mut().enumerate() {
+            let (h2, rest) = (self.lengths[n], &self.rest.differences[n]);
+            let mut weights = vec![0.0; d.len()];
+            rows_of(self.dims, s.direction.step, |from, to, count| {
+                for z in 0..count {
+                    let delta = sigma * (d[from + z].as_f64() - d[to + z].as_f64());
+                    let (rest, scale) = (rest[from + z].as_f64(), self.rest.scale.at(from + z).as_f64());
+                    let (_, _, t) = spring::<f64, true>(delta, rest, scale, h2);
+                    weights[from + z] = s.weights.at(from + z) * t.max(0.0);
+                }
+            });
+            s.weights = Weights::Each(weights);
+        }
     }
 
     /// Of a spring of the unit of stiffness, twice, stretched by the unit of length.

@@ -1,5 +1,7 @@
+use serde::{Deserialize, Serialize};
+
 /// Which samples a density spring joins.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Neighbours {
     /// The nearest along the axes. Isotropic to 2 % for linear springs.
     Six,

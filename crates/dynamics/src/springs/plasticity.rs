@@ -1,11 +1,12 @@
 use bspline::Real;
+use serde::{Deserialize, Serialize};
 
 use super::Law;
 use super::law::{SpringNetwork, length, rows_of};
 use crate::patch::{Patch, PatchError, finite};
 
 /// Whether springs keep their rest lengths.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub enum Plasticity<T> {
     /// They do.
     #[default]

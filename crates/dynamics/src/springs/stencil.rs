@@ -4,7 +4,7 @@ use bspline::vectorized;
 use super::neighbours::Direction;
 
 /// A number per sample, or the same for all.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Weights<T> {
     /// The same everywhere.
     Constant(T),

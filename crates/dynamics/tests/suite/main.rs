@@ -10,6 +10,8 @@ mod lattice;
 mod motion;
 mod plasticity;
 mod region;
+mod replay;
+mod response;
 mod solve;
 mod springs;
 mod stability;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use bspline::hierarchical::{BRICK, BrickKey, Corrections, LevelCorrections};
+use bspline::hierarchical::{BRICK, BrickKey, DenseCorrections, LevelCorrections};
 use bspline::{HierarchicalSpline, Real};
 use glam::DVec3;
 
@@ -30,26 +30,26 @@ pub(crate) fn assemble_in<T: Real>(
 ) -> HierarchicalSpline<T> {
     let mut stored: Vec<LevelCorrections<T>> = Vec::with_capacity(levels.len() + 1);
     let m = base.width();
-    let mut bottom: BTreeMap<BrickKey, Corrections<T>> = BTreeMap::new();
+    let mut bottom: BTreeMap<BrickKey, DenseCorrections<T>> = BTreeMap::new();
     for (i, c) in base.values.iter().enumerate() {
         let s = [i / (m * m), i / m % m, i % m];
         let key = BrickKey(s.map(|s| (s / BRICK) as u32));
         let value = T::from_f64(c * scale);
         bottom
             .entry(key)
-            .or_insert_with(Corrections::empty)
+            .or_insert_with(DenseCorrections::empty)
             .set(s.map(|s| s % BRICK), value);
     }
-    stored.push(bottom.into_iter().map(|(k, c)| (k, Arc::new(c))).collect());
+    stored.push(bottom.into_iter().map(|(k, c)| (k, Arc::new(c.pack()))).collect());
     let unit = T::from_f64(scale);
     for level in levels {
         let mut values = level.x.iter();
-        let mut bricks: BTreeMap<BrickKey, Corrections<T>> = BTreeMap::new();
+        let mut bricks: BTreeMap<BrickKey, DenseCorrections<T>> = BTreeMap::new();
         for (key, &mask) in level.keys.iter().zip(&level.masks).filter(|(_, m)| **m != 0) {
             let corner = key.map(|k| k as usize * band::BRICK);
             let brick = bricks
                 .entry(BrickKey(corner.map(|c| (c / BRICK) as u32)))
-                .or_insert_with(Corrections::empty);
+                .or_insert_with(DenseCorrections::empty);
             for (slot, value) in band::active_slots(mask).zip(values.by_ref()) {
                 let within = [slot / 16, slot / 4 % 4, slot % 4];
                 brick.set(
@@ -58,7 +58,7 @@ pub(crate) fn assemble_in<T: Real>(
                 );
             }
         }
-        let corrections = bricks.into_iter().map(|(k, c)| (k, Arc::new(c))).collect();
+        let corrections = bricks.into_iter().map(|(k, c)| (k, Arc::new(c.pack()))).collect();
         stored.push(corrections);
     }
     HierarchicalSpline::from_corrections(lattice(origin, scale), 1.0, stored)

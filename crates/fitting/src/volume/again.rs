@@ -75,17 +75,15 @@ fn stored_level<T: Real>(
 ) -> (ActiveSet, Vec<T>) {
     let size = domain.functions(level);
     let mut found: Vec<(usize, T)> = Vec::new();
-    for (key, corrections) in field.corrections(level) {
+    for (key, corrections) in &field.corrections(level) {
         let corner = key.0.map(|k| k as usize * BRICK);
-        for (slot, value) in corrections.values.iter().enumerate() {
-            if corrections.is_active(slot) {
-                let at = [
-                    corner[0] + slot / 64,
-                    corner[1] + slot / 8 % 8,
-                    corner[2] + slot % 8,
-                ];
-                found.push(((at[2] * size[1] + at[1]) * size[0] + at[0], *value * scale));
-            }
+        for (slot, value) in corrections.iter() {
+            let at = [
+                corner[0] + slot / 64,
+                corner[1] + slot / 8 % 8,
+                corner[2] + slot % 8,
+            ];
+            found.push(((at[2] * size[1] + at[1]) * size[0] + at[0], value * scale));
         }
     }
     found.sort_unstable_by_key(|f| f.0);

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bspline::Real;
-use bspline::hierarchical::{BRICK, BrickKey, Corrections, LevelCorrections};
+use bspline::hierarchical::{BRICK, BrickKey, Corrections, DenseCorrections, LevelCorrections};
 use rayon::prelude::*;
 
 use super::active::ActiveSet;
@@ -19,7 +19,7 @@ pub(crate) fn sparse_bricks<T: Real>(active: &ActiveSet, packed: &[T], scale: T)
                 for (&x, &c) in active.x(range.clone()).iter().zip(&packed[range]) {
                     let x = x as usize;
                     row[x / BRICK]
-                        .get_or_insert_with(Corrections::empty)
+                        .get_or_insert_with(DenseCorrections::empty)
                         .set([x % BRICK, y % BRICK, z % BRICK], c * scale);
                 }
             }
@@ -38,7 +38,7 @@ pub(crate) fn full_bricks<T: Real>(size: [usize; 3], dense: &[T], scale: T) -> L
                 let slot = y % BRICK * BRICK + z % BRICK;
                 let bricks = &mut layer[y / BRICK * nx.div_ceil(BRICK)..];
                 for (brick, piece) in bricks.iter_mut().zip(line.chunks(BRICK)) {
-                    let brick = brick.get_or_insert_with(Corrections::empty);
+                    let brick = brick.get_or_insert_with(DenseCorrections::empty);
                     for (x, &c) in piece.iter().enumerate() {
                         brick.mask[x] |= bit;
                         brick.values[x * BRICK * BRICK + slot] = c * scale;
@@ -52,19 +52,19 @@ pub(crate) fn full_bricks<T: Real>(size: [usize; 3], dense: &[T], scale: T) -> L
 /// Fills layers of bricks of equal z side by side; `fill` gets the layer's number and its bricks, x fastest.
 fn assemble<T: Real>(
     size: [usize; 3],
-    fill: impl Fn(usize, &mut [Option<Corrections<T>>]) + Sync,
+    fill: impl Fn(usize, &mut [Option<DenseCorrections<T>>]) + Sync,
 ) -> LevelCorrections<T> {
     let [bx, by, bz] = size.map(|n| n.div_ceil(BRICK));
     let layers: Vec<Vec<(BrickKey, Arc<Corrections<T>>)>> = (0..bz)
         .into_par_iter()
         .map(|z| {
-            let mut layer: Vec<Option<Corrections<T>>> = (0..bx * by).map(|_| None).collect();
+            let mut layer: Vec<Option<DenseCorrections<T>>> = (0..bx * by).map(|_| None).collect();
             fill(z, &mut layer);
             let key = |i: usize| BrickKey([(i % bx) as u32, (i / bx) as u32, z as u32]);
             layer
                 .into_iter()
                 .enumerate()
-                .filter_map(|(i, c)| Some((key(i), Arc::new(c?))))
+                .filter_map(|(i, c)| Some((key(i), Arc::new(c?.pack()))))
                 .collect()
         })
         .collect();

@@ -41,11 +41,11 @@ pub(super) fn decode_within(bytes: &[u8], budget: &mut Budget) -> Result<LoadedF
         remedy: "a field file starts with \"\\x89ICLAY\\r\\n\"; was it sent as text?",
     })?;
     let version = Cursor::new(rest, "the version").u32()?;
-    if version != VERSION {
+    if !(1..=VERSION).contains(&version) {
         return Err(Fault::Value {
             what: "the version of the file",
             value: version.to_string(),
-            remedy: "this program reads version 1; use a newer one",
+            remedy: "this program reads versions 1 and 2; use a newer one",
         });
     }
     rest = &rest[4..];

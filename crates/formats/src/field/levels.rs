@@ -24,32 +24,21 @@ pub(super) fn to_bytes<T: Stored>(level: u32, bricks: &Level<T>) -> Vec<u8> {
         key.0.iter().for_each(|k| bytes.extend(k.to_le_bytes()));
     }
     for c in bricks.values() {
-        c.mask.iter().for_each(|m| bytes.extend(m.to_le_bytes()));
+        c.mask().iter().for_each(|m| bytes.extend(m.to_le_bytes()));
     }
     // Byte i of all values, then byte i + 1: signs and exponents stand together and pack, mantissas do not.
     let planes = bytes.len();
     bytes.resize(planes + active * T::BYTES, 0);
     let mut at = 0;
     for c in bricks.values() {
-        for_active(&c.mask, |slot| {
-            for (i, b) in c.values[slot].to_raw().as_ref().iter().enumerate() {
+        for value in c.values() {
+            for (i, b) in value.to_raw().as_ref().iter().enumerate() {
                 bytes[planes + i * active + at] = *b;
             }
             at += 1;
-        });
-    }
-    bytes
-}
-
-/// Calls `each` with the number of every active slot, in order.
-pub(super) fn for_active(mask: &[u64; BRICK], mut each: impl FnMut(usize)) {
-    for (word, bits) in mask.iter().enumerate() {
-        let mut bits = *bits;
-        while bits != 0 {
-            each(64 * word + bits.trailing_zeros() as usize);
-            bits &= bits - 1;
         }
     }
+    bytes
 }
 
 /// Reads the chunk of level `expected`; keys, masks and values are checked against `lattice`.
@@ -79,11 +68,9 @@ pub(super) fn from_bytes<T: Stored>(
     cursor.end()?;
     let active = active as usize;
 
-    budget.reserve(
-        "the coefficients",
-        count.into(),
-        size_of::<Corrections<T>>() + 512 * T::BYTES + 64,
-    )?;
+    let brick = size_of::<Corrections<T>>() + 64;
+    budget.reserve("the coefficients", active as u64, T::BYTES)?;
+    budget.reserve("the bricks of coefficients", count.into(), brick)?;
     let mut bricks = Vec::with_capacity(count as usize);
     let mut previous = None;
     let mut at = 0;
@@ -97,12 +84,12 @@ pub(super) fn from_bytes<T: Stored>(
             )));
         }
         previous = Some(key);
-        let mut c = Corrections::<T>::empty();
-        c.mask = std::array::from_fn(|i| u64::from_le_bytes(std::array::from_fn(|b| mask[8 * i + b])));
-        for_active(&c.mask, |slot| {
-            c.values[slot] = T::from_bytes(|i| planes[i * active + at]);
-            at += 1;
-        });
+        let mask: [u64; BRICK] =
+            std::array::from_fn(|i| u64::from_le_bytes(std::array::from_fn(|b| mask[8 * i + b])));
+        let end = at + mask.iter().map(|m| m.count_ones() as usize).sum::<usize>();
+        let values = (at..end).map(|at| T::from_bytes(|i| planes[i * active + at]));
+        let c = Corrections::new(mask, values.collect());
+        at = end;
         valid::brick(lattice, level as usize, key, &c).map_err(written_wrongly)?;
         bricks.push((key, Arc::new(c)));
     }

@@ -23,8 +23,8 @@ use crate::{Fault, FormatError, ReadLimits, Unit, atomic, input};
 /// stripped the eighth bit.
 pub const MAGIC: [u8; 8] = *b"\x89ICLAY\r\n";
 
-/// Version of the layout that is written, and the newest that is read.
-pub const VERSION: u32 = 1;
+/// Version that is written, and the newest that is read. All older ones are read too.
+pub const VERSION: u32 = 2;
 
 /// Most levels a file may have: 2^20 cells along a cell of level 0 is beyond any scan.
 pub const MAX_LEVELS: usize = 21;

@@ -1,8 +1,7 @@
 //! What a field file may hold: asked before it is written and after it is read, so that what was saved can be loaded.
 
-use bspline::hierarchical::{BRICK, BrickKey, Corrections, Lattice};
+use bspline::hierarchical::{BRICK, BrickKey, Corrections, Lattice, active_slots};
 
-use super::levels::for_active;
 use super::{FieldMeta, LeafRecord, MAX_LEVELS, Stored};
 use crate::volumes::geometry::is_usable;
 
@@ -52,22 +51,16 @@ pub(super) fn brick<T: Stored>(
 ) -> Result<(), Wrong> {
     // Functions stand at slots 0 ..= n+2 of each axis.
     let last = lattice.cells_at(level).map(|n| n + 2);
-    if !(0..3).all(|a| key.0[a] <= last[a] / BRICK as u32) || !within(&c.mask, key, last) {
+    if !(0..3).all(|a| key.0[a] <= last[a] / BRICK as u32) || !within(c.mask(), key, last) {
         return wrong(
             "a brick",
             format!("{:?} of level {level}, outside of the lattice", key.0),
         );
     }
-    let mut bad = None;
-    for_active(&c.mask, |slot| {
-        if !c.values[slot].is_finite() {
-            bad = Some(slot);
-        }
-    });
-    match bad {
-        Some(slot) => wrong(
+    match c.values().iter().find(|value| !value.is_finite()) {
+        Some(value) => wrong(
             "a coefficient",
-            format!("{:?} in brick {:?} of level {level}", c.values[slot], key.0),
+            format!("{value:?} in brick {:?} of level {level}", key.0),
         ),
         None => Ok(()),
     }
@@ -79,12 +72,10 @@ fn within(mask: &[u64; BRICK], key: BrickKey, last: [u32; 3]) -> bool {
     if (0..3).all(|a| room(a) >= BRICK as u32 - 1) {
         return true;
     }
-    let mut inside = true;
-    for_active(mask, |slot| {
+    active_slots(mask).all(|slot| {
         let place = [slot / 64, slot / 8 % 8, slot % 8];
-        inside &= (0..3).all(|a| place[a] as u32 <= room(a));
-    });
-    inside
+        (0..3).all(|a| place[a] as u32 <= room(a))
+    })
 }
 
 /// The leaf table and the confidences beside it.

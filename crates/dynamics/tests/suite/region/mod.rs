@@ -2,6 +2,7 @@
 
 mod baking;
 mod cutting;
+mod moving;
 mod parts;
 mod random_events;
 mod sleep;
@@ -24,10 +25,10 @@ const INTEGRATORS: [Integrator; 4] = [
 ];
 
 /// Numbers in `0..1`.
-struct Random(u64);
+pub struct Random(pub u64);
 
 impl Random {
-    fn unit(&mut self) -> f64 {
+    pub fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         ((z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb) >> 11) as f64 / (1u64 << 53) as f64
@@ -43,7 +44,7 @@ fn lattice() -> Lattice {
 }
 
 /// A half-space with bumps on `levels` levels: level 0 and 1 everywhere, level 2 where `x` is in the lower half.
-fn field<T: Real>(levels: usize) -> HierarchicalSpline<T> {
+pub fn field<T: Real>(levels: usize) -> HierarchicalSpline<T> {
     let lattice = lattice();
     let mut random = Random(7);
     let levels = (0..levels).map(|level| {
@@ -72,7 +73,7 @@ fn field<T: Real>(levels: usize) -> HierarchicalSpline<T> {
     HierarchicalSpline::from_corrections(lattice, 1.0, levels.collect())
 }
 
-const CELLS: Cells = Cells {
+pub const CELLS: Cells = Cells {
     level: 1,
     first: [7, 3, 5],
     count: [10, 9, 12],
@@ -85,7 +86,7 @@ fn options<T: Real>(field: &HierarchicalSpline<T>) -> RegionOptions {
     }
 }
 
-fn damped() -> Matter {
+pub fn damped() -> Matter {
     Matter {
         damping: Quantity::Constant(3.0),
         ..Matter::default()
@@ -93,7 +94,7 @@ fn damped() -> Matter {
 }
 
 /// A push on the samples round the middle.
-fn push<T: Real>(region: &Region<T>, size: f64) -> Vec<T> {
+pub fn push<T: Real>(region: &Region<T>, size: f64) -> Vec<T> {
     let [nx, ny, nz] = region.patch().lattice().sample_dims();
     let mut force = vec![T::zero(); nx * ny * nz];
     for (i, f) in force.iter_mut().enumerate() {

@@ -1,0 +1,68 @@
+//! What a patch keeps from step to step that is made from its state and matter: solvers, matrices, bounds.
+
+use bspline::Real;
+use serde::{Deserialize, Serialize};
+
+use crate::response::StaticSolver;
+use crate::solve::StepSolver;
+use crate::springs::StepMatrix;
+
+/// Solvers and matrices of a patch.
+#[derive(Clone, Debug)]
+pub(crate) struct Cache<T> {
+    pub solver: StepSolver<T>,
+    /// For the mass alone, made by the first explicit step.
+    pub mass_solver: Option<Box<StepSolver<T>>>,
+    /// `M + ΔtD` with the version and the step it was made for.
+    pub mass_matrix: Option<(u64, f64, StepMatrix<T>)>,
+    pub matrix: StepMatrix<T>,
+    /// Version, damping, stiffness and unit that the matrix holds.
+    pub filled: Option<(u64, f64, f64, f64)>,
+    /// What the solver was made for.
+    pub prepared: Option<Prepared>,
+    /// Counts changes of matter and constraints.
+    pub changes: u64,
+    /// Bound of explicit steps with the version it is of.
+    pub limit: Option<(u64, f64)>,
+    /// Of static problems, painted and of reference; no bit depends on whether they are there.
+    pub statics: [Option<Box<StaticSolver>>; 2],
+}
+
+/// Key of the matrix that the solver was made for.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Prepared {
+    pub version: u64,
+    pub damping: f64,
+    pub stiffness: f64,
+    /// Of the matrix.
+    pub unit: f64,
+    /// Residual of the first solve with it.
+    pub residual: f64,
+}
+
+impl<T: Real> Cache<T> {
+    /// Nothing made yet.
+    pub fn new(solver: StepSolver<T>, matrix: StepMatrix<T>) -> Self {
+        Self {
+            solver,
+            mass_solver: None,
+            mass_matrix: None,
+            matrix,
+            filled: None,
+            prepared: None,
+            changes: 0,
+            limit: None,
+            statics: [None, None],
+        }
+    }
+
+    /// Forgets all that later bits could depend on. What comes out the same when it is made again stays.
+    pub fn begin_again(&mut self) {
+        self.solver.begin_again();
+        if let Some(solver) = &mut self.mass_solver {
+            solver.begin_again();
+        }
+        self.mass_matrix = None;
+        self.prepared = None;
+    }
+}
