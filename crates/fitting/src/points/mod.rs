@@ -191,10 +191,7 @@ pub fn fit_points<T: Real>(
             conditions.len()
         ));
     };
-    let room = options
-        .coefficients
-        .map_or(usize::MAX, |most| most.saturating_sub(field.coefficient_count()));
-    let (field, specks) = specks::remove(field, &samples, &cascade.still, room);
+    let (field, specks) = specks::remove(field, &samples, &cascade.still, options.coefficients);
     if specks > 0 {
         samples.notes.push(format!(
             "specks of solid or cavity without a point of their own taken out: {specks}"

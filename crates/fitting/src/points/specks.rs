@@ -41,19 +41,18 @@ const BEYOND: f64 = 0.02;
 /// Rounds of search and repair.
 const ROUNDS: usize = 3;
 
-/// The field without specks, and how many there were. No more than `room` further functions are made active.
+/// The field without specks, and how many there were; with no more than `most` functions active, if that is given.
 pub(crate) fn remove<T: Real>(
     mut field: HierarchicalSpline<T>,
     samples: &Samples,
     still: &[StillCell],
-    room: usize,
+    most: Option<usize>,
 ) -> (HierarchicalSpline<T>, usize) {
-    let most = field.coefficient_count().saturating_add(room);
     let mut removed = 0;
     let mut asked = still.to_vec();
     for _ in 0..ROUNDS {
         let specks = specks(&field, samples, &asked);
-        let edits = shifts(&field, &specks, most.saturating_sub(field.coefficient_count()));
+        let edits = shifts(&field, &specks, most);
         match field.edited(&edits) {
             Ok(next) if !edits.is_empty() => field = next,
             _ => break,
@@ -245,8 +244,12 @@ fn piece<T: Real>(field: &HierarchicalSpline<T>, peak: &Peak) -> Option<FxHashSe
     Some(seen)
 }
 
-/// What shifts all of the specks over zero, at most `room` functions that are not active yet among it.
-fn shifts<T: Real>(field: &HierarchicalSpline<T>, specks: &[Speck], mut room: usize) -> Vec<LevelEdit<T>> {
+/// What shifts all of the specks over zero, with no more than `most` functions active in all.
+fn shifts<T: Real>(
+    field: &HierarchicalSpline<T>,
+    specks: &[Speck],
+    most: Option<usize>,
+) -> Vec<LevelEdit<T>> {
     let mut deltas: BTreeMap<(usize, [u32; 3]), f64> = BTreeMap::new();
     for speck in specks {
         let beyond = BEYOND * field.lattice().spacing(speck.level).x;
@@ -259,29 +262,26 @@ fn shifts<T: Real>(field: &HierarchicalSpline<T>, specks: &[Speck], mut room: us
             }
         }
     }
-    let mut edits = Vec::with_capacity(deltas.len());
-    for ((level, function), delta) in deltas {
-        if !is_active(field, level, function) {
-            if room == 0 {
-                continue;
-            }
-            room -= 1;
-        }
-        edits.push(LevelEdit {
-            level,
-            function,
-            delta: T::from_f64(delta),
+    if let Some(most) = most {
+        let mut room = most.saturating_sub(field.coefficient_count());
+        let known: Vec<_> = (0..field.level_count()).map(|l| field.corrections(l)).collect();
+        deltas.retain(|(level, function), _| {
+            let slot = function.map(|s| s as usize % BRICK);
+            let brick = known[*level].get(&BrickKey::of(*function));
+            let is_active = brick.is_some_and(|b| b.is_active((slot[0] * BRICK + slot[1]) * BRICK + slot[2]));
+            let has_room = is_active || room > 0;
+            room -= usize::from(!is_active && has_room);
+            has_room
         });
     }
-    edits
+    let edits = deltas.into_iter().map(|((level, function), delta)| LevelEdit {
+        level,
+        function,
+        delta: T::from_f64(delta),
+    });
+    edits.collect()
 }
 
-fn is_active<T: Real>(field: &HierarchicalSpline<T>, level: usize, function: [u32; 3]) -> bool {
-    let [x, y, z] = function.map(|s| s as usize % BRICK);
-    let key = BrickKey(function.map(|s| s / BRICK as u32));
-    let brick = field.corrections(level).get(&key);
-    brick.is_some_and(|b| b.is_active((x * BRICK + y) * BRICK + z))
-}
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -346,7 +346,7 @@ mod tests {
         let still =
             spots.map(|p| StillCell::unsure(BASE_DEPTH + level, to_cell(p).to_array().map(|c| c as u32)));
         samples = samples.with_entries(entries);
-        let (mended, count) = remove(spoiled, &samples, &still, usize::MAX);
+        let (mended, count) = remove(spoiled, &samples, &still, None);
         assert_eq!(count, 2);
         assert_eq!(is_solid(&mended), [false, true, true]);
         let moved = cloud
