@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use bspline::hierarchical::{BrickKey, Corrections, Lattice, LevelEdit};
 use bspline::polygonize::{BlockMesh, PolygonizeOptions, polygonize};
-use bspline::{Frame, HierarchicalSpline};
+use bspline::{Field, Frame, HierarchicalSpline};
 use criterion::{Criterion, criterion_group, criterion_main};
 use glam::{DAffine3, DVec3};
 
@@ -70,7 +70,7 @@ fn remesh(c: &mut Criterion) {
     println!(
         "{} bricks, {} of them new; {} blocks, {} of them new; {} cells sampled, {} for the whole",
         field.brick_count(),
-        edited.unshared_brick_count(&field),
+        edited.changed_bricks(&field).len(),
         report.blocks,
         update.changed.len(),
         update.report.cells_sampled,

@@ -1,3 +1,5 @@
+use std::any::Any;
+
 use glam::{DAffine3, DMat3, DVec3};
 
 use crate::Interval;
@@ -127,6 +129,26 @@ pub trait Field: Send + Sync {
     fn hessian_bound(&self, b: &Aabb) -> f64 {
         let _ = b;
         f64::INFINITY
+    }
+
+    /// An interval that holds `f` everywhere on the segment between two points: never too small, possibly too large.
+    fn bounds_along(&self, from: DVec3, to: DVec3) -> Interval {
+        self.bounds(&Aabb {
+            min: from.min(to),
+            max: from.max(to),
+        })
+    }
+
+    /// World boxes outside which, within `within`, this field has the very bits that `before` has; all of `within`, as
+    /// here, for fields that do not know how they follow from one another.
+    fn changed_boxes(&self, before: &dyn Field, within: &Aabb) -> Vec<Aabb> {
+        let _ = before;
+        vec![*within]
+    }
+
+    /// The field itself, for [`Field::changed_boxes`] of its own kind to look into.
+    fn as_any(&self) -> Option<&dyn Any> {
+        None
     }
 
     /// [`Field::value_gradient`] of many points, in order.

@@ -77,6 +77,35 @@ impl<T: Real> RestrictedAxis<T> {
         rows
     }
 
+    /// Rows for the derivative on `[a, b]`, by cells: they weigh differences `d_k = c_{k+1} - c_k`, the coefficients of a
+    /// quadratic spline, three at a time; the fourth weight is 0. Otherwise as [`Self::new`].
+    pub fn of_slopes(a: f64, b: f64) -> Self {
+        let a = a.clamp(0.0, CELLS as f64);
+        let b = b.clamp(a, CELLS as f64);
+        let mut rows = Self {
+            count: 0,
+            start: [0; COEFFICIENTS],
+            weights: [[T::zero(); 4]; COEFFICIENTS],
+        };
+        let ka = (a.floor() as usize).min(CELLS - 1);
+        let kb = (b.ceil() as usize).max(1) - 1;
+        rows.push_slope(ka, [a, a]);
+        if a == b {
+            return rows;
+        }
+        if ka >= kb {
+            rows.push_slope(ka, [a, b]);
+        } else {
+            rows.push_slope(ka, [a, (ka + 1) as f64]);
+            for k in ka + 1..kb {
+                rows.push_slope(k, [k as f64, (k + 1) as f64]);
+            }
+            rows.push_slope(kb, [b, kb as f64]);
+        }
+        rows.push_slope(kb, [b, b]);
+        rows
+    }
+
     /// Number of rows, `1 ..= 11`.
     pub fn count(&self) -> usize {
         self.count
@@ -123,6 +152,27 @@ impl<T: Real> RestrictedAxis<T> {
         self.count += 1;
     }
 
+    /// Appends the blossom of cell `k` of a quadratic spline at `u`.
+    fn push_slope(&mut self, k: usize, u: [f64; 2]) {
+        let k0 = k as f64;
+        let half = |n: f64, x: f64| [(n + 2.0 - x) / 2.0, (x - n) / 2.0];
+        let s1 = [half(k0 - 1.0, u[0]), half(k0, u[0])];
+        let s2 = [k0 + 1.0 - u[1], u[1] - k0];
+        let w = [
+            s2[0] * s1[0][0],
+            s2[0] * s1[0][1] + s2[1] * s1[1][0],
+            s2[1] * s1[1][1],
+            0.0,
+        ];
+        debug_assert!(
+            w.iter().all(|w| *w >= 0.0),
+            "negative weight {w:?} in cell {k} at {u:?}"
+        );
+        self.start[self.count] = k as u8;
+        self.weights[self.count] = w.map(T::from_f64);
+        self.count += 1;
+    }
+
     /// Bound on the error of one row times coefficients `c`, evaluated in `T` in any order, as a multiple of
     /// `max |c|`.
     ///
@@ -147,49 +197,60 @@ pub fn restricted_range<T: Real>(
 ) -> (T, T) {
     vectorized(
         #[inline(always)]
-        || range_of_rows(coefficients, axes),
+        || {
+            const SHORT: usize = 8;
+            if axes[1..].iter().all(|a| a.reads().len() <= SHORT) {
+                range_of_rows::<T, SHORT>(coefficients, axes)
+            } else {
+                range_of_rows::<T, COEFFICIENTS>(coefficients, axes)
+            }
+        },
     )
 }
 
+/// `LANES` is at least the number of coefficients read along y and z.
 #[inline(always)]
-fn range_of_rows<T: Real>(
+fn range_of_rows<T: Real, const LANES: usize>(
     coefficients: &[T; COEFFICIENTS * COEFFICIENTS * COEFFICIENTS],
     axes: &[RestrictedAxis<T>; 3],
 ) -> (T, T) {
     const N: usize = COEFFICIENTS;
     let [ax, ay, az] = axes;
     let (ry, rz) = (ay.reads(), az.reads());
+    // First coefficient along z that stands in a lane.
+    let oz = rz.start.min(N - LANES);
     // Lanes are rows of y; those beyond `ay.count` are computed with the rest and left out in the end.
-    let (mut low, mut high) = ([T::infinity(); N], [T::neg_infinity(); N]);
-    let mut plane = [[T::zero(); N]; N];
-    let mut turned = [[T::zero(); N]; N];
+    let (mut low, mut high) = ([T::infinity(); LANES], [T::neg_infinity(); LANES]);
+    let mut plane = [[T::zero(); LANES]; N];
+    let mut turned = [[T::zero(); LANES]; LANES];
     for i in 0..ax.count {
         let (x0, wx) = ax.row(i);
         for y in ry.clone() {
-            let line = |x: usize| -> &[T; N] {
-                coefficients[((x0 + x) * N + y) * N..][..N]
+            let line = |x: usize| -> &[T; LANES] {
+                coefficients[((x0 + x) * N + y) * N + oz..][..LANES]
                     .try_into()
-                    .expect("a row of 11")
+                    .expect("a row of lanes")
             };
             let (l0, l1, l2, l3) = (line(0), line(1), line(2), line(3));
-            for z in 0..N {
+            for z in 0..LANES {
                 plane[y][z] = (wx[0] * l0[z] + wx[1] * l1[z]) + (wx[2] * l2[z] + wx[3] * l3[z]);
             }
         }
         for j in 0..ay.count {
             let (y0, wy) = ay.row(j);
-            let mut line = [T::zero(); N];
-            for z in 0..N {
+            let mut line = [T::zero(); LANES];
+            for z in 0..LANES {
                 line[z] = (wy[0] * plane[y0][z] + wy[1] * plane[y0 + 1][z])
                     + (wy[2] * plane[y0 + 2][z] + wy[3] * plane[y0 + 3][z]);
             }
-            for z in rz.clone() {
+            for z in rz.start - oz..rz.end - oz {
                 turned[z][j] = line[z];
             }
         }
         for k in 0..az.count {
             let (z0, wz) = az.row(k);
-            for j in 0..N {
+            let z0 = z0 - oz;
+            for j in 0..LANES {
                 let c = (wz[0] * turned[z0][j] + wz[1] * turned[z0 + 1][j])
                     + (wz[2] * turned[z0 + 2][j] + wz[3] * turned[z0 + 3][j]);
                 low[j] = if c < low[j] { c } else { low[j] };

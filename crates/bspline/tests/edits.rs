@@ -8,7 +8,7 @@ use std::sync::Arc;
 use bspline::hierarchical::{
     BlockEdit, BrickKey, Change, Corrections, DiffError, EditError, Lattice, LevelCorrections, LevelEdit,
 };
-use bspline::{Aabb, Field, HierarchicalSpline, KnotVector, Real, TensorSpline};
+use bspline::{Aabb, Csg, Field, HierarchicalSpline, KnotVector, Real, TensorSpline};
 use common::Random;
 use glam::{DAffine3, DMat3, DVec3};
 
@@ -149,14 +149,14 @@ fn a_local_edit_shares_all_other_bricks() {
     };
     // Inside a brick; on a corner of eight; on the coarse level, whose change reaches its children.
     let fine = field.edited(&[edit(1, [100, 100, 100])]).unwrap();
-    assert_eq!(fine.unshared_brick_count(&field), 1);
+    assert_eq!(fine.changed_bricks(&field).len(), 1);
     let corner = field.edited(&[edit(1, [97, 97, 97])]).unwrap();
-    assert_eq!(corner.unshared_brick_count(&field), 8);
+    assert_eq!(corner.changed_bricks(&field).len(), 8);
     let coarse = field.edited(&[edit(0, [52, 52, 52])]).unwrap();
-    assert_eq!(coarse.unshared_brick_count(&field), 1 + 8);
+    assert_eq!(coarse.changed_bricks(&field).len(), 1 + 8);
     // A new level: its brick, and the one that covers its cells on the level between is there already.
     let deeper = field.edited(&[edit(2, [204, 204, 204])]).unwrap();
-    assert_eq!(deeper.unshared_brick_count(&field), 1);
+    assert_eq!(deeper.changed_bricks(&field).len(), 1);
     assert_eq!(deeper.level_count(), 3);
     // Undo is the old version; subtraction only comes near it.
     let back = fine
@@ -166,7 +166,7 @@ fn a_local_edit_shares_all_other_bricks() {
             delta: -0.25,
         }])
         .unwrap();
-    assert_eq!(back.unshared_brick_count(&field), 1);
+    assert_eq!(back.changed_bricks(&field).len(), 1);
     let boxes = fine.changed_boxes(&field, &field.lattice().world_box());
     assert_eq!(boxes.len(), 1);
     assert!(
@@ -276,7 +276,7 @@ fn bad_edits_are_refused_and_change_nothing() {
     assert!(matches!(overflow, Some(EditError::NotFinite { .. })));
     assert!(field.level_coefficients(0, [18, 0, 0], [3, 1, 1]).is_err());
     assert_eq!(field.level_coefficients(0, [0; 3], [0, 1, 1]), Ok(vec![]));
-    assert_eq!(field.edited(&[]).unwrap().unshared_brick_count(&field), 0);
+    assert_eq!(field.edited(&[]).unwrap().changed_bricks(&field).len(), 0);
 }
 
 /// All active functions with their coefficients: what edits are checked against.
@@ -391,7 +391,91 @@ fn deactivated_functions_take_their_bricks_with_them() {
     }
     let back = refined.edited_blocks(&[block(Change::Deactivate)]).unwrap();
     assert_same(&back, &field, &mut random);
-    assert_eq!(back.unshared_brick_count(&field), 0);
+    assert_eq!(back.changed_bricks(&field).len(), 0);
     let wrong = field.edited_blocks(&[block(Change::Set(vec![1.0]))]).err();
     assert_eq!(wrong, Some(EditError::Length { shape, found: 1 }));
+}
+
+#[test]
+fn a_patch_on_the_knots_of_a_level_is_an_edit() {
+    let mut random = Random(17);
+    let field =
+        HierarchicalSpline::from_corrections(lattice(), 0.5, random_levels::<f64>(&lattice(), &mut random));
+    let (level, first, cells) = (2usize, [20.0, 16.0, 30.0], [9, 8, 7]);
+    let knots: [KnotVector; 3] = std::array::from_fn(|a| {
+        let scale = 0.25;
+        KnotVector::uniform(
+            3,
+            cells[a],
+            first[a] * scale,
+            (first[a] + cells[a] as f64) * scale,
+        )
+        .unwrap()
+    });
+    let shape = cells.map(|n| n + 3);
+    let coefficients: Vec<f64> = (0..shape.iter().product::<usize>())
+        .map(|i| {
+            let at = [i / shape[2] / shape[1], i / shape[2] % shape[1], i % shape[2]];
+            let is_rim = (0..3).any(|a| at[a] < 3 || at[a] + 3 >= shape[a]);
+            if is_rim { 0.0 } else { random.unit() - 0.5 }
+        })
+        .collect();
+    let patch = TensorSpline::new(knots.clone(), coefficients.clone(), oblique(), 0.0).unwrap();
+    let edit = BlockEdit::adding(&patch, &lattice()).unwrap();
+    assert_eq!(edit.level, level);
+    let moved = field.edited_blocks(&[edit]).unwrap();
+    let region = field.lattice().world_box();
+    let mut most = 0.0f64;
+    for _ in 0..3000 {
+        let p = random.point(&region);
+        let expected = field.value(p) + patch.value(p);
+        assert!((moved.value(p) - expected).abs() < 1e-12, "at {p}");
+        most = most.max(patch.value(p).abs());
+    }
+    assert!(most > 0.05, "{most}");
+    let shifted = KnotVector::uniform(3, 9, 5.1, 5.1 + 9.0 * 0.25).unwrap();
+    let [_, y, z] = knots;
+    let off = TensorSpline::new([shifted, y, z], coefficients, oblique(), 0.0).unwrap();
+    let refused = BlockEdit::adding(&off, &lattice()).unwrap_err();
+    assert!(matches!(refused, EditError::NotDyadic { .. }), "{refused}");
+}
+
+#[test]
+fn trees_know_what_has_changed_in_their_branches() {
+    let mut random = Random(19);
+    let levels = random_levels::<f32>(&lattice(), &mut random);
+    let old = Arc::new(HierarchicalSpline::from_corrections(lattice(), 0.5, levels));
+    let edit = LevelEdit {
+        level: 2,
+        function: [33, 30, 25],
+        delta: 0.5,
+    };
+    let new = Arc::new(old.edited(&[edit]).unwrap());
+    let whole = old.lattice().world_box();
+    let within = Aabb::new(whole.min - 50.0, whole.max + 50.0);
+    let turned = DAffine3::from_rotation_y(0.4);
+    let tree = |field: &Arc<HierarchicalSpline<f32>>| -> Csg {
+        let field: Arc<dyn Field> = field.clone();
+        let moved = Arc::new(Csg::affine(field.clone(), turned).unwrap());
+        let mean = Arc::new(Csg::sum(vec![(0.5, field.clone()), (0.5, moved)], 0.1).unwrap());
+        let grown = Arc::new(Csg::grown(field, 0.2).unwrap());
+        Csg::difference(mean, vec![grown], 0.0).unwrap()
+    };
+    let (before, after) = (tree(&old), tree(&new));
+    let boxes = after.changed_boxes(&before, &within);
+    let volume = |b: &Aabb| b.size().element_product();
+    assert!(boxes.len() < 40 && boxes.iter().map(volume).sum::<f64>() < 0.3 * volume(&whole));
+    let mut changed = 0;
+    for _ in 0..20_000 {
+        let p = random.point(&whole);
+        let differs = after.value(p) != before.value(p);
+        changed += usize::from(differs);
+        let may = boxes.iter().any(|b| p.cmpge(b.min).all() && p.cmple(b.max).all());
+        assert!(may || !differs, "at {p}");
+    }
+    assert!(changed > 20, "{changed}");
+    // Other operations, other fields: everything may have changed.
+    assert_eq!(after.changed_boxes(old.as_ref(), &within), [within]);
+    let union = Csg::union(vec![old.clone(), new]).unwrap();
+    assert_eq!(union.changed_boxes(&before, &within), [within]);
 }

@@ -1,8 +1,9 @@
+use std::any::Any;
 use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
 
-use super::CsgError;
+use super::{CsgError, changed_branches, node_of};
 use crate::{Aabb, Field, Frame, Interval, Jet, vectors};
 
 /// `f(x) = g(T⁻¹x)` for an invertible affine `T`, the `s_i(T_i(x))` of [Hua04 eqs. 3 and 4].
@@ -102,6 +103,27 @@ impl Field for Affine {
     fn gradient_bounds(&self, b: &Aabb) -> [Interval; 3] {
         let local = self.field.gradient_bounds(&b.transformed(&self.local_from_world));
         vectors::transformed(self.local_from_world.matrix3.transpose(), local)
+    }
+
+    fn bounds_along(&self, from: DVec3, to: DVec3) -> Interval {
+        let [from, to] = [from, to].map(|p| self.local_from_world.transform_point3(p));
+        self.field.bounds_along(from, to)
+    }
+
+    fn changed_boxes(&self, before: &dyn Field, within: &Aabb) -> Vec<Aabb> {
+        let before =
+            node_of::<Self>(before).filter(|before| before.world_from_local == self.world_from_local);
+        let local = within.transformed(&self.local_from_world);
+        let pair = before.map(|before| std::iter::once((&self.field, &before.field)));
+        let boxes = changed_branches(pair, &local);
+        boxes
+            .iter()
+            .map(|b| b.transformed(&self.world_from_local))
+            .collect()
+    }
+
+    fn as_any(&self) -> Option<&dyn Any> {
+        Some(self)
     }
 
     fn hessian_bound(&self, b: &Aabb) -> f64 {

@@ -1,8 +1,9 @@
+use std::any::Any;
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 
-use super::{CsgError, Operation};
+use super::{CsgError, Operation, changed_branches, node_of};
 use crate::{Aabb, Field, Frame, Interval, Jet, vectors};
 
 /// How a smooth union rounds the crease `f = g` of the sharp one; an intersection is the mirror image.
@@ -343,6 +344,27 @@ impl Field for Blend {
                 Rounding::Rvachev { .. } => sum,
             }
         })
+    }
+
+    fn bounds_along(&self, from: DVec3, to: DVec3) -> Interval {
+        self.combine(
+            self.branches
+                .each_ref()
+                .map(|branch| branch.bounds_along(from, to)),
+        )
+    }
+
+    fn changed_boxes(&self, before: &dyn Field, within: &Aabb) -> Vec<Aabb> {
+        let kind = |node: &Self| (node.operation, node.rounding, node.iso);
+        let before = node_of::<Self>(before).filter(|before| kind(self) == kind(before));
+        changed_branches(
+            before.map(|before| self.branches.iter().zip(&before.branches)),
+            within,
+        )
+    }
+
+    fn as_any(&self) -> Option<&dyn Any> {
+        Some(self)
     }
 
     /// The formula of [`Field::jet`] with norms; the second derivatives of both roundings have the sign pattern of a

@@ -1,8 +1,9 @@
+use std::any::Any;
 use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::CsgError;
+use super::{CsgError, changed_branches, node_of};
 use crate::{Aabb, Field, Frame, Interval, Jet};
 
 /// Points of a batch that are pruned together: enough to pay for the bounds, few enough to lie close together
@@ -292,6 +293,31 @@ impl Field for Boolean {
         ranges
             .reduce(|a, b| std::array::from_fn(|i| a[i].hull(b[i])))
             .expect("a branch lives everywhere")
+    }
+
+    fn bounds_along(&self, from: DVec3, to: DVec3) -> Interval {
+        self.combine(
+            self.branches
+                .iter()
+                .map(|branch| branch.map_interval(branch.field.bounds_along(from, to))),
+        )
+    }
+
+    fn changed_boxes(&self, before: &dyn Field, within: &Aabb) -> Vec<Aabb> {
+        let same_kind = |before: &&Self| {
+            let signs = |node: &Self| node.branches.iter().map(|b| b.twice_iso).collect::<Vec<_>>();
+            self.operation == before.operation && signs(self) == signs(before)
+        };
+        let before = node_of::<Self>(before).filter(same_kind);
+        let pairs = before.map(|before| self.branches.iter().zip(&before.branches));
+        changed_branches(
+            pairs.map(|p| p.map(|(now, before)| (&now.field, &before.field))),
+            within,
+        )
+    }
+
+    fn as_any(&self) -> Option<&dyn Any> {
+        Some(self)
     }
 
     /// Infinite where two branches can win: there may be a crease.

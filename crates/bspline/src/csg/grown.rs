@@ -1,8 +1,9 @@
+use std::any::Any;
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 
-use super::CsgError;
+use super::{CsgError, changed_branches, node_of};
 use crate::{Aabb, Field, Frame, Interval, Jet, vectors};
 
 /// `F = f + h·|∇f|`: the solid grown by the length `h` (shrunk, if negative), to first order for any field.
@@ -83,6 +84,18 @@ impl Field for Grown {
             gradient,
             hessian: f.hessian + (f.hessian * across * f.hessian * (1.0 / slope) + third) * self.by,
         }
+    }
+
+    fn changed_boxes(&self, before: &dyn Field, within: &Aabb) -> Vec<Aabb> {
+        let before = node_of::<Self>(before).filter(|before| before.by == self.by);
+        changed_branches(
+            before.map(|before| std::iter::once((&self.field, &before.field))),
+            within,
+        )
+    }
+
+    fn as_any(&self) -> Option<&dyn Any> {
+        Some(self)
     }
 
     fn bounds(&self, b: &Aabb) -> Interval {

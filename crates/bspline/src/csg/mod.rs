@@ -32,6 +32,7 @@ pub use boolean::{Boolean, Operation};
 pub use grown::Grown;
 pub use sum::Sum;
 
+use std::any::Any;
 use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
@@ -222,6 +223,15 @@ impl Field for Csg {
     fn hessian_bound(&self, b: &Aabb) -> f64 {
         self.node().hessian_bound(b)
     }
+    fn bounds_along(&self, from: DVec3, to: DVec3) -> Interval {
+        self.node().bounds_along(from, to)
+    }
+    fn changed_boxes(&self, before: &dyn Field, within: &Aabb) -> Vec<Aabb> {
+        self.node().changed_boxes(before, within)
+    }
+    fn as_any(&self) -> Option<&dyn Any> {
+        self.node().as_any()
+    }
     fn jets(&self, points: &[DVec3], out: &mut [Jet]) {
         self.node().jets(points, out);
     }
@@ -237,6 +247,26 @@ impl Field for Csg {
     fn frame_bounds_about(&self, frame: &Frame, lo: [i64; 3], hi: [i64; 3], level: f64) -> Interval {
         self.node().frame_bounds_about(frame, lo, hi, level)
     }
+}
+
+/// World boxes outside which no branch has changed. `pairs` gives each branch with what stood in its place before; none
+/// if the nodes differ in more than their branches.
+fn changed_branches<'a>(
+    pairs: Option<impl Iterator<Item = (&'a Arc<dyn Field>, &'a Arc<dyn Field>)>>,
+    within: &Aabb,
+) -> Vec<Aabb> {
+    let Some(pairs) = pairs else {
+        return vec![*within];
+    };
+    let changed = pairs.filter(|(now, before)| !Arc::ptr_eq(now, before));
+    changed
+        .flat_map(|(now, before)| now.changed_boxes(before.as_ref(), within))
+        .collect()
+}
+
+/// `before` as a node of the kind `N`.
+fn node_of<N: 'static>(before: &dyn Field) -> Option<&N> {
+    before.as_any()?.downcast_ref()
 }
 
 /// Two fields at a time, from the first on.

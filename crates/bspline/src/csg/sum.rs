@@ -1,8 +1,9 @@
+use std::any::Any;
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 
-use super::CsgError;
+use super::{CsgError, changed_branches, node_of};
 use crate::{Aabb, Field, Frame, Interval, Jet};
 
 /// `f = constant + Σ_i w_i f_i`, added in the order given.
@@ -117,6 +118,24 @@ impl Field for Sum {
                 let term = field.gradient_bounds(b);
                 std::array::from_fn(|a| sum[a] + Interval::point(*w) * term[a])
             })
+    }
+
+    fn bounds_along(&self, from: DVec3, to: DVec3) -> Interval {
+        self.add_intervals(|field| field.bounds_along(from, to))
+    }
+
+    fn changed_boxes(&self, before: &dyn Field, within: &Aabb) -> Vec<Aabb> {
+        let same_weights = |before: &&Self| {
+            let weights = |node: &Self| node.terms.iter().map(|t| t.0).collect::<Vec<_>>();
+            self.constant == before.constant && weights(self) == weights(before)
+        };
+        let before = node_of::<Self>(before).filter(same_weights);
+        let pairs = before.map(|before| self.terms.iter().zip(&before.terms));
+        changed_branches(pairs.map(|p| p.map(|(now, before)| (&now.1, &before.1))), within)
+    }
+
+    fn as_any(&self) -> Option<&dyn Any> {
+        Some(self)
     }
 
     fn hessian_bound(&self, b: &Aabb) -> f64 {

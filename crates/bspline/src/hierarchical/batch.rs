@@ -52,10 +52,7 @@ pub(super) fn values_gradients<T: Real>(
     for (p, o) in points.iter().zip(out) {
         let (q, beyond) = f.place.clamp(*p);
         let at = f.place_after(last.as_ref(), q);
-        let (v, g) = kernel::value_gradient(at.brick.own_totals(), at.cell, at.t);
-        *o = f
-            .place
-            .extend((v.as_f64(), f.world_gradient(at.brick, g)), q, beyond);
+        *o = f.place.extend(at.value_gradient(&f.place), q, beyond);
         last = Some(at);
     }
 }
@@ -90,7 +87,7 @@ pub(super) fn jet_after<'a, T: Real>(
     let m = f.lattice_from_world().matrix3 * at.brick.scale();
     let inside = Jet {
         value: value.as_f64(),
-        gradient: f.world_gradient(at.brick, gradient),
+        gradient: at.world_gradient(&f.place, gradient),
         hessian: m.transpose() * h * m,
     };
     (f.place.extend_jet(inside, q, beyond), at)

@@ -5,11 +5,30 @@ use glam::DVec3;
 use super::brick::{BRICK, HALO};
 use super::node::Node;
 use super::spline::HierarchicalSpline;
+use crate::placed_box::PlacedBox;
 use crate::restrict::{RestrictedAxis, restricted_range};
 use crate::{Aabb, Interval, Real};
 
 /// Distance, in cells of the finest level, within which the end of a box counts as lying on a knot plane.
 const ON_KNOT: f64 = 1e-9;
+
+/// What bounds are taken of: nodes that together hold the box's cells, wherever a question reaches.
+pub(super) struct Roots<'a, I> {
+    pub place: &'a PlacedBox,
+    /// Finest level.
+    pub finest: usize,
+    pub nodes: I,
+}
+
+impl<T: Real> HierarchicalSpline<T> {
+    pub(super) fn roots(&self) -> Roots<'_, std::iter::Once<&Node<T>>> {
+        Roots {
+            place: &self.place,
+            finest: self.level_count() - 1,
+            nodes: std::iter::once(&*self.root),
+        }
+    }
+}
 
 /// Moves the ends of a box that lie next to a knot plane of the finest level onto it, and says by how much in
 /// cells, all ends together.
@@ -17,8 +36,8 @@ const ON_KNOT: f64 = 1e-9;
 /// Boxes laid along the knots, as a mesher asks for, miss them by a rounding and would reach slivers of up to 26 more
 /// bricks. In such a sliver of thickness `d` the one function that the cells on this side do not read has the
 /// weight `d³/6 <= 2e-28`; that of the others changes the field by less than `2d` of the largest coefficient.
-pub(super) fn onto_knots<T: Real>(spline: &HierarchicalSpline<T>, b: &Aabb) -> (Aabb, f64) {
-    let scale = (1u64 << (spline.level_count() - 1)) as f64;
+pub(super) fn onto_knots(finest: usize, b: &Aabb) -> (Aabb, f64) {
+    let scale = (1u64 << finest) as f64;
     let mut moved = 0.0;
     let mut snap = |q: f64| {
         let knot = (q * scale).round();
@@ -40,21 +59,21 @@ pub(super) fn onto_knots<T: Real>(spline: &HierarchicalSpline<T>, b: &Aabb) -> (
 ///
 /// With a `level`, only as tight as it takes to tell on which side of it the field lies; the whole line as soon as
 /// that cannot be told.
-pub(super) fn over_lattice_box<T: Real>(
-    spline: &HierarchicalSpline<T>,
+pub(super) fn over_lattice_box<'a, T: Real>(
+    roots: Roots<'a, impl Iterator<Item = &'a Node<T>>>,
     b: &Aabb,
     level: Option<f64>,
 ) -> Interval {
     if !(b.min.is_finite() && b.max.is_finite()) {
         return Interval::EVERYTHING;
     }
-    let extent = spline.lattice().extent();
+    let extent = roots.place.max;
     let inside = Aabb {
         min: b.min.clamp(DVec3::ZERO, extent),
         max: b.max.clamp(DVec3::ZERO, extent),
     };
-    let (snapped, moved) = onto_knots(spline, &inside);
-    let fall = spline.place.fall(b, &inside);
+    let (snapped, moved) = onto_knots(roots.finest, &inside);
+    let fall = roots.place.fall(b, &inside);
     let mut hull = Hull {
         lo: f64::INFINITY,
         hi: f64::NEG_INFINITY,
@@ -62,7 +81,9 @@ pub(super) fn over_lattice_box<T: Real>(
         // The fall may decide what the inside does not.
         level: level.filter(|_| fall == Interval::point(0.0)),
     };
-    visit(&spline.root, &spline.lattice().extent(), &snapped, &mut hull);
+    for node in roots.nodes {
+        visit(node, &extent, &snapped, &mut hull);
+    }
     if hull.is_undecided() {
         return Interval::EVERYTHING;
     }

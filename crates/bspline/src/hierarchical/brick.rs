@@ -20,6 +20,11 @@ pub const HALO_LEN: usize = HALO * HALO * HALO;
 pub struct BrickKey(pub [u32; 3]);
 
 impl BrickKey {
+    /// The brick in which a function's coefficient stands.
+    pub fn of(function: [u32; 3]) -> Self {
+        Self(function.map(|s| s / BRICK as u32))
+    }
+
     /// The brick of the next coarser level that covers this one's cells.
     pub fn parent(self) -> Self {
         Self(self.0.map(|b| b >> 1))
@@ -126,28 +131,29 @@ impl<T: Real> Corrections<T> {
     pub(super) fn add_to(&self, count: [usize; 3], target: &mut [T; HALO_LEN], start: usize) {
         let mut rank = 0;
         for (x, &word) in self.mask.iter().enumerate().take(count[0]) {
-            if word == 0 {
-                continue;
-            }
-            for y in 0..BRICK {
-                let row = (word >> (BRICK * y)) as u8;
-                let values = &self.values[rank..rank + row.count_ones() as usize];
-                rank += values.len();
-                if y >= count[1] || row == 0 {
-                    continue;
+            let mut values = &self.values[rank..];
+            rank += word.count_ones() as usize;
+            let mut rows = word;
+            for y in 0..count[1] {
+                if rows == 0 {
+                    break;
                 }
+                let mut row = rows as u8;
+                rows >>= BRICK;
+                let (own, rest) = values.split_at(row.count_ones() as usize);
+                values = rest;
                 let to = start + (x * HALO + y) * HALO;
                 let to = &mut target[to..to + count[2]];
                 if row == 0xff {
-                    to.iter_mut().zip(values).for_each(|(t, v)| *t += *v);
+                    to.iter_mut().zip(own).for_each(|(t, v)| *t += *v);
                     continue;
                 }
-                let mut bits = row;
-                for value in values {
-                    if let Some(t) = to.get_mut(bits.trailing_zeros() as usize) {
-                        *t += *value;
-                    }
-                    bits &= bits - 1;
+                for value in own {
+                    let Some(t) = to.get_mut(row.trailing_zeros() as usize) else {
+                        break;
+                    };
+                    *t += *value;
+                    row &= row - 1;
                 }
             }
         }

@@ -29,7 +29,7 @@ pub(super) fn over_world_box<T: Real>(spline: &HierarchicalSpline<T>, b: &Aabb) 
         min: local.min.clamp(DVec3::ZERO, extent),
         max: local.max.clamp(DVec3::ZERO, extent),
     };
-    let (snapped, moved) = onto_knots(spline, &inside);
+    let (snapped, moved) = onto_knots(spline.level_count() - 1, &inside);
     let most = over_node(spline, &spline.root, &snapped);
     // Second derivatives are continuous and, cell by cell, linear along each axis: a move of `d` cells changes them by
     // at most `4d` of the largest second difference in reach; over a million times what `moved` can be.

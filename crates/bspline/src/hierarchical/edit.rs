@@ -3,12 +3,14 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use super::brick::{BRICK, DenseCorrections, HALO, HALO_LEN, reaches};
 use super::graft::{Graft, grafted};
 use super::prolong::prolong;
 use super::renew::renewed;
 use super::{BrickKey, HierarchicalSpline, Lattice};
-use crate::Real;
+use crate::{KnotVector, Real, TensorSpline};
 
 /// Most levels that an edit may lead to.
 pub const MAX_LEVELS: usize = 21;
@@ -81,6 +83,12 @@ pub enum EditError {
         /// What it would be.
         value: f64,
     },
+    /// A patch does not stand on the functions of a level.
+    #[error("the patch's knots are none of the lattice's: {why}")]
+    NotDyadic {
+        /// What is different.
+        why: &'static str,
+    },
     /// A block's values do not fit its shape.
     #[error("a block of {shape:?} functions takes as many values; there are {found}")]
     Length {
@@ -99,17 +107,28 @@ impl<T: Real> HierarchicalSpline<T> {
     /// # Errors
     /// Any [`EditError`]; then nothing is done.
     pub fn edited(&self, edits: &[LevelEdit<T>]) -> Result<Self, EditError> {
-        let mut pending = Pending::new(self);
         for edit in edits {
             check_function(&self.lattice, edit.level, edit.function)?;
-            let &LevelEdit {
-                level,
-                function,
-                delta,
-            } = edit;
-            pending.put(level, function, |old| Some(old.unwrap_or(T::zero()) + delta))?;
         }
-        Ok(pending.apply())
+        // Edits of one brick stand together, and keep their order.
+        let mut order: Vec<(usize, BrickKey, usize)> = (edits.iter().enumerate())
+            .map(|(i, edit)| (edit.level, BrickKey::of(edit.function), i))
+            .collect();
+        order.sort_unstable();
+        let same_brick =
+            |a: &(usize, BrickKey, usize), b: &(usize, BrickKey, usize)| (a.0, a.1) == (b.0, b.1);
+        let groups: Vec<_> = order.chunk_by(same_brick).collect();
+        let changed = groups.into_par_iter().with_min_len(1000).map(|group| {
+            let mut brick = ChangedBrick::of(self, group[0].0, group[0].1);
+            for (.., i) in group {
+                let LevelEdit { function, delta, .. } = edits[*i];
+                brick.put(function, |old| Some(old.unwrap_or(T::zero()) + delta))?;
+            }
+            Ok(brick)
+        });
+        // The first error, whichever thread meets one first.
+        let changed: Vec<Result<_, EditError>> = changed.collect();
+        Ok(self.with_bricks(changed.into_iter().collect::<Result<_, _>>()?))
     }
 
     /// The field with blocks of coefficients changed, in the order given.
@@ -122,29 +141,32 @@ impl<T: Real> HierarchicalSpline<T> {
     /// # Errors
     /// Any [`EditError`]; then nothing is done.
     pub fn edited_blocks(&self, edits: &[BlockEdit<T>]) -> Result<Self, EditError> {
-        let mut pending = Pending::new(self);
+        let mut bricks: BTreeMap<(usize, BrickKey), ChangedBrick<T>> = BTreeMap::new();
         for edit in edits {
-            let (Change::Add(values) | Change::Set(values)) = &edit.change else {
-                edit.each(&self.lattice, |_, function| {
-                    pending.put(edit.level, function, |_| None)
-                })?;
-                continue;
+            let [nx, ny, nz] = edit.shape;
+            let found = match &edit.change {
+                Change::Add(values) | Change::Set(values) => values.len(),
+                Change::Deactivate => nx * ny * nz,
             };
-            if values.len() != edit.shape.iter().product::<usize>() {
+            if found != nx * ny * nz {
                 return Err(EditError::Length {
                     shape: edit.shape,
-                    found: values.len(),
+                    found,
                 });
             }
-            let adds = matches!(edit.change, Change::Add(_));
-            edit.each(&self.lattice, |i, function| {
-                pending.put(edit.level, function, |old| {
-                    let base = old.filter(|_| adds);
-                    Some(base.map_or(values[i], |old| old + values[i]))
-                })
-            })?;
+            if found == 0 {
+                continue;
+            }
+            let last = last_of(edit.first, edit.shape);
+            check_function(&self.lattice, edit.level, last)?;
+            for key in keys_between(BrickKey::of(edit.first), BrickKey::of(last)) {
+                bricks
+                    .entry((edit.level, key))
+                    .or_insert_with(|| ChangedBrick::of(self, edit.level, key))
+                    .put_block(edit, last)?;
+            }
         }
-        Ok(pending.apply())
+        Ok(self.with_bricks(bricks.into_values().collect()))
     }
 
     /// Coefficients `first .. first + count` of the total spline of `level` (function numbers as in [`LevelEdit`]), last
@@ -206,28 +228,51 @@ impl<T: Real> HierarchicalSpline<T> {
     }
 }
 
-impl<T> BlockEdit<T> {
-    /// Calls `visit` with the place in `values` and the number of every function.
-    fn each(
-        &self,
-        lattice: &Lattice,
-        mut visit: impl FnMut(usize, [u32; 3]) -> Result<(), EditError>,
-    ) -> Result<(), EditError> {
-        let [nx, ny, nz] = self.shape;
-        if nx * ny * nz == 0 {
-            return Ok(());
+impl<T: Real> BlockEdit<T> {
+    /// The edit that adds a patch to a field on `lattice`: a cubic one on uniform knots of one of its levels, placed as
+    /// it is. Exact where all functions of the patch lie within it, so with zeros in its outer three layers.
+    ///
+    /// # Errors
+    /// [`EditError::NotDyadic`]; [`EditError::Function`] if the patch reaches further than the lattice's functions.
+    pub fn adding(patch: &TensorSpline<T>, lattice: &Lattice) -> Result<Self, EditError> {
+        let not = |why| Err(EditError::NotDyadic { why });
+        if patch.world_from_parameter() != &lattice.world_from_lattice {
+            return not("it is placed by another map");
         }
-        check_function(lattice, self.level, last_of(self.first, self.shape))?;
-        for x in 0..nx {
-            for y in 0..ny {
-                for z in 0..nz {
-                    let at = [x, y, z];
-                    let function = std::array::from_fn(|a| self.first[a] + at[a] as u32);
-                    visit((x * ny + y) * nz + z, function)?;
-                }
+        let axes = patch.knots();
+        let spacing = axes[0].knots()[1] - axes[0].knots()[0];
+        let level = (1.0 / spacing).log2().round();
+        if !(0.0..=MAX_LEVELS as f64).contains(&level) {
+            return not("they are further apart than those of level 0, or nearer than any");
+        }
+        let scale = level.exp2();
+        let mut first = [0; 3];
+        for (axis, first) in axes.iter().zip(&mut first) {
+            if axis.degree() != 3 {
+                return not("its degree is not 3 on every axis");
+            }
+            let places = axis.knots().iter().map(|knot| knot * scale);
+            let start = axis.knots()[0] * scale;
+            if places
+                .enumerate()
+                .any(|(i, place)| (place - start.round() - i as f64).abs() > 1e-9)
+            {
+                return not("they are not evenly spaced on those of one level");
+            }
+            // Function 0 is centred on the third knot; function `s` of a level on knot `s - 1`.
+            match u32::try_from(start.round() as i64 + 3) {
+                Ok(number) => *first = number,
+                Err(_) => return not("it reaches further than the lattice's functions"),
             }
         }
-        Ok(())
+        let edit = Self {
+            level: level as usize,
+            first,
+            shape: axes.each_ref().map(KnotVector::coefficient_count),
+            change: Change::Add(patch.coefficients().to_vec()),
+        };
+        check_function(lattice, edit.level, last_of(edit.first, edit.shape))?;
+        Ok(edit)
     }
 }
 
@@ -259,98 +304,103 @@ pub(super) fn check_function(lattice: &Lattice, level: usize, function: [u32; 3]
     Ok(())
 }
 
-/// Bricks with changed functions.
-struct Pending<'a, T> {
-    field: &'a HierarchicalSpline<T>,
-    bricks: BTreeMap<(usize, BrickKey), Brick<T>>,
-    /// The brick of the last change, out of `bricks`: changes come in blocks.
-    last: Option<((usize, BrickKey), Brick<T>)>,
+fn keys_between(first: BrickKey, last: BrickKey) -> impl Iterator<Item = BrickKey> {
+    let range = move |a: usize| first.0[a]..=last.0[a];
+    range(0).flat_map(move |x| range(1).flat_map(move |y| range(2).map(move |z| BrickKey([x, y, z]))))
 }
 
-struct Brick<T> {
+/// A brick whose functions change.
+struct ChangedBrick<T> {
+    level: usize,
+    key: BrickKey,
     corrections: DenseCorrections<T>,
     /// Slots that changed, as in [`DenseCorrections::mask`].
     changed: [u64; BRICK],
 }
 
-impl<'a, T: Real> Pending<'a, T> {
-    fn new(field: &'a HierarchicalSpline<T>) -> Self {
+impl<T: Real> ChangedBrick<T> {
+    fn of(field: &HierarchicalSpline<T>, level: usize, key: BrickKey) -> Self {
+        let node = field.find(level, key);
+        let corrections = node.and_then(|n| n.corrections.as_deref());
         Self {
-            field,
-            bricks: BTreeMap::new(),
-            last: None,
+            level,
+            key,
+            corrections: corrections.map_or_else(DenseCorrections::empty, DenseCorrections::from),
+            changed: [0; BRICK],
         }
     }
 
-    fn brick(&mut self, place: (usize, BrickKey)) -> &mut Brick<T> {
-        if self.last.as_ref().is_none_or(|(last, _)| *last != place) {
-            if let Some((last, brick)) = self.last.take() {
-                self.bricks.insert(last, brick);
-            }
-            let brick = self.bricks.remove(&place).unwrap_or_else(|| {
-                let node = self.field.find(place.0, place.1);
-                let corrections = node.and_then(|n| n.corrections.as_deref());
-                Brick {
-                    corrections: corrections.map_or_else(DenseCorrections::empty, DenseCorrections::from),
-                    changed: [0; BRICK],
+    /// Does what a block asks of the brick's functions; `last` is the block's last.
+    fn put_block(&mut self, edit: &BlockEdit<T>, last: [u32; 3]) -> Result<(), EditError> {
+        let corner = self.key.0.map(|k| k * BRICK as u32);
+        let range = |a: usize| edit.first[a].max(corner[a])..=last[a].min(corner[a] + BRICK as u32 - 1);
+        for x in range(0) {
+            for y in range(1) {
+                for z in range(2) {
+                    let [i, j, k] =
+                        [x - edit.first[0], y - edit.first[1], z - edit.first[2]].map(|n| n as usize);
+                    let n = (i * edit.shape[1] + j) * edit.shape[2] + k;
+                    self.put([x, y, z], |old| match &edit.change {
+                        Change::Add(values) => Some(old.unwrap_or(T::zero()) + values[n]),
+                        Change::Set(values) => Some(values[n]),
+                        Change::Deactivate => None,
+                    })?;
                 }
-            });
-            self.last = Some((place, brick));
+            }
         }
-        &mut self.last.as_mut().expect("just set").1
+        Ok(())
     }
 
     /// Changes one function: from its coefficient, none if it is not active, to a new one.
+    #[inline]
     fn put(
         &mut self,
-        level: usize,
         function: [u32; 3],
         change: impl FnOnce(Option<T>) -> Option<T>,
     ) -> Result<(), EditError> {
-        let brick = self.brick((level, BrickKey(function.map(|s| s / BRICK as u32))));
         let slot = function.map(|s| s as usize % BRICK);
         let bit = 1 << (BRICK * slot[1] + slot[2]);
-        let is_active = brick.corrections.mask[slot[0]] & bit != 0;
-        let value = &mut brick.corrections.values[(slot[0] * BRICK + slot[1]) * BRICK + slot[2]];
+        let is_active = self.corrections.mask[slot[0]] & bit != 0;
+        let value = &mut self.corrections.values[(slot[0] * BRICK + slot[1]) * BRICK + slot[2]];
         let old = is_active.then_some(*value);
         let new = change(old);
         if let Some(new) = new.filter(|new| !new.is_finite()) {
             return Err(EditError::NotFinite {
-                level,
+                level: self.level,
                 function,
                 value: new.as_f64(),
             });
         }
         if old != new {
             *value = new.unwrap_or(T::zero());
-            brick.changed[slot[0]] |= bit;
-            brick.corrections.mask[slot[0]] &= !bit;
+            self.changed[slot[0]] |= bit;
+            self.corrections.mask[slot[0]] &= !bit;
             if new.is_some() {
-                brick.corrections.mask[slot[0]] |= bit;
+                self.corrections.mask[slot[0]] |= bit;
             }
         }
         Ok(())
     }
-
-    fn apply(mut self) -> HierarchicalSpline<T> {
-        self.bricks.extend(self.last.take());
-        let lattice = &self.field.lattice;
-        let mut grafts = Vec::new();
-        for ((level, key), brick) in self.bricks {
-            if brick.changed == [0; BRICK] {
-                continue;
-            }
-            let readers = readers(key, brick.changed);
-            grafts.extend(readers.map(|key| Graft::stale(lattice, level, key)));
-            let is_empty = brick.corrections.mask == [0; BRICK];
-            let functions = (!is_empty).then(|| Arc::new(brick.corrections.pack()));
-            grafts.push(Graft::functions(lattice, level, key, functions));
-        }
-        self.field.with_grafts(grafts)
-    }
 }
 
 impl<T: Real> HierarchicalSpline<T> {
+    fn with_bricks(&self, bricks: Vec<ChangedBrick<T>>) -> Self {
+        let mut grafts = Vec::new();
+        for brick in bricks.into_iter().filter(|b| b.changed != [0; BRICK]) {
+            let ChangedBrick { level, key, .. } = brick;
+            let readers = readers(key, brick.changed);
+            grafts.extend(readers.map(|key| Graft::stale(&self.lattice, level, key)));
+            let functions = Some(brick.corrections.pack()).filter(|c| c.count() > 0);
+            grafts.push(Graft::functions(
+                &self.lattice,
+                level,
+                key,
+                functions.map(Arc::new),
+            ));
+        }
+        self.with_grafts(grafts)
+    }
+
     /// The field with other functions in some bricks, whose readers are among the grafts.
     pub(super) fn with_grafts(&self, grafts: Vec<Graft<T>>) -> Self {
         if grafts.is_empty() {

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::spline::HierarchicalSpline;
-use super::{batch, bounds, curvature, grid, kernel, slopes};
+use super::{along, batch, bounds, curvature, grid, kernel, slopes, versions};
 use crate::{Aabb, Field, Frame, Interval, Jet, Real};
 
 impl<T: Real> Field for HierarchicalSpline<T> {
@@ -16,9 +16,7 @@ impl<T: Real> Field for HierarchicalSpline<T> {
     fn value_gradient(&self, p: DVec3) -> (f64, DVec3) {
         let (q, beyond) = self.place.clamp(p);
         let at = self.place(q);
-        let (v, g) = kernel::value_gradient(at.brick.own_totals(), at.cell, at.t);
-        self.place
-            .extend((v.as_f64(), self.world_gradient(at.brick, g)), q, beyond)
+        self.place.extend(at.value_gradient(&self.place), q, beyond)
     }
 
     fn jet(&self, p: DVec3) -> Jet {
@@ -26,11 +24,26 @@ impl<T: Real> Field for HierarchicalSpline<T> {
     }
 
     fn bounds(&self, b: &Aabb) -> Interval {
-        bounds::over_lattice_box(self, &b.transformed(self.lattice_from_world()), None)
+        bounds::over_lattice_box(self.roots(), &b.transformed(self.lattice_from_world()), None)
     }
 
     fn gradient_bounds(&self, b: &Aabb) -> [Interval; 3] {
-        slopes::over_world_box(self, b)
+        slopes::over_world_box(self.roots(), b)
+    }
+
+    fn bounds_along(&self, from: DVec3, to: DVec3) -> Interval {
+        along::over_segment(self, from, to, self.finest_spacing(), self.rounding_bound())
+    }
+
+    fn changed_boxes(&self, before: &dyn Field, within: &Aabb) -> Vec<Aabb> {
+        match before.as_any().and_then(|any| any.downcast_ref::<Self>()) {
+            Some(before) => versions::changed_boxes(self, before, within),
+            None => vec![*within],
+        }
+    }
+
+    fn as_any(&self) -> Option<&dyn std::any::Any> {
+        Some(self)
     }
 
     fn hessian_bound(&self, b: &Aabb) -> f64 {
@@ -50,10 +63,10 @@ impl<T: Real> Field for HierarchicalSpline<T> {
     }
 
     fn frame_bounds(&self, frame: &Frame, lo: [i64; 3], hi: [i64; 3]) -> Interval {
-        bounds::over_lattice_box(self, &self.place.frame_box(frame, lo, hi), None)
+        bounds::over_lattice_box(self.roots(), &self.place.frame_box(frame, lo, hi), None)
     }
 
     fn frame_bounds_about(&self, frame: &Frame, lo: [i64; 3], hi: [i64; 3], level: f64) -> Interval {
-        bounds::over_lattice_box(self, &self.place.frame_box(frame, lo, hi), Some(level))
+        bounds::over_lattice_box(self.roots(), &self.place.frame_box(frame, lo, hi), Some(level))
     }
 }

@@ -10,6 +10,7 @@
 //! bricks are nodes of one tree (`node`); an edit copies the paths to what it changes (`graft`), then makes the totals
 //! and summaries on them anew (`renew`).
 
+mod along;
 mod batch;
 mod bounds;
 mod brick;
@@ -23,6 +24,8 @@ mod graft;
 mod grid;
 mod kernel;
 mod lattice;
+mod local;
+mod motion;
 mod node;
 mod prolong;
 mod renew;
@@ -31,6 +34,7 @@ mod spline;
 mod surface;
 mod totals;
 mod versions;
+mod view;
 mod window;
 
 pub use brick::{
@@ -39,5 +43,8 @@ pub use brick::{
 pub use difference::{BrickChange, BrickDiff, DiffError};
 pub use edit::{BlockEdit, Change, EditError, LevelEdit, MAX_LEVELS};
 pub use lattice::Lattice;
+pub use local::{LocalField, LocalFields};
+pub use motion::Motion;
 pub use prolong::refine_block;
 pub use spline::HierarchicalSpline;
+pub use view::Brick;

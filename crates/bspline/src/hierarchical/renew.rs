@@ -10,8 +10,9 @@ use super::node::{Children, Node, covers_cells};
 use super::window::Window;
 use crate::Real;
 
-/// Bricks below a node from which on its children are made side by side.
-const SIDE_BY_SIDE: u64 = 64;
+/// Bricks below a node from which on its children are made side by side: about a millisecond's work, as waking another
+/// thread may take a tenth of that.
+const SIDE_BY_SIDE: u64 = 200;
 
 /// Makes the totals that are missing in `grafted`, and those that follow from others; nodes that come out as they are in
 /// `old` are `old`'s. Bricks that no function reaches are left out.

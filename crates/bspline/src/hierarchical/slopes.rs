@@ -1,35 +1,41 @@
 //! Sound intervals of the gradient over a box: differences of control coefficients.
 
-use std::sync::OnceLock;
+use std::ops::Range;
 
 use glam::DVec3;
 
-use super::bounds::{corners, local_box, own_part, shared};
-use super::brick::{BRICK, HALO};
+use super::bounds::{Roots, corners, local_box, own_part, shared};
+use super::brick::{BRICK, HALO, HALO_LEN};
 use super::node::Node;
-use super::spline::HierarchicalSpline;
-use crate::{Aabb, Interval, KnotVector, Real, tensor, vectors};
+use crate::restrict::{RestrictedAxis, restricted_range};
+use crate::{Aabb, Interval, Real, vectorized, vectors};
 
 /// Boxes up to this many cells on an axis are restricted; for larger ones the differences of the coefficients as they
 /// are cost a tenth and say nearly as much.
 const RESTRICTED: f64 = 4.0;
 
 /// Interval of each component of the gradient over a world box.
-pub(super) fn over_world_box<T: Real>(spline: &HierarchicalSpline<T>, b: &Aabb) -> [Interval; 3] {
-    let local = b.transformed(spline.lattice_from_world());
+pub(super) fn over_world_box<'a, T: Real>(
+    roots: Roots<'a, impl Iterator<Item = &'a Node<T>>>,
+    b: &Aabb,
+) -> [Interval; 3] {
+    let place = roots.place;
+    let local = b.transformed(&place.local_from_world);
     if !(local.min.is_finite() && local.max.is_finite()) {
         return [Interval::EVERYTHING; 3];
     }
-    let extent = spline.lattice().extent();
+    let extent = place.max;
     let inside = Aabb {
         min: local.min.clamp(DVec3::ZERO, extent),
         max: local.max.clamp(DVec3::ZERO, extent),
     };
     let mut hull: Option<[Interval; 3]> = None;
-    visit(&spline.root, &extent, &inside, &mut hull);
+    for node in roots.nodes {
+        visit(node, &extent, &inside, &mut hull);
+    }
     let slopes = hull.expect("a box has a part in some brick");
-    let world = vectors::transformed(spline.lattice_from_world().matrix3.transpose(), slopes);
-    spline.place.extend_slopes(world, &local, &inside)
+    let world = vectors::transformed(place.local_from_world.matrix3.transpose(), slopes);
+    place.extend_slopes(world, &local, &inside)
 }
 
 /// Adds the slopes of a node over the part of `b` in it.
@@ -62,24 +68,59 @@ fn visit<T: Real>(node: &Node<T>, extent: &DVec3, b: &Aabb, hull: &mut Option<[I
 fn of_part<T: Real>(brick: &Node<T>, part: &Aabb) -> [Interval; 3] {
     let within = local_box(brick, part);
     let scale = Interval::point(brick.scale());
-    let plain = differences(brick, &within);
     let is_small = within.iter().all(|[a, b]| b - a <= RESTRICTED);
     if !is_small {
-        return plain.map(|s| s * scale);
+        return differences(brick, &within).map(|s| s * scale);
     }
-    static CELLS: OnceLock<[KnotVector; 3]> = OnceLock::new();
-    let knots = CELLS.get_or_init(|| {
-        let cells = KnotVector::uniform(3, BRICK, 0.0, BRICK as f64);
-        let cells = cells.expect("eight unit cells");
-        [cells.clone(), cells.clone(), cells]
-    });
-    let cells = Aabb {
-        min: DVec3::from_array(within.map(|w| w[0])),
-        max: DVec3::from_array(within.map(|w| w[1])),
+    let values = within.map(|[a, b]| RestrictedAxis::<T>::new(a, b));
+    let mut rises = [T::zero(); HALO_LEN];
+    // Differences first, convex combinations of them after: no box is too tiny for that.
+    std::array::from_fn(|axis| {
+        let mut axes = values;
+        axes[axis] = RestrictedAxis::of_slopes(within[axis][0], within[axis][1]);
+        let [x, y, _] = axes.each_ref().map(RestrictedAxis::reads);
+        let largest = vectorized(
+            #[inline(always)]
+            || take_rises(brick.own_totals(), axis, x.clone(), y.clone(), &mut rises),
+        );
+        let (lo, hi) = restricted_range(&rises, &axes);
+        let share = 64.0 * T::UNIT_ROUND_OFF + 3.0 * RestrictedAxis::<T>::axis_error();
+        Interval::new(lo.as_f64(), hi.as_f64()).widened(share * largest.as_f64()) * scale
+    })
+}
+
+/// Differences along an axis of the coefficients in the rows `x`, `y`, and the largest coefficient there. Behind the
+/// last coefficient stands a difference of weight 0.
+#[inline(always)]
+fn take_rises<T: Real>(
+    totals: &[T; HALO_LEN],
+    axis: usize,
+    x: Range<usize>,
+    y: Range<usize>,
+    rises: &mut [T; HALO_LEN],
+) -> T {
+    let mut most = [T::zero(); HALO];
+    let row = |i: usize, j: usize| -> &[T; HALO] {
+        let start = (i.min(HALO - 1) * HALO + j.min(HALO - 1)) * HALO;
+        totals[start..start + HALO].try_into().expect("a row")
     };
-    let restricted = tensor::slopes(brick.own_totals().as_slice(), knots, &cells);
-    // Of tiny boxes in single precision the differences know more than the restriction.
-    std::array::from_fn(|a| plain[a].intersection(restricted[a]) * scale)
+    for i in x {
+        for j in y.clone() {
+            let own = row(i, j);
+            let next = match axis {
+                0 => *row(i + 1, j),
+                1 => *row(i, j + 1),
+                _ => std::array::from_fn(|k| own[(k + 1).min(HALO - 1)]),
+            };
+            let out = &mut rises[(i * HALO + j) * HALO..][..HALO];
+            for k in 0..HALO {
+                let size = own[k].abs();
+                most[k] = if size > most[k] { size } else { most[k] };
+                out[k] = next[k] - own[k];
+            }
+        }
+    }
+    most.into_iter().fold(T::zero(), |m, c| if c > m { c } else { m })
 }
 
 /// Least and largest difference of neighbouring coefficients among those that the cells of a box read: the derivative

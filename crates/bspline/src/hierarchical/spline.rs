@@ -6,7 +6,7 @@ use sha2::{Digest, Sha256};
 use super::brick::{BRICK, HALO_LEN};
 use super::edit::{EditError, check_function};
 use super::node::{Node, octant};
-use super::{BrickKey, Corrections, Lattice, LevelCorrections, build};
+use super::{BrickKey, Corrections, Lattice, LevelCorrections, build, kernel};
 use crate::Real;
 use crate::placed_box::PlacedBox;
 
@@ -182,6 +182,11 @@ impl<T: Real> HierarchicalSpline<T> {
         is_spanned.then(|| self.root.find(level, key))?
     }
 
+    /// Least world length of a knot interval of the finest level.
+    pub fn finest_spacing(&self) -> f64 {
+        self.lattice.spacing(self.level_count() - 1).min_element()
+    }
+
     /// Where lattice point `q`, inside the box, is evaluated: in the finest brick that covers it.
     #[inline]
     pub(super) fn place(&self, q: DVec3) -> Place<'_, T> {
@@ -192,33 +197,54 @@ impl<T: Real> HierarchicalSpline<T> {
     #[inline]
     pub(super) fn place_after<'a>(&'a self, last: Option<&Place<'a, T>>, q: DVec3) -> Place<'a, T> {
         let finest = self.level_count() - 1;
-        let limit = self.lattice.cells_at(finest);
-        let scaled = q * (1u64 << finest) as f64;
-        let cell: [u32; 3] = std::array::from_fn(|a| (scaled[a] as u32).min(limit[a] - 1));
+        let cell = finest_cell(&self.lattice, finest, q);
         let brick = match last {
             Some(last) if is_finest_over(last.brick, finest, cell) => last.brick,
             _ => finest_over(&self.root, finest, cell),
         };
+        Place::new(brick, finest, cell, q)
+    }
+}
+
+impl<'a, T: Real> Place<'a, T> {
+    /// Point `q` in `cell` of level `finest`, which `brick` evaluates.
+    #[inline]
+    pub fn new(brick: &'a Node<T>, finest: usize, cell: [u32; 3], q: DVec3) -> Self {
         let shift = finest - brick.level as usize;
         let scale = brick.scale();
-        Place {
+        Self {
             brick,
             cell: cell.map(|c| (c >> shift) as usize % BRICK),
             t: std::array::from_fn(|a| T::from_f64(q[a] * scale - (cell[a] >> shift) as f64)),
         }
     }
 
-    /// Gradient by cell coordinates of a brick to gradient by world coordinates.
+    /// Value and gradient by world coordinates, before the fall outside.
     #[inline]
-    pub(super) fn world_gradient(&self, brick: &Node<T>, g: [T; 3]) -> DVec3 {
-        let g = DVec3::new(g[0].as_f64(), g[1].as_f64(), g[2].as_f64()) * brick.scale();
-        self.place.local_from_world.matrix3.transpose() * g
+    pub fn value_gradient(&self, place: &PlacedBox) -> (f64, DVec3) {
+        let (value, g) = kernel::value_gradient(self.brick.own_totals(), self.cell, self.t);
+        (value.as_f64(), self.world_gradient(place, g))
     }
+
+    /// Gradient by cell coordinates to gradient by world coordinates.
+    #[inline]
+    pub fn world_gradient(&self, place: &PlacedBox, g: [T; 3]) -> DVec3 {
+        let g = DVec3::new(g[0].as_f64(), g[1].as_f64(), g[2].as_f64()) * self.brick.scale();
+        place.local_from_world.matrix3.transpose() * g
+    }
+}
+
+/// The cell of level `finest` that holds a point of the box.
+#[inline]
+pub(super) fn finest_cell(lattice: &Lattice, finest: usize, q: DVec3) -> [u32; 3] {
+    let limit = lattice.cells_at(finest);
+    let scaled = q * (1u64 << finest) as f64;
+    std::array::from_fn(|a| (scaled[a] as u32).min(limit[a] - 1))
 }
 
 /// Whether a brick is the one that evaluates a cell of level `finest`.
 #[inline]
-fn is_finest_over<T: Real>(brick: &Node<T>, finest: usize, cell: [u32; 3]) -> bool {
+pub(super) fn is_finest_over<T: Real>(brick: &Node<T>, finest: usize, cell: [u32; 3]) -> bool {
     let shift = finest - brick.level as usize;
     let key = cell.map(|c| c >> shift >> BRICK.ilog2());
     if key != brick.key.0 {
@@ -229,7 +255,7 @@ fn is_finest_over<T: Real>(brick: &Node<T>, finest: usize, cell: [u32; 3]) -> bo
 
 /// The finest brick over a cell of level `finest`. Where the box has cells every node has totals.
 #[inline]
-fn finest_over<T: Real>(root: &Node<T>, finest: usize, cell: [u32; 3]) -> &Node<T> {
+pub(super) fn finest_over<T: Real>(root: &Node<T>, finest: usize, cell: [u32; 3]) -> &Node<T> {
     let mut node = root;
     let mut shift = (finest as i32 - i32::from(root.level)) as usize;
     while shift > 0 {

@@ -4,64 +4,29 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::brick::BrickKey;
 use super::node::Node;
 use super::spline::HierarchicalSpline;
 use crate::{Aabb, Real};
 
-impl<T: Real> HierarchicalSpline<T> {
-    /// World boxes outside which, within `within`, this field has the very bits of `other`.
-    ///
-    /// Two bricks count as equal if they are one, so the versions have to come from each other by [`Self::edited`], in
-    /// any order and number; of fields built apart everything differs. Time in proportion to the bricks that differ.
-    pub fn changed_boxes(&self, other: &Self, within: &Aabb) -> Vec<Aabb> {
-        if self.lattice() != other.lattice() || self.slope() != other.slope() {
-            return vec![*within];
-        }
-        let mut changes = Changes {
-            spline: self,
-            reach: within.transformed(self.lattice_from_world()),
-            boxes: Vec::new(),
-        };
-        changes.compare(&self.root, &other.root);
-        changes.boxes
+/// [`Field::changed_boxes`](crate::Field::changed_boxes) of two versions.
+///
+/// Two bricks count as equal if they are one, so the versions have to come from each other by edits, in any order and
+/// number; of fields built apart everything differs. Time in proportion to the bricks that differ.
+pub(super) fn changed_boxes<T: Real>(
+    now: &HierarchicalSpline<T>,
+    before: &HierarchicalSpline<T>,
+    within: &Aabb,
+) -> Vec<Aabb> {
+    if now.lattice() != before.lattice() || now.slope() != before.slope() {
+        return vec![*within];
     }
-
-    /// Whether `level` has a brick at `key`: its cells are then evaluated at this level or a finer one, and editing
-    /// functions of the level changes no rounding beside their supports.
-    pub fn has_brick(&self, level: usize, key: BrickKey) -> bool {
-        self.find(level, key).is_some_and(|node| node.totals.is_some())
-    }
-
-    /// Bricks of totals that are not the very bricks of `other`.
-    pub fn unshared_brick_count(&self, other: &Self) -> usize {
-        let own = |node: &Node<T>, other: Option<&Node<T>>| {
-            let totals = other.and_then(|o| o.totals.as_ref());
-            let is_shared = node
-                .totals
-                .as_ref()
-                .zip(totals)
-                .is_some_and(|(a, b)| Arc::ptr_eq(a, b));
-            usize::from(node.totals.is_some() && !is_shared)
-        };
-        unshared(&self.root, Some(&other.root), &own)
-    }
-}
-
-/// Sum of `count` over the nodes of a tree that are not shared with another, each with its counterpart there.
-fn unshared<T: Real>(
-    node: &Node<T>,
-    other: Option<&Node<T>>,
-    count: &impl Fn(&Node<T>, Option<&Node<T>>) -> usize,
-) -> usize {
-    if other.is_some_and(|other| std::ptr::eq(node, other)) {
-        return 0;
-    }
-    let children = node.children.iter().enumerate().map(|(octant, child)| {
-        let other = other.and_then(|o| o.children[octant].as_deref());
-        child.as_deref().map_or(0, |child| unshared(child, other, count))
-    });
-    count(node, other) + children.sum::<usize>()
+    let mut changes = Changes {
+        spline: now,
+        reach: within.transformed(now.lattice_from_world()),
+        boxes: Vec::new(),
+    };
+    changes.compare(&now.root, &before.root);
+    changes.boxes
 }
 
 struct Changes<'a, T> {

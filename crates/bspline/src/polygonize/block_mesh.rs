@@ -1,7 +1,8 @@
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use super::blocks::{BlockGrid, Dirty, find_blocks};
+use super::blocks::{BlockGrid, BlockKey, Dirty, find_blocks};
 use super::piece::piece;
 use super::sampling::sample_blocks;
 use super::stitch::stitch;
@@ -38,8 +39,8 @@ use crate::{Aabb, Field, Frame};
 pub struct BlockMesh {
     frame: Frame,
     options: PolygonizeOptions,
-    /// Blocks with surface, sorted by key.
-    surfaces: Vec<Arc<BlockSurface>>,
+    /// Blocks with surface.
+    surfaces: BTreeMap<BlockKey, Arc<BlockSurface>>,
 }
 
 /// What an update did.
@@ -78,10 +79,10 @@ impl BlockMesh {
         let mut mesh = Self {
             frame: *frame,
             options: *options,
-            surfaces: Vec::new(),
+            surfaces: BTreeMap::new(),
         };
         let (surfaces, report) = mesh.sample(field, None, progress)?;
-        mesh.surfaces = surfaces;
+        mesh.surfaces = surfaces.into_iter().map(|s| (s.key, s)).collect();
         Ok((mesh, report))
     }
 
@@ -89,7 +90,7 @@ impl BlockMesh {
     /// coordinates, ends included), which may overlap.
     ///
     /// The cost is that of the blocks that the boxes meet. For two versions of a hierarchical spline
-    /// [`HierarchicalSpline::changed_boxes`](crate::HierarchicalSpline::changed_boxes) gives the boxes.
+    /// [`Field::changed_boxes`] gives the boxes.
     ///
     /// # Errors
     /// [`PolygonizeError::TooManyBlocks`]; the mesh is then as before.
@@ -112,15 +113,20 @@ impl BlockMesh {
         }
         let dirty = Dirty::new(&self.grid(), changed);
         let (new, report) = self.sample(field, dirty.as_ref(), progress)?;
-        let is_dirty = |s: &BlockSurface| dirty.as_ref().is_none_or(|d| d.contains(0, s.key));
-        let old = self.surfaces.iter().filter(|s| is_dirty(s));
-        let mut keys: Vec<[i32; 3]> = old.chain(&new).map(|s| s.key).collect();
+        let mut keys: Vec<BlockKey> = match &dirty {
+            Some(dirty) => {
+                let gone = dirty
+                    .blocks()
+                    .iter()
+                    .filter(|key| self.surfaces.remove(*key).is_some());
+                gone.copied().collect()
+            }
+            None => std::mem::take(&mut self.surfaces).into_keys().collect(),
+        };
+        keys.extend(new.iter().map(|s| s.key));
         keys.sort_unstable();
         keys.dedup();
-        self.surfaces.retain(|s| !is_dirty(s));
-        self.surfaces.extend(new);
-        // Two sorted runs: merged in one pass.
-        self.surfaces.sort_by_key(|s| s.key);
+        self.surfaces.extend(new.into_iter().map(|s| (s.key, s)));
         Ok(BlockUpdate {
             report,
             changed: keys,
@@ -170,7 +176,8 @@ impl BlockMesh {
         &self,
         progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
     ) -> Result<Mesh, PolygonizeError> {
-        stitch(&self.grid(), &self.options, &self.surfaces, progress)
+        let surfaces: Vec<_> = self.surfaces.values().cloned().collect();
+        stitch(&self.grid(), &self.options, &surfaces, progress)
     }
 
     /// The triangles of one block as a mesh of its own, with copies of the vertices that it shares with its neighbours,
@@ -184,7 +191,7 @@ impl BlockMesh {
 
     /// Blocks with surface, in order.
     pub fn blocks(&self) -> impl Iterator<Item = [i32; 3]> {
-        self.surfaces.iter().map(|s| s.key)
+        self.surfaces.keys().copied()
     }
 
     /// What is meshed.

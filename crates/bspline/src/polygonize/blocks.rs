@@ -197,6 +197,11 @@ impl Dirty {
         }
     }
 
+    /// The blocks, in order.
+    pub fn blocks(&self) -> &[BlockKey] {
+        &self.0[0]
+    }
+
     /// Whether a block of the octant `key` of `level` may have changed.
     pub fn contains(&self, level: u32, key: BlockKey) -> bool {
         // Above the last level the octants are the eight about the origin, as on it.

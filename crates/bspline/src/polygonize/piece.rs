@@ -1,5 +1,6 @@
 //! One block's triangles on their own.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::blocks::{BlockGrid, BlockKey, CELLS, NODES};
@@ -10,13 +11,10 @@ use super::{Mesh, PolygonizeError};
 /// See [`super::BlockMesh::piece`].
 pub(super) fn piece(
     grid: &BlockGrid,
-    surfaces: &[Arc<BlockSurface>],
+    surfaces: &BTreeMap<BlockKey, Arc<BlockSurface>>,
     block: BlockKey,
 ) -> Result<Option<Mesh>, PolygonizeError> {
-    let find = |key: BlockKey| -> Option<&BlockSurface> {
-        let index = surfaces.binary_search_by_key(&key, |s| s.key).ok()?;
-        Some(&surfaces[index])
-    };
+    let find = |key: BlockKey| surfaces.get(&key).map(|s| &**s);
     let Some(surface) = find(block) else {
         return Ok(None);
     };

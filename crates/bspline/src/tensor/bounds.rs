@@ -43,7 +43,7 @@ pub(super) fn of_gradient<T: Real>(spline: &TensorSpline<T>, b: &Aabb) -> [Inter
 }
 
 /// Interval of each derivative by parameters over a box of the domain.
-pub(crate) fn slopes<T: Real>(coefficients: &[T], knots: &[KnotVector; 3], inside: &Aabb) -> [Interval; 3] {
+fn slopes<T: Real>(coefficients: &[T], knots: &[KnotVector; 3], inside: &Aabb) -> [Interval; 3] {
     let shape = knots.each_ref().map(KnotVector::coefficient_count);
     let values: [BandedRows<T>; 3] =
         std::array::from_fn(|a| restriction_rows(&knots[a], inside.min[a], inside.max[a]).1);

@@ -26,5 +26,4 @@ mod kernel;
 mod refine;
 mod spline;
 
-pub(crate) use bounds::slopes;
 pub use spline::{TensorError, TensorSpline};

@@ -48,6 +48,7 @@ impl Default for Options {
 pub fn field_conformance(name: &str, field: &dyn Field, region: &Aabb, options: &Options) -> [f64; 2] {
     bounds_are_sound(name, field, region, options);
     gradient_bounds_are_sound(name, field, region, options);
+    bounds_along_are_sound(name, field, region, options);
     hessian_bounds_are_sound(name, field, region, options);
     ways_to_ask_agree(name, field, region, options);
     derivatives_match_differences(name, field, region, options);
@@ -175,6 +176,30 @@ fn gradient_bounds_are_sound(name: &str, field: &dyn Field, region: &Aabb, optio
             assert!(
                 (0..3).all(|a| bounds[a].contains(gradient[a])),
                 "{name}: {gradient} leaves {bounds:?} over {b:?} at {p}"
+            );
+        }
+    }
+}
+
+/// Segments of all lengths, also without one; a twentieth of them lie along an axis.
+fn bounds_along_are_sound(name: &str, field: &dyn Field, region: &Aabb, options: &Options) {
+    let mut random = Random(options.seed ^ 0xa106);
+    let reach = region.size() * 0.1;
+    let around = Aabb::new(region.min - reach, region.max + reach);
+    for i in 0..options.sound_boxes / 10 {
+        let b = random.small_box(&around);
+        let (from, mut to) = (b.min, b.max);
+        match i % 20 {
+            0 => to = from,
+            1 => to = DVec3::new(to.x, from.y, from.z),
+            _ => {}
+        }
+        let bounds = field.bounds_along(from, to);
+        for t in [0.0, 1.0, random.unit(), random.unit(), random.unit()] {
+            let value = field.value(from.lerp(to, t));
+            assert!(
+                bounds.contains(value),
+                "{name}: {value} leaves {bounds:?} between {from} and {to} at {t}"
             );
         }
     }

@@ -86,7 +86,7 @@ impl Cells {
                 for y in range(1) {
                     for z in range(2) {
                         let key = [x, y, z];
-                        if field.has_brick(level, BrickKey(key)) {
+                        if field.brick(level, BrickKey(key)).is_some() {
                             continue;
                         }
                         let low = key.map(|k| (u64::from(k) * width) as u32);

@@ -50,7 +50,7 @@ fn baking_keeps_the_old_version_to_the_bit() {
     );
     // Undo takes the old version out of the drawer: every brick of it is still there, and is the one it was.
     assert_eq!(old.sha256(), hash);
-    assert_eq!(old.unshared_brick_count(&copy), 0);
+    assert_eq!(old.changed_bricks(&copy).len(), 0);
     for ((p, _), b) in points.iter().zip(before) {
         assert_eq!(bits(&old, *p), b);
     }
@@ -77,7 +77,7 @@ fn outside_the_region_not_one_bit_changes() {
     let old = field::<f32>(3);
     let new = pushed(&old, CELLS, damped()).bake(&old).unwrap();
     // Cells 7..17, 3..12, 5..17 lie in 3·2·3 bricks, each with up to 8 below.
-    let unshared = new.unshared_brick_count(&old);
+    let unshared = new.changed_bricks(&old).len();
     assert!(
         (18..=18 * 9).contains(&unshared),
         "{unshared} of {}",
