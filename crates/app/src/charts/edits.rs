@@ -7,7 +7,10 @@ use std::time::Instant;
 
 use bspline::hierarchical::{BlockEdit, BrickKey, Change, DenseCorrections, Lattice, LevelEdit};
 use bspline::polygonize::{BlockMesh, PolygonizeError, PolygonizeOptions};
-use bspline::{Aabb, Field, Frame, HierarchicalSpline};
+use bspline::primitives::Sphere;
+use bspline::{Aabb, Csg, Field, Frame, HierarchicalSpline};
+use fitting::Control;
+use fitting::field::{Aim, FieldFitOptions, fit_field};
 use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 use serde_json::{Map, Value};
@@ -218,6 +221,8 @@ fn measure(ball: &Ball) -> Result<EditCosts, PolygonizeError> {
     });
     costs.push(("drop_us", middle(drops.collect())));
     costs.push(("remesh20_us", remeshed(ball)?));
+    let tools = [("tool10_ms", 10.0), ("tool20_ms", 20.0), ("tool40_ms", 40.0)];
+    costs.extend(tools.map(|(name, across)| (name, carved(ball, across))));
     costs.extend(questions(ball));
     Ok(EditCosts {
         coefficients: field.coefficient_count(),
@@ -245,6 +250,28 @@ fn remeshed(ball: &Ball) -> Result<f64, PolygonizeError> {
         times.push(start.elapsed().as_secs_f64() * 1e6);
     }
     Ok(middle(times))
+}
+
+/// Milliseconds to carve a ball `across` finest cells wide, and to write the result back: rows of \[Hua04\] Table 1.
+fn carved(ball: &Ball, across: f64) -> f64 {
+    let field: Arc<dyn Field> = Arc::new(ball.field.clone());
+    let radius = 0.5 * across * ball.cell();
+    let options = FieldFitOptions {
+        aim: Aim::Surface {
+            iso: 0.0,
+            tolerance: 0.05 * ball.cell(),
+        },
+        finest: ball.level,
+    };
+    let time = median(15, |i| {
+        let middle = ball.stroke(i);
+        let tool = Sphere::new(middle, radius).expect("a ball of some size");
+        let target = Csg::difference(field.clone(), vec![Arc::new(tool)], 0.0).expect("finite");
+        let within = Aabb::new(middle - radius, middle + radius);
+        fit_field(&target, &ball.field, &within, &options, &mut Control::default())
+            .expect("a tool beside nothing else")
+    });
+    time / 1e3
 }
 
 /// What it costs to lay out the bricks round a tool, and to ask them.
