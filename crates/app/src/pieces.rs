@@ -47,8 +47,9 @@ impl Pieces {
     }
 }
 
-/// For each triangle whether it belongs to a part narrower than `width` on every axis; all false if there is no other.
-pub fn of_narrow_parts(mesh: &Mesh, width: f64) -> Vec<bool> {
+/// How many parts are narrower than `width` on every axis, and for each triangle whether it belongs to one; none if there is
+/// no other.
+pub fn of_narrow_parts(mesh: &Mesh, width: f64) -> (usize, Vec<bool>) {
     let pieces = connected(mesh);
     let mut boxes = vec![(DVec3::INFINITY, DVec3::NEG_INFINITY); pieces.parts.len()];
     if boxes.len() > 1 {
@@ -60,13 +61,15 @@ pub fn of_narrow_parts(mesh: &Mesh, width: f64) -> Vec<bool> {
         }
     }
     let is_narrow = |(low, high): &(DVec3, DVec3)| (*high - *low).max_element() < width;
-    let narrow: Vec<bool> = boxes.iter().map(is_narrow).collect();
-    let drop = narrow.contains(&true) && narrow.contains(&false);
-    pieces
-        .part_of
-        .iter()
-        .map(|&p| drop && narrow[p as usize])
-        .collect()
+    let mut narrow: Vec<bool> = boxes.iter().map(is_narrow).collect();
+    if !narrow.contains(&false) {
+        narrow.fill(false);
+    }
+    let count = narrow.iter().filter(|n| **n).count();
+    (
+        count,
+        pieces.part_of.iter().map(|&p| narrow[p as usize]).collect(),
+    )
 }
 
 /// Parts by union and find over the vertices, smaller numbers as roots.
@@ -311,9 +314,9 @@ mod tests {
         cube(&mut mesh, [0.5; 3], 0.5, true);
         cube(&mut mesh, [4.0; 3], 0.9, false);
         let narrow = of_narrow_parts(&mesh, 1.0);
-        assert_eq!(narrow, [[false; 12], [true; 12], [true; 12]].concat());
-        assert_eq!(of_narrow_parts(&mesh, 3.0), [false; 36]);
-        assert_eq!(of_narrow_parts(&mesh, 0.1), [false; 36]);
+        assert_eq!(narrow, (2, [[false; 12], [true; 12], [true; 12]].concat()));
+        assert_eq!(of_narrow_parts(&mesh, 3.0), (0, vec![false; 36]));
+        assert_eq!(of_narrow_parts(&mesh, 0.1), (0, vec![false; 36]));
     }
 
     #[test]

@@ -14,8 +14,10 @@ pub struct UnsupportedComponent {
     pub at: DVec3,
 }
 
-/// Values held at once, about.
+/// Signs held at once, about.
 const SLAB: usize = 1 << 17;
+/// Nodes on an axis of the blocks whose bounds are asked for first.
+const BLOCK: usize = 8;
 
 /// Cells `start..end` of one row along z, all of one sign.
 struct Run {
@@ -102,18 +104,17 @@ fn runs_of_sign(field: &dyn Field, iso: f64, frame: &Frame) -> (Vec<Run>, Vec<u3
         ..*frame
     };
     let (mut runs, mut rows) = (Vec::new(), vec![0]);
-    // Several planes at once, where they are small: a brick is found once for all of them.
-    let planes = (SLAB / (ny * nz).max(1)).clamp(1, 8);
-    let mut slab = vec![0.0; planes * ny * nz];
+    let planes = (SLAB / (ny * nz).max(1)).clamp(1, BLOCK);
+    let mut slab = vec![false; planes * ny * nz];
     for x in (0..nx).step_by(planes) {
         let count = planes.min(nx - x);
         let slab = &mut slab[..count * ny * nz];
-        field.frame_values(&centres, [x as i64, 0, 0], [count, ny, nz], slab);
-        for values in slab.chunks_exact(nz) {
+        mark_inside(field, iso, &centres, x, [count, ny, nz], slab);
+        for inside in slab.chunks_exact(nz) {
             let mut start = 0;
             for end in 1..=nz {
-                let is_inside = values[start] > iso;
-                if end == nz || (values[end] > iso) != is_inside {
+                let is_inside = inside[start];
+                if end == nz || inside[end] != is_inside {
                     let (start_cell, parent) = (start as u32, runs.len() as u32);
                     let run = Run {
                         start: start_cell,
@@ -130,6 +131,47 @@ fn runs_of_sign(field: &dyn Field, iso: f64, frame: &Frame) -> (Vec<Run>, Vec<u3
         }
     }
     (runs, rows)
+}
+
+/// Whether `f > iso` at the nodes of `frame` from plane `first` on, `count` on each axis. Blocks that the bounds of the field
+/// leave on one side are not evaluated.
+pub(crate) fn mark_inside(
+    field: &dyn Field,
+    iso: f64,
+    frame: &Frame,
+    first: usize,
+    count: [usize; 3],
+    inside: &mut [bool],
+) {
+    let blocks = count.map(|n| n.div_ceil(BLOCK));
+    let mut values = [0.0; BLOCK * BLOCK * BLOCK];
+    for block in 0..blocks.iter().product() {
+        let at = [
+            block / (blocks[1] * blocks[2]),
+            block / blocks[2] % blocks[1],
+            block % blocks[2],
+        ];
+        let low = at.map(|b| b * BLOCK);
+        let size: [usize; 3] = std::array::from_fn(|a| BLOCK.min(count[a] - low[a]));
+        let lo = [first + low[0], low[1], low[2]].map(|n| n as i64);
+        let hi = std::array::from_fn(|a| lo[a] + size[a] as i64 - 1);
+        let bounds = field.frame_bounds_about(frame, lo, hi, iso);
+        let values = &mut values[..size.iter().product()];
+        if bounds.hi <= iso {
+            values.fill(f64::NEG_INFINITY);
+        } else if bounds.lo > iso {
+            values.fill(f64::INFINITY);
+        } else {
+            field.frame_values(frame, lo, size, values);
+        }
+        for (row, values) in values.chunks_exact(size[2]).enumerate() {
+            let [x, y] = [low[0] + row / size[1], low[1] + row % size[1]];
+            let to = &mut inside[(x * count[1] + y) * count[2] + low[2]..][..size[2]];
+            for (to, value) in to.iter_mut().zip(values) {
+                *to = *value > iso;
+            }
+        }
+    }
 }
 
 /// Joins the runs of equal sign of two neighbouring rows that overlap.

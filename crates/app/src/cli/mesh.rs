@@ -123,7 +123,7 @@ pub fn run(args: &Args) -> Outcome {
         return Err(open.no_surface(&field, options.iso));
     }
     interrupt::check(&cancel)?;
-    drop_specks(&mut mesh, &open);
+    drop_specks(&mut mesh, &open, &mut notes);
     trim(&mut mesh, &open, args.trim, &mut notes)?;
     if args.open || args.trim.is_some() {
         crate::fans::split(&mut mesh);
@@ -154,14 +154,29 @@ pub fn run(args: &Args) -> Outcome {
 }
 
 /// Leaves out parts of the surface of a cloud that are narrower than a finest knot interval: where sheets all but touch, a mesh
-/// splits off a few triangles that no sample speaks for.
-fn drop_specks(mesh: &mut Mesh, open: &OpenField) {
-    if open.source() == SourceKind::Cloud {
-        let width = open.lattice().spacing(open.level_count() - 1).max_element();
-        let narrow = of_narrow_parts(mesh, width);
-        if narrow.contains(&true) {
-            drop_marked(mesh, &narrow);
-        }
+/// splits off a few triangles that the field holds by a neck.
+fn drop_specks(mesh: &mut Mesh, open: &OpenField, notes: &mut Vec<String>) {
+    if open.source() != SourceKind::Cloud {
+        return;
+    }
+    let width = open.lattice().spacing(open.level_count() - 1).max_element();
+    let (count, narrow) = of_narrow_parts(mesh, width);
+    if count > 0 {
+        notes.push(format!(
+            "{} left out: {} narrower than {}, the finest knot interval",
+            if count == 1 {
+                "1 speck".into()
+            } else {
+                format!("{count} specks")
+            },
+            if count == 1 {
+                "a part of the surface"
+            } else {
+                "parts of the surface"
+            },
+            human_number(width)
+        ));
+        drop_marked(mesh, &narrow);
     }
 }
 

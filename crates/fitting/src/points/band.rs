@@ -153,6 +153,25 @@ impl<T: Real> Band<T> {
         })
     }
 
+    /// The cells of `brick`, one bit each, of whose eight central functions one is active.
+    pub fn inner_cells(&self, brick: usize) -> u64 {
+        let mut masks = self.ahead[brick].map(|b| if b == NONE { 0 } else { self.masks[b as usize] });
+        // Cell `at` of an axis has its central functions in slots `at + 1` and `at + 2`, of this brick or the next.
+        for axis in 0..3 {
+            let stride = BRICK.pow(2 - axis as u32);
+            let half = 1 << (2 - axis);
+            for octant in 0..half {
+                let [own, next] = [masks[octant], masks[octant + half]];
+                let shifted = |by: usize| {
+                    let own = own >> (by * stride) & BELOW[axis][BRICK - by];
+                    own | next << ((BRICK - by) * stride) & !BELOW[axis][BRICK - by]
+                };
+                masks[octant] = shifted(1) | shifted(2);
+            }
+        }
+        masks[0]
+    }
+
     /// The 7³ coefficients that the cells of `brick` read, from an array of bricks; absent ones are 0.
     #[inline]
     pub fn halo(&self, values: &[T], brick: usize, out: &mut [T; HALO_LEN]) {
@@ -392,6 +411,26 @@ mod tests {
                 if slot.iter().all(|s| (0..=last).contains(s)) {
                     assert!(band.find(key_of(slot.map(|s| s as u32))).is_some(), "{slot:?}");
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn inner_cells_are_those_with_an_active_central_function() {
+        let base = FullGrid::zeros(32);
+        let cells: Vec<[u32; 3]> = (0..40).map(|i| [20 + i % 7, 30 + i % 11, 40 + i % 5]).collect();
+        let band = Band::<f64>::around(6, &cells, &Coarser::Full(&base));
+        let is_active = |s: [u32; 3]| {
+            let brick = band.find(key_of(s));
+            brick.is_some_and(|b| band.masks[b] >> slot_of(s) & 1 == 1)
+        };
+        for (brick, key) in band.keys.iter().enumerate() {
+            let inner = band.inner_cells(brick);
+            for slot in 0..BRICK_LEN {
+                let at = [slot / 16, slot / 4 % 4, slot % 4];
+                let cell: [u32; 3] = std::array::from_fn(|a| key[a] * BRICK as u32 + at[a] as u32);
+                let any = (0..8u32).any(|o| is_active(std::array::from_fn(|a| cell[a] + 1 + (o >> a & 1))));
+                assert_eq!(inner >> slot & 1 == 1, any, "{cell:?}");
             }
         }
     }

@@ -12,6 +12,7 @@ use super::full_grid::FullGrid;
 use super::plan::Plan;
 use super::samples::{BASE_DEPTH, Samples};
 use super::stencil::Spot;
+use super::still::{StillCell, replace_refined, still_cells_of_base};
 use super::{NormalForm, between};
 use crate::{Control, FitError, StopReason};
 
@@ -26,6 +27,8 @@ pub(crate) struct Cascade<T> {
     pub leaves: Vec<LeafCell>,
     /// What the solve of each level did.
     pub solves: Vec<SolveReport>,
+    /// Where the field may have an extremum near the surface, if that was asked.
+    pub still: Vec<StillCell>,
 }
 
 /// The stored part of a level: the corrections `x` of its active functions, brick by brick.
@@ -52,6 +55,11 @@ pub(crate) fn run<T: Real>(
         levels: Vec::new(),
         leaves: Vec::new(),
         solves: Vec::new(),
+        still: if plan.seeks_extrema {
+            still_cells_of_base(base)
+        } else {
+            Vec::new()
+        },
     };
     let mut split = root_cells(samples);
     let mut worth: Vec<f64> = split.iter().map(|(c, _)| f64::from(c.end - c.start)).collect();
@@ -105,6 +113,9 @@ pub(crate) fn run<T: Real>(
         let problem = BandProblem::new(&band, &list, &bricks, plan.weights(depth));
         let (x, report) = problem.solve(plan.residual, plan.iterations);
         band.add_active(&x);
+        if plan.seeks_extrema {
+            replace_refined(&mut out.still, &band);
+        }
         coefficients += x.len();
         out.solves.push(report);
         let quality = cell_quality(&band, &list, &bricks, &owners, cells.len());
@@ -128,6 +139,7 @@ pub(crate) fn run<T: Real>(
         });
         coarser = Some(band);
     }
+    out.still.retain(StillCell::leads);
     Ok(out)
 }
 

@@ -5,6 +5,7 @@ use glam::{DAffine3, DQuat, DVec3};
 use rustc_hash::FxHashSet;
 
 use super::samples::{BASE_DEPTH, Samples};
+use crate::components::mark_inside;
 use crate::{Leaf, StopReason};
 
 /// Finest grid that is looked at: 64 cells along the box.
@@ -37,8 +38,8 @@ pub(crate) fn leaves(field: &dyn Field, samples: &Samples, leaves: &[Leaf]) -> V
         ),
         cells: [n as u32; 3],
     };
-    let mut values = vec![0.0; n * n * n];
-    field.frame_values(&centres, [0; 3], [n; 3], &mut values);
+    let mut inside = vec![false; n * n * n];
+    mark_inside(field, 0.0, &centres, 0, [n; 3], &mut inside);
     let taken: FxHashSet<(u8, [u32; 3])> = leaves.iter().map(|l| (l.level, l.cell)).collect();
     let level = (depth - BASE_DEPTH) as u8;
     let mut found = Vec::new();
@@ -49,7 +50,7 @@ pub(crate) fn leaves(field: &dyn Field, samples: &Samples, leaves: &[Leaf]) -> V
                 let crossed = (0..3).any(|a| {
                     let mut next = c;
                     next[a] += 1;
-                    next[a] < n && (values[at(c)] > 0.0) != (values[at(next)] > 0.0)
+                    next[a] < n && inside[at(c)] != inside[at(next)]
                 });
                 if !crossed || is_near[at(c)] {
                     continue;

@@ -26,7 +26,9 @@ pub use measure::{LeafError, PointError, PointErrors, crossing, measure_points, 
 pub use residual::newton_distance;
 mod robust;
 pub(crate) mod samples;
+mod specks;
 pub(crate) mod stencil;
+mod still;
 mod support;
 
 use bspline::{HierarchicalSpline, Real};
@@ -169,6 +171,7 @@ pub fn fit_points<T: Real>(
         samples.notes.push(account);
         plan.form = NormalForm::OffsetPairs;
     }
+    plan.seeks_extrema = true;
     let mut rounds = 0;
     let (cascade, field) = loop {
         // A round of repair costs what the first run did; most clouds need none.
@@ -188,6 +191,12 @@ pub fn fit_points<T: Real>(
             conditions.len()
         ));
     };
+    let (field, specks) = specks::remove(field, &samples, &cascade.still, options.coefficients);
+    if specks > 0 {
+        samples.notes.push(format!(
+            "specks of solid or cavity without a point of their own taken out: {specks}"
+        ));
+    }
     control.step("measuring", 0.95)?;
     let report = residual::report(&field, &samples, &cascade, cloud.positions, &plan, noise);
     Ok((field, report))

@@ -37,6 +37,8 @@ pub(crate) struct Plan {
     pub robust: bool,
     /// What the samples ask for beside their values.
     pub form: NormalForm,
+    /// Whether cells that an extremum near the surface may lie in are told.
+    pub seeks_extrema: bool,
     /// Value targets in the place of 0, and no normals: for the trace of the smoother.
     pub probe: Option<Vec<f32>>,
 }
@@ -120,6 +122,7 @@ impl Plan {
             limited_by: StopReason::Depth,
             robust: options.robust,
             form: NormalForm::Gradient,
+            seeks_extrema: false,
             probe: None,
         };
         let Some(sigma) = noise else { return clean };

@@ -258,6 +258,37 @@ impl Samples {
         self.with_entries(entries)
     }
 
+    /// The points of the cloud that have weight and whose conditions hold within `radius` of `at`, world units.
+    pub fn within(&self, at: DVec3, radius: f64) -> Vec<usize> {
+        let (at, radius) = ((at - self.origin) / self.scale, radius / self.scale);
+        // Cells as wide as the ball, so that it meets eight of them.
+        let mut depth = 0;
+        while depth < MAX_DEPTH && 0.5f64.powi(depth as i32 + 1) >= 2.0 * radius {
+            depth += 1;
+        }
+        let last = (1u64 << depth) - 1;
+        let range = |a: usize| {
+            let cell = |q: f64| ((q * (last + 1) as f64) as u64).min(last);
+            cell(at[a] - radius)..=cell(at[a] + radius)
+        };
+        let before = |key: u64| self.positions.partition_point(|p| morton(*p) < key);
+        let mut found = Vec::new();
+        for x in range(0) {
+            for y in range(1) {
+                for z in range(2) {
+                    let corner = DVec3::new(x as f64, y as f64, z as f64) / (last + 1) as f64;
+                    let first = morton(corner);
+                    let keys = 1u64 << (3 * (MAX_DEPTH - depth));
+                    found.extend((before(first)..before(first + keys)).filter(|&i| {
+                        let is_live = !self.is_sign_condition(i) && self.weights[i] > 0.0;
+                        is_live && self.positions[i].distance(at) <= radius
+                    }));
+                }
+            }
+        }
+        found
+    }
+
     /// Mean spacing `√(area/N)` of the samples, unit box.
     ///
     /// The area is that of the occupied cells, `cells·h²/1.5`, on the grid where a cell holds about six points, or
