@@ -1,8 +1,8 @@
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-use bspline::polygonize::{Mesh, PolygonizeOptions};
-use bspline::{Field, Frame, HierarchicalSpline, Real};
+use bspline::polygonize::Mesh;
+use bspline::{HierarchicalSpline, Real};
 use fitting::Cancel;
 use formats::Unit;
 use formats::field::{AnyField, FieldMeta, Stored};
@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::cost::Cost;
 use super::failure::{Failure, Outcome};
 use super::field::{self, OpenField, either};
-use super::mesh::Mesher;
+use super::fineness::{Adaptive, Fineness};
 use super::mesh_output::MESHES;
 use super::output::Output;
 use super::overwrite::refuse_own_input;
@@ -187,7 +187,7 @@ impl Stage<'_> {
             frames.publish()?;
         }
         if let Some(output) = self.mesh {
-            let mesh = self.surface(&baked, simulation.region().cells().level)?;
+            let mesh = self.surface(&baked, &mut total.summary.notes)?;
             formats::meshes::save(output.path(), &written(&mesh, self.open.unit()))
                 .map_err(|e| output.writing(e))?;
         }
@@ -203,7 +203,7 @@ impl Stage<'_> {
             return Ok(());
         }
         let baked = simulation.baked().map_err(Failure::input)?;
-        let mesh = self.surface(&baked, simulation.region().cells().level)?;
+        let mesh = self.surface(&baked, &mut Vec::new())?;
         let unit = self.open.unit();
         if let Some(frames) = &mut self.frames {
             frames.write(&format!("frame-{step:05}.ply"), |path| {
@@ -213,26 +213,26 @@ impl Stage<'_> {
         Ok(())
     }
 
-    /// Meshes a field, with two cells in every knot interval of the surface's level or the region's.
-    fn surface(&self, field: &dyn Field, level: usize) -> Outcome<Mesh> {
+    /// Meshes what became of the field, as finely as `mesh` would.
+    fn surface<T: Real>(&self, field: &HierarchicalSpline<T>, notes: &mut Vec<String>) -> Outcome<Mesh> {
         let Some(iso) = self.iso else {
             return Err(Failure::usage(
                 "a mesh needs the density of the surface; write iso above all tables of the scene",
             ));
         };
-        let frame: Frame = self
-            .open
-            .frame_of_level(self.open.level_of_surface(iso).max(level));
-        let mut mesher = Mesher {
+        let fineness = Fineness::OfTheFit;
+        let levels = field.level_count();
+        let mut adaptive = Adaptive::new(
+            self.open,
             field,
-            options: PolygonizeOptions {
-                iso,
-                ..Default::default()
-            },
-            cancel: self.cancel,
-            bar: &self.bar,
-        };
-        Ok(mesher.on(frame)?.0)
+            levels,
+            iso,
+            true,
+            fineness,
+            self.cancel,
+            &self.bar,
+        )?;
+        Ok(adaptive.mesh(fineness, notes)?.mesh)
     }
 
     /// Writes the field with what is known of the one it was made from; returns its SHA-256.
