@@ -213,16 +213,6 @@ impl OpenField {
         self.frame(self.lattice().cells_at(finest).map(|c| c.saturating_mul(n)))
     }
 
-    /// The finest level on which, or on finer ones, at least a tenth of the surface's area lies.
-    pub fn level_of_surface(&self, iso: f64) -> usize {
-        either!(&self.loaded.field, f => f.level_of_surface(iso, 0.1))
-    }
-
-    /// The grid with two cells in every knot interval of `level`.
-    pub fn frame_of_level(&self, level: usize) -> Frame {
-        self.frame(self.lattice().cells_at(level).map(|c| c.saturating_mul(2)))
-    }
-
     /// The grid with `n` cells along the longest side of the box and as many on the others as their lengths ask.
     pub fn frame_of_resolution(&self, n: u32) -> Frame {
         let sides = self.lattice().spacing(0) * self.lattice().extent();

@@ -2,10 +2,10 @@
 
 use std::ops::ControlFlow;
 
-use bspline::Frame;
 use bspline::polygonize::{
     AdaptiveMesh, AdaptiveMesher, AdaptiveOptions, AdaptiveReport, Mesh, PolygonizeError,
 };
+use bspline::{Field, Frame};
 use fitting::Cancel;
 use formats::field::SourceKind;
 use glam::DVec3;
@@ -35,6 +35,8 @@ const SPARE: f64 = 3.6;
 const OF_NOISE: f64 = 0.125;
 /// The same of a fit to a mesh, which leaves less of its tolerance to be spent again: bunny within 1.0 u both ways.
 const OF_MESH: f64 = 0.75;
+/// The same over what 95 % of the surface keep, where that is more: triangles half as far off add a tenth to it.
+const OF_REACHED: f64 = 0.9;
 /// Share of the triangles asked for that is aimed at.
 const AIM: f64 = 0.96;
 /// Least share of the triangles asked for.
@@ -48,6 +50,7 @@ const MEASURED: usize = 1 << 12;
 pub struct Adaptive<'a> {
     mesher: AdaptiveMesher<'a>,
     open: &'a OpenField,
+    field: &'a dyn Field,
     options: AdaptiveOptions,
     frame: Frame,
     cancel: &'a Cancel,
@@ -63,9 +66,11 @@ pub struct Meshed {
 }
 
 impl<'a> Adaptive<'a> {
-    /// Prepares the surface `{ f = iso }` of an open field.
+    /// Prepares the surface `{ f = iso }` of `field`, which is the open one or what became of it, of so many `levels`.
     pub fn new(
         open: &'a OpenField,
+        field: &'a dyn Field,
+        levels: usize,
         iso: f64,
         capped: bool,
         fineness: Fineness,
@@ -84,7 +89,7 @@ impl<'a> Adaptive<'a> {
             (SourceKind::Volume, Fineness::OfTheFit) => 0,
             _ => 2,
         };
-        let finest = open.level_count() - 1 + above;
+        let finest = levels - 1 + above;
         let longest = cells.into_iter().max().unwrap_or(1);
         let options = AdaptiveOptions {
             iso,
@@ -92,13 +97,16 @@ impl<'a> Adaptive<'a> {
             // Room for cells of half the size.
             depth: (finest + beyond).min(AdaptiveOptions::most_depth(2 * longest)),
             detection: finest + 1,
+            // Their first mesh is nearly always the last.
+            frugal: !matches!(fineness, Fineness::Error(_)),
             ..AdaptiveOptions::default()
         };
         let frame = open.frame(cells);
-        let mesher = AdaptiveMesher::new(open.field(), &frame, &options, &mut watch(cancel, bar, 0.0, 0.1));
+        let mesher = AdaptiveMesher::new(field, &frame, &options, &mut watch(cancel, bar, 0.0, 0.1));
         Ok(Self {
             mesher: mesher.map_err(failed)?,
             open,
+            field,
             options,
             frame,
             cancel,
@@ -116,7 +124,7 @@ impl<'a> Adaptive<'a> {
         self.frame = self.open.frame(cells);
         let progress = &mut watch(self.cancel, self.bar, 0.1, 0.2);
         self.mesher =
-            AdaptiveMesher::new(self.open.field(), &self.frame, &self.options, progress).map_err(failed)?;
+            AdaptiveMesher::new(self.field, &self.frame, &self.options, progress).map_err(failed)?;
         Ok(())
     }
 
@@ -134,7 +142,7 @@ impl<'a> Adaptive<'a> {
                 let length = match open.source() {
                     SourceKind::Volume => tolerance / open.slope(),
                     SourceKind::Cloud if open.report().noise.is_some() => OF_NOISE * tolerance,
-                    _ if belongs::is_of_mesh(open) => OF_MESH * tolerance,
+                    _ if belongs::is_of_mesh(open) => of_mesh(open, notes),
                     _ => tolerance,
                 };
                 let wanted = if length > 0.0 {
@@ -317,7 +325,7 @@ impl<'a> Adaptive<'a> {
                 let (mut feet, mut answers) = (points, [(0.0, DVec3::ZERO); 4]);
                 // One step says too little where the triangles are as large as the bends of the field.
                 for _ in 0..2 {
-                    self.open.field().values_gradients(&feet, &mut answers);
+                    self.field.values_gradients(&feet, &mut answers);
                     for (foot, (f, g)) in feet.iter_mut().zip(answers) {
                         *foot += g * ((self.options.iso - f) / g.length_squared());
                     }
@@ -332,6 +340,20 @@ impl<'a> Adaptive<'a> {
         let rank = (errors.len() * 95 / 100).min(errors.len() - 1);
         *errors.select_nth_unstable_by(rank, f64::total_cmp).1
     }
+}
+
+/// Twice the chord error for a fit to a mesh. Where its coefficients were spent before the tolerance was met, triangles made
+/// for that would show its ripples and no more of the mesh.
+fn of_mesh(open: &OpenField, notes: &mut Vec<String>) -> f64 {
+    let report = open.report();
+    if report.p95 > report.tolerance {
+        notes.push(format!(
+            "the fit is farther off than its tolerance, by {} at 95 % of the surface; triangles are made for that (finer: \
+             --tolerance, --triangles)",
+            human_number(report.p95)
+        ));
+    }
+    (OF_MESH * report.tolerance).max(OF_REACHED * report.p95)
 }
 
 /// Shows progress between two shares of the whole and listens for the user's wish to stop.

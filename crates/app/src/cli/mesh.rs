@@ -34,7 +34,8 @@ pub struct Args {
     resolution: Option<u32>,
     /// Distance from the surface that 95 % of the centres and sides of the triangles keep: in the field's unit, in mm, or
     /// in per cent of the solid's diagonal [default: half the tolerance of the fit, a sixteenth where that
-    /// is the noise of the samples]
+    /// is the noise of the samples; of a mesh three eighths, or 0.45 of what 95 % of the
+    /// surface keep, if that is more]
     #[arg(
         long,
         value_name = "T[mm|%]",
@@ -113,7 +114,8 @@ pub fn run(args: &Args) -> Outcome {
                 (_, Some(most)) => Fineness::Triangles(most),
                 _ => Fineness::OfTheFit,
             };
-            let mut adaptive = Adaptive::new(&open, options.iso, !args.open, fineness, &cancel, &bar)?;
+            let (field, levels, iso) = (open.field(), open.level_count(), options.iso);
+            let mut adaptive = Adaptive::new(&open, field, levels, iso, !args.open, fineness, &cancel, &bar)?;
             let made = adaptive.mesh(fineness, &mut notes)?;
             notes.extend(doubts(0, made.report.nan_nodes));
             (made.mesh, None)

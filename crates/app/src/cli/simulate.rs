@@ -1,17 +1,19 @@
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
-use bspline::polygonize::{Mesh, PolygonizeOptions};
-use bspline::{Field, Frame, HierarchicalSpline, Real};
+use bspline::polygonize::Mesh;
+use bspline::{HierarchicalSpline, Real};
 use fitting::Cancel;
 use formats::Unit;
 use formats::field::{AnyField, FieldMeta, Stored};
 use serde::Serialize;
+use tools::scene::{Scene, SimulateError, Simulation, StepLine};
 
 use super::cost::Cost;
 use super::failure::{Failure, Outcome};
 use super::field::{self, OpenField, either};
-use super::mesh::Mesher;
+use super::fineness::{Adaptive, Fineness};
 use super::mesh_output::MESHES;
 use super::output::Output;
 use super::overwrite::refuse_own_input;
@@ -21,7 +23,6 @@ use super::source::{FIELDS, Source};
 use super::staged::StagedFiles;
 use super::summary::{self, Summary, table};
 use super::{interrupt, set_threads};
-use crate::simulate::{Scene, SimulateError, Simulation, StepLine};
 
 /// Arguments of `isoclay simulate`.
 #[derive(clap::Args)]
@@ -49,6 +50,15 @@ pub struct Args {
     /// Print one JSON object for each step, and one at the end
     #[arg(long)]
     pub json: bool,
+}
+
+/// What a step did, and how long it took.
+#[derive(Serialize)]
+struct Timed<'a> {
+    #[serde(flatten)]
+    line: &'a StepLine,
+    /// By the wall clock.
+    seconds: f64,
 }
 
 /// What all steps did.
@@ -171,9 +181,14 @@ impl Stage<'_> {
         self.frame(&simulation, 0)?;
         while !simulation.is_over() {
             interrupt::check(self.cancel)?;
+            let start = Instant::now();
             let line = simulation.step().map_err(failed)?;
             if self.args.json {
-                let text = serde_json::to_string(&line).expect("a struct of plain fields is always JSON");
+                let timed = Timed {
+                    line: &line,
+                    seconds: start.elapsed().as_secs_f64(),
+                };
+                let text = serde_json::to_string(&timed).expect("a struct of plain fields is always JSON");
                 let is_taken = self.output.is_stdout() || self.mesh.is_some_and(Output::is_stdout);
                 summary::print(&text, is_taken)?;
             }
@@ -187,7 +202,7 @@ impl Stage<'_> {
             frames.publish()?;
         }
         if let Some(output) = self.mesh {
-            let mesh = self.surface(&baked, simulation.region().cells().level)?;
+            let mesh = self.surface(&baked, &mut total.summary.notes)?;
             formats::meshes::save(output.path(), &written(&mesh, self.open.unit()))
                 .map_err(|e| output.writing(e))?;
         }
@@ -203,7 +218,7 @@ impl Stage<'_> {
             return Ok(());
         }
         let baked = simulation.baked().map_err(Failure::input)?;
-        let mesh = self.surface(&baked, simulation.region().cells().level)?;
+        let mesh = self.surface(&baked, &mut Vec::new())?;
         let unit = self.open.unit();
         if let Some(frames) = &mut self.frames {
             frames.write(&format!("frame-{step:05}.ply"), |path| {
@@ -213,26 +228,26 @@ impl Stage<'_> {
         Ok(())
     }
 
-    /// Meshes a field, with two cells in every knot interval of the surface's level or the region's.
-    fn surface(&self, field: &dyn Field, level: usize) -> Outcome<Mesh> {
+    /// Meshes what became of the field, as finely as `mesh` would.
+    fn surface<T: Real>(&self, field: &HierarchicalSpline<T>, notes: &mut Vec<String>) -> Outcome<Mesh> {
         let Some(iso) = self.iso else {
             return Err(Failure::usage(
                 "a mesh needs the density of the surface; write iso above all tables of the scene",
             ));
         };
-        let frame: Frame = self
-            .open
-            .frame_of_level(self.open.level_of_surface(iso).max(level));
-        let mut mesher = Mesher {
+        let fineness = Fineness::OfTheFit;
+        let levels = field.level_count();
+        let mut adaptive = Adaptive::new(
+            self.open,
             field,
-            options: PolygonizeOptions {
-                iso,
-                ..Default::default()
-            },
-            cancel: self.cancel,
-            bar: &self.bar,
-        };
-        Ok(mesher.on(frame)?.0)
+            levels,
+            iso,
+            true,
+            fineness,
+            self.cancel,
+            &self.bar,
+        )?;
+        Ok(adaptive.mesh(fineness, notes)?.mesh)
     }
 
     /// Writes the field with what is known of the one it was made from; returns its SHA-256.

@@ -1,10 +1,9 @@
-use std::collections::HashMap;
-
 use bspline::hierarchical::Lattice;
 use bspline::polygonize::Mesh;
 use fitting::Leaf;
 use glam::DVec3;
 use rayon::prelude::*;
+use rustc_hash::FxHashMap;
 
 /// Which parts of the surface of a cloud are invented: those too far from every leaf that holds samples.
 pub struct Sampled {
@@ -13,7 +12,7 @@ pub struct Sampled {
     /// Corners of the boxes of leaves with samples, world units.
     boxes: Vec<(DVec3, DVec3)>,
     /// Boxes that meet a bucket.
-    buckets: HashMap<[i32; 3], Vec<u32>>,
+    buckets: FxHashMap<[i32; 3], Vec<u32>>,
 }
 
 impl Sampled {
@@ -33,7 +32,7 @@ impl Sampled {
         let mut sampled = Self {
             reach,
             boxes,
-            buckets: HashMap::new(),
+            buckets: FxHashMap::default(),
         };
         for (i, (low, high)) in sampled.boxes.iter().enumerate() {
             let [first, last] = [*low, *high].map(|p| bucket(p, reach));

@@ -95,6 +95,31 @@ fn meshes_of_noisy_clouds_lose_nothing_of_the_fit() {
     assert!(default < 1.05 * fine, "{default} {fine}");
 }
 
+/// Triangles far finer than what a fit of a mesh reached would show its ripples, not the mesh.
+#[test]
+fn meshes_of_fits_that_ran_out_of_coefficients_are_as_fine_as_the_fit() {
+    let bench = Bench::new();
+    bench.json("phantom gyroid -o cloud.ply --count 20000");
+    bench.json("fit cloud.ply -o cloud.iclay");
+    bench.json("mesh cloud.iclay -o given.ply --triangles 20000");
+    let fit = bench.json("fit given.ply --as mesh -o field.iclay --coefficients 50000");
+    let (tolerance, reached) = (number(&fit, "tolerance"), number(&fit, "p95"));
+    assert!(reached > 3.0 * tolerance, "{reached} {tolerance}");
+    let mesh = bench.json("mesh field.iclay -o mesh.ply");
+    assert!(
+        mesh["notes"]
+            .to_string()
+            .contains("farther off than its tolerance"),
+        "{mesh}"
+    );
+    let asked = bench.json(&format!(
+        "mesh field.iclay -o fine.ply --tolerance {}",
+        0.375 * tolerance
+    ));
+    let [own, fine] = [&mesh, &asked].map(|m| number(m, "triangles"));
+    assert!(own < fine / 2.0, "{own} {fine}");
+}
+
 #[test]
 fn trim_leaves_holes_open_and_says_how_much_was_invented() {
     let bench = Bench::new();

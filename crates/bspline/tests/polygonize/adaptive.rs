@@ -343,6 +343,16 @@ fn same_bits_with_1_2_and_8_threads_and_after_other_errors() {
         }
         let again = mesher.mesh(0.02, settled, go_on).expect("a mesh").0;
         assert!(again == meshes[0].0);
+        // Nor does what was forgotten.
+        let frugal = AdaptiveOptions {
+            frugal: true,
+            ..options(3)
+        };
+        let mut mesher = AdaptiveMesher::new(&spline, &frame, &frugal, go_on).expect("a frame");
+        for error in [0.1, 0.02] {
+            let made = mesher.mesh(error, settled, go_on).expect("a mesh").0;
+            assert!(error > 0.02 || made == meshes[0].0);
+        }
     }
 }
 

@@ -9,7 +9,7 @@ use super::judge::Quality;
 use super::probes::{Cell, Octants, Probe, cell_of, center, child};
 use crate::points::band::{BRICK, Band, HALO, HALO_LEN, Key, halo_start, key_of, slot_of};
 use crate::points::band_solve::{BandSample, BrickSamples};
-use crate::points::stencil::{Spot, gather};
+use crate::points::stencil::{Spot, gather, gather_value};
 
 /// Weight of a condition that stands for a larger part of space than those of the level at hand, at most.
 const MOST_WEIGHT: f32 = 8.0;
@@ -60,6 +60,44 @@ fn sample<T: Real>(probe: &Probe, depth: usize) -> BandSample<T> {
     }
 }
 
+/// Probes brick by brick, in their order.
+struct Placed<'a> {
+    /// Where those of each brick start, and the end.
+    starts: Vec<u32>,
+    probes: Vec<&'a Probe>,
+}
+
+impl<'a> Placed<'a> {
+    fn new(probes: &[&'a Probe], brick_of: &[Option<u32>], bricks: usize) -> Self {
+        let mut starts = vec![0u32; bricks + 1];
+        for brick in brick_of.iter().flatten() {
+            starts[*brick as usize + 1] += 1;
+        }
+        for brick in 0..bricks {
+            starts[brick + 1] += starts[brick];
+        }
+        let mut next = starts.clone();
+        let count = starts[bricks] as usize;
+        let mut placed = probes[..count].to_vec();
+        for (probe, brick) in probes.iter().zip(brick_of) {
+            if let Some(brick) = brick {
+                let slot = &mut next[*brick as usize];
+                placed[*slot as usize] = probe;
+                *slot += 1;
+            }
+        }
+        Self {
+            starts,
+            probes: placed,
+        }
+    }
+
+    fn of_brick(&self, brick: usize) -> impl Iterator<Item = &'a Probe> {
+        let [start, end] = [self.starts[brick], self.starts[brick + 1]];
+        self.probes[start as usize..end as usize].iter().copied()
+    }
+}
+
 /// The cells of each brick: `cells` are sorted brick by brick.
 pub(super) fn by_brick(cells: &[Cell]) -> Vec<(Key, std::ops::Range<usize>)> {
     let mut out = Vec::new();
@@ -86,25 +124,9 @@ impl<T: Real> Conditions<T> {
             let brick = band.find(key_of(cell))?;
             (near[brick] >> slot_of(cell) & 1 == 1).then_some(brick as u32)
         };
-        let others = [around.settled, around.corners];
-        // (brick, list, index): keys of their own, so any sort gives one order.
-        let mut placed: Vec<(u32, u32)> = Vec::new();
-        let of = |index: u32| {
-            let first = others[0].len();
-            let i = index as usize;
-            if i < first {
-                &others[0][i]
-            } else {
-                &others[1][i - first]
-            }
-        };
-        let total = (others[0].len() + others[1].len()) as u32;
-        placed.par_extend(
-            (0..total)
-                .into_par_iter()
-                .filter_map(|i| Some((place(of(i))?, i))),
-        );
-        placed.par_sort_unstable();
+        let others: Vec<&Probe> = around.settled.iter().chain(around.corners).collect();
+        let brick_of: Vec<Option<u32>> = others.par_iter().map(|probe| place(probe)).collect();
+        let others = Placed::new(&others, &brick_of, band.keys.len());
         let mut own = vec![0..0; band.keys.len()];
         for (key, range) in by_brick(cells) {
             own[band.find(key).expect("the band reaches round its cells")] = range;
@@ -112,14 +134,13 @@ impl<T: Real> Conditions<T> {
         let found: Vec<Vec<BandSample<T>>> = (0..band.keys.len())
             .into_par_iter()
             .map(|brick| {
-                let start = placed.partition_point(|p| (p.0 as usize) < brick);
-                let others = placed[start..].iter().take_while(|p| p.0 as usize == brick);
                 let mut probes = Vec::new();
                 for i in own[brick].clone() {
                     cells[i].conditions(&octants[i], depth, &mut probes);
                 }
                 let own = probes.iter().map(|p| sample(p, depth));
-                own.chain(others.map(|p| sample(of(p.1), depth))).collect()
+                own.chain(others.of_brick(brick).map(|p| sample(p, depth)))
+                    .collect()
             })
             .collect();
         let mut out = Self {
@@ -168,9 +189,12 @@ pub(super) fn qualities<T: Real>(
                 (v.as_f64(), DVec3::from_array(g.map(|g| g.as_f64() * n)))
             };
             let first = range.start;
-            let mut out: Vec<Quality> = range
-                .map(|i| Quality::of(&cells[i], &octants[i], depth, plan, |at| field(at, cells[i].at)))
-                .collect();
+            let quality = |i: usize| {
+                let own = cells[i].at;
+                let value = |at| gather_value(&values, spot(at, own, depth), STRIDES).as_f64();
+                Quality::of(&cells[i], &octants[i], depth, plan, value, |at| field(at, own))
+            };
+            let mut out: Vec<Quality> = range.map(quality).collect();
             let start = cornered.partition_point(|c| c.0 < key);
             for (_, i) in cornered[start..].iter().take_while(|c| c.0 == key) {
                 let at = corners[*i as usize].at;
@@ -196,7 +220,7 @@ pub(super) fn base_qualities(
     cells
         .par_iter()
         .zip(octants)
-        .map(|(cell, octants)| Quality::of(cell, octants, depth, plan, &field))
+        .map(|(cell, octants)| Quality::of(cell, octants, depth, plan, |at| field(at).0, &field))
         .collect()
 }
 

@@ -69,13 +69,14 @@ impl Quality {
         octants: &Octants,
         depth: usize,
         plan: &Plan,
+        value: impl Fn(DVec3) -> f64,
         field: impl Fn(DVec3) -> (f64, DVec3),
     ) -> Self {
         let mut out = Self::default();
         let h = 0.5f64.powi(depth as i32);
         for (o, found) in octants.iter().enumerate() {
             let place = part(cell, o, depth);
-            let error = (field(place).0 - found.value()).abs();
+            let error = (value(place) - found.value()).abs();
             let allowed = plan.allowed(found.distance, found.in_hole());
             if error > allowed.max(RIDGE * h) {
                 out.lost |= 1 << o;

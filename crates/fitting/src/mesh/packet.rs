@@ -51,14 +51,20 @@ fn search(tree: &TriangleTree, places: &Packet, hint: u32) -> [u32; PLACES] {
     while height > 0 {
         height -= 1;
         let mut at = stack[height];
-        if !any_below(&to_box(places, &tree.nodes[at as usize]), &best) {
+        if !any_below(&to_node(places, &tree.nodes[at as usize]), &best) {
             continue;
         }
         loop {
             let node = &tree.nodes[at as usize];
             if node.count > 0 {
                 for t in node.first..node.first + node.count {
-                    let d = to_triangle(places, &tree.corners[t as usize]);
+                    let corners @ [a, b, c] = &tree.corners[t as usize];
+                    // A fifth of the cost of the triangle itself, and most are farther than what is known.
+                    let around = to_box(places, a.min(*b).min(*c), a.max(*b).max(*c));
+                    if !any_below(&around, &best) {
+                        continue;
+                    }
+                    let d = to_triangle(places, corners);
                     for l in 0..PLACES {
                         let nearer = d[l] < best[l] || (d[l] == best[l] && t < found[l]);
                         best[l] = if nearer { d[l] } else { best[l] };
@@ -69,8 +75,8 @@ fn search(tree: &TriangleTree, places: &Packet, hint: u32) -> [u32; PLACES] {
             }
             let children = [at + 1, node.first];
             let bounds = [
-                to_box(places, &tree.nodes[children[0] as usize]),
-                to_box(places, &tree.nodes[children[1] as usize]),
+                to_node(places, &tree.nodes[children[0] as usize]),
+                to_node(places, &tree.nodes[children[1] as usize]),
             ];
             let near = usize::from(sum(&bounds[1]) < sum(&bounds[0]));
             let is_open = [any_below(&bounds[0], &best), any_below(&bounds[1], &best)];
@@ -104,10 +110,14 @@ fn any_below(bound: &Lanes, best: &Lanes) -> bool {
     any
 }
 
+#[inline(always)]
+fn to_node(p: &Packet, node: &Node) -> Lanes {
+    to_box(p, node.min, node.max)
+}
+
 /// Squares of the distances to a box.
 #[inline(always)]
-fn to_box(p: &Packet, node: &Node) -> Lanes {
-    let (low, high) = (node.min, node.max);
+fn to_box(p: &Packet, low: DVec3, high: DVec3) -> Lanes {
     // A loop: closures of `from_fn` are compiled for the baseline.
     let mut out = [0.0; PLACES];
     for l in 0..PLACES {

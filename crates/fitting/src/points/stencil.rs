@@ -47,6 +47,24 @@ pub(crate) fn gather<T: Real>(values: &[T], spot: Spot<T>, strides: [usize; 2]) 
     )
 }
 
+/// `Σ B c` alone, with the bits of [`gather`].
+#[inline(always)]
+pub(crate) fn gather_value<T: Real>(values: &[T], spot: Spot<T>, strides: [usize; 2]) -> T {
+    let [wx, wy, wz] = spot.t.map(cubic::values);
+    let mut plane = [T::zero(); 4];
+    let values = &values[spot.start..spot.start + 3 * (strides[0] + strides[1]) + 4];
+    for b in 0..4 {
+        let mut line = [T::zero(); 4];
+        for a in 0..4 {
+            let start = a * strides[0] + b * strides[1];
+            let row: &[T; 4] = values[start..start + 4].try_into().expect("four of a row");
+            axpy(&mut line, wx[a], row);
+        }
+        axpy(&mut plane, wy[b], &line);
+    }
+    dot(&wz, &plane)
+}
+
 /// Transpose of [`gather`]: adds `v·B + Σ g·∂B` to the 64 coefficients.
 #[inline(always)]
 pub(crate) fn scatter<T: Real>(values: &mut [T], spot: Spot<T>, strides: [usize; 2], v: T, g: [T; 3]) {

@@ -7,8 +7,6 @@ use crate::{Aabb, Frame};
 
 /// Nodes of a block.
 pub(super) const NODE_COUNT: usize = NODES * NODES * NODES;
-/// Cells of a block.
-pub(super) const CELL_COUNT: usize = CELLS * CELLS * CELLS;
 /// No block, no vertex.
 pub(super) const NONE: u32 = u32::MAX;
 
@@ -104,10 +102,23 @@ pub(super) fn node_index(n: [usize; 3]) -> usize {
     (n[0] * NODES + n[1]) * NODES + n[2]
 }
 
+/// A cell in the word of its `x`.
+#[inline(always)]
+pub(super) fn bit(c: [usize; 3]) -> u64 {
+    1 << (CELLS * c[1] + c[2])
+}
+
 /// Whether a set holds a cell.
 #[inline(always)]
 pub(super) fn holds(set: &Cells, c: [usize; 3]) -> bool {
-    set[c[0]] >> (CELLS * c[1] + c[2]) & 1 == 1
+    set[c[0]] & bit(c) != 0
+}
+
+/// How many cells of a set come before this one.
+#[inline(always)]
+pub(super) fn rank(set: &Cells, c: [usize; 3]) -> usize {
+    let before: u32 = set[..c[0]].iter().map(|w| w.count_ones()).sum();
+    (before + (set[c[0]] & (bit(c) - 1)).count_ones()) as usize
 }
 
 /// The cells of a set in order.

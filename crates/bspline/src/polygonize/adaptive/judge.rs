@@ -3,7 +3,7 @@
 use glam::{DVec3, Mat3, Vec3};
 
 use super::cases::is_complex;
-use super::grid::{Cells, cell_index, each, holds, node_index, octant_of_set, octant_place};
+use super::grid::{Cells, bit, each, holds, node_index, octant_of_set, octant_place, rank};
 use super::hidden::{SEARCH, may_hide, may_peak, slopes};
 use super::sample::{Judge, Sample, Scratch};
 use crate::Jet;
@@ -16,17 +16,16 @@ impl Sample {
         let vague = each(std::array::from_fn(|x| {
             cells[x] & (self.bounded[x] | self.guessed[x])
         }))
-        .filter(|c| holds(&self.bounded, *c) == (self.error[cell_index(*c)] > least));
+        .filter(|c| holds(&self.bounded, *c) == (self.error(*c) > least));
         let mut new: Cells = std::array::from_fn(|x| cells[x] & !self.judged[x]);
         for c in vague {
-            new[c[0]] |= 1 << (CELLS * c[1] + c[2]);
+            new[c[0]] |= bit(c);
         }
-        let crossed = self.crossed();
         for octant in 0..8 {
             if self.should_be_coarse(octant, least) != self.is_coarse(octant) {
                 let known = octant_of_set(&self.judged, octant);
                 for x in 0..CELLS {
-                    new[x] |= known[x] & cells[x] & !crossed[x];
+                    new[x] |= known[x] & cells[x] & !self.crossed[x];
                 }
             }
         }
@@ -54,7 +53,7 @@ impl Sample {
         let grids = judge.grids;
         let origin = key.map(|b| b * CELLS as i32);
         let new = *cells;
-        let crossed = self.crossed();
+        let crossed = self.crossed;
         let inside_frame = |c: [usize; 3]| {
             (0..3).all(|a| {
                 let at = origin[a] + c[a] as i32;
@@ -98,41 +97,44 @@ impl Sample {
                     continue;
                 }
                 let cell: [i32; 3] = std::array::from_fn(|a| origin[a] + c[a] as i32);
-                let slot = cell_index(c);
-                let bit = 1 << (CELLS * c[1] + c[2]);
                 if holds(&crossed, c) {
                     let is_guessed = holds(&self.guessed, c);
                     let guess = if is_guessed {
-                        self.error[slot]
+                        self.error(c)
                     } else {
                         self.guess(judge, level, key, c)
                     };
                     if is_guessed && guess > least {
                         continue;
                     }
-                    self.guessed[c[0]] &= !bit;
+                    self.guessed[c[0]] &= !bit(c);
                     let bend = *bend
                         .get_or_insert_with(|| judge.field.hessian_bound(&grids.world_box(level, lo, 4)));
                     let v = self.corners(c);
                     let error =
                         self.judge_crossed(judge, level, c, cell, &v, bend, h, &world_from_grid, scratch);
-                    self.error[slot] = error.max(guess);
-                } else if level == grids.depth() {
+                    *self.error_mut(c) = error.max(guess);
+                    continue;
+                }
+                let may_hold = if level == grids.depth() {
                     // What hides here cannot be divided.
-                    self.error[slot] = 0.0;
+                    false
                 } else if is_coarse {
                     let bounds = judge.bounds(level, cell, 1);
-                    let may_hold = bounds.lo <= judge.iso && judge.iso < bounds.hi;
-                    self.error[slot] = if may_hold { f32::INFINITY } else { 0.0 };
+                    bounds.lo <= judge.iso && judge.iso < bounds.hi
                 } else {
-                    let bend = *bend
-                        .get_or_insert_with(|| judge.field.hessian_bound(&grids.world_box(level, lo, 4)));
                     let v = self.corners(c);
-                    let hidden = level < judge.detection
-                        && may_peak(&v, bend, size)
-                        && may_hide(judge, level, cell, v[0] > 0.0, bend, SEARCH);
-                    self.error[slot] = if hidden { f32::INFINITY } else { 0.0 };
-                }
+                    level < judge.detection && {
+                        let bend = *bend
+                            .get_or_insert_with(|| judge.field.hessian_bound(&grids.world_box(level, lo, 4)));
+                        let own_bend = || judge.field.hessian_bound(&grids.world_box(level, cell, 1));
+                        may_peak(&v, bend, size)
+                            && may_peak(&v, own_bend(), size)
+                            && may_hide(judge, level, cell, v[0] > 0.0, SEARCH)
+                    }
+                };
+                self.hidden[c[0]] &= !bit(c);
+                self.hidden[c[0]] |= if may_hold { bit(c) } else { 0 };
             }
         }
         self.measure(judge, h, scratch);
@@ -204,7 +206,7 @@ impl Sample {
         if bend == f64::INFINITY {
             bend = judge.field.hessian_bound(&judge.grids.world_box(level, cell, 1));
             if bend == f64::INFINITY {
-                self.creased[c[0]] |= 1 << (CELLS * c[1] + c[2]);
+                self.creased[c[0]] |= bit(c);
                 return (CREASE * h) as f32;
             }
         }
@@ -222,14 +224,13 @@ impl Sample {
                 .sqrt(),
         );
         let most = bend * h * h / (8.0 * steep);
-        let bit = 1 << (CELLS * c[1] + c[2]);
         if most <= judge.least {
-            self.bounded[c[0]] |= bit;
+            self.bounded[c[0]] |= bit(c);
             return most as f32;
         }
-        self.bounded[c[0]] &= !bit;
+        self.bounded[c[0]] &= !bit(c);
         let origin = DVec3::from_array(cell.map(f64::from));
-        let owner = cell_index(c) as u16;
+        let owner = rank(&self.crossed, c) as u16;
         let first = scratch.points.len();
         let limit = (0.5 * h) as f32;
         // The middles of every other eighth of the cell, like the corners of a tetrahedron.
@@ -279,7 +280,7 @@ impl Sample {
             } else {
                 error.min(CREASE * h)
             };
-            let slot = &mut self.error[usize::from(*owner)];
+            let slot = &mut self.errors[usize::from(*owner)];
             *slot = slot.max((error as f32).min(*most));
         }
     }

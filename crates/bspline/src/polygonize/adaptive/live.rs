@@ -10,7 +10,7 @@ use super::grid::{Cells, Grids, NONE};
 use super::sample::{Judge, Sample};
 use super::tree::{Block, Limits, Samples, Tree};
 use super::vertices::{self, BlockVertices, Placer};
-use super::{AdaptiveMesh, AdaptiveOptions, AdaptiveReport, checked, contour, report_of, settle_made, steps};
+use super::{AdaptiveMesh, AdaptiveOptions, AdaptiveReport, Drawn, checked, report_of, settle_made, steps};
 use crate::polygonize::blocks::{BlockGrid, BlockKey, Dirty, find_blocks};
 use crate::polygonize::{PolygonizeError, PolygonizeOptions};
 use crate::{Aabb, Field, Frame};
@@ -80,7 +80,9 @@ impl AdaptiveBlockMesh {
     pub fn mesh(&self, field: &dyn Field) -> Result<(AdaptiveMesh, AdaptiveReport), PolygonizeError> {
         let report = report_of(&self.samples, &self.tree, &self.options, self.error);
         let placer = self.placer(field);
-        let (mut made, report) = contour(&placer, &self.tree, &self.vertices, self.options.open, report)?;
+        let open = self.options.open;
+        let drawn = Drawn::new(&placer, &self.tree, &self.vertices, open)?;
+        let (mut made, report) = drawn.join(&placer, &self.vertices, open, report);
         if self.settled {
             settle_made(field, self.options.iso, self.error, &mut made);
         }

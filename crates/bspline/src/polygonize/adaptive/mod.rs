@@ -49,6 +49,9 @@ pub struct AdaptiveOptions {
     pub detection: usize,
     /// Most blocks of 8³ cells before the work is refused.
     pub max_blocks: usize,
+    /// Forgets what was learnt of the field before a mesh settles, which halves the memory beside the field's own; the next
+    /// mesh begins anew.
+    pub frugal: bool,
 }
 
 impl Default for AdaptiveOptions {
@@ -60,6 +63,7 @@ impl Default for AdaptiveOptions {
             depth: 8,
             detection: 8,
             max_blocks: 1 << 22,
+            frugal: false,
         }
     }
 }
@@ -206,9 +210,14 @@ impl<'a> AdaptiveMesher<'a> {
                 blocks.map_init(vertices::Scratch::default, place).collect()
             })
             .collect::<Vec<_>>();
-        let (mut made, report) = contour(&placer, &tree, &vertices, self.options.open, report)?;
-        drop(vertices);
+        let open = self.options.open;
+        let drawn = Drawn::new(&placer, &tree, &vertices, open)?;
         drop(tree);
+        if self.options.frugal {
+            self.samples = Samples::new(self.options.depth);
+        }
+        let (mut made, report) = drawn.join(&placer, &vertices, open, report);
+        drop(vertices);
         if progress(0.5).is_break() {
             return Err(PolygonizeError::Cancelled);
         }
@@ -277,7 +286,7 @@ fn report_of(samples: &Samples, tree: &Tree, options: &AdaptiveOptions, error: f
     for block in tree.get(options.depth).into_iter().flatten() {
         let sample: &Sample = &block.sample;
         for c in grid::each(tree::leaves(block)) {
-            if f64::from(sample.error[grid::cell_index(c)]) > error {
+            if f64::from(sample.error(c)) > error {
                 report.leaves_at_limit += 1;
                 report.creased_leaves += u64::from(grid::holds(&sample.creased, c));
             }
@@ -286,86 +295,100 @@ fn report_of(samples: &Samples, tree: &Tree, options: &AdaptiveOptions, error: f
     report
 }
 
-/// Vertices and triangles of an octree.
-fn contour(
-    placer: &Placer,
-    tree: &Tree,
-    vertices: &[Vec<Arc<BlockVertices>>],
-    open: bool,
-    mut report: AdaptiveReport,
-) -> Result<(AdaptiveMesh, AdaptiveReport), PolygonizeError> {
-    let depth = placer.grids.depth();
-    // Blocks in the order of space, so that what is close in it is close in the mesh.
-    let mut order: Vec<(u64, usize, usize)> = tree
-        .iter()
-        .enumerate()
-        .flat_map(|(level, blocks)| {
-            blocks.iter().enumerate().map(move |(n, b)| {
-                let fine = b.key.map(|k| ((i64::from(k) + 1) << (depth - level)) as u64);
-                (interleave(fine), level, n)
-            })
-        })
-        .collect();
-    order.sort_unstable();
-    let mut first: Vec<Vec<u32>> = tree.iter().map(|blocks| vec![0; blocks.len()]).collect();
-    let mut total: u64 = 0;
-    for &(_, level, n) in &order {
-        first[level][n] = total as u32;
-        total += vertices[level][n].positions.len() as u64;
-    }
-    if total >= u64::from(EXTRA) {
-        return Err(PolygonizeError::TooManyVertices { vertices: total });
-    }
-    let numbered = Numbered {
-        vertices,
-        first: &first,
-        cells: placer.grids.frames[0].cells.map(|n| n as i32),
-        mirrored: placer.grids.mirrored,
-        grid_from_world: placer
-            .grids
-            .frames
-            .iter()
-            .map(|f| f.world_from_grid.inverse())
-            .collect(),
-        depth,
-        open,
-    };
-    let parts: Vec<BlockTriangles> = order
-        .par_iter()
-        .with_min_len(4)
-        .map(|&(_, level, n)| {
-            let mut out = BlockTriangles::default();
-            numbered.triangles(&Around::new(tree, level, &tree[level][n]), &mut out)?;
-            Ok(out)
-        })
-        .collect::<Result<_, PolygonizeError>>()?;
+/// The triangles of an octree, block by block.
+struct Drawn {
+    /// Blocks in the order of space, so that what is close in it is close in the mesh: place, level, number.
+    order: Vec<(u64, usize, usize)>,
+    /// Vertices of all leaves.
+    count: u64,
+    parts: Vec<BlockTriangles>,
+}
 
-    let mut made = AdaptiveMesh::default();
-    let count = total as usize;
-    made.mesh.positions.reserve_exact(count);
-    made.keys.reserve_exact(count);
-    made.fixed.reserve_exact(count);
-    for &(_, level, n) in &order {
-        let block = &vertices[level][n];
-        made.mesh.positions.extend_from_slice(&block.positions);
-        made.keys.extend_from_slice(&block.keys);
-        made.fixed.extend_from_slice(&block.fixed);
+impl Drawn {
+    /// Draws the triangles between the vertices of an octree.
+    fn new(
+        placer: &Placer,
+        tree: &Tree,
+        vertices: &[Vec<Arc<BlockVertices>>],
+        open: bool,
+    ) -> Result<Self, PolygonizeError> {
+        let depth = placer.grids.depth();
+        let mut order: Vec<(u64, usize, usize)> = tree
+            .iter()
+            .enumerate()
+            .flat_map(|(level, blocks)| {
+                blocks.iter().enumerate().map(move |(n, b)| {
+                    let fine = b.key.map(|k| ((i64::from(k) + 1) << (depth - level)) as u64);
+                    (interleave(fine), level, n)
+                })
+            })
+            .collect();
+        order.sort_unstable();
+        let mut first: Vec<Vec<u32>> = tree.iter().map(|blocks| vec![0; blocks.len()]).collect();
+        let mut count: u64 = 0;
+        for &(_, level, n) in &order {
+            first[level][n] = count as u32;
+            count += vertices[level][n].positions.len() as u64;
+        }
+        if count >= u64::from(EXTRA) {
+            return Err(PolygonizeError::TooManyVertices { vertices: count });
+        }
+        let frames = placer.grids.frames.iter();
+        let numbered = Numbered {
+            vertices,
+            first: &first,
+            cells: placer.grids.frames[0].cells.map(|n| n as i32),
+            mirrored: placer.grids.mirrored,
+            grid_from_world: frames.map(|f| f.world_from_grid.inverse()).collect(),
+            depth,
+            open,
+        };
+        let parts = order
+            .par_iter()
+            .with_min_len(4)
+            .map(|&(_, level, n)| {
+                let mut out = BlockTriangles::default();
+                numbered.triangles(&Around::new(tree, level, &tree[level][n]), &mut out)?;
+                Ok(out)
+            })
+            .collect::<Result<_, PolygonizeError>>()?;
+        Ok(Self { order, count, parts })
     }
-    let extras = add_extras(placer, &order, &parts, &mut made);
-    report.extra_vertices = made.mesh.positions.len() as u64 - total;
-    made.mesh
-        .triangles
-        .reserve_exact(parts.iter().map(|p| p.triangles.len()).sum());
-    for (part, own) in parts.iter().zip(extras) {
-        let known = |v: u32| if v < EXTRA { v } else { own[(v - EXTRA) as usize] };
-        made.mesh
-            .triangles
-            .extend(part.triangles.iter().map(|t| t.map(known)));
+
+    /// Joins the blocks.
+    fn join(
+        self,
+        placer: &Placer,
+        vertices: &[Vec<Arc<BlockVertices>>],
+        open: bool,
+        mut report: AdaptiveReport,
+    ) -> (AdaptiveMesh, AdaptiveReport) {
+        let Self { order, count, parts } = self;
+        let mut made = AdaptiveMesh::default();
+        made.mesh.positions.reserve_exact(count as usize);
+        made.keys.reserve_exact(count as usize);
+        made.fixed.reserve_exact(count as usize);
+        for &(_, level, n) in &order {
+            let block = &vertices[level][n];
+            made.mesh.positions.extend_from_slice(&block.positions);
+            made.keys.extend_from_slice(&block.keys);
+            made.fixed.extend_from_slice(&block.fixed);
+        }
+        let extras = add_extras(placer, &order, &parts, &mut made);
+        report.extra_vertices = made.mesh.positions.len() as u64 - count;
+        let triangle_count = parts.iter().map(|p| p.triangles.len()).sum();
+        made.mesh.triangles.reserve_exact(triangle_count);
+        for (part, own) in parts.into_iter().zip(extras) {
+            let known = |v: u32| if v < EXTRA { v } else { own[(v - EXTRA) as usize] };
+            made.mesh
+                .triangles
+                .extend(part.triangles.iter().map(|t| t.map(known)));
+        }
+        if open {
+            drop_unused(&mut made);
+        }
+        (made, report)
     }
-    if open {
-        drop_unused(&mut made);
-    }
-    Ok((made, report))
 }
 
 /// Numbers, keys and places the vertices that no leaf has; gives the numbers by part.

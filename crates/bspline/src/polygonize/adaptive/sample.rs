@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::grid::{CELL_COUNT, Cells, Grids, NODE_COUNT, cell_index, each, node_index, octant_with};
+use super::grid::{Cells, Grids, NODE_COUNT, bit, each, holds, node_index, octant_with, rank};
 use crate::polygonize::blocks::{BlockKey, CELLS, NODES};
 use crate::{Field, Interval, Jet};
 
@@ -11,6 +11,7 @@ use crate::{Field, Interval, Jet};
 pub(super) struct Scratch {
     pub values: Vec<f64>,
     pub points: Vec<DVec3>,
+    /// Crossed cells by number, with the bounds of their errors.
     pub owners: Vec<(u16, f32)>,
     pub jets: Vec<Jet>,
 }
@@ -43,8 +44,12 @@ pub(super) struct Sample {
     pub rows: [u16; NODES * NODES],
     /// `f - iso` at the nodes, 0 beyond the frame.
     pub values: [f32; NODE_COUNT],
-    /// Chord error of each cell that was judged, world length; 0 without surface.
-    pub error: [f32; CELL_COUNT],
+    /// Cells that have corners on both sides.
+    pub crossed: Cells,
+    /// Chord errors of the crossed cells, in their order, world length.
+    pub errors: Box<[f32]>,
+    /// Judged cells that may hold surface though their corners are on one side.
+    pub hidden: Cells,
     /// Cells judged.
     pub judged: Cells,
     /// Judged cells of which only an upper bound of the error is known.
@@ -61,9 +66,29 @@ pub(super) struct Sample {
     pub nan_nodes: u32,
 }
 
+impl Default for Sample {
+    /// Nothing known.
+    fn default() -> Self {
+        Self {
+            rows: [0; NODES * NODES],
+            values: [0.0; NODE_COUNT],
+            crossed: [0; CELLS],
+            errors: Box::default(),
+            hidden: [0; CELLS],
+            judged: [0; CELLS],
+            bounded: [0; CELLS],
+            guessed: [0; CELLS],
+            guesses: [0.0; 8],
+            coarse: 0,
+            creased: [0; CELLS],
+            nan_nodes: 0,
+        }
+    }
+}
+
 impl Sample {
-    /// Samples the nodes of a block.
-    pub fn new(judge: &Judge, level: usize, key: BlockKey, scratch: &mut Scratch) -> Self {
+    /// Samples the nodes of a block of which nothing is known.
+    pub fn fill(&mut self, judge: &Judge, level: usize, key: BlockKey, scratch: &mut Scratch) {
         let grids = judge.grids;
         let origin = key.map(|b| b * CELLS as i32);
         let (lo, hi) = grids.clipped(level, origin, CELLS as i32);
@@ -73,37 +98,52 @@ impl Sample {
         judge
             .field
             .frame_values(&grids.frames[level], lo, count, &mut scratch.values);
-        let mut sample = Self {
-            rows: [0; NODES * NODES],
-            values: [0.0; NODE_COUNT],
-            error: [0.0; CELL_COUNT],
-            judged: [0; CELLS],
-            bounded: [0; CELLS],
-            guessed: [0; CELLS],
-            guesses: [0.0; 8],
-            coarse: 0,
-            creased: [0; CELLS],
-            nan_nodes: 0,
-        };
         for (n, row) in scratch.values.chunks_exact(count[2]).enumerate() {
             let (i, j) = (n / count[1] + skip[0], n % count[1] + skip[1]);
             let start = node_index([i, j, skip[2]]);
             let mut bits = 0;
-            for (k, (&f, out)) in row.iter().zip(&mut sample.values[start..]).enumerate() {
+            for (k, (&f, out)) in row.iter().zip(&mut self.values[start..]).enumerate() {
                 bits |= ((f > judge.iso) as u16) << k;
                 *out = (f - judge.iso) as f32;
             }
-            sample.nan_nodes += row.iter().map(|f| u32::from(f.is_nan())).sum::<u32>();
-            sample.rows[NODES * i + j] = bits << skip[2];
+            self.nan_nodes += row.iter().map(|f| u32::from(f.is_nan())).sum::<u32>();
+            self.rows[NODES * i + j] = bits << skip[2];
         }
-        sample.guessed = sample.crossed();
-        for c in each(sample.guessed) {
-            let guess = sample.guess(judge, level, key, c);
-            sample.error[cell_index(c)] = guess;
-            let most = &mut sample.guesses[octant_with(c)];
-            *most = most.max(guess);
+        self.crossed = self.find_crossed();
+        self.guessed = self.crossed;
+        let guesses = each(self.crossed).map(|c| self.guess(judge, level, key, c));
+        self.errors = guesses.collect();
+        for (c, guess) in each(self.crossed).zip(&self.errors) {
+            let most = &mut self.guesses[octant_with(c)];
+            *most = most.max(*guess);
         }
-        sample
+    }
+
+    /// Chord error of a cell, world length: infinite for one that hides surface, 0 without surface.
+    pub fn error(&self, c: [usize; 3]) -> f32 {
+        if holds(&self.crossed, c) {
+            self.errors[rank(&self.crossed, c)]
+        } else if holds(&self.hidden, c) {
+            f32::INFINITY
+        } else {
+            0.0
+        }
+    }
+
+    /// The error of a crossed cell, to be changed.
+    pub fn error_mut(&mut self, c: [usize; 3]) -> &mut f32 {
+        &mut self.errors[rank(&self.crossed, c)]
+    }
+
+    /// Judged ones of `cells` whose errors are larger than this.
+    pub fn larger(&self, cells: &Cells, error: f32) -> Cells {
+        let mut found: Cells = std::array::from_fn(|x| cells[x] & self.judged[x] & self.hidden[x]);
+        for (c, own) in each(self.crossed).zip(&self.errors) {
+            if *own > error {
+                found[c[0]] |= bit(c) & cells[c[0]] & self.judged[c[0]];
+            }
+        }
+        found
     }
 
     /// Whether a node is inside.
@@ -119,8 +159,7 @@ impl Sample {
         pair(0, 0) | pair(0, 1) << 2 | pair(1, 0) << 4 | pair(1, 1) << 6
     }
 
-    /// Cells that have corners on both sides.
-    pub fn crossed(&self) -> Cells {
+    fn find_crossed(&self) -> Cells {
         std::array::from_fn(|x| {
             (0..CELLS).fold(0, |word, y| {
                 let at = NODES * x + y;

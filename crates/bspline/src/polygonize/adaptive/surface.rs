@@ -54,16 +54,63 @@ struct Nodes {
     split_faces: u8,
 }
 
-fn node(n: [usize; 3]) -> usize {
+const fn node(n: [usize; 3]) -> usize {
     9 * n[0] + 3 * n[1] + n[2]
 }
 
 /// Number of an edge along `axis` at the sides `u`, `v` (0 or 2) of the next axes.
-fn edge_bit(axis: usize, u: usize, v: usize) -> u16 {
-    1 << (4 * axis + u + v / 2)
+const fn edge_number(axis: usize, u: usize, v: usize) -> usize {
+    4 * axis + u + v / 2
 }
 
-fn placed(axis: usize, along: usize, u: usize, v: usize) -> [usize; 3] {
+/// The middles of a leaf's faces, by `2·axis + side`, and of its edges, by number. The cell beside the side 0 or 2 of an
+/// axis stands at 0 or 2 of the 27 as well.
+const FACES: [[usize; 3]; 6] = {
+    let mut faces = [[0; 3]; 6];
+    let mut f = 0;
+    while f < 6 {
+        faces[f] = placed(f / 2, f % 2 * 2, 1, 1);
+        f += 1;
+    }
+    faces
+};
+const EDGES: [[usize; 3]; 12] = {
+    let mut edges = [[0; 3]; 12];
+    let mut e = 0;
+    while e < 12 {
+        edges[e] = placed(e / 4, 1, e / 2 % 2 * 2, e % 2 * 2);
+        e += 1;
+    }
+    edges
+};
+/// The three cells beside each edge.
+const BESIDE: [[[usize; 3]; 3]; 12] = {
+    let mut beside = [[[0; 3]; 3]; 12];
+    let mut e = 0;
+    while e < 12 {
+        let (axis, u, v) = (e / 4, e / 2 % 2 * 2, e % 2 * 2);
+        beside[e] = [
+            placed(axis, 1, u, 1),
+            placed(axis, 1, 1, v),
+            placed(axis, 1, u, v),
+        ];
+        e += 1;
+    }
+    beside
+};
+/// The same as bits of the 27.
+const BESIDE_BITS: [u32; 12] = {
+    let mut bits = [0; 12];
+    let mut e = 0;
+    while e < 12 {
+        let [a, b, c] = BESIDE[e];
+        bits[e] = 1 << node(a) | 1 << node(b) | 1 << node(c);
+        e += 1;
+    }
+    bits
+};
+
+const fn placed(axis: usize, along: usize, u: usize, v: usize) -> [usize; 3] {
     let mut n = [0; 3];
     n[axis] = along;
     n[(axis + 1) % 3] = u;
@@ -80,11 +127,10 @@ impl Nodes {
             split_edges: 0,
             split_faces: 0,
         };
+        let case = sample.case(c);
         for corner in 0..8usize {
             let at = [corner >> 2, corner >> 1 & 1, corner & 1];
-            let n: [usize; 3] = std::array::from_fn(|a| c[a] + at[a]);
-            let slot = node(at.map(|x| 2 * x));
-            nodes.put(slot, sample.is_inside(n));
+            nodes.put(node(at.map(|x| 2 * x)), case >> corner & 1 == 1);
         }
         let cell = c.map(|c| c as i32);
         let split = around.split_about(c);
@@ -93,25 +139,17 @@ impl Nodes {
             let fine = std::array::from_fn(|a| 2 * cell[a] + n[a] as i32);
             nodes.put(node(n), around.fine_node(beside, fine).0);
         };
-        // The cell beside the side 0 or 2 of an axis stands at 0 or 2 of the 27 as well.
-        for axis in 0..3 {
-            for u in [0, 2] {
-                let face = placed(axis, u, 1, 1);
-                if split >> node(face) & 1 == 1 {
-                    nodes.split_faces |= 1 << (2 * axis + u / 2);
-                    take(&mut nodes, face, face);
-                }
-                for v in [0, 2] {
-                    let about = [
-                        placed(axis, 1, u, 1),
-                        placed(axis, 1, 1, v),
-                        placed(axis, 1, u, v),
-                    ];
-                    if let Some(out) = about.into_iter().find(|n| split >> node(*n) & 1 == 1) {
-                        nodes.split_edges |= edge_bit(axis, u, v);
-                        take(&mut nodes, placed(axis, 1, u, v), out);
-                    }
-                }
+        for (f, face) in FACES.into_iter().enumerate() {
+            if split >> node(face) & 1 == 1 {
+                nodes.split_faces |= 1 << f;
+                take(&mut nodes, face, face);
+            }
+        }
+        for (e, edge) in EDGES.into_iter().enumerate() {
+            if split & BESIDE_BITS[e] != 0 {
+                nodes.split_edges |= 1 << e;
+                let found = BESIDE[e].into_iter().find(|n| split >> node(*n) & 1 == 1);
+                take(&mut nodes, edge, found.expect("one of the bits is set"));
             }
         }
         nodes
@@ -129,7 +167,7 @@ impl Nodes {
 
     /// Whether the edge between two corners of a face has a node in its middle.
     fn is_split(&self, axis: usize, u: usize, v: usize) -> bool {
-        self.split_edges & edge_bit(axis, u, v) != 0
+        self.split_edges >> edge_number(axis, u, v) & 1 == 1
     }
 }
 

@@ -96,18 +96,23 @@ impl Samples {
         let mut merged: Vec<(BlockKey, Arc<Sample>)> = Vec::with_capacity(sets.len());
         let others = self.len();
         for part in sets.chunks(STRIDE) {
-            let mut work: Vec<(BlockKey, Cells, Option<Arc<Sample>>)> = Vec::with_capacity(part.len());
+            let mut work: Vec<(BlockKey, Cells, bool, Arc<Sample>)> = Vec::with_capacity(part.len());
             for &(key, cells) in part {
                 while let Some(before) = known.next_if(|(k, _)| *k < key) {
-                    work.push((before.0, [0; CELLS], Some(before.1)));
+                    work.push((before.0, [0; CELLS], true, before.1));
                 }
                 let own = known.next_if(|(k, _)| *k == key).map(|(_, s)| s);
-                work.push((key, if judged { cells } else { [0; CELLS] }, own));
+                let cells = if judged { cells } else { [0; CELLS] };
+                // Asked for here, not by the threads: what is freed makes room for what the caller asks for.
+                work.push((key, cells, own.is_some(), own.unwrap_or_default()));
             }
             merged.par_extend(work.into_par_iter().with_min_len(2).map_init(
                 Scratch::default,
-                |scratch, (key, cells, own)| {
-                    let mut sample = own.unwrap_or_else(|| Arc::new(Sample::new(judge, level, key, scratch)));
+                |scratch, (key, cells, is_known, mut sample)| {
+                    if !is_known {
+                        let blank = Arc::get_mut(&mut sample).expect("nobody else has it yet");
+                        blank.fill(judge, level, key, scratch);
+                    }
                     let new = sample.unjudged(judge, &cells);
                     if new != [0; CELLS] {
                         Arc::make_mut(&mut sample).judge(judge, level, key, &new, scratch);
@@ -136,15 +141,7 @@ impl Samples {
         sets.iter()
             .filter_map(|&(key, cells)| {
                 let sample = self.get(level, key).expect("every set was sampled");
-                let mut split = [0; CELLS];
-                for (x, word) in split.iter_mut().enumerate() {
-                    let errors = &sample.error[64 * x..64 * x + 64];
-                    let large = errors
-                        .iter()
-                        .enumerate()
-                        .fold(0u64, |m, (i, e)| m | u64::from(*e > error) << i);
-                    *word = large & cells[x] & sample.judged[x];
-                }
+                let split = sample.larger(&cells, error);
                 (split != [0; CELLS]).then_some((key, split))
             })
             .collect()
@@ -314,7 +311,7 @@ pub(super) fn crossed_leaves(tree: &Tree) -> u64 {
     let blocks = tree.iter().flatten();
     blocks
         .map(|b| {
-            let (leaves, crossed) = (leaves(b), b.sample.crossed());
+            let (leaves, crossed) = (leaves(b), b.sample.crossed);
             u64::from(count(&std::array::from_fn(|x| leaves[x] & crossed[x])))
         })
         .sum()

@@ -4,15 +4,12 @@ use glam::DVec3;
 
 use super::around::Around;
 use super::cases;
-use super::grid::{CELL_COUNT, Cells, Grids, NODE_COUNT, cell_index, each, holds, node_index};
+use super::grid::{Cells, Grids, NODE_COUNT, bit, cell_index, each, holds, node_index, rank};
 use super::surface::{Crossing, LeafSurface, MARGIN, Segment, crossing_on, share};
 use super::tree::leaves;
 use crate::Field;
 use crate::polygonize::blocks::CELLS;
 use crate::polygonize::table::edge_place;
-
-/// No vertex.
-const NO_VERTEX: u16 = u16::MAX;
 
 /// Bits of a vertex's key that number the loops of its leaf.
 const LOOP_BITS: u32 = 4;
@@ -24,8 +21,10 @@ pub(super) const STEPS: usize = 2;
 
 /// The vertices of a block.
 pub(super) struct BlockVertices {
-    /// First vertex of each leaf.
-    first: Box<[u16; CELL_COUNT]>,
+    /// Leaves that have vertices, which are in their order.
+    holding: Cells,
+    /// Leaves with several loops, and how many more than one.
+    more: Vec<(u16, u8)>,
     /// Leaves with several loops: their crossings with their loops, by leaf and name.
     crossings: Vec<(u16, Crossing, u8)>,
     /// Segments of leaves that share their minimal face with another segment of the same loop, by leaf.
@@ -60,15 +59,17 @@ impl BlockVertices {
     /// The vertex of a leaf's loop that has that crossing; `None` if there is none.
     #[inline]
     pub fn vertex(&self, c: [usize; 3], crossing: impl FnOnce() -> Option<Crossing>) -> Option<u32> {
-        let leaf = cell_index(c);
-        let first = self.first[leaf];
-        if first == NO_VERTEX {
+        if !holds(&self.holding, c) {
             return None;
         }
+        let mut first = rank(&self.holding, c) as u32;
         if self.crossings.is_empty() {
-            return Some(u32::from(first));
+            return Some(first);
         }
-        Some(u32::from(first) + u32::from(self.loop_of(leaf, crossing()?)))
+        let leaf = cell_index(c);
+        let before = self.more.iter().take_while(|(l, _)| usize::from(*l) < leaf);
+        first += before.map(|(_, n)| u32::from(*n)).sum::<u32>();
+        Some(first + u32::from(self.loop_of(leaf, crossing()?)))
     }
 
     /// Which loop of a leaf a crossing belongs to.
@@ -85,11 +86,12 @@ impl BlockVertices {
         let own = block.key.map(|b| b * CELLS as i32);
         let cells: [i32; 3] = std::array::from_fn(|a| grids.cells(level, a));
         let leaves = leaves(block);
-        let crossed = block.sample.crossed();
+        let crossed = block.sample.crossed;
         let beside = around.beside_split();
         let border = grids.meets_border(level, block.key);
         let mut made = Self {
-            first: Box::new([NO_VERTEX; CELL_COUNT]),
+            holding: [0; CELLS],
+            more: Vec::new(),
             crossings: Vec::new(),
             twice: Vec::new(),
             positions: Vec::new(),
@@ -105,9 +107,8 @@ impl BlockVertices {
             let case = cases::case(block.sample.case(c));
             let leaf = cell_index(c) as u16;
             let key = key_of(grids, level, cell);
-            let first = made.positions.len() as u16;
             if !capped && !holds(&beside, c) && case.loops == 1 && case.ambiguous == 0 {
-                made.first[usize::from(leaf)] = first;
+                made.holding[c[0]] |= bit(c);
                 made.push(
                     mean_of_edges(&block.sample.values, c, case.edges) + place(own),
                     key,
@@ -121,7 +122,7 @@ impl BlockVertices {
             if surface.loops == 0 {
                 continue;
             }
-            made.first[usize::from(leaf)] = first;
+            made.holding[c[0]] |= bit(c);
             for n in 0..surface.loops {
                 let own_segments = || {
                     surface
@@ -144,6 +145,7 @@ impl BlockVertices {
                 made.crossings
                     .extend(surface.segments.iter().map(|s| (leaf, s.from, s.of_loop)));
                 made.crossings[start..].sort_unstable();
+                made.more.push((leaf, surface.loops as u8 - 1));
             }
             let segments = &surface.segments;
             let same = |s: &Segment, t: &Segment| s.face == t.face && s.of_loop == t.of_loop;
