@@ -105,7 +105,6 @@ pub fn fit_field<T: Real>(
         let mut round = fit.run(&keys)?;
         report.samples += round.samples;
         if level > options.finest {
-            // Nothing is added here: it is only told how far off the field is.
             report.worst = round.worst;
             report.over_tolerance = round.over_tolerance;
             report.wrong_signs = round.wrong_signs;
