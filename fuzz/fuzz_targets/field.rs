@@ -1,14 +1,15 @@
 #![no_main]
-//! Any chunks: an error or a field, within the ceiling.
+//! Any chunks: an error, a field or a difference of fields, within the ceiling.
 //!
 //! Checksums are set right first: behind wrong ones the fuzzer would never get.
 
+use bspline::hierarchical::Lattice;
 use formats::{ReadLimits, field};
 use libfuzzer_sys::fuzz_target;
 
-fuzz_target!(|bytes: &[u8]| {
+/// The bytes with right checksums of the chunks that begin at `at`.
+fn checked(bytes: &[u8], mut at: usize) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
-    let mut at = 12;
     while let Some(head) = bytes.get(at..at + 28) {
         let length = u64::from_le_bytes(head[8..16].try_into().unwrap());
         let Some(end) = usize::try_from(length).ok().and_then(|n| n.checked_add(at + 28)) else { break };
@@ -19,5 +20,15 @@ fuzz_target!(|bytes: &[u8]| {
         bytes[at + 24..at + 28].copy_from_slice(&crc.finalize().to_le_bytes());
         at = end;
     }
-    let _ = field::decode(&bytes, &ReadLimits { max_bytes: 1 << 24 });
+    bytes
+}
+
+fuzz_target!(|bytes: &[u8]| {
+    let limits = ReadLimits { max_bytes: 1 << 24 };
+    let _ = field::decode(&checked(bytes, 12), &limits);
+    let lattice = Lattice {
+        world_from_lattice: Default::default(),
+        cells: [40, 30, 20],
+    };
+    let _ = field::decode_difference::<f32>(&checked(bytes, 8), &lattice, &limits);
 });

@@ -7,7 +7,6 @@ mod cli;
 mod fans;
 mod picture;
 mod pieces;
-mod simulate;
 
 use std::process::ExitCode;
 

@@ -15,6 +15,7 @@
 //!
 //! Index order is `(x, y, z)` with `z` fastest in memory, everywhere in this crate.
 
+mod any_field;
 mod banded;
 pub mod basis;
 pub mod csg;
@@ -32,6 +33,7 @@ pub mod restrict;
 pub mod tensor;
 mod vectorized;
 
+pub use any_field::AnyField;
 pub use banded::BandedRows;
 pub use basis::Basis;
 pub use csg::{Csg, CsgError};

@@ -1,7 +1,6 @@
 //! What a patch keeps from step to step that is made from its state and matter: solvers, matrices, bounds.
 
 use bspline::Real;
-use serde::{Deserialize, Serialize};
 
 use crate::response::StaticSolver;
 use crate::solve::StepSolver;
@@ -14,24 +13,35 @@ pub(crate) struct Cache<T> {
     /// For the mass alone, made by the first explicit step.
     pub mass_solver: Option<Box<StepSolver<T>>>,
     /// `M + ΔtD` with the version and the step it was made for.
-    pub mass_matrix: Option<(u64, f64, StepMatrix<T>)>,
+    pub mass_matrix: Option<(Version, f64, StepMatrix<T>)>,
     pub matrix: StepMatrix<T>,
     /// Version, damping, stiffness and unit that the matrix holds.
-    pub filled: Option<(u64, f64, f64, f64)>,
+    pub filled: Option<(Version, f64, f64, f64)>,
     /// What the solver was made for.
     pub prepared: Option<Prepared>,
     /// Counts changes of matter and constraints.
     pub changes: u64,
+    /// Counts paint, which what was made before may survive.
+    pub paints: u64,
     /// Bound of explicit steps with the version it is of.
-    pub limit: Option<(u64, f64)>,
+    pub limit: Option<(Version, f64)>,
     /// Of static problems, painted and of reference; no bit depends on whether they are there.
     pub statics: [Option<Box<StaticSolver>>; 2],
 }
 
+/// What a matrix depends on, counted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Version {
+    /// Matter and constraints that were set.
+    pub changes: u64,
+    /// Matter that was painted since.
+    pub paints: u64,
+}
+
 /// Key of the matrix that the solver was made for.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Prepared {
-    pub version: u64,
+    pub version: Version,
     pub damping: f64,
     pub stiffness: f64,
     /// Of the matrix.
@@ -51,6 +61,7 @@ impl<T: Real> Cache<T> {
             filled: None,
             prepared: None,
             changes: 0,
+            paints: 0,
             limit: None,
             statics: [None, None],
         }

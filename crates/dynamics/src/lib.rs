@@ -41,6 +41,7 @@ pub mod constraints;
 pub mod integrators;
 pub mod lattice;
 pub mod matter;
+pub mod paint;
 pub mod patch;
 mod patch_error;
 pub mod region;

@@ -7,7 +7,7 @@ use bspline::Real;
 use serde::{Deserialize, Serialize};
 
 use crate::lattice::Lattice;
-use crate::springs::{Neighbours, SpringWeights, Weights};
+use crate::springs::{Direction, Neighbours, SpringWeights, Weights};
 use crate::units::InUnits;
 
 /// One quantity over the samples of a patch.
@@ -169,8 +169,7 @@ pub(crate) struct ScaledMatter<T> {
 }
 
 impl Matter {
-    /// The numbers on a lattice. A spring lies half in the volume of each of its samples: it has the harmonic mean of
-    /// their stiffness.
+    /// The numbers on a lattice.
     ///
     /// # Errors
     /// [`MatterError`].
@@ -221,6 +220,42 @@ impl Matter {
         Ok((scaled, lumped.springs))
     }
 
+    /// Stiffness of the springs of direction `n` by the sample where they begin. Half of a spring lies in the volume of each of
+    /// its samples: it has the harmonic mean of their stiffness. Where the lattice ends and there is no spring it is that of the
+    /// sample, so that each number depends on what is near it only.
+    pub(crate) fn spring_weight<U: Real>(
+        &self,
+        lattice: &Lattice<U>,
+        n: usize,
+        direction: Direction,
+    ) -> impl Fn(usize) -> f64 + '_ {
+        // Along an axis of spacing h: κV/h². Diagonals are for cubic lattices, where all spacings agree.
+        let axis = direction.step.iter().position(|&s| s != 0).unwrap_or(0);
+        let (spacing, dims) = (lattice.spacing(), lattice.sample_dims());
+        let factor = direction.share * lattice.sample_volume() / (spacing[axis] * spacing[axis]);
+        let own = self.spring_factors.as_ref().map(|f| &f[n]);
+        let [dx, dy, dz] = direction.step;
+        let offset = (dx * dims[1] as isize + dy) * dims[2] as isize + dz;
+        move |i| {
+            let own = own.map_or(1.0, |f| f[i]);
+            let mean = match &self.stiffness {
+                Quantity::Constant(v) if self.spring_factors.is_none() => return v * factor,
+                stiffness => {
+                    let at = [i / (dims[1] * dims[2]), i / dims[2] % dims[1], i % dims[2]];
+                    let ends = |a: usize| at[a].wrapping_add_signed(direction.step[a]) < dims[a];
+                    let j = if (0..3).all(ends) {
+                        i.wrapping_add_signed(offset)
+                    } else {
+                        i
+                    };
+                    let (a, b) = (stiffness.at(i), stiffness.at(j));
+                    if a + b > 0.0 { 2.0 * a * (b / (a + b)) } else { 0.0 }
+                }
+            };
+            mean * factor * own
+        }
+    }
+
     fn lumped_on<T: Real, U: Real>(
         &self,
         lattice: &Lattice<U>,
@@ -244,30 +279,15 @@ impl Matter {
                 Quantity::PerSample(f.clone()).check("spring stiffness", samples, true)?;
             }
         }
-        let volume = lattice.sample_volume();
-        let spacing = lattice.spacing();
-        let dims = lattice.sample_dims();
         let springs = directions.into_iter().enumerate().map(|(n, direction)| {
-            // Along an axis of spacing h: κV/h². Diagonals are for cubic lattices, where all spacings agree.
-            let axis = direction.step.iter().position(|&s| s != 0).unwrap_or(0);
-            let factor = direction.share * volume / (spacing[axis] * spacing[axis]);
-            let own = self.spring_factors.as_ref().map(|f| &f[n]);
-            if let (Quantity::Constant(v), None) = (&self.stiffness, own) {
-                let weights = Weights::Constant(T::from_f64(v * factor));
-                return SpringWeights { direction, weights };
-            }
-            let [dx, dy, dz] = direction.step;
-            let offset = (dx * dims[1] as isize + dy) * dims[2] as isize + dz;
-            let weight = |i: usize| {
-                // Where the lattice ends the number is not read.
-                let j = i.wrapping_add_signed(offset).min(samples - 1);
-                let (a, b) = (self.stiffness.at(i), self.stiffness.at(j));
-                let mean = if a + b > 0.0 { 2.0 * a * (b / (a + b)) } else { 0.0 };
-                T::from_f64(mean * factor * own.map_or(1.0, |f| f[i]))
+            let weight = self.spring_weight(lattice, n, direction);
+            let weights = match (&self.stiffness, &self.spring_factors) {
+                (Quantity::Constant(_), None) => Weights::Constant(T::from_f64(weight(0))),
+                _ => Weights::Each((0..samples).map(|i| T::from_f64(weight(i))).collect()),
             };
-            let weights = Weights::Each((0..samples).map(weight).collect());
             SpringWeights { direction, weights }
         });
+        let volume = lattice.sample_volume();
         Ok(Lumped {
             mass: self.mass.weights(volume),
             damping: self.damping.weights(volume),

@@ -3,7 +3,7 @@
 use bspline::Real;
 use serde::{Deserialize, Serialize};
 
-use crate::cache::Cache;
+use crate::cache::{Cache, Version};
 use crate::constraints::Held;
 use crate::lattice::{Lattice, OnBox, SampleBox, TensorWorkspace};
 use crate::matter::{Matter, Quantity, ScaledMatter};
@@ -303,8 +303,11 @@ impl<T: Real> Patch<T> {
     }
 
     /// Counts all that the matrix of a step depends on.
-    pub(crate) fn version(&self) -> u64 {
-        self.cache.changes + self.network.changes()
+    pub(crate) fn version(&self) -> Version {
+        Version {
+            changes: self.cache.changes + self.network.changes(),
+            paints: self.cache.paints,
+        }
     }
 
     /// Sets the external forces on the densities of the samples, which hold until they are set again.

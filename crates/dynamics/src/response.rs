@@ -2,6 +2,7 @@
 
 use bspline::Real;
 
+use crate::cache::Version;
 use crate::integrators::Integrator;
 use crate::lattice::{Lattice, OnBox, Rim, SampleBox};
 use crate::matter::{Matter, Quantity};
@@ -57,7 +58,7 @@ pub enum Against {
 pub(crate) struct StaticSolver {
     against: Against,
     /// Of the matter it is for.
-    version: u64,
+    version: Version,
     matrix: StepMatrix<f64>,
     /// Of the matrix, `σ²` included.
     unit: f64,

@@ -3,13 +3,13 @@
 use bspline::{KnotVector, Real};
 use serde::{Deserialize, Serialize};
 
-use crate::cache::Prepared;
+use crate::cache::{Prepared, Version};
 use crate::constraints::{Constraint, Held};
 use crate::lattice::{Axis, Lattice, LatticeError, Rim};
 use crate::matter::Matter;
 use crate::patch::{Patch, PatchError, State, finite};
 use crate::solve::{SolverHistory, SolverOptions};
-use crate::springs::{Law, Neighbours, Plasticity, Rest, SpringWeights, Weights};
+use crate::springs::{Law, Neighbours, Plasticity, Rest, SpringWeights, StepMatrix, Weights};
 
 /// All of a patch that later bits depend on: state, matter, and of the solvers what they were made for. Factors are not in
 /// it; they come out the same when they are made again.
@@ -32,6 +32,8 @@ pub struct PatchSnapshot<T> {
     constraints: Vec<Constraint>,
     /// Damping, stiffness, unit and residual of [`Prepared`], as bits: some formats know no infinity.
     prepared: Option<[u64; 4]>,
+    /// Whether there was paint since.
+    painted: bool,
     solver: Option<SolverHistory<T>>,
     /// Bits of the damping in the matrix of explicit steps.
     mass_prepared: Option<u64>,
@@ -95,6 +97,9 @@ impl<T: Real> Patch<T> {
         let (now, cache) = (self.version(), &self.cache);
         let springs = self.own_springs.then(|| self.exact_springs());
         let solver = cache.solver.history();
+        // Constant material is prepared for anew after paint.
+        let lags = |p: &Prepared| p.version.changes == now.changes && solver.is_some();
+        let prepared = cache.prepared.filter(|p| p.version == now || lags(p));
         let mass_matrix = cache.mass_matrix.as_ref().filter(|m| m.0 == now);
         let bits = |p: Prepared| [p.damping, p.stiffness, p.unit, p.residual].map(f64::to_bits);
         PatchSnapshot {
@@ -112,7 +117,8 @@ impl<T: Real> Patch<T> {
             anchor: self.anchor.clone(),
             external: self.external.clone(),
             constraints: self.constraints().to_vec(),
-            prepared: cache.prepared.filter(|p| p.version == now).map(bits),
+            prepared: prepared.map(bits),
+            painted: prepared.is_some_and(|p| p.version != now),
             solver,
             mass_prepared: mass_matrix.map(|m| m.1.to_bits()),
             mass_solver: cache.mass_solver.as_ref().and_then(|s| s.history()),
@@ -180,19 +186,13 @@ impl<T: Real> Patch<T> {
 
     fn resume(&mut self, s: &PatchSnapshot<T>) -> Result<(), PatchError> {
         let now = self.version();
-        let m = self.base.len();
-        for history in s.solver.iter().chain(&s.mass_solver) {
-            if !history.fits(m) {
-                return Err(damaged("a matrix of another size"));
-            }
-        }
-        let fits = |history: &SolverHistory<T>, directions: usize| match history.directions() == directions {
+        let fits = |history: &SolverHistory<T>, like: &StepMatrix<T>| match history.fits(like) {
             true => Ok(()),
-            false => Err(damaged("a matrix of another number of directions")),
+            false => Err(damaged("a matrix of another size")),
         };
         let cache = &mut self.cache;
         if let Some(history) = &s.solver {
-            fits(history, cache.matrix.springs.len())?;
+            fits(history, &cache.matrix)?;
             cache.solver.resume(history, &cache.matrix)?;
         }
         cache.limit = s.limit.map(|l| (now, f64::from_bits(l)));
@@ -203,8 +203,9 @@ impl<T: Real> Patch<T> {
                 self.fill_matrix(damping, stiffness, unit);
                 self.cache.solver.prepare(&self.cache.matrix)?;
             }
+            let paints = if s.painted { u64::MAX } else { now.paints };
             self.cache.prepared = Some(Prepared {
-                version: now,
+                version: Version { paints, ..now },
                 damping,
                 stiffness,
                 unit,
@@ -222,7 +223,7 @@ impl<T: Real> Patch<T> {
         }
         match &s.mass_solver {
             Some(history) => {
-                fits(history, matrix.springs.len())?;
+                fits(history, &matrix)?;
                 solver.resume(history, &matrix)?;
             }
             None => solver.prepare(&matrix)?,

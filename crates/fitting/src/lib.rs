@@ -1,5 +1,5 @@
 //! Samples in, field out: fits of oriented point clouds ([`points`]), of triangle meshes ([`mesh`]) and of voxel
-//! grids ([`volume`]).
+//! grids ([`volume`]); and any field written back into a box of another ([`field`]).
 //!
 //! A fit takes plain slices and gives a [`bspline::HierarchicalSpline`] with a [`FitReport`]: residuals of every
 //! leaf, why it was not split, and what was repaired in the input. The caller holds a [`Control`]: progress out,
@@ -8,6 +8,7 @@
 mod budget;
 mod components;
 mod error;
+pub mod field;
 mod leaf_index;
 mod lines;
 pub mod mesh;

@@ -1,1 +1,4 @@
-//! What a hand can do to a field: force tools, geometric tools, painting, haptics. Not built yet.
+//! What a hand can do to a field. So far scripted [scenes](scene): kernels, paint, levels and formulas of matter; force tools,
+//! geometric tools and haptics are not built yet.
+
+pub mod scene;

@@ -1,6 +1,7 @@
 //! Speed against accuracy: sweeps over the options, and their charts.
 
 mod dynamics;
+mod edits;
 mod fit;
 mod hard;
 mod meshes;
@@ -10,6 +11,7 @@ mod outliers;
 mod plot;
 
 pub use dynamics::{DynamicsError, Extent, Line, Run, cost, sampling, sweep};
+pub use edits::edit_costs;
 pub use fit::{Configuration, Input, Measurement, sweeps};
 pub use hard::Scene;
 pub use meshes::{MeshSubject, MeshTrial};

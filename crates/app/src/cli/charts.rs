@@ -17,7 +17,7 @@ use super::progress::Bar;
 use super::quantity::between;
 use super::source::{SAMPLES, Source, scratch};
 use super::staged::StagedFiles;
-use super::{chart_dynamics, chart_mesh, chart_orient};
+use super::{chart_dynamics, chart_edits, chart_mesh, chart_orient};
 use crate::charts::{Chart, Configuration, Input, Measurement, Scene, noise, outliers, sweeps};
 
 /// Arguments of `isoclay charts`.
@@ -37,6 +37,8 @@ enum Subject {
     Dynamics(chart_dynamics::Args),
     /// Distance of meshes from the surface of their field against triangles and time
     Mesh(chart_mesh::Args),
+    /// Time of edits, and of what follows from them, against the size of the field
+    Edits(chart_edits::Args),
     /// Noise against the resolution chosen and the error, and outliers against the error with and without --robust
     Hard(HardArgs),
 }
@@ -84,6 +86,7 @@ impl Args {
         match &self.subject {
             Subject::Fit(a) => a.json,
             Subject::Dynamics(a) => a.json,
+            Subject::Edits(a) => a.json,
             Subject::Orient(_) | Subject::Mesh(_) | Subject::Hard(_) => false,
         }
     }
@@ -97,6 +100,7 @@ pub fn run(args: &Args) -> Outcome {
         Subject::Orient(args) => chart_orient::run(args, &cancel),
         Subject::Dynamics(args) => chart_dynamics::run(args, &cancel),
         Subject::Mesh(args) => chart_mesh::run(args, &cancel),
+        Subject::Edits(args) => chart_edits::run(args, &cancel),
         Subject::Hard(args) => hard(args, &cancel),
     }
 }

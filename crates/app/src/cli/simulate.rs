@@ -1,5 +1,6 @@
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use bspline::polygonize::Mesh;
 use bspline::{HierarchicalSpline, Real};
@@ -7,6 +8,7 @@ use fitting::Cancel;
 use formats::Unit;
 use formats::field::{AnyField, FieldMeta, Stored};
 use serde::Serialize;
+use tools::scene::{Scene, SimulateError, Simulation, StepLine};
 
 use super::cost::Cost;
 use super::failure::{Failure, Outcome};
@@ -21,7 +23,6 @@ use super::source::{FIELDS, Source};
 use super::staged::StagedFiles;
 use super::summary::{self, Summary, table};
 use super::{interrupt, set_threads};
-use crate::simulate::{Scene, SimulateError, Simulation, StepLine};
 
 /// Arguments of `isoclay simulate`.
 #[derive(clap::Args)]
@@ -49,6 +50,15 @@ pub struct Args {
     /// Print one JSON object for each step, and one at the end
     #[arg(long)]
     pub json: bool,
+}
+
+/// What a step did, and how long it took.
+#[derive(Serialize)]
+struct Timed<'a> {
+    #[serde(flatten)]
+    line: &'a StepLine,
+    /// By the wall clock.
+    seconds: f64,
 }
 
 /// What all steps did.
@@ -171,9 +181,14 @@ impl Stage<'_> {
         self.frame(&simulation, 0)?;
         while !simulation.is_over() {
             interrupt::check(self.cancel)?;
+            let start = Instant::now();
             let line = simulation.step().map_err(failed)?;
             if self.args.json {
-                let text = serde_json::to_string(&line).expect("a struct of plain fields is always JSON");
+                let timed = Timed {
+                    line: &line,
+                    seconds: start.elapsed().as_secs_f64(),
+                };
+                let text = serde_json::to_string(&timed).expect("a struct of plain fields is always JSON");
                 let is_taken = self.output.is_stdout() || self.mesh.is_some_and(Output::is_stdout);
                 summary::print(&text, is_taken)?;
             }

@@ -15,7 +15,7 @@ use crate::Real;
 /// the bits of the one that the difference was taken from.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BrickDiff<T> {
-    /// In the order of the tree.
+    /// In the order of levels, then of keys.
     pub bricks: Vec<BrickChange<T>>,
 }
 
@@ -73,6 +73,7 @@ impl<T: Real> HierarchicalSpline<T> {
         }
         let mut bricks = Vec::new();
         collect(Some(&self.root), Some(&newer.root), &mut bricks);
+        bricks.sort_unstable_by_key(|change| (change.level, change.key));
         Ok(BrickDiff { bricks })
     }
 

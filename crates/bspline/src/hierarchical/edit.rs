@@ -5,10 +5,11 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::brick::{BRICK, DenseCorrections, HALO, HALO_LEN, reaches};
+use super::brick::{BRICK, Corrections, DenseCorrections, HALO, HALO_LEN, reaches};
 use super::graft::{Graft, grafted};
 use super::prolong::prolong;
 use super::renew::renewed;
+use super::spline::check_functions;
 use super::{BrickKey, HierarchicalSpline, Lattice};
 use crate::{KnotVector, Real, TensorSpline};
 
@@ -50,6 +51,17 @@ pub enum Change<T> {
     Set(Vec<T>),
     /// Takes the functions out of the field; bricks that no function reaches any more go with them.
     Deactivate,
+}
+
+/// What is added to functions of one brick.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BrickEdit<T> {
+    /// Level of the brick, 0 the coarsest; may be finer than the field was so far.
+    pub level: usize,
+    /// Place of the brick.
+    pub key: BrickKey,
+    /// Its functions become active, its coefficients are added to theirs.
+    pub add: Corrections<T>,
 }
 
 /// Why coefficients cannot be changed.
@@ -167,6 +179,37 @@ impl<T: Real> HierarchicalSpline<T> {
             }
         }
         Ok(self.with_bricks(bricks.into_values().collect()))
+    }
+
+    /// The field with coefficients added brick by brick; of several edits of one brick all are added, in order.
+    ///
+    /// See [`Self::edited_blocks`].
+    ///
+    /// # Errors
+    /// Any [`EditError`]; then nothing is done.
+    pub fn added(&self, edits: &[BrickEdit<T>]) -> Result<Self, EditError> {
+        for edit in edits {
+            check_functions(&self.lattice, edit.level, edit.key, &edit.add)?;
+        }
+        let mut order: Vec<&BrickEdit<T>> = edits.iter().collect();
+        order.sort_by_key(|edit| (edit.level, edit.key));
+        let groups: Vec<_> = order
+            .chunk_by(|a, b| (a.level, a.key) == (b.level, b.key))
+            .collect();
+        let changed = groups.into_par_iter().with_min_len(64).map(|group| {
+            let mut brick = ChangedBrick::of(self, group[0].level, group[0].key);
+            for edit in group {
+                let corner = edit.key.0.map(|k| k * BRICK as u32);
+                for (slot, delta) in edit.add.iter() {
+                    let at = [slot / 64, slot / 8 % 8, slot % 8];
+                    let function = std::array::from_fn(|a| corner[a] + at[a] as u32);
+                    brick.put(function, |old| Some(old.unwrap_or(T::zero()) + delta))?;
+                }
+            }
+            Ok(brick)
+        });
+        let changed: Vec<Result<_, EditError>> = changed.collect();
+        Ok(self.with_bricks(changed.into_iter().collect::<Result<_, _>>()?))
     }
 
     /// Coefficients `first .. first + count` of the total spline of `level` (function numbers as in [`LevelEdit`]), last

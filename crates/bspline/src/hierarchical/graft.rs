@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use super::brick::{BrickKey, Corrections};
 use super::node::{Children, Node, crown};
 use super::{Lattice, node};
@@ -20,6 +22,9 @@ pub(super) struct Graft<T> {
 
 /// Bits of a path: 40 octants.
 const PATH: u32 = 120;
+
+/// Grafts from which on a node's children are made side by side: a millisecond's work.
+const SIDE_BY_SIDE: usize = 1000;
 
 impl<T: Real> Graft<T> {
     /// The functions of a brick from now on; none removes them.
@@ -86,14 +91,23 @@ fn at_node<T: Real>(
             corrections = new.clone();
         }
     }
-    for (octant, child) in children.iter_mut().enumerate() {
+    let mut split = children.iter_mut().enumerate().map(|(octant, child)| {
         let count = below.partition_point(|g| g.octant(depth + 1) == octant);
         let (here, rest) = below.split_at(count);
         below = rest;
+        (octant, child, here)
+    });
+    let graft = |(octant, child, here): (usize, &mut Option<Arc<Node<T>>>, &[Graft<T>])| {
         if !here.is_empty() {
             let place = (level + 1, key.child(octant));
             *child = Some(Arc::new(at_node(child.as_ref(), place, depth + 1, here)));
         }
+    };
+    if grafts.len() < SIDE_BY_SIDE {
+        split.for_each(graft);
+    } else {
+        let split: [_; 8] = std::array::from_fn(|_| split.next().expect("eight children"));
+        split.into_par_iter().with_max_len(1).for_each(graft);
     }
     Node::skeleton((level, key), totals, corrections, children, grafts.len())
 }

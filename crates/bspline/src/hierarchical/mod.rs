@@ -41,7 +41,7 @@ pub use brick::{
     BRICK, BRICK_LEN, BrickKey, Corrections, DenseCorrections, HALO, HALO_LEN, LevelCorrections, active_slots,
 };
 pub use difference::{BrickChange, BrickDiff, DiffError};
-pub use edit::{BlockEdit, Change, EditError, LevelEdit, MAX_LEVELS};
+pub use edit::{BlockEdit, BrickEdit, Change, EditError, LevelEdit, MAX_LEVELS};
 pub use lattice::Lattice;
 pub use local::{LocalField, LocalFields};
 pub use motion::Motion;

@@ -1,3 +1,4 @@
+use std::fmt;
 use std::sync::{Arc, OnceLock};
 
 use super::brick::{BRICK, BrickKey, Corrections, HALO_LEN};
@@ -10,7 +11,7 @@ use crate::Real;
 ///
 /// Nodes of levels `0, 1, …` are bricks; those of negative levels lead up to one root. A node never changes: another
 /// version of the field has another node in its place and shares what is below.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub(crate) struct Node<T> {
     /// Level, `>= 0` for bricks; a node above level 0 is `-level` halvings above it.
     pub level: i8,
@@ -38,6 +39,16 @@ pub(crate) struct Node<T> {
 }
 
 pub(crate) type Children<T> = [Option<Arc<Node<T>>>; 8];
+
+impl<T> fmt::Debug for Node<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "level {} {:?}: {} functions",
+            self.level, self.key.0, self.count
+        )
+    }
+}
 
 impl<T: Real> Node<T> {
     /// A node with its summary, gathered from its own totals and its children.

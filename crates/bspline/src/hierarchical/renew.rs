@@ -1,6 +1,6 @@
 //! Totals and summaries of a grafted tree.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 use rayon::prelude::*;
 
@@ -21,8 +21,17 @@ pub(super) fn renewed<T: Real>(
     old: Option<&Arc<Node<T>>>,
     grafted: &Arc<Node<T>>,
 ) -> Arc<Node<T>> {
+    // A whole field's totals are asked for here, not by the threads: so they take the place of what the caller has freed.
+    let mut blank = Vec::new();
+    if old.is_none() {
+        grafted.walk(&mut |node| {
+            blank.extend(covers_cells(lattice, node.place()).then(|| Arc::new([T::zero(); HALO_LEN])));
+            true
+        });
+    }
     let root = Renewal {
         lattice,
+        blank: &Mutex::new(blank),
         old,
         grafted,
         window: Window::root(grafted),
@@ -34,6 +43,8 @@ pub(super) fn renewed<T: Real>(
 /// One node in the old tree and in the grafted one.
 struct Renewal<'a, T> {
     lattice: &'a Lattice,
+    /// Totals that are all 0, to be filled; when there are none left they are allocated.
+    blank: &'a Mutex<Vec<Arc<[T; HALO_LEN]>>>,
     old: Option<&'a Arc<Node<T>>>,
     grafted: &'a Arc<Node<T>>,
     window: Window<'a, T>,
@@ -82,7 +93,8 @@ impl<T: Real> Renewal<'_, T> {
         if let (Some(kept), false) = (&grafted.totals, is_forced) {
             return (Some(kept.clone()), false);
         }
-        let mut totals = Arc::new([T::zero(); HALO_LEN]);
+        let kept = self.blank.lock().expect("no thread panics with it").pop();
+        let mut totals = kept.unwrap_or_else(|| Arc::new([T::zero(); HALO_LEN]));
         let blank = Arc::get_mut(&mut totals).expect("just made");
         self.window.fill(self.parent, grafted.key.octant(), blank);
         match self.old.and_then(|old| old.totals.as_ref()) {
@@ -96,6 +108,7 @@ impl<T: Real> Renewal<'_, T> {
             let grafted = self.grafted.children[octant].as_ref()?;
             let child = Renewal {
                 lattice: self.lattice,
+                blank: self.blank,
                 old: self.old.and_then(|old| old.children[octant].as_ref()),
                 grafted,
                 window: self.window.child(octant),

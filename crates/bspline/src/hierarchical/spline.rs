@@ -1,3 +1,4 @@
+use std::fmt;
 use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
@@ -19,11 +20,23 @@ use crate::placed_box::PlacedBox;
 ///
 /// The bricks form a tree whose nodes are shared between versions, so that a copy costs nothing and an edit the paths
 /// to what it changes.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct HierarchicalSpline<T> {
     pub(super) lattice: Lattice,
     pub(super) place: PlacedBox,
     pub(super) root: Arc<Node<T>>,
+}
+
+impl<T> fmt::Debug for HierarchicalSpline<T> {
+    /// What it is, without its millions of coefficients.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("HierarchicalSpline")
+            .field("lattice", &self.lattice)
+            .field("slope", &self.place.slope)
+            .field("levels", &self.root.level_count)
+            .field("coefficients", &self.root.count)
+            .finish_non_exhaustive()
+    }
 }
 
 /// A point of the box, found: which brick evaluates it, which cell of that brick, where in the cell.

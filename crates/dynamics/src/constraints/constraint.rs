@@ -307,6 +307,19 @@ impl Row {
         }
     }
 
+    /// Moves the target to that of a constraint that differs in nothing else.
+    pub fn aim<T: Real>(&mut self, c: &Constraint, base: &[T]) {
+        (self.target, self.size) = match &c.on {
+            On::Point { field, .. } => (c.density - field, c.density.abs() + field.abs()),
+            On::Samples(weights) => {
+                let terms = weights.iter().map(|(i, w)| w * base[*i].as_f64());
+                terms.fold((c.density, c.density.abs()), |(target, size), t| {
+                    (target - t, size + t.abs())
+                })
+            }
+        };
+    }
+
     /// `r·p`.
     pub fn value<T: Real>(&self, p: &[T]) -> f64 {
         self.terms.iter().map(|(i, w)| w * p[*i].as_f64()).sum()

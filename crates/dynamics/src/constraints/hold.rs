@@ -70,6 +70,37 @@ impl<T: Real> Held<T> {
         })
     }
 
+    /// Moves the targets to those of `constraints`, if nothing else is different and all hard ones are independent; says
+    /// whether that was so.
+    fn aim_at(&mut self, constraints: &[Constraint], base: &[T]) -> Result<bool, ConstraintError> {
+        let same = |a: &Constraint, b: &Constraint| a.label == b.label && a.on == b.on && a.hold == b.hold;
+        let mut pairs = self.constraints.iter().zip(constraints);
+        if constraints.len() != self.constraints.len()
+            || !pairs.all(|(a, b)| same(a, b))
+            || !self.hard.can_be_aimed()
+        {
+            return Ok(false);
+        }
+        if let Some(c) = constraints.iter().find(|c| !c.density.is_finite()) {
+            return Err(ConstraintError::NotFinite {
+                label: c.label.clone(),
+                what: "density",
+                value: c.density,
+            });
+        }
+        self.constraints.clone_from_slice(constraints);
+        for (row, c) in self.rows.iter_mut().zip(constraints) {
+            row.aim(c, base);
+        }
+        let all = || constraints.iter().zip(&self.rows);
+        let hard = all().filter(|(c, _)| c.hold == Hold::Hard);
+        let hard: Vec<f64> = hard.map(|(_, r)| r.target).collect();
+        self.hard.aim(hard.into_iter());
+        let soft = all().filter(|(c, _)| c.hold != Hold::Hard);
+        self.targets = soft.map(|(_, r)| r.target).collect();
+        Ok(true)
+    }
+
     /// Rows on the unknowns of the constraint springs, with `σ²k`.
     pub fn springs(&self) -> &[(Vec<(usize, f64)>, f64)] {
         &self.springs
@@ -93,11 +124,18 @@ impl<T: Real> Patch<T> {
     /// unknowns; to bring matter to them slowly, move their densities from step to step. Hard constraints that follow
     /// from others are accepted.
     ///
-    /// Costs a solve per constraint at the next step and as many vectors of coefficients.
+    /// Costs a solve per constraint at the next step and as many vectors of coefficients; nothing of that where only densities
+    /// differ from those of the constraints before.
     ///
     /// # Errors
     /// [`PatchError::Constraint`]; the old constraints then stay.
     pub fn set_constraints(&mut self, constraints: &[Constraint]) -> Result<(), PatchError> {
+        if let Some(held) = &mut self.held
+            && held.aim_at(constraints, &self.base)?
+        {
+            self.meet_constraints();
+            return Ok(());
+        }
         let sigma2 = self.network.law().scale().powi(2);
         let (coefficients, limit) = (
             self.lattice().coefficient_count(),

@@ -15,6 +15,10 @@ const REACH: f64 = 1e-6;
 pub(crate) struct Independent {
     pub rows: OrthonormalRows,
     pub c: Vec<f64>,
+    /// How `c` is made of the targets, a row of as many numbers as there are constraints for each.
+    shares: Vec<f64>,
+    /// Whether some constraints are implied by others, or by what is fixed.
+    dependent: bool,
 }
 
 /// A row in the making: `rest = (row - Σ along_k q_k)/length`, `c` likewise.
@@ -23,6 +27,8 @@ struct Candidate<'a> {
     row: &'a Row,
     rest: Vec<f64>,
     c: f64,
+    /// What `c` is of all targets.
+    shares: Vec<f64>,
     along: Vec<f64>,
     /// Length of the row, by which all is divided.
     length: f64,
@@ -35,12 +41,15 @@ fn product(a: &[f64], b: &[f64]) -> f64 {
 
 impl Candidate<'_> {
     /// Takes out the part along `q`, which is row `k`.
-    fn reduce(&mut self, q: &[f64], c: f64, k: usize) {
+    fn reduce(&mut self, q: &[f64], c: f64, shares: &[f64], k: usize) {
         let along = product(&self.rest, q);
         for (r, q) in self.rest.iter_mut().zip(q) {
             *r -= along * q;
         }
         self.c -= along * c;
+        for (s, q) in self.shares.iter_mut().zip(shares) {
+            *s -= along * q;
+        }
         self.along[k] += along;
     }
 }
@@ -59,7 +68,7 @@ impl Independent {
         let mut out = Self::default();
         out.rows.columns = columns;
         let mut left = Vec::new();
-        for (label, row) in rows {
+        for (number, (label, row)) in rows.iter().enumerate() {
             let length = row.terms.iter().map(|t| t.1 * t.1).sum::<f64>().sqrt();
             if length <= REACH * row.weight {
                 if row.target.abs() > CONSISTENT * row.size {
@@ -80,6 +89,9 @@ impl Independent {
                 row,
                 rest,
                 c: row.target / length,
+                shares: (0..rows.len())
+                    .map(|i| if i == number { 1.0 / length } else { 0.0 })
+                    .collect(),
                 along: vec![0.0; rows.len()],
                 length,
                 done: false,
@@ -92,8 +104,13 @@ impl Independent {
             let longest = lengths.reduce(|a, b| if b.1 > a.1 { b } else { a });
             let Some((next, _)) = longest else { break };
             let row = &mut left[next];
-            for (k, q) in out.rows.q.chunks_exact(width).enumerate() {
-                row.reduce(q, out.c[k], k);
+            let done = out
+                .rows
+                .q
+                .chunks_exact(width)
+                .zip(out.shares.chunks_exact(rows.len()));
+            for (k, (q, shares)) in done.enumerate() {
+                row.reduce(q, out.c[k], shares, k);
             }
             let length = product(&row.rest, &row.rest).sqrt();
             if length <= RANK {
@@ -102,18 +119,35 @@ impl Independent {
             row.done = true;
             let q: Vec<f64> = row.rest.iter().map(|r| r / length).collect();
             let c = row.c / length;
+            let shares: Vec<f64> = row.shares.iter().map(|s| s / length).collect();
             let k = chosen.len();
             for other in left.iter_mut().filter(|r| !r.done) {
-                other.reduce(&q, c, k);
+                other.reduce(&q, c, &shares, k);
             }
             out.rows.q.extend(q);
+            out.shares.extend(shares);
             out.c.push(c);
             chosen.push((next, length));
         }
         for row in left.iter().filter(|r| !r.done) {
             out.check(row, &left, &chosen)?;
         }
+        out.dependent = chosen.len() < rows.len();
+        out.aim(rows.iter().map(|r| r.1.target));
         Ok(out)
+    }
+
+    /// Whether the targets can be moved without asking whether they still agree.
+    pub fn can_be_aimed(&self) -> bool {
+        !self.dependent
+    }
+
+    /// Sets `c` for other targets.
+    pub fn aim(&mut self, targets: impl ExactSizeIterator<Item = f64> + Clone) {
+        let rows = targets.len().max(1);
+        for (c, shares) in self.c.iter_mut().zip(self.shares.chunks_exact(rows)) {
+            *c = shares.iter().zip(targets.clone()).map(|(s, t)| s * t).sum();
+        }
     }
 
     /// Whether a row that the chosen ones imply has the value that they give it.

@@ -64,9 +64,10 @@ impl<T: Real> Patch<T> {
         )
     }
 
-    /// Whether a factor may serve for a matrix with this stiffness.
+    /// Whether a factor may serve for a matrix with this stiffness: paint may be younger than it is.
     fn is_near(&self, p: &Prepared, stiffness: f64) -> bool {
-        p.version == self.version() && (1.0 / STALE..=STALE).contains(&(stiffness / p.stiffness))
+        p.version.changes == self.version().changes
+            && (1.0 / STALE..=STALE).contains(&(stiffness / p.stiffness))
     }
 
     /// Solves `(M̃ + aD̃ + bK̃) x = Aᵀg` into `work.x`, `work.dx`; tangents of the 4-D law are those of [`forces`].
@@ -83,7 +84,6 @@ impl<T: Real> Patch<T> {
         stiffness: f64,
         residual: Option<f64>,
     ) -> Result<SolveReport, PatchError> {
-        let asked = residual;
         let (version, four_d) = (self.version(), matches!(self.network.law(), Law::FourD { .. }));
         let unit = self.matrix_unit(damping, stiffness);
         let same = self
@@ -99,25 +99,34 @@ impl<T: Real> Patch<T> {
         let near = self.cache.prepared.is_some_and(|p| self.is_near(&p, stiffness));
         self.aim_implicit(stiffness / unit);
         // The diagonalization of constant material costs nothing to renew.
-        let mut fresh = !near || (!same && self.cache.matrix.is_uniform());
+        let uniform = self.cache.matrix.is_uniform();
+        let diagonalized = self.cache.solver.method() == Method::FastDiagonalization;
+        let mut fresh = !near || (!same && (uniform || diagonalized));
+        // A factor of matter before the last paint is no more than that.
+        let painted = self.cache.prepared.is_some_and(|p| p.version != version);
         loop {
             if fresh {
                 self.cache.prepared = None;
                 self.cache.solver.prepare(&self.cache.matrix)?;
             }
+            let usual = self.cache.solver.tolerance();
+            let asked = match residual {
+                Some(residual) => Some(residual.min(usual)),
+                None => (painted && !fresh).then_some(ITERATED),
+            };
             let work = &mut self.work;
             let report =
                 self.cache
                     .solver
                     .solve_to(&self.cache.matrix, &work.g, &mut work.x, &mut work.dx, asked);
-            let residual = report.iteration.residual;
+            let left = report.iteration.residual;
             if fresh {
                 self.cache.prepared = Some(Prepared {
                     version,
                     damping,
                     stiffness,
                     unit,
-                    residual,
+                    residual: left,
                 });
                 return Ok(report.checked()?);
             }
@@ -127,7 +136,7 @@ impl<T: Real> Patch<T> {
                 Method::VCycle | Method::SampleMultigrid => 3.0 * ITERATED,
                 _ => TRUSTED,
             };
-            if residual <= trusted.max(2.0 * known) && report.iteration.negative_curvature.is_none() {
+            if left <= trusted.max(2.0 * known) && report.iteration.negative_curvature.is_none() {
                 return Ok(report);
             }
             fresh = true;

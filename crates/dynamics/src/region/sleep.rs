@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::Region;
 use crate::integrators::{Integrator, StepReport};
 use crate::lattice::OnBox;
+use crate::paint::Substance;
 use crate::patch::PatchError;
 
 /// Below which motion a region falls asleep, in world lengths: densities times the scale of the law, so about the motion
@@ -33,6 +34,18 @@ impl<T: Real> Region<T> {
     pub fn wake(&mut self) {
         self.asleep = false;
         self.parts.steps_to_look = 0;
+    }
+
+    /// Paints matter on a box of samples, as [`crate::patch::Patch::paint`]; wakes the region, all parts of it.
+    ///
+    /// # Errors
+    /// As there; the old matter then stays.
+    pub fn paint(&mut self, substance: Substance, paint: OnBox<f64>) -> Result<(), PatchError> {
+        self.patch.paint(substance, paint)?;
+        self.wake();
+        self.part = None;
+        self.parts.forget();
+        Ok(())
     }
 
     /// Finishes at once the factors that are being made beside the steps.

@@ -4,15 +4,10 @@ use bspline::Real;
 
 use super::band_cholesky::{BandCholesky, NotPositive, SLICE};
 use super::galerkin::Galerkin;
-use super::pcg::{PcgReport, Preconditioner};
+use super::pcg::Preconditioner;
 use super::v_cycle::{VCycle, VCycleOptions};
 use crate::lattice::Lattice;
 use crate::springs::StepMatrix;
-
-/// Iterations with a factor, made for an earlier matrix, that cost as much as a V-cycle's.
-const SLOW: usize = 2;
-/// Slow solves in a row after which the factor is renewed: a single step of another length is not worth it.
-const PATIENCE: usize = 4;
 
 /// A V-cycle without blocks, and the factor that takes its place. The work on the factor is a fixed part per solve, so
 /// that no step stalls and the same steps give the same bits.
@@ -28,7 +23,8 @@ pub(super) struct Background<T> {
     made: Work,
     /// Row at which there is no factor.
     failed: Option<usize>,
-    slow: usize,
+    /// Whether the V-cycle is still of the matrix before.
+    stale: bool,
 }
 
 /// What comes next, in the order of time.
@@ -44,13 +40,6 @@ pub(super) enum Work {
     Impossible,
 }
 
-/// How far a [`Background`] is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub(super) struct Progress {
-    work: Work,
-    slow: usize,
-}
-
 impl<T: Real> Background<T> {
     pub fn new(lattice: &Lattice<T>, steps: &[[isize; 3]], options: VCycleOptions) -> Self {
         let galerkin = Galerkin::new(lattice, steps);
@@ -61,7 +50,7 @@ impl<T: Real> Background<T> {
             work: Work::Prepared,
             made: Work::Prepared,
             failed: None,
-            slow: 0,
+            stale: false,
         }
     }
 
@@ -73,21 +62,32 @@ impl<T: Real> Background<T> {
         self.cycle.prepare(s)?;
         self.made = Work::Prepared;
         self.failed = None;
-        self.begin_again();
+        self.stale = false;
+        self.work = Work::Prepared;
         Ok(())
     }
 
-    /// Stays with the matrix that it was prepared for, after another was refused.
-    pub fn keep(&mut self, matrix: &StepMatrix<T>) {
-        self.cycle
-            .prepare(matrix)
-            .expect("it was prepared for this matrix before");
+    /// Begins anew with the matrix that its factor is of.
+    ///
+    /// # Errors
+    /// [`NotPositive`] if the V-cycle cannot be prepared.
+    pub fn begin_again(&mut self, matrix: &StepMatrix<T>) -> Result<(), NotPositive> {
+        self.work = Work::Prepared;
+        if self.stale {
+            self.cycle.prepare(matrix)?;
+            self.stale = false;
+        }
+        Ok(())
     }
 
-    /// Begins anew with the matrix that it was prepared for.
-    pub fn begin_again(&mut self) {
-        self.work = Work::Prepared;
-        self.slow = 0;
+    /// The factor, and what assembles it.
+    pub fn factor(&mut self) -> (&mut Galerkin, &mut BandCholesky<T>) {
+        (&mut self.galerkin, &mut self.factor)
+    }
+
+    /// Told that the factor is now that of another matrix.
+    pub fn exchanged(&mut self) {
+        self.stale = true;
     }
 
     /// Whether the factor is done.
@@ -96,23 +96,13 @@ impl<T: Real> Background<T> {
     }
 
     /// How far it is.
-    pub fn progress(&self) -> Progress {
-        Progress {
-            work: self.work,
-            slow: self.slow,
-        }
+    pub fn progress(&self) -> Work {
+        self.work
     }
 
-    /// After a solve: the next part of the work on the factor of `matrix`, which it was prepared for. Says whether a new
-    /// factor is needed since this one is too old.
-    #[must_use]
-    pub fn advance(&mut self, matrix: &StepMatrix<T>, report: PcgReport) -> bool {
-        match self.work {
-            Work::Done if report.iterations > SLOW => self.slow += 1,
-            Work::Done => self.slow = 0,
-            _ => self.work = self.next(matrix),
-        }
-        self.slow >= PATIENCE
+    /// After a solve: the next part of the work on the factor of `matrix`, which it was prepared for.
+    pub fn advance(&mut self, matrix: &StepMatrix<T>) {
+        self.work = self.next(matrix);
     }
 
     /// What follows on the work that is next now, which is done where it is not yet.
@@ -148,11 +138,10 @@ impl<T: Real> Background<T> {
     }
 
     /// Goes to where another one was.
-    pub fn resume(&mut self, matrix: &StepMatrix<T>, progress: Progress) {
-        while self.work < progress.work && !matches!(self.work, Work::Done | Work::Impossible) {
+    pub fn resume(&mut self, matrix: &StepMatrix<T>, work: Work) {
+        while self.work < work && !matches!(self.work, Work::Done | Work::Impossible) {
             self.work = self.next(matrix);
         }
-        self.slow = progress.slow;
     }
 }
 

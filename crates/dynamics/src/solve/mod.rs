@@ -9,6 +9,7 @@ mod galerkin;
 mod lanczos;
 mod orthonormal;
 mod pcg;
+mod renewal;
 mod report;
 mod sample_multigrid;
 mod schwarz;

@@ -1,14 +1,16 @@
 //! The methods that solve a step, behind one interface.
 
 use bspline::Real;
+use serde::{Deserialize, Serialize};
 
-use super::background::{Background, Progress};
+use super::background::{Background, Work};
 use super::band_cholesky::{BandCholesky, NotPositive};
 use super::border::Border;
 use super::dot::dot;
 use super::fast_diagonalization::FastDiagonalization;
 use super::galerkin::Galerkin;
 use super::pcg::{CoefficientSystem, ConjugateGradients, PcgReport, Preconditioner, System, add_scaled};
+use super::renewal::{Renewal, Renewed, Stage};
 use super::report::{ITERATED, Method, SolveError, SolveReport, SolverOptions};
 use super::sample_multigrid::SampleMultigrid;
 use super::v_cycle::VCycle;
@@ -23,6 +25,11 @@ const EXACT: f64 = 64.0;
 /// sample: one iteration leaves up to 2000 units of it in single precision, and increments of the samples that are wrong
 /// by a few units.
 const DIAGONALIZED: f64 = 4096.0;
+
+/// Iterations with a factor, made for an earlier matrix, that cost as much as a V-cycle's.
+const SLOW: usize = 2;
+/// Slow solves in a row after which a factor is renewed: a single step of another length is not worth it.
+const PATIENCE: usize = 4;
 
 /// Most iterations of a solve that is asked for more than a step needs.
 const MOST_ITERATIONS: usize = 64;
@@ -50,6 +57,10 @@ pub struct StepSolver<T> {
     painted_for: Option<StepMatrix<T>>,
     /// Whether the solver was prepared since it began anew.
     begun: bool,
+    /// Slow solves in a row.
+    slow: usize,
+    /// The factor that will take the place of the one at hand.
+    renewal: Option<Box<Renewal<T>>>,
     inverse: Option<SampleInverse>,
     iteration: ConjugateGradients<T>,
     border: Option<Box<Border<T>>>,
@@ -70,28 +81,67 @@ enum Painted<T> {
     SampleMultigrid(Box<SampleMultigrid<T>>),
 }
 
-/// All of a solver that is neither its lattice nor made from the matrix at hand: the matrix that it was prepared for, and
-/// how far the factor is that is made beside the steps.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+/// All of a solver that is neither its lattice nor made from the matrix at hand: the matrix that it was prepared for, how
+/// far the factor is that is made beside the steps, and that which will take its place.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct SolverHistory<T> {
-    mass: Weights<T>,
-    springs: Vec<Weights<T>>,
-    progress: Option<Progress>,
+    matrix: MatrixRecord<T>,
+    progress: Option<Work>,
+    slow: usize,
+    renewal: Option<(MatrixRecord<T>, Stage)>,
 }
 
-impl<T> SolverHistory<T> {
-    /// Whether all lists have `samples` numbers.
-    pub fn fits(&self, samples: usize) -> bool {
+/// The weights of a [`StepMatrix`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct MatrixRecord<T> {
+    mass: Weights<T>,
+    springs: Vec<Weights<T>>,
+}
+
+impl<T: Real> MatrixRecord<T> {
+    fn of(matrix: &StepMatrix<T>) -> Self {
+        Self {
+            mass: matrix.mass.clone(),
+            springs: matrix.springs.iter().map(|s| s.weights.clone()).collect(),
+        }
+    }
+
+    /// With the springs of `like`.
+    fn matrix(&self, like: &StepMatrix<T>) -> StepMatrix<T> {
+        let springs = like.springs.iter().zip(&self.springs);
+        let springs = springs.map(|(s, w)| SpringWeights {
+            direction: s.direction,
+            weights: w.clone(),
+        });
+        StepMatrix::new(like.dims(), self.mass.clone(), springs.collect())
+    }
+
+    fn fits(&self, like: &StepMatrix<T>) -> bool {
+        let samples = like.dims().iter().product();
         let fit = |w: &Weights<T>| match w {
             Weights::Constant(_) => true,
             Weights::Each(list) => list.len() == samples,
         };
-        fit(&self.mass) && self.springs.iter().all(fit)
+        self.springs.len() == like.springs.len() && fit(&self.mass) && self.springs.iter().all(fit)
     }
+}
 
-    /// Directions of its springs.
-    pub fn directions(&self) -> usize {
-        self.springs.len()
+impl<T: Real> SolverHistory<T> {
+    /// Whether its matrices have as many samples and springs as `like`.
+    pub fn fits(&self, like: &StepMatrix<T>) -> bool {
+        let renewal = self.renewal.as_ref().is_none_or(|(m, _)| m.fits(like));
+        self.matrix.fits(like) && renewal
+    }
+}
+
+impl<T: Real> Painted<T> {
+    /// The factor on the coefficients, if there is one, and what assembles it.
+    fn factor(&mut self) -> Option<(&mut Galerkin, &mut BandCholesky<T>)> {
+        match self {
+            Self::Direct(direct) => Some((&mut direct.0, &mut direct.1)),
+            Self::Background(background) => Some(background.factor()),
+            _ => None,
+        }
     }
 }
 
@@ -136,6 +186,8 @@ impl<T: Real> StepSolver<T> {
             painted: Painted::None,
             painted_for: None,
             begun: false,
+            slow: 0,
+            renewal: None,
             inverse: square.then(|| SampleInverse {
                 product: lattice.inverse(),
                 d: vec![0.0; m],
@@ -191,10 +243,11 @@ impl<T: Real> StepSolver<T> {
         }
         if self.painted_for.as_ref() != Some(s) {
             self.painted_for = None;
+            self.forget_renewal();
             self.make(s)?;
             self.painted_for = Some(s.clone());
         } else if let (Painted::Background(background), false) = (&mut self.painted, self.begun) {
-            background.begin_again();
+            background.begin_again(s)?;
         }
         self.begun = true;
         self.settle_method();
@@ -221,13 +274,37 @@ impl<T: Real> StepSolver<T> {
         }
     }
 
-    /// Makes factors and cycles for another matrix; where that cannot be, the old ones stay, which still solve.
-    fn renew(&mut self, s: &StepMatrix<T>) {
-        if self.make(s).is_ok() {
-            self.painted_for = Some(s.clone());
-        } else if let (Painted::Background(background), Some(matrix)) = (&mut self.painted, &self.painted_for)
-        {
-            background.keep(matrix);
+    fn forget_renewal(&mut self) {
+        self.renewal = None;
+        self.slow = 0;
+    }
+
+    /// After a solve of `s` by a factor: when several in a row were slow, since it is of another matrix, one of `s` is made
+    /// beside the next ones.
+    fn keep_up(&mut self, s: &StepMatrix<T>, iterations: usize) {
+        let Some(mut renewal) = self.renewal.take() else {
+            self.slow = if iterations > SLOW { self.slow + 1 } else { 0 };
+            if let (true, Some((_, factor))) = (self.slow >= PATIENCE, self.painted.factor()) {
+                self.factorizations += 1;
+                self.renewal = Some(Box::new(Renewal::new(s.clone(), factor)));
+            }
+            return;
+        };
+        let Some((galerkin, factor)) = self.painted.factor() else {
+            return;
+        };
+        match renewal.advance(galerkin) {
+            Renewed::NotYet => self.renewal = Some(renewal),
+            Renewed::Done => {
+                self.painted_for = Some(renewal.finish(factor));
+                if let Painted::Background(background) = &mut self.painted {
+                    background.exchanged();
+                }
+                self.slow = 0;
+                self.renew_border();
+            }
+            // The old one still solves.
+            Renewed::Impossible => self.slow = 0,
         }
     }
 
@@ -236,6 +313,7 @@ impl<T: Real> StepSolver<T> {
     pub(crate) fn begin_again(&mut self) {
         self.begun = false;
         self.border = None;
+        self.forget_renewal();
     }
 
     /// Factors and cycles that were made so far, each of a background once.
@@ -247,9 +325,11 @@ impl<T: Real> StepSolver<T> {
     /// constant material.
     pub(crate) fn history(&self) -> Option<SolverHistory<T>> {
         let matrix = self.painted_for.as_ref().filter(|_| self.begun)?;
+        let renewal = self.renewal.as_ref().map(|r| r.state());
         Some(SolverHistory {
-            mass: matrix.mass.clone(),
-            springs: matrix.springs.iter().map(|s| s.weights.clone()).collect(),
+            matrix: MatrixRecord::of(matrix),
+            slow: self.slow,
+            renewal: renewal.map(|(matrix, stage)| (MatrixRecord::of(matrix), stage)),
             progress: match &self.painted {
                 Painted::Background(background) => Some(background.progress()),
                 _ => None,
@@ -267,21 +347,29 @@ impl<T: Real> StepSolver<T> {
         history: &SolverHistory<T>,
         like: &StepMatrix<T>,
     ) -> Result<(), SolveError> {
-        let springs = like.springs.iter().zip(&history.springs);
-        let springs = springs.map(|(s, w)| SpringWeights {
-            direction: s.direction,
-            weights: w.clone(),
-        });
-        let s = StepMatrix::new(like.dims(), history.mass.clone(), springs.collect());
+        let s = history.matrix.matrix(like);
         let border = self.border.take();
         self.prepare(&s)?;
         if let (Painted::Background(background), Some(progress)) = (&mut self.painted, history.progress) {
             background.resume(&s, progress);
         }
+        self.slow = history.slow;
+        if let (Some((matrix, stage)), Some((galerkin, factor))) = (&history.renewal, self.painted.factor()) {
+            let mut renewal = Renewal::new(matrix.matrix(like), factor);
+            self.renewal = renewal.resume(*stage, galerkin).then(|| Box::new(renewal));
+        }
         self.settle_method();
         self.border = border;
         self.prepare_border(&s);
         Ok(())
+    }
+
+    /// Fits the constraints to what solves now.
+    fn renew_border(&mut self) {
+        if let Some(matrix) = self.painted_for.take() {
+            self.prepare_border(&matrix);
+            self.painted_for = Some(matrix);
+        }
     }
 
     fn prepare_border(&mut self, s: &StepMatrix<T>) {
@@ -341,7 +429,7 @@ impl<T: Real> StepSolver<T> {
         self.solve_to(s, g, x, dx, None)
     }
 
-    /// The same to a residual, if one is asked for that is less than what a step needs.
+    /// The same to a residual, if one is asked for; in more iterations than steps take if it is less than theirs.
     pub(crate) fn solve_to(
         &mut self,
         s: &StepMatrix<T>,
@@ -353,7 +441,7 @@ impl<T: Real> StepSolver<T> {
         let usual = self.tolerance();
         let (tolerance, cap) = match asked {
             Some(asked) if asked < usual => (asked, MOST_ITERATIONS.max(self.options.iterations)),
-            _ => (usual, self.options.iterations),
+            asked => (asked.unwrap_or(usual), self.options.iterations),
         };
         if self.inverse.is_some() {
             self.b.copy_from_slice(g);
@@ -393,17 +481,18 @@ impl<T: Real> StepSolver<T> {
             report
         } else {
             let report = self.iterate(s, x, Some(dx), cap, tolerance);
-            if let (Painted::Background(background), None) = (&mut self.painted, &self.border)
-                && solved_by != Method::FastDiagonalization
-            {
+            if solved_by == Method::Direct {
+                self.keep_up(s, report.iterations);
+            } else if let (Painted::Background(background), Method::VCycle) = (&mut self.painted, solved_by) {
                 let matrix = self
                     .painted_for
                     .as_ref()
                     .expect("prepared before the first solve");
-                if background.advance(matrix, report) {
-                    self.renew(s);
-                }
+                background.advance(matrix);
                 self.settle_method();
+                if self.method != solved_by {
+                    self.renew_border();
+                }
             }
             report
         };
@@ -422,7 +511,7 @@ impl<T: Real> StepSolver<T> {
     }
 
     /// Residual at which steps stop.
-    fn tolerance(&self) -> f64 {
+    pub(crate) fn tolerance(&self) -> f64 {
         self.options.tolerance.unwrap_or(match self.method {
             Method::VCycle | Method::SampleMultigrid => ITERATED,
             Method::Direct if matches!(self.painted, Painted::Background(_)) => ITERATED,
@@ -457,11 +546,12 @@ impl<T: Real> StepSolver<T> {
 
     /// Finishes a factor that is being made beside the steps: what some hundred steps would do.
     pub fn settle(&mut self) {
-        if let (Painted::Background(background), Some(matrix), None, Method::VCycle) =
-            (&mut self.painted, &self.painted_for, &self.border, self.method)
+        if let (Painted::Background(background), Some(matrix), Method::VCycle) =
+            (&mut self.painted, &self.painted_for, self.method)
         {
             background.finish(matrix);
             self.settle_method();
+            self.renew_border();
         }
     }
 

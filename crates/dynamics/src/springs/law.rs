@@ -7,7 +7,7 @@ use bspline::vectorized;
 use serde::{Deserialize, Serialize};
 
 use super::stencil::{SpringWeights, Weights};
-use crate::units::{binary_unit, springs_in_units};
+use crate::units::{binary_unit, largest, springs_in_units};
 
 /// Which law, with its scale `σ`, a length per density: without it a density could not be added to a distance.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -222,6 +222,48 @@ impl<T: Real> SpringNetwork<T> {
     pub(crate) fn set_springs(&mut self, springs: &[SpringWeights<f64>]) {
         (self.stiffness_unit, self.springs) = springs_in_units(springs);
         self.changes += 1;
+    }
+
+    /// The same where it is not told as a change: solvers go on with what they have.
+    pub(crate) fn paint(&mut self, springs: &[SpringWeights<f64>]) {
+        (self.stiffness_unit, self.springs) = springs_in_units(springs);
+    }
+
+    /// The same of some springs of each direction, whose stiffness is one per spring.
+    pub(crate) fn paint_on(&mut self, springs: &[Vec<(usize, f64)>]) {
+        let all = springs.iter().flatten();
+        let most = all.fold(0.0_f64, |m, (_, k)| m.max(*k));
+        self.set_unit(binary_unit(most).max(self.stiffness_unit));
+        for (to, from) in self.springs.iter_mut().zip(springs) {
+            if let Weights::Each(weights) = &mut to.weights {
+                for (i, k) in from {
+                    // The unit is 0 if all weights are.
+                    weights[*i] = T::from_f64(if *k > 0.0 {
+                        k * (1.0 / self.stiffness_unit)
+                    } else {
+                        0.0
+                    });
+                }
+            }
+        }
+        // What was largest may be gone.
+        let largest = self.springs.iter().map(|s| match &s.weights {
+            Weights::Each(list) => largest(list),
+            Weights::Constant(k) => k.as_f64(),
+        });
+        let most = largest.fold(0.0, f64::max);
+        self.set_unit(binary_unit(most * self.stiffness_unit));
+    }
+
+    /// Writes the stiffness as multiples of another power of two.
+    fn set_unit(&mut self, unit: f64) {
+        if unit != self.stiffness_unit && self.stiffness_unit > 0.0 && unit > 0.0 {
+            let factor = self.stiffness_unit / unit;
+            for s in &mut self.springs {
+                s.weights = s.weights.scaled(factor);
+            }
+        }
+        self.stiffness_unit = unit;
     }
 
     /// The rest state.

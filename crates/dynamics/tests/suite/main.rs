@@ -8,6 +8,7 @@ mod constraints;
 mod increment;
 mod lattice;
 mod motion;
+mod paint;
 mod plasticity;
 mod region;
 mod replay;

@@ -3,8 +3,9 @@
 use bspline::HierarchicalSpline;
 use dynamics::constraints::{Constraint, Hold, On};
 use dynamics::integrators::Integrator;
-use dynamics::lattice::{Lattice, Rim};
+use dynamics::lattice::{Lattice, OnBox, Rim, SampleBox};
 use dynamics::matter::{Matter, Quantity};
+use dynamics::paint::Substance;
 use dynamics::patch::Patch;
 use dynamics::region::{Cells, Region, RegionOptions, RegionSnapshot, Schedule, Turn};
 use dynamics::solve::{Method, SolverOptions};
@@ -102,6 +103,14 @@ impl Scene {
             region.patch_mut().set_constraints(&[pin]).unwrap();
         }
         for _ in 0..3 + (random.unit() * 9.0) as usize {
+            if self.painted && seed % 4 == 1 {
+                let first = [mx, my, mz].map(|m| (random.unit() * (m - 3) as f64) as usize);
+                let at = SampleBox { first, count: [3; 3] };
+                let values = [2.0 + 20.0 * random.unit(); 27];
+                region
+                    .paint(Substance::Stiffness, OnBox { at, values: &values })
+                    .unwrap();
+            }
             let dt = 0.05 * (1.0 + (random.unit() * 6.0).floor());
             region.step(self.integrator, dt).unwrap();
         }

@@ -3,6 +3,7 @@
 mod chunk;
 mod cursor;
 mod decode;
+mod difference;
 mod encode;
 mod levels;
 mod stored;
@@ -10,9 +11,11 @@ mod valid;
 
 use std::path::Path;
 
-use bspline::{Field, HierarchicalSpline};
+pub use bspline::AnyField;
+use bspline::HierarchicalSpline;
 
 pub use decode::decode;
+pub use difference::{DIFFERENCE_MAGIC, decode_difference, encode_difference};
 pub use encode::encode;
 pub use stored::Stored;
 
@@ -80,25 +83,6 @@ pub struct FieldMeta {
     pub notes: Vec<String>,
     /// Where the field comes from (input, options, program version), a JSON object or empty.
     pub provenance: String,
-}
-
-/// A field of either precision.
-#[derive(Clone, Debug)]
-pub enum AnyField {
-    /// Single precision.
-    F32(HierarchicalSpline<f32>),
-    /// Double precision.
-    F64(HierarchicalSpline<f64>),
-}
-
-impl AnyField {
-    /// The field, to be asked.
-    pub fn as_field(&self) -> &dyn Field {
-        match self {
-            Self::F32(f) => f,
-            Self::F64(f) => f,
-        }
-    }
 }
 
 /// What a field file holds.

@@ -1,6 +1,6 @@
 use std::sync::Arc;
 
-use bspline::hierarchical::{BrickKey, Corrections, Lattice};
+use bspline::hierarchical::{BlockEdit, BrickDiff, BrickKey, Change, Corrections, Lattice, LevelEdit};
 use bspline::{Field, HierarchicalSpline};
 use glam::{DAffine3, DMat3, DVec3};
 
@@ -424,4 +424,53 @@ fn files_of_version_1_are_read_and_those_of_the_future_are_not() {
             "{refused}"
         );
     }
+}
+
+#[test]
+fn differences_come_back_and_damaged_ones_are_refused() {
+    let old = sample::<f32>(21, 6);
+    let edits: Vec<_> = (0..40)
+        .map(|i| LevelEdit {
+            level: i as usize % 4,
+            function: [1 + i % 3, 2, 1 + i % 2],
+            delta: 0.5,
+        })
+        .collect();
+    let mut new = old.edited(&edits).unwrap();
+    let gone = BlockEdit {
+        level: 1,
+        first: [0; 3],
+        shape: [6; 3],
+        change: Change::Deactivate,
+    };
+    new = new.edited_blocks(&[gone]).unwrap();
+    let diff = old.difference(&new).unwrap();
+    let bytes = encode_difference(&diff).unwrap();
+    let limits = ReadLimits::default();
+    let read = |bytes: &[u8]| decode_difference::<f32>(bytes, old.lattice(), &limits);
+    let back = read(&bytes).unwrap();
+    assert_eq!(back, diff);
+    assert_eq!(old.applied(&back).unwrap().sha256(), new.sha256());
+    assert_eq!(
+        read(&encode_difference(&BrickDiff::<f32>::default()).unwrap())
+            .unwrap()
+            .bricks,
+        []
+    );
+    for length in 0..bytes.len() {
+        assert!(read(&bytes[..length]).is_err(), "cut at {length}");
+    }
+    for bit in (0..8 * bytes.len()).step_by(7) {
+        let mut turned = bytes.clone();
+        turned[bit / 8] ^= 1 << (bit % 8);
+        assert!(read(&turned).is_err(), "bit {bit}");
+    }
+    assert!(decode_difference::<f64>(&bytes, old.lattice(), &limits).is_err());
+    let small = Lattice {
+        cells: [1; 3],
+        ..*old.lattice()
+    };
+    assert!(decode_difference::<f32>(&bytes, &small, &limits).is_err());
+    let few = ReadLimits { max_bytes: 500 };
+    assert!(decode_difference::<f32>(&bytes, old.lattice(), &few).is_err());
 }

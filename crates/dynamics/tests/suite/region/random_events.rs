@@ -3,7 +3,9 @@
 use bspline::Real;
 use dynamics::constraints::{Constraint, Hold, On};
 use dynamics::integrators::{AdaptiveOptions, Integrator};
+use dynamics::lattice::{OnBox, SampleBox};
 use dynamics::matter::Quantity;
+use dynamics::paint::Substance;
 use dynamics::region::{Cells, Region, RegionOptions, RegionSnapshot};
 use dynamics::solve::SolverOptions;
 use dynamics::springs::{Law, Neighbours, Plasticity};
@@ -117,6 +119,20 @@ fn play<T: Real + Serialize + DeserializeOwned>(seed: u64, restored: bool) -> Re
                 set.map_err(|e| e.to_string())?;
             }
             10 => region.wake(),
+            11 | 12 => {
+                let first = dims.map(|m| (r() * (m - 1) as f64) as usize);
+                let count = [0, 1, 2].map(|a| 1 + (r() * (dims[a] - first[a]) as f64 * 0.6) as usize);
+                let at = SampleBox { first, count };
+                let value = 10f64.powf(3.0 * r() - 1.0);
+                let values = vec![value; at.len()];
+                let substance = if r() < 0.8 {
+                    Substance::Stiffness
+                } else {
+                    Substance::Damping
+                };
+                let paint = OnBox { at, values: &values };
+                region.paint(substance, paint).map_err(|e| e.to_string())?;
+            }
             _ => (),
         }
         let asleep = region.is_asleep().then(|| state_bits(&region));

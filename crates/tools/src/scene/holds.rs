@@ -5,7 +5,7 @@ use dynamics::constraints::{Constraint, Hold as How, On, curve};
 
 use super::error::{SimulateError, wrong};
 use super::place::Samples;
-use super::scene::{Hold, Scene};
+use super::script::{Hold, Scene};
 
 /// All constraints of a scene, and which of them hold.
 #[derive(Clone, Debug)]

@@ -1,4 +1,7 @@
 //! Scripted scenes: a region of a field, its matter, forces over time and constraints, moved without a window.
+//!
+//! A [`Scene`] is read by any `serde` format whose tables look like those of the guide; a [`Simulation`] moves it on its field.
+//! Nothing here reads a file, a clock or prints.
 
 mod error;
 mod formula;
@@ -8,9 +11,9 @@ mod matter;
 mod motion;
 mod number;
 mod place;
-mod scene;
+mod script;
 mod when;
 
 pub use error::SimulateError;
 pub use motion::{Simulation, StepLine};
-pub use scene::Scene;
+pub use script::Scene;

@@ -9,7 +9,7 @@ use glam::DVec3;
 use super::error::{SimulateError, wrong};
 use super::number::Point;
 use super::place::Samples;
-use super::scene::{Amount, Material, Paint, Scene, Substance};
+use super::script::{Amount, Material, Paint, Scene, Substance};
 
 /// Matter and scale of rest lengths.
 #[derive(Clone, Debug, PartialEq)]

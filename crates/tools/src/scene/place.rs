@@ -7,7 +7,7 @@ use dynamics::springs::{Law, Neighbours};
 use glam::DVec3;
 
 use super::error::{SimulateError, wrong};
-use super::scene::{LawKind, RegionTable, Scene};
+use super::script::{LawKind, RegionTable, Scene};
 
 /// Of a pull: samples lie at most this share of its radius apart, or its kernel is not resolved.
 const SPACINGS_PER_RADIUS: f64 = 1.5;

@@ -1,7 +1,5 @@
 //! The scene in motion.
 
-use std::time::Instant;
-
 use bspline::{HierarchicalSpline, Real};
 use dynamics::integrators::{AdaptiveOptions, Integrator, StepReport};
 use dynamics::region::Region;
@@ -12,7 +10,7 @@ use super::holds::Holds;
 use super::load::Load;
 use super::matter::{self, Clay};
 use super::place::{self, Samples};
-use super::scene::{ReleaseKind, Scene, Scheme};
+use super::script::{ReleaseKind, Scene, Scheme};
 
 /// What a step did.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -53,8 +51,6 @@ pub struct StepLine {
     /// Steps taken back before this one; of adaptive ones.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rejected: Option<usize>,
-    /// Wall seconds it took.
-    pub seconds: f64,
 }
 
 /// A scene on its field.
@@ -161,7 +157,6 @@ impl<'a, T: Real> Simulation<'a, T> {
     /// # Errors
     /// [`SimulateError`]; the scene cannot go on then.
     pub fn step(&mut self) -> Result<StepLine, SimulateError> {
-        let start = Instant::now();
         let dt = self.length();
         self.act(dt)?;
         let awake_samples = self.region.awake_samples();
@@ -199,7 +194,6 @@ impl<'a, T: Real> Simulation<'a, T> {
             max_change: changes.map(|(d, b)| (d.as_f64() - b).abs()).fold(0.0, f64::max),
             error: report.and_then(|r| r.error),
             rejected,
-            seconds: start.elapsed().as_secs_f64(),
         })
     }
 

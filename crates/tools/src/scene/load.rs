@@ -4,7 +4,7 @@ use bspline::Real;
 
 use super::error::{SimulateError, wrong};
 use super::place::Samples;
-use super::scene::{Force, Pull, Scene};
+use super::script::{Force, Pull, Scene};
 
 /// All forces of a scene.
 #[derive(Clone, Debug)]

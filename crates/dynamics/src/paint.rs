@@ -1,0 +1,122 @@
+//! Matter painted on a box of samples, also while the patch moves.
+
+use bspline::Real;
+
+use crate::lattice::OnBox;
+use crate::matter::{MatterError, Quantity};
+use crate::patch::{Patch, PatchError};
+
+/// What can be painted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Substance {
+    /// κ.
+    Stiffness,
+    /// μ.
+    Mass,
+    /// γ.
+    Damping,
+    /// Stiffness of the ground springs.
+    Ground,
+}
+
+impl Substance {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Stiffness => "stiffness",
+            Self::Mass => "mass",
+            Self::Damping => "damping",
+            Self::Ground => "ground stiffness",
+        }
+    }
+}
+
+impl<T: Real> Patch<T> {
+    /// Gives the samples of a box other matter, per volume; all is then as after [`set_matter`](Self::set_matter) with the
+    /// same, to the bit. Stiffness costs the box, all else a list.
+    ///
+    /// A factor or cycle that is there serves on as long as it solves a step to 10⁻³ of the impulse within the usual
+    /// iterations. If that takes more than two of them several times in a row, a factor of the matter as it is by then is made
+    /// beside the steps and takes its place.
+    ///
+    /// # Errors
+    /// [`PatchError::Box`], [`PatchError::Matter`]; the old matter then stays.
+    pub fn paint(&mut self, substance: Substance, paint: OnBox<f64>) -> Result<(), PatchError> {
+        let dims = self.lattice().sample_dims();
+        if !paint.at.fits(dims) {
+            return Err(PatchError::Box { at: paint.at, dims });
+        }
+        let values = Quantity::PerSample(paint.values.to_vec());
+        values.check(substance.name(), paint.at.len(), substance != Substance::Mass)?;
+        let samples = self.base.len();
+        let quantity = match substance {
+            Substance::Stiffness => &mut self.matter.stiffness,
+            Substance::Mass => &mut self.matter.mass,
+            Substance::Damping => &mut self.matter.damping,
+            Substance::Ground => &mut self.matter.ground,
+        };
+        let was_constant = matches!(quantity, Quantity::Constant(_));
+        let list = quantity.paint(samples);
+        let before = paint.at.crop(list, dims);
+        paint.at.paste(list, dims, paint.values);
+        let done = if substance == Substance::Stiffness && !was_constant && !self.own_springs {
+            self.stiffen(paint)
+        } else {
+            self.lump_again()
+        };
+        if let Err(e) = done {
+            let undone = match substance {
+                Substance::Stiffness => &mut self.matter.stiffness,
+                Substance::Mass => &mut self.matter.mass,
+                Substance::Damping => &mut self.matter.damping,
+                Substance::Ground => &mut self.matter.ground,
+            };
+            paint.at.paste(undone.paint(samples), dims, &before);
+            return Err(e.into());
+        }
+        self.cache.paints += 1;
+        Ok(())
+    }
+
+    /// Of all matter.
+    fn lump_again(&mut self) -> Result<(), MatterError> {
+        let (lumped, springs) = self
+            .matter
+            .in_units(self.cache.solver.lattice(), self.neighbours)?;
+        self.lumped = lumped;
+        self.network.paint(&springs);
+        self.own_springs = false;
+        Ok(())
+    }
+
+    /// The springs that begin or end in a box.
+    fn stiffen(&mut self, paint: OnBox<f64>) -> Result<(), MatterError> {
+        let lattice = self.cache.solver.lattice();
+        let dims = lattice.sample_dims();
+        let near = paint.at.grown(1, dims);
+        let changed: Vec<Vec<(usize, f64)>> = self
+            .neighbours
+            .directions()
+            .into_iter()
+            .enumerate()
+            .map(|(n, direction)| {
+                let weight = self.matter.spring_weight(lattice, n, direction);
+                near.indices(dims).map(|i| (i, weight(i))).collect()
+            })
+            .collect();
+        let all = changed.iter().flatten().map(|(_, k)| *k);
+        let (least, largest) = all.fold((f64::INFINITY, 0.0_f64), |(l, h), k| (l.min(k), h.max(k)));
+        if !largest.is_finite() {
+            return Err(MatterError::Range {
+                what: "stiffness",
+                least,
+                largest,
+                precision: match T::NAME {
+                    "f32" => "single precision",
+                    _ => "double precision",
+                },
+            });
+        }
+        self.network.paint_on(&changed);
+        Ok(())
+    }
+}
