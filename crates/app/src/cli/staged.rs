@@ -1,4 +1,5 @@
 use std::fs;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use formats::FormatError;
@@ -107,6 +108,16 @@ impl StagedFiles {
         let mut whole = fs::File::open(self.hidden(name)).or_limit()?;
         formats::atomic::replace(target, |out| std::io::copy(&mut whole, out).map(drop)).map_err(writing)
     }
+}
+
+/// Gives charts their names and tells them.
+pub fn publish(staged: StagedFiles, quiet: bool) -> Outcome {
+    for path in staged.publish()? {
+        if !quiet {
+            writeln!(io::stdout().lock(), "written  {}", path.display()).or_limit()?;
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]
