@@ -21,7 +21,7 @@ pub struct StagedFiles {
 impl StagedFiles {
     /// Makes the directory that `option` names, if it is missing.
     pub fn new(option: &str, directory: &Path) -> Outcome<Self> {
-        let fail = |e: std::io::Error| {
+        let fail = |e: io::Error| {
             Failure::limit(format!(
                 "{option} {}: no file can be made there ({e}); name another directory",
                 directory.display()
@@ -106,7 +106,7 @@ impl StagedFiles {
 
     fn copy(&self, name: &str, target: &Path) -> Outcome {
         let mut whole = fs::File::open(self.hidden(name)).or_limit()?;
-        formats::atomic::replace(target, |out| std::io::copy(&mut whole, out).map(drop)).map_err(writing)
+        formats::atomic::replace(target, |out| io::copy(&mut whole, out).map(drop)).map_err(writing)
     }
 }
 
