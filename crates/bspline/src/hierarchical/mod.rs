@@ -20,6 +20,7 @@ mod difference;
 mod digest;
 mod edit;
 mod evaluate;
+mod functions;
 mod graft;
 mod grid;
 mod kernel;
@@ -41,7 +42,8 @@ pub use brick::{
     BRICK, BRICK_LEN, BrickKey, Corrections, DenseCorrections, HALO, HALO_LEN, LevelCorrections, active_slots,
 };
 pub use difference::{BrickChange, BrickDiff, DiffError};
-pub use edit::{BlockEdit, BrickEdit, Change, EditError, LevelEdit, MAX_LEVELS};
+pub use edit::{BlockEdit, BrickEdit, Change, LevelEdit};
+pub use functions::{EditError, MAX_LEVELS};
 pub use lattice::Lattice;
 pub use local::{LocalField, LocalFields};
 pub use motion::Motion;
