@@ -32,7 +32,6 @@ mod prolong;
 mod renew;
 mod slopes;
 mod spline;
-mod surface;
 mod totals;
 mod versions;
 mod view;
