@@ -142,13 +142,7 @@ impl<T: Real> RestrictedAxis<T> {
             d[1] * s1[1][1] + d[2] * s1[2][0],
             d[2] * s1[2][1],
         ];
-        debug_assert!(
-            w.iter().all(|w| *w >= 0.0),
-            "negative weight {w:?} in cell {k} at {u:?}"
-        );
-        self.start[self.count] = k as u8;
-        self.weights[self.count] = w.map(T::from_f64);
-        self.count += 1;
+        self.push_row(k, w);
     }
 
     /// Appends the blossom of cell `k` of a quadratic spline at `u`.
@@ -163,10 +157,11 @@ impl<T: Real> RestrictedAxis<T> {
             s2[1] * s1[1][1],
             0.0,
         ];
-        debug_assert!(
-            w.iter().all(|w| *w >= 0.0),
-            "negative weight {w:?} in cell {k} at {u:?}"
-        );
+        self.push_row(k, w);
+    }
+
+    fn push_row(&mut self, k: usize, w: [f64; 4]) {
+        debug_assert!(w.iter().all(|w| *w >= 0.0), "negative weight {w:?} in cell {k}");
         self.start[self.count] = k as u8;
         self.weights[self.count] = w.map(T::from_f64);
         self.count += 1;

@@ -5,11 +5,11 @@ mod common;
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex};
 
-use bspline::Field;
+use bspline::{Field, HierarchicalSpline};
 use common::{cloud, fit, oriented, to_depth};
 use fitting::phantoms::{CloudOptions, SampledCloud, Solid, SplitMix64};
 use fitting::points::{LEAST_COEFFICIENTS, PointOptions, fit_points};
-use fitting::{Cancel, Control, FitError, StopReason};
+use fitting::{Cancel, Control, FitError, FitReport, StopReason};
 use glam::DVec3;
 
 /// A ball of 4000 points in which something is wrong.
@@ -329,16 +329,7 @@ fn a_robust_fit_survives_points_that_all_contradict_each_other() {
         (dust, anyhow(3000)),
     ];
     for (positions, normals) in clouds {
-        let samples = SampledCloud {
-            positions,
-            normals,
-            holes: Vec::new(),
-        };
-        let options = PointOptions {
-            robust: true,
-            ..to_depth(6)
-        };
-        let (field, report) = fit::<f32>(&samples, &options).expect("weights that stay");
+        let (field, report) = fitted_robustly(positions, normals).expect("weights that stay");
         assert!(field.value(DVec3::splat(0.4)).is_finite() && report.rms.is_finite());
         assert!(report.used_count >= 10, "{}", report.used_count);
     }
@@ -382,18 +373,25 @@ fn small_clouds_without_sense_end_with_a_field_or_an_error() {
         ("half dust", with_dust.clone(), with_dust),
     ];
     for (name, positions, normals) in clouds {
-        let samples = SampledCloud {
-            positions,
-            normals,
-            holes: Vec::new(),
-        };
-        let options = PointOptions {
-            robust: true,
-            ..to_depth(6)
-        };
-        if let Ok((field, report)) = fit::<f32>(&samples, &options) {
+        if let Ok((field, report)) = fitted_robustly(positions, normals) {
             let inside = field.value(field.lattice().world_box().center());
             assert!(inside.is_finite() && report.rms.is_finite(), "{name}");
         }
     }
+}
+
+fn fitted_robustly(
+    positions: Vec<DVec3>,
+    normals: Vec<DVec3>,
+) -> Result<(HierarchicalSpline<f32>, FitReport), FitError> {
+    let samples = SampledCloud {
+        positions,
+        normals,
+        holes: Vec::new(),
+    };
+    let options = PointOptions {
+        robust: true,
+        ..to_depth(6)
+    };
+    fit::<f32>(&samples, &options)
 }

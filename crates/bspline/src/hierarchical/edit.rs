@@ -70,20 +70,26 @@ impl<T: Real> HierarchicalSpline<T> {
         for edit in edits {
             check_function(&self.lattice, edit.level, edit.function)?;
         }
-        // Edits of one brick stand together, and keep their order.
-        let mut order: Vec<(usize, BrickKey, usize)> = (edits.iter().enumerate())
-            .map(|(i, edit)| (edit.level, BrickKey::of(edit.function), i))
-            .collect();
-        order.sort_unstable();
-        let same_brick =
-            |a: &(usize, BrickKey, usize), b: &(usize, BrickKey, usize)| (a.0, a.1) == (b.0, b.1);
-        let groups: Vec<_> = order.chunk_by(same_brick).collect();
-        let changed = groups.into_par_iter().with_min_len(1000).map(|group| {
-            let mut brick = ChangedBrick::of(self, group[0].0, group[0].1);
-            for (.., i) in group {
-                let LevelEdit { function, delta, .. } = edits[*i];
-                brick.put(function, |old| Some(old.unwrap_or(T::zero()) + delta))?;
-            }
+        let place = |edit: &LevelEdit<T>| (edit.level, BrickKey::of(edit.function));
+        self.edited_by_brick(edits, place, |brick, edit| {
+            brick.put(edit.function, |old| Some(old.unwrap_or(T::zero()) + edit.delta))
+        })
+    }
+
+    /// The field with edits put into their bricks, brick beside brick; those of one brick in their order.
+    fn edited_by_brick<E: Sync>(
+        &self,
+        edits: &[E],
+        place: impl Fn(&E) -> (usize, BrickKey),
+        put: impl Fn(&mut ChangedBrick<T>, &E) -> Result<(), EditError> + Sync,
+    ) -> Result<Self, EditError> {
+        let mut order: Vec<_> = edits.iter().map(|edit| (place(edit), edit)).collect();
+        order.sort_by_key(|(place, _)| *place);
+        let groups: Vec<_> = order.chunk_by(|a, b| a.0 == b.0).collect();
+        let changed = groups.into_par_iter().with_min_len(64).map(|group| {
+            let (level, key) = group[0].0;
+            let mut brick = ChangedBrick::of(self, level, key);
+            group.iter().try_for_each(|(_, edit)| put(&mut brick, edit))?;
             Ok(brick)
         });
         // The first error, whichever thread meets one first.
@@ -139,25 +145,18 @@ impl<T: Real> HierarchicalSpline<T> {
         for edit in edits {
             check_functions(&self.lattice, edit.level, edit.key, &edit.add)?;
         }
-        let mut order: Vec<&BrickEdit<T>> = edits.iter().collect();
-        order.sort_by_key(|edit| (edit.level, edit.key));
-        let groups: Vec<_> = order
-            .chunk_by(|a, b| (a.level, a.key) == (b.level, b.key))
-            .collect();
-        let changed = groups.into_par_iter().with_min_len(64).map(|group| {
-            let mut brick = ChangedBrick::of(self, group[0].level, group[0].key);
-            for edit in group {
+        self.edited_by_brick(
+            edits,
+            |edit| (edit.level, edit.key),
+            |brick, edit| {
                 let corner = edit.key.0.map(|k| k * BRICK as u32);
-                for (slot, delta) in edit.add.iter() {
+                edit.add.iter().try_for_each(|(slot, delta)| {
                     let at = [slot / 64, slot / 8 % 8, slot % 8];
                     let function = std::array::from_fn(|a| corner[a] + at[a] as u32);
-                    brick.put(function, |old| Some(old.unwrap_or(T::zero()) + delta))?;
-                }
-            }
-            Ok(brick)
-        });
-        let changed: Vec<Result<_, EditError>> = changed.collect();
-        Ok(self.with_bricks(changed.into_iter().collect::<Result<_, _>>()?))
+                    brick.put(function, |old| Some(old.unwrap_or(T::zero()) + delta))
+                })
+            },
+        )
     }
 
     /// Coefficients `first .. first + count` of the total spline of `level` (function numbers as in [`LevelEdit`]), last
