@@ -125,7 +125,7 @@ impl<T: Real> Patch<T> {
         let on_samples = |value: &dyn Fn(usize) -> f64| sampling.galerkin(&diagonal(count, value));
         let ground = self.exact_ground();
         let springs = laplacian(lattice.sample_dims(), &self.present_springs());
-        let springs = &springs + &diagonal(count, &|i| ground.at(i));
+        let springs = &springs + &diagonal(count, |i| ground.at(i));
         let mut stiffness = sampling.galerkin(&springs.map(|v| sigma2 * v));
         let rows = self.constraint_springs();
         if !rows.is_empty() {
