@@ -62,7 +62,10 @@ use std::ops::ControlFlow;
 use self::blocks::MAX_CELLS;
 use crate::{Field, Frame};
 
-pub use self::adaptive::{AdaptiveBlockMesh, AdaptiveMesh, AdaptiveMesher, AdaptiveOptions, AdaptiveReport};
+pub use self::adaptive::{
+    AdaptiveBlock, AdaptiveBlockMesh, AdaptiveMesh, AdaptiveMesher, AdaptiveOptions, AdaptiveReport,
+    AdaptiveUpdate,
+};
 pub use self::block_mesh::{BlockMesh, BlockUpdate};
 pub use self::check::{MeshCheck, check_mesh};
 pub use self::crossings::self_intersections;

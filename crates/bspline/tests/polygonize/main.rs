@@ -2,6 +2,7 @@
 
 mod adaptive;
 mod fields;
+mod live;
 mod settle;
 
 use std::f64::consts::PI;

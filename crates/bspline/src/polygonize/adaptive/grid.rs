@@ -41,6 +41,16 @@ impl Grids {
         }
     }
 
+    /// The maps from the world to the grids of all levels.
+    pub fn inverses(&self) -> Vec<DAffine3> {
+        self.frames.iter().map(|f| f.world_from_grid.inverse()).collect()
+    }
+
+    /// A place in the grid of a level, in the world.
+    pub fn world(&self, level: usize, at: DVec3) -> DVec3 {
+        self.frames[level].world_from_grid.transform_point3(at)
+    }
+
     /// Finest level.
     pub fn depth(&self) -> usize {
         self.frames.len() - 1

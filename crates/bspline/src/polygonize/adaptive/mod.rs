@@ -7,10 +7,15 @@
 
 mod around;
 mod cases;
+mod changed;
 mod grid;
 mod hidden;
+mod join;
 mod judge;
 mod live;
+mod octree;
+mod patch;
+mod pieces;
 mod polygons;
 mod sample;
 mod surface;
@@ -18,12 +23,11 @@ mod tree;
 mod vertices;
 
 use std::ops::ControlFlow;
-use std::sync::Arc;
 
 use glam::DVec3;
 use rayon::prelude::*;
 
-pub use self::live::AdaptiveBlockMesh;
+pub use self::live::{AdaptiveBlock, AdaptiveBlockMesh, AdaptiveUpdate};
 
 use self::around::Around;
 use self::grid::Grids;
@@ -188,28 +192,26 @@ impl<'a> AdaptiveMesher<'a> {
         progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
     ) -> Result<(AdaptiveMesh, AdaptiveReport), PolygonizeError> {
         let tree = self.grow(error, &mut |_| progress(0.0))?;
-        let report = report_of(&self.samples, &tree, &self.options, error);
+        let mut report = report_of(&tree, &self.options, error);
+        report.blocks = self.samples.len() as u64;
+        report.nan_nodes = self.samples.nan_nodes();
         let placer = Placer {
             field: self.field,
             grids: &self.grids,
             iso: self.options.iso,
             steps: steps(settled),
         };
-        let vertices = tree
+        let vertices: Vec<Vec<BlockVertices>> = tree
             .iter()
             .enumerate()
             .map(|(level, blocks)| {
                 let place = |scratch: &mut vertices::Scratch, block| {
-                    Arc::new(BlockVertices::new(
-                        &placer,
-                        &Around::new(&tree, level, block),
-                        scratch,
-                    ))
+                    BlockVertices::new(&placer, &Around::new(&tree, level, block), scratch)
                 };
                 let blocks = blocks.par_iter().with_min_len(4);
                 blocks.map_init(vertices::Scratch::default, place).collect()
             })
-            .collect::<Vec<_>>();
+            .collect();
         let open = self.options.open;
         let drawn = Drawn::new(&placer, &tree, &vertices, open)?;
         drop(tree);
@@ -276,11 +278,10 @@ fn checked(
     Ok(plain)
 }
 
-fn report_of(samples: &Samples, tree: &Tree, options: &AdaptiveOptions, error: f64) -> AdaptiveReport {
+/// What the leaves tell.
+fn report_of(tree: &Tree, options: &AdaptiveOptions, error: f64) -> AdaptiveReport {
     let mut report = AdaptiveReport {
-        blocks: samples.len() as u64,
         crossed_leaves: tree::crossed_leaves(tree),
-        nan_nodes: samples.nan_nodes(),
         ..Default::default()
     };
     for block in tree.get(options.depth).into_iter().flatten() {
@@ -309,7 +310,7 @@ impl Drawn {
     fn new(
         placer: &Placer,
         tree: &Tree,
-        vertices: &[Vec<Arc<BlockVertices>>],
+        vertices: &[Vec<BlockVertices>],
         open: bool,
     ) -> Result<Self, PolygonizeError> {
         let depth = placer.grids.depth();
@@ -317,10 +318,10 @@ impl Drawn {
             .iter()
             .enumerate()
             .flat_map(|(level, blocks)| {
-                blocks.iter().enumerate().map(move |(n, b)| {
-                    let fine = b.key.map(|k| ((i64::from(k) + 1) << (depth - level)) as u64);
-                    (interleave(fine), level, n)
-                })
+                blocks
+                    .iter()
+                    .enumerate()
+                    .map(move |(n, b)| (order_of(b.key, level, depth), level, n))
             })
             .collect();
         order.sort_unstable();
@@ -333,13 +334,13 @@ impl Drawn {
         if count >= u64::from(EXTRA) {
             return Err(PolygonizeError::TooManyVertices { vertices: count });
         }
-        let frames = placer.grids.frames.iter();
+        let grid_from_world = placer.grids.inverses();
         let numbered = Numbered {
             vertices,
-            first: &first,
+            first: |level: usize, n: usize| first[level][n],
             cells: placer.grids.frames[0].cells.map(|n| n as i32),
             mirrored: placer.grids.mirrored,
-            grid_from_world: frames.map(|f| f.world_from_grid.inverse()).collect(),
+            grid_from_world: &grid_from_world,
             depth,
             open,
         };
@@ -359,7 +360,7 @@ impl Drawn {
     fn join(
         self,
         placer: &Placer,
-        vertices: &[Vec<Arc<BlockVertices>>],
+        vertices: &[Vec<BlockVertices>],
         open: bool,
         mut report: AdaptiveReport,
     ) -> (AdaptiveMesh, AdaptiveReport) {
@@ -374,7 +375,12 @@ impl Drawn {
             made.keys.extend_from_slice(&block.keys);
             made.fixed.extend_from_slice(&block.fixed);
         }
-        let extras = add_extras(placer, &order, &parts, &mut made);
+        let extras: Vec<_> = parts
+            .iter()
+            .zip(&order)
+            .map(|(p, o)| (o.1, &p.extras[..]))
+            .collect();
+        let extras = add_extras(placer.grids, &extras, &mut made);
         report.extra_vertices = made.mesh.positions.len() as u64 - count;
         let triangle_count = parts.iter().map(|p| p.triangles.len()).sum();
         made.mesh.triangles.reserve_exact(triangle_count);
@@ -391,18 +397,15 @@ impl Drawn {
     }
 }
 
-/// Numbers, keys and places the vertices that no leaf has; gives the numbers by part.
+/// Numbers, keys and places the vertices that no leaf has, given by part with its level; gives the numbers by part.
 fn add_extras(
-    placer: &Placer,
-    order: &[(u64, usize, usize)],
-    parts: &[BlockTriangles],
+    grids: &Grids,
+    parts: &[(usize, &[(ExtraKey, DVec3)])],
     made: &mut AdaptiveMesh,
 ) -> Vec<Vec<u32>> {
     let mut all: Vec<(ExtraKey, DVec3)> = Vec::new();
-    for (part, &(_, level, _)) in parts.iter().zip(order) {
-        let frame = &placer.grids.frames[level];
-        let placed = part.extras.iter();
-        all.extend(placed.map(|(key, p)| (*key, frame.world_from_grid.transform_point3(*p))));
+    for (level, extras) in parts {
+        all.extend(extras.iter().map(|(key, p)| (*key, grids.world(*level, *p))));
     }
     if all.is_empty() {
         return parts.iter().map(|_| Vec::new()).collect();
@@ -425,7 +428,7 @@ fn add_extras(
     };
     parts
         .iter()
-        .map(|part| part.extras.iter().map(|(key, _)| number(key)).collect())
+        .map(|(_, extras)| extras.iter().map(|(key, _)| number(key)).collect())
         .collect()
 }
 
@@ -434,6 +437,11 @@ fn mixed(x: u64) -> u64 {
     let z = (x ^ x >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
     z ^ z >> 31
+}
+
+/// Place of a block in the order of space; of two with one place, the coarser comes first.
+fn order_of(key: BlockKey, level: usize, depth: usize) -> u64 {
+    interleave(key.map(|k| ((i64::from(k) + 1) << (depth - level)) as u64))
 }
 
 /// Bits of three numbers below 2²¹ by turns, the first highest.

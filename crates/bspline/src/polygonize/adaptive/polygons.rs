@@ -1,7 +1,5 @@
 //! The triangles: one polygon for each minimal edge that the surface crosses, through the leaves about it.
 
-use std::sync::Arc;
-
 use glam::{DAffine3, DVec3};
 
 use super::around::{Around, State};
@@ -15,14 +13,14 @@ use crate::polygonize::blocks::{CELLS, NODES};
 pub(super) const EXTRA: u32 = 1 << 31;
 
 /// All vertices, by level and block, and the number of the first one of each block.
-pub(super) struct Numbered<'a> {
-    pub vertices: &'a [Vec<Arc<BlockVertices>>],
-    pub first: &'a [Vec<u32>],
+pub(super) struct Numbered<'a, F> {
+    pub vertices: &'a [Vec<BlockVertices>],
+    pub first: F,
     /// Coarsest cells of the frame.
     pub cells: [i32; 3],
     pub mirrored: bool,
     /// By level.
-    pub grid_from_world: Vec<DAffine3>,
+    pub grid_from_world: &'a [DAffine3],
     pub depth: usize,
     /// Leave out what lies on the frame's faces.
     pub open: bool,
@@ -53,7 +51,7 @@ struct Leaf {
 /// Steps from one leaf round an edge to the next: the axis after the edge's, or the one after that, and which way.
 const TURNS: [(usize, i32); 4] = [(1, 1), (2, 1), (1, -1), (2, -1)];
 
-impl Numbered<'_> {
+impl<F: Fn(usize, usize) -> u32> Numbered<'_, F> {
     /// Makes the triangles of the minimal edges that a block owns.
     pub fn triangles(&self, around: &Around, out: &mut BlockTriangles) -> Result<(), PolygonizeError> {
         let rows = &around.block.sample.rows;
@@ -207,7 +205,7 @@ impl Numbered<'_> {
 
     fn position(&self, around: &Around, leaf: &Leaf) -> DVec3 {
         let level = around.level - usize::from(leaf.state == State::Coarse);
-        let first = self.first[level][leaf.block];
+        let first = (self.first)(level, leaf.block);
         self.vertices[level][leaf.block].positions[(leaf.vertex - first) as usize]
     }
 
@@ -235,7 +233,7 @@ impl Numbered<'_> {
             block,
             local,
             crossing,
-            vertex: self.first[level][block] + vertex,
+            vertex: (self.first)(level, block) + vertex,
         })
     }
 

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::grid::{Cells, Grids, NODE_COUNT, bit, each, holds, node_index, octant_with, rank};
+use super::grid::{Cells, Grids, NODE_COUNT, bit, each, holds, node_index, octant_of_set, octant_with, rank};
 use crate::polygonize::blocks::{BlockKey, CELLS, NODES};
 use crate::{Field, Interval, Jet};
 
@@ -89,33 +89,75 @@ impl Default for Sample {
 impl Sample {
     /// Samples the nodes of a block of which nothing is known.
     pub fn fill(&mut self, judge: &Judge, level: usize, key: BlockKey, scratch: &mut Scratch) {
+        let nodes = judge
+            .grids
+            .clipped(level, key.map(|b| b * CELLS as i32), CELLS as i32);
+        self.refill(judge, level, key, nodes, 0xff, scratch);
+    }
+
+    /// Samples the nodes from `lo` to `hi` again, none if one of these is beyond the other, and forgets what is known of
+    /// the cells of the octants `stale`: those that have these nodes, or are one cell away from them.
+    pub fn refill(
+        &mut self,
+        judge: &Judge,
+        level: usize,
+        key: BlockKey,
+        (lo, hi): ([i64; 3], [i64; 3]),
+        stale: u8,
+        scratch: &mut Scratch,
+    ) {
         let grids = judge.grids;
         let origin = key.map(|b| b * CELLS as i32);
-        let (lo, hi) = grids.clipped(level, origin, CELLS as i32);
-        let count: [usize; 3] = std::array::from_fn(|a| (hi[a] - lo[a] + 1) as usize);
-        let skip: [usize; 3] = std::array::from_fn(|a| (lo[a] - i64::from(origin[a])).max(0) as usize);
-        scratch.values.resize(count.iter().product(), 0.0);
-        judge
-            .field
-            .frame_values(&grids.frames[level], lo, count, &mut scratch.values);
-        for (n, row) in scratch.values.chunks_exact(count[2]).enumerate() {
-            let (i, j) = (n / count[1] + skip[0], n % count[1] + skip[1]);
-            let start = node_index([i, j, skip[2]]);
-            let mut bits = 0;
-            for (k, (&f, out)) in row.iter().zip(&mut self.values[start..]).enumerate() {
-                bits |= ((f > judge.iso) as u16) << k;
-                *out = (f - judge.iso) as f32;
+        if (0..3).all(|a| lo[a] <= hi[a]) {
+            let count: [usize; 3] = std::array::from_fn(|a| (hi[a] - lo[a] + 1) as usize);
+            let skip: [usize; 3] = std::array::from_fn(|a| (lo[a] - i64::from(origin[a])) as usize);
+            scratch.values.resize(count.iter().product(), 0.0);
+            judge
+                .field
+                .frame_values(&grids.frames[level], lo, count, &mut scratch.values);
+            let known = !(((1 << count[2]) - 1) << skip[2]);
+            for (n, row) in scratch.values.chunks_exact(count[2]).enumerate() {
+                let (i, j) = (n / count[1] + skip[0], n % count[1] + skip[1]);
+                let start = node_index([i, j, skip[2]]);
+                let mut bits = 0;
+                for (k, (&f, out)) in row.iter().zip(&mut self.values[start..]).enumerate() {
+                    bits |= ((f > judge.iso) as u16) << k;
+                    *out = (f - judge.iso) as f32;
+                }
+                let row = &mut self.rows[NODES * i + j];
+                *row = *row & known | bits << skip[2];
             }
-            self.nan_nodes += row.iter().map(|f| u32::from(f.is_nan())).sum::<u32>();
-            self.rows[NODES * i + j] = bits << skip[2];
+            self.nan_nodes = self.values.iter().map(|f| u32::from(f.is_nan())).sum();
         }
-        self.crossed = self.find_crossed();
-        self.guessed = self.crossed;
-        let guesses = each(self.crossed).map(|c| self.guess(judge, level, key, c));
-        self.errors = guesses.collect();
+        let crossed = self.find_crossed();
+        let before = std::mem::replace(&mut self.crossed, crossed);
+        let known = std::mem::take(&mut self.errors);
+        for octant in (0..8).filter(|o| stale >> o & 1 == 1) {
+            let all = octant_of_set(&[u64::MAX; CELLS], octant);
+            for x in 0..CELLS {
+                for set in [
+                    &mut self.hidden,
+                    &mut self.judged,
+                    &mut self.bounded,
+                    &mut self.creased,
+                ] {
+                    set[x] &= !all[x];
+                }
+                self.guessed[x] = self.guessed[x] & !all[x] | self.crossed[x] & all[x];
+            }
+            self.guesses[octant] = 0.0;
+        }
+        self.coarse &= !stale;
+        let errors = each(self.crossed).map(|c| match stale >> octant_with(c) & 1 {
+            0 => known[rank(&before, c)],
+            _ => self.guess(judge, level, key, c),
+        });
+        self.errors = errors.collect();
         for (c, guess) in each(self.crossed).zip(&self.errors) {
-            let most = &mut self.guesses[octant_with(c)];
-            *most = most.max(*guess);
+            let octant = octant_with(c);
+            if stale >> octant & 1 == 1 {
+                self.guesses[octant] = self.guesses[octant].max(*guess);
+            }
         }
     }
 

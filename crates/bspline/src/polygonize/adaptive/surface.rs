@@ -21,7 +21,7 @@ pub(super) type Crossing = u8;
 const NAMES: usize = 125;
 
 /// A segment of a loop.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Segment {
     /// Minimal face, `5·(2·axis + side)`, plus 1 … 4 for a quarter.
     pub face: u8,

@@ -14,10 +14,11 @@ use crate::polygonize::blocks::{BlockKey, CELLS};
 const STRIDE: usize = 1 << 10;
 
 /// What was asked of the field, level by level, sorted by key.
-#[derive(Clone, Default)]
+#[derive(Default)]
 pub(super) struct Samples(Vec<Vec<(BlockKey, Arc<Sample>)>>);
 
 /// A block of the finished octree.
+#[derive(Clone)]
 pub(super) struct Block {
     pub key: BlockKey,
     pub sample: Arc<Sample>,
@@ -73,13 +74,6 @@ impl Samples {
         let level = &self.0[level];
         let at = level.binary_search_by_key(&key, |(k, _)| *k).ok()?;
         Some(&level[at].1)
-    }
-
-    /// Forgets the blocks that `is_stale` names.
-    pub fn forget(&mut self, is_stale: impl Fn(usize, BlockKey) -> bool) {
-        for (n, level) in self.0.iter_mut().enumerate() {
-            level.retain(|(key, _)| !is_stale(n, *key));
-        }
     }
 
     /// Sees to it that the cells of `sets` are judged; blocks that are not there are sampled.
@@ -223,7 +217,7 @@ fn below(sets: &Sets, domain: impl Fn(BlockKey) -> Cells) -> Sets {
 /// Adds to the split cells of each level the parents of all 26 neighbours of the split cells of the next.
 ///
 /// The children of those then touch cells of at least their parents' size only: 26 neighbours, 2 : 1.
-fn balance(split: &mut [Sets], domain: impl Fn(usize, BlockKey) -> Cells) {
+pub(super) fn balance(split: &mut [Sets], domain: impl Fn(usize, BlockKey) -> Cells) {
     for level in (1..split.len()).rev() {
         let (coarse, fine) = split.split_at_mut(level);
         let target = &mut coarse[level - 1];

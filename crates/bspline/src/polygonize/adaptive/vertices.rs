@@ -12,7 +12,7 @@ use crate::polygonize::blocks::CELLS;
 use crate::polygonize::table::edge_place;
 
 /// Bits of a vertex's key that number the loops of its leaf.
-const LOOP_BITS: u32 = 4;
+pub(super) const LOOP_BITS: u32 = 4;
 /// Bits of a vertex's key for each coordinate of its leaf.
 pub(super) const PLACE_BITS: u32 = 20;
 
@@ -20,6 +20,7 @@ pub(super) const PLACE_BITS: u32 = 20;
 pub(super) const STEPS: usize = 2;
 
 /// The vertices of a block.
+#[derive(Default)]
 pub(super) struct BlockVertices {
     /// Leaves that have vertices, which are in their order.
     holding: Cells,
@@ -31,10 +32,10 @@ pub(super) struct BlockVertices {
     pub twice: Vec<(u16, Segment)>,
     pub positions: Vec<DVec3>,
     pub keys: Vec<u64>,
+    /// Names within the block, rising: number of the leaf, then of the loop.
+    pub names: Vec<u16>,
     /// Vertices on the cap, which stay where they are.
     pub fixed: Vec<bool>,
-    /// Vertices of leaves with several loops, which stay amid their crossings: sheets that close may have the same foot.
-    amid: Vec<bool>,
 }
 
 /// What to place vertices by.
@@ -80,6 +81,24 @@ impl BlockVertices {
         at.map_or(0, |n| self.crossings[n].2)
     }
 
+    /// Number of the vertex of that name.
+    pub fn find(&self, name: u16) -> Option<usize> {
+        self.names.binary_search(&name).ok()
+    }
+
+    /// Whether the vertices of another version of the block are these, to the bit.
+    pub fn is_same(&self, other: &Self) -> bool {
+        let bits = |p: &DVec3| p.to_array().map(f64::to_bits);
+        (self.holding, &self.more, &self.crossings, &self.twice)
+            == (other.holding, &other.more, &other.crossings, &other.twice)
+            && (&self.names, &self.fixed) == (&other.names, &other.fixed)
+            && self
+                .positions
+                .iter()
+                .map(bits)
+                .eq(other.positions.iter().map(bits))
+    }
+
     /// Finds and places the vertices of a block.
     pub fn new(placer: &Placer, around: &Around, scratch: &mut Scratch) -> Self {
         let (grids, level, block) = (placer.grids, around.level, around.block);
@@ -89,16 +108,7 @@ impl BlockVertices {
         let crossed = block.sample.crossed;
         let beside = around.beside_split();
         let border = grids.meets_border(level, block.key);
-        let mut made = Self {
-            holding: [0; CELLS],
-            more: Vec::new(),
-            crossings: Vec::new(),
-            twice: Vec::new(),
-            positions: Vec::new(),
-            keys: Vec::new(),
-            fixed: Vec::new(),
-            amid: Vec::new(),
-        };
+        let mut made = Self::default();
         scratch.cells.clear();
         let candidates: Cells = std::array::from_fn(|x| leaves[x] & (crossed[x] | beside[x]));
         for c in each(candidates) {
@@ -112,7 +122,8 @@ impl BlockVertices {
                 made.push(
                     mean_of_edges(&block.sample.values, c, case.edges) + place(own),
                     key,
-                    [false; 2],
+                    leaf << LOOP_BITS,
+                    false,
                 );
                 scratch.cells.push(cell);
                 continue;
@@ -137,7 +148,7 @@ impl BlockVertices {
                     let count = own_segments().count() as f64;
                     points.map(|p| p.1).sum::<DVec3>() / count
                 };
-                made.push(at, key + n as u64, [capped, surface.loops > 1]);
+                made.push(at, key + n as u64, leaf << LOOP_BITS | n as u16, capped);
                 scratch.cells.push(cell);
             }
             if surface.loops > 1 {
@@ -159,11 +170,11 @@ impl BlockVertices {
         made
     }
 
-    fn push(&mut self, at: DVec3, key: u64, [fixed, amid]: [bool; 2]) {
+    fn push(&mut self, at: DVec3, key: u64, name: u16, fixed: bool) {
         self.positions.push(at);
         self.keys.push(key);
+        self.names.push(name);
         self.fixed.push(fixed);
-        self.amid.push(fixed || amid);
     }
 
     /// Moves the vertices, given in the grid's coordinates, onto the surface and into the world.
