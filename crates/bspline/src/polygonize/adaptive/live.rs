@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
-use glam::{DAffine3, DVec3};
+use glam::DAffine3;
 use rayon::prelude::*;
 
 use super::around::Around;
 use super::changed::Changed;
-use super::grid::{Grids, NONE};
+use super::grid::{Cells, Grids, NONE};
 use super::octree::Place;
 use super::patch::{At, Calming, calm};
 use super::pieces::{Calm, Corner, Parts, Pen, Piece, corner};
@@ -186,12 +186,10 @@ impl AdaptiveBlockMesh {
 
         let mut redraw = followed.about;
         redraw.extend(&followed.dirty);
-        let octree = &self.parts.octree;
-        // Where vertices are joined twice, crossings of a leaf count beside its vertices.
-        let twice = |place: &&Place| !self.parts.vertices_of(**place).twice.is_empty();
-        for &place in moved.iter().chain(followed.dirty.iter().filter(twice)) {
-            redraw.extend(octree.neighbours(place).chain(octree.finer(place)));
+        for &(place, leaves) in &moved {
+            redraw.extend(self.parts.octree.touching(place, &leaves));
         }
+        let moved: Vec<Place> = moved.into_iter().map(|(place, _)| place).collect();
         let touched = self.draw(&mut redraw, &moved, &mut seeds)?;
         update.drawn = redraw.len();
         let block = |parts: &Parts, place: Place| AdaptiveBlock {
@@ -266,9 +264,14 @@ impl AdaptiveBlockMesh {
         found
     }
 
-    /// Places the vertices of some blocks anew, which it sorts; gives the blocks where that changed something, and adds
-    /// the vertices that are new or moved to `seeds`.
-    fn place(&mut self, field: &dyn Field, renew: &mut Vec<Place>, seeds: &mut Vec<At>) -> Vec<Place> {
+    /// Places the vertices of some blocks anew, which it sorts; gives the blocks where that changed something, with the
+    /// leaves, and adds the vertices that are new or moved to `seeds`.
+    fn place(
+        &mut self,
+        field: &dyn Field,
+        renew: &mut Vec<Place>,
+        seeds: &mut Vec<At>,
+    ) -> Vec<(Place, Cells)> {
         renew.sort_unstable();
         renew.dedup();
         let tree = &self.parts.octree.tree;
@@ -292,7 +295,7 @@ impl AdaptiveBlockMesh {
             if old.is_same(&new) {
                 continue;
             }
-            moved.push((level, slot));
+            moved.push(((level, slot), old.changed(&new)));
             if self.settled {
                 let calm = &mut self.parts.calm[level][slot as usize];
                 let mut positions = new.positions.clone();
@@ -301,11 +304,7 @@ impl AdaptiveBlockMesh {
                     if let Some(k) = known {
                         positions[n] = calm.positions[k];
                     }
-                    let bits = |p: DVec3| p.to_array().map(f64::to_bits);
-                    let is_same = known.is_some_and(|k| {
-                        bits(old.positions[k]) == bits(new.positions[n]) && old.fixed[k] == new.fixed[n]
-                    });
-                    if !is_same {
+                    if !known.is_some_and(|k| new.is_same_at(n, old, k)) {
                         seeds.push(((level, slot), n));
                     }
                 }
@@ -326,6 +325,11 @@ impl AdaptiveBlockMesh {
     ) -> Result<Vec<Place>, PolygonizeError> {
         redraw.sort_unstable();
         redraw.dedup();
+        // A polygon belongs to a block that has one of its vertices.
+        redraw.retain(|place| {
+            let is_bare = self.parts.vertices_of(*place).names.is_empty();
+            !(is_bare && self.parts.piece_of(*place).triangles.is_empty())
+        });
         let pen = Pen {
             cells: self.grids.frames[0].cells.map(|n| n as i32),
             mirrored: self.grids.mirrored,

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 use super::changed::Changed;
-use super::grid::{Cells, Grids, NONE, child, children, octant_of, parent};
+use super::grid::{Cells, Grids, NONE, child, children, each, octant_of, parent};
 use super::sample::{Judge, Sample, Scratch};
 use super::tree::{Block, Limits, Tree, balance};
 use crate::polygonize::PolygonizeError;
@@ -102,6 +102,39 @@ impl Octree {
     pub fn neighbours(&self, place: Place) -> impl Iterator<Item = Place> + '_ {
         let found = self.block(place).neighbours.iter();
         found.filter(|n| **n != NONE).map(move |n| (place.0, *n))
+    }
+
+    /// Blocks of the same and the next level that touch some cells of one.
+    pub fn touching(&self, place: Place, cells: &Cells) -> Vec<Place> {
+        let (level, _) = place;
+        let block = self.block(place);
+        let (mut near, mut found) = (0u32, Vec::new());
+        for c in each(*cells) {
+            near |= (0..27).fold(0, |near, n| {
+                let beside = [n / 9, n / 3 % 3, n % 3];
+                let is_near = (0..3).all(|a| [c[a] == 0, true, c[a] + 1 == CELLS][beside[a]]);
+                near | u32::from(is_near) << n
+            });
+            if level + 1 == self.tree.len() {
+                continue;
+            }
+            // Finer cells from one before the leaf's to one after.
+            for corner in 0..8 {
+                let at: [i32; 3] = std::array::from_fn(|a| 2 * c[a] as i32 - 1 + 3 * (corner >> a & 1));
+                let fine: BlockKey = std::array::from_fn(|a| 2 * block.key[a] + (at[a] >> 3));
+                let n: [usize; 3] = std::array::from_fn(|a| (parent(fine)[a] - block.key[a] + 1) as usize);
+                let holder = block.neighbours[9 * n[0] + 3 * n[1] + n[2]];
+                if holder != NONE {
+                    let slot = self.tree[level][holder as usize].children[octant_of(fine)];
+                    found.extend((slot != NONE).then_some((level + 1, slot)));
+                }
+            }
+        }
+        let beside = (0..27).filter(|n| near >> n & 1 == 1 && block.neighbours[*n] != NONE);
+        found.extend(beside.map(|n| (level, block.neighbours[n])));
+        found.sort_unstable();
+        found.dedup();
+        found
     }
 
     /// Blocks of the next level that touch one.

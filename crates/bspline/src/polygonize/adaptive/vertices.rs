@@ -88,15 +88,38 @@ impl BlockVertices {
 
     /// Whether the vertices of another version of the block are these, to the bit.
     pub fn is_same(&self, other: &Self) -> bool {
-        let bits = |p: &DVec3| p.to_array().map(f64::to_bits);
         (self.holding, &self.more, &self.crossings, &self.twice)
             == (other.holding, &other.more, &other.crossings, &other.twice)
             && (&self.names, &self.fixed) == (&other.names, &other.fixed)
-            && self
-                .positions
-                .iter()
-                .map(bits)
-                .eq(other.positions.iter().map(bits))
+            && (0..self.names.len()).all(|n| self.is_same_at(n, other, n))
+    }
+
+    /// Whether a vertex is one of another version of the block, to the bit.
+    pub fn is_same_at(&self, n: usize, other: &Self, k: usize) -> bool {
+        let bits = |p: DVec3| p.to_array().map(f64::to_bits);
+        bits(self.positions[n]) == bits(other.positions[k]) && self.fixed[n] == other.fixed[k]
+    }
+
+    /// Leaves whose vertices differ from those of another version of the block.
+    pub fn changed(&self, other: &Self) -> Cells {
+        let mut found = [0; CELLS];
+        let mut put = |leaf: u16| {
+            let c = [leaf >> 6, leaf >> 3 & 7, leaf & 7].map(usize::from);
+            found[c[0]] |= bit(c);
+        };
+        for (one, two) in [(self, other), (other, self)] {
+            for (n, name) in one.names.iter().enumerate() {
+                if !two.find(*name).is_some_and(|k| one.is_same_at(n, two, k)) {
+                    put(name >> LOOP_BITS);
+                }
+            }
+            let loops = one.crossings.iter().filter(|c| !two.crossings.contains(c));
+            let twice = one.twice.iter().filter(|s| !two.twice.contains(s));
+            for leaf in loops.map(|c| c.0).chain(twice.map(|s| s.0)) {
+                put(leaf);
+            }
+        }
+        found
     }
 
     /// Finds and places the vertices of a block.
