@@ -139,8 +139,8 @@ pub trait Field: Send + Sync {
         })
     }
 
-    /// World boxes outside which, within `within`, this field has the very bits that `before` has; all of `within`, as
-    /// here, for fields that do not know how they follow from one another.
+    /// World boxes outside which, within `within`, this field and its bounds have the very bits that those of `before`
+    /// have; all of `within`, as here, for fields that do not know how they follow from one another.
     fn changed_boxes(&self, before: &dyn Field, within: &Aabb) -> Vec<Aabb> {
         let _ = before;
         vec![*within]

@@ -6,7 +6,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use bspline::hierarchical::{BlockEdit, BrickKey, Change, DenseCorrections, Lattice, LevelEdit};
-use bspline::polygonize::{BlockMesh, PolygonizeError, PolygonizeOptions};
+use bspline::polygonize::{
+    AdaptiveBlockMesh, AdaptiveOptions, BlockMesh, PolygonizeError, PolygonizeOptions,
+};
 use bspline::primitives::Sphere;
 use bspline::{Aabb, Csg, Field, Frame, HierarchicalSpline};
 use fitting::Control;
@@ -221,6 +223,8 @@ fn measure(ball: &Ball) -> Result<EditCosts, PolygonizeError> {
     });
     costs.push(("drop_us", middle(drops.collect())));
     costs.push(("remesh20_us", remeshed(ball)?));
+    costs.push(("remesh20_live_us", remeshed_adaptively(ball, false)?));
+    costs.push(("remesh20_settled_ms", remeshed_adaptively(ball, true)? / 1e3));
     let tools = [("tool10_ms", 10.0), ("tool20_ms", 20.0), ("tool40_ms", 40.0)];
     costs.extend(tools.map(|(name, across)| (name, carved(ball, across))));
     costs.extend(questions(ball));
@@ -228,6 +232,14 @@ fn measure(ball: &Ball) -> Result<EditCosts, PolygonizeError> {
         coefficients: field.coefficient_count(),
         costs,
     })
+}
+
+/// Box of 20 cells of the finest level at step `i` of a stroke: 5 by 2 by 2, from the middle of one to that of another.
+fn twenty_cells(ball: &Ball, i: usize) -> Aabb {
+    let size = ball.cell();
+    let middle = (ball.stroke(i) / size).floor() + 0.5;
+    let reach = DVec3::new(2.0, 0.5, 0.5);
+    Aabb::new((middle - reach) * size, (middle + reach) * size)
 }
 
 /// Microseconds to mesh 20 cells again.
@@ -238,18 +250,37 @@ fn remeshed(ball: &Ball) -> Result<f64, PolygonizeError> {
         cells: [cells; 3],
     };
     let (mut mesh, _) = BlockMesh::new(&ball.field, &frame, &PolygonizeOptions::default())?;
-    let size = frame.world_from_grid.matrix3.x_axis.x;
-    let mut times = Vec::new();
-    for i in 0..50 {
-        // 5 by 2 by 2 cells, from the middle of one to that of another.
-        let middle = (ball.stroke(i) / size).floor() + 0.5;
-        let reach = DVec3::new(2.0, 0.5, 0.5);
-        let changed = Aabb::new((middle - reach) * size, (middle + reach) * size);
+    remeshing(ball, |changed| mesh.update(&ball.field, &[changed]).map(drop))
+}
+
+/// Microseconds to mesh 20 cells again in a mesh that follows the surface, of cells as small as the field's.
+fn remeshed_adaptively(ball: &Ball, settled: bool) -> Result<f64, PolygonizeError> {
+    let frame = Frame {
+        world_from_grid: DAffine3::IDENTITY,
+        cells: [CELLS; 3],
+    };
+    let options = AdaptiveOptions {
+        depth: ball.level,
+        detection: ball.level,
+        ..Default::default()
+    };
+    let error = 0.02 * ball.cell();
+    let mut mesh = AdaptiveBlockMesh::new(&ball.field, &frame, &options, error, settled)?;
+    remeshing(ball, |changed| mesh.update(&ball.field, &[changed]).map(drop))
+}
+
+/// Median time of 50 updates, microseconds.
+fn remeshing(
+    ball: &Ball,
+    mut update: impl FnMut(Aabb) -> Result<(), PolygonizeError>,
+) -> Result<f64, PolygonizeError> {
+    let times = (0..50).map(|i| {
+        let changed = twenty_cells(ball, i);
         let start = Instant::now();
-        black_box(mesh.update(&ball.field, &[changed])?);
-        times.push(start.elapsed().as_secs_f64() * 1e6);
-    }
-    Ok(middle(times))
+        update(changed)?;
+        Ok(start.elapsed().as_secs_f64() * 1e6)
+    });
+    Ok(middle(times.collect::<Result<_, _>>()?))
 }
 
 /// Milliseconds to carve a ball `across` finest cells wide, and to write the result back: rows of \[Hua04\] Table 1.

@@ -49,7 +49,9 @@ impl<T: Real> Changes<'_, T> {
         };
         let width = a.width();
         let corner = DVec3::from_array(a.key.0.map(|k| k as f64 * width));
-        if !is_same && !a.has_children() && !b.has_children() {
+        let is_divided = [a.has_children(), b.has_children()];
+        // Bounds are taken by octants in a node that has children, so with the first of them they change all over it.
+        if is_divided[0] != is_divided[1] || !is_same && is_divided == [false; 2] {
             return self.push(corner, corner + width);
         }
         for octant in 0..8usize {

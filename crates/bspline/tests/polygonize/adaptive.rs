@@ -8,7 +8,7 @@ use bspline::polygonize::{
     PolygonizeOptions, check_mesh, polygonize, self_intersections,
 };
 use bspline::primitives::{Cuboid, Gyroid, Sphere, Torus};
-use bspline::{Aabb, Csg, Field, Frame};
+use bspline::{Csg, Field, Frame};
 use glam::{DAffine3, DQuat, DVec3};
 
 use super::fields::{Random, Trilinear, random_spline, unbounded};
@@ -353,6 +353,35 @@ fn same_bits_with_1_2_and_8_threads_and_after_other_errors() {
             let made = mesher.mesh(error, settled, go_on).expect("a mesh").0;
             assert!(error > 0.02 || made == meshes[0].0);
         }
+    }
+}
+
+#[test]
+fn meshes_have_the_bits_that_they_had() {
+    let spline = random_spline(5, DAffine3::IDENTITY);
+    let frame = Frame {
+        world_from_grid: DAffine3::IDENTITY,
+        cells: spline.lattice().cells,
+    };
+    for (open, settled, hash) in [
+        (false, false, 0x767a_0d4f_be3c_be7f),
+        (true, false, 0xde31_f450_2baa_5e8c),
+        (false, true, 0x00f9_82c8_9939_efff),
+        (true, true, 0x47a5_bd4c_777a_eb8f),
+    ] {
+        let options = AdaptiveOptions { open, ..options(3) };
+        let (made, _) = meshed(&spline, &frame, &options, 0.02, settled);
+        let words = made
+            .mesh
+            .positions
+            .iter()
+            .flat_map(|p| p.to_array().map(f64::to_bits));
+        let words = words.chain(made.mesh.triangles.iter().flatten().map(|v| u64::from(*v)));
+        let words = words.chain(made.keys.iter().copied());
+        let found = words.fold(0xcbf2_9ce4_8422_2325u64, |hash, word| {
+            (hash ^ word).wrapping_mul(0x0100_0000_01b3)
+        });
+        assert_eq!(found, hash, "open: {open}, settled: {settled}");
     }
 }
 
