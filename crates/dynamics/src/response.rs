@@ -277,13 +277,13 @@ impl<T: Real> Patch<T> {
         StepSolver::new(self.lattice().in_double(), &steps.collect::<Vec<_>>(), options)
     }
 
-    fn exact_ground(&self) -> Weights<f64> {
+    pub(crate) fn exact_ground(&self) -> Weights<f64> {
         let ground = &self.lumped.ground;
         ground.weights.scaled(ground.unit)
     }
 
     /// Springs of the linear law, tangents of the 4-D one, without `σ²`.
-    fn present_springs(&self) -> Vec<SpringWeights<f64>> {
+    pub(crate) fn present_springs(&self) -> Vec<SpringWeights<f64>> {
         let mut springs = self.exact_springs();
         if let Law::FourD { .. } = self.network.law() {
             self.network.scale_by_tangent(&self.state.d, &mut springs);

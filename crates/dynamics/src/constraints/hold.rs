@@ -178,6 +178,17 @@ impl<T: Real> Patch<T> {
         rows.map(|r| r.target - r.value(&self.state.p))
     }
 
+    /// Constraint springs on the coefficients: rows with `σ²k`.
+    pub(crate) fn constraint_springs(&self) -> Vec<(&[(usize, f64)], f64)> {
+        let sigma2 = self.network.law().scale().powi(2);
+        let rows = self.held.iter().flat_map(|h| h.constraints.iter().zip(&h.rows));
+        let springs = rows.filter_map(|(c, row)| match c.hold {
+            Hold::Spring(k) => Some((&row.terms[..], sigma2 * k)),
+            Hold::Hard => None,
+        });
+        springs.collect()
+    }
+
     /// Energy of the constraint springs.
     pub(crate) fn constraint_energy(&self) -> f64 {
         let sigma2 = self.network.law().scale().powi(2);

@@ -14,6 +14,7 @@ mod region;
 mod replay;
 mod response;
 mod solve;
+mod sparse;
 mod springs;
 mod stability;
 mod tensor_region;
