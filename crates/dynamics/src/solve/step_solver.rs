@@ -17,7 +17,7 @@ use super::report::{ITERATED, Method, SolveError, SolveReport, SolverOptions};
 use super::sample_multigrid::SampleMultigrid;
 use super::v_cycle::VCycle;
 use crate::lattice::{Lattice, TensorProduct, TensorWorkspace};
-use crate::sparse::{Mask, MaskedSolver, Projected};
+use crate::sparse::{Mask, MaskedSolver, MaskedWay, Projected};
 use crate::springs::{SpringWeights, StepMatrix, Weights};
 use crate::units::{binary_unit, largest};
 
@@ -410,6 +410,12 @@ impl<T: Real> StepSolver<T> {
         self.mask = mask;
         self.painted = Painted::None;
         self.painted_for = None;
+    }
+
+    /// How a patch with this mask is solved by these options.
+    pub(crate) fn masked_way(&self) -> Option<MaskedWay> {
+        let mask = self.mask.as_deref()?;
+        Some(self.options.masked.or_best(&self.lattice, mask))
     }
 
     /// Lets what belongs to coefficients that do not move be 0.

@@ -48,6 +48,11 @@ impl<T: Real> Patch<T> {
         self.mask.as_deref()
     }
 
+    /// How its steps are solved, of a patch with a mask.
+    pub fn masked_way(&self) -> Option<super::MaskedWay> {
+        self.cache.solver.masked_way()
+    }
+
     /// The mask if matter outside it is lighter.
     fn thinned(&self) -> Option<&Mask> {
         self.mask.as_deref().filter(|m| m.rim() == Rim::Free)

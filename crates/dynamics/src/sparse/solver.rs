@@ -36,6 +36,18 @@ pub enum MaskedWay {
     Cycle,
 }
 
+impl MaskedWay {
+    /// This one, or in place of [`Best`](Self::Best) the one that is expected to cost least, from what was measured
+    /// (`docs/dynamics.md`).
+    pub(crate) fn or_best<T: Real>(self, _lattice: &Lattice<T>, mask: &Mask) -> Self {
+        match self {
+            Self::Best if mask.moving().len() <= 6000 => Self::Band,
+            Self::Best => Self::Cycle,
+            other => other,
+        }
+    }
+}
+
 /// An approximate inverse of the matrix of a step on the coefficients that move.
 #[derive(Clone, Debug)]
 pub(crate) struct MaskedSolver<T> {
@@ -118,10 +130,7 @@ impl<T: Real> MaskedSolver<T> {
         v_cycle: VCycleOptions,
     ) -> Self {
         let places = places(lattice, mask.moving());
-        let way = match way {
-            MaskedWay::Best => best(lattice, &places),
-            other => other,
-        };
+        let way = way.or_best(lattice, &mask);
         let count = places.len();
         let way = match way {
             MaskedWay::Band | MaskedWay::Best => {
@@ -246,14 +255,5 @@ impl<T: Real> Preconditioner<T> for MaskedSolver<T> {
                 }
             }
         }
-    }
-}
-
-/// The way that is expected to cost least, from what was measured (`docs/dynamics.md`).
-fn best<T: Real>(_lattice: &Lattice<T>, places: &[[usize; 3]]) -> MaskedWay {
-    if places.len() <= 6000 {
-        MaskedWay::Band
-    } else {
-        MaskedWay::Cycle
     }
 }

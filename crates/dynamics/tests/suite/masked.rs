@@ -335,7 +335,7 @@ fn masks_that_leave_nothing_are_refused_by_name() {
     assert_eq!(none.err(), Some(MaskError::Empty));
     // One layer of samples holds no whole function.
     let layer = cube(|[x, ..]| x == 8, Rim::Fixed, Matter::default());
-    let layer = layer.err().expect("refused");
+    let layer = layer.expect_err("one layer");
     assert!(matches!(layer, MaskError::Held { samples: 256, .. }), "{layer}");
     assert!(layer.to_string().contains("thicker"));
     // Only functions of the fixed rim reach the corner.
