@@ -6,7 +6,6 @@ mod belongs;
 mod ceiling;
 mod chart_dynamics;
 mod chart_edits;
-mod chart_masks;
 mod chart_mesh;
 mod chart_orient;
 mod charts;
