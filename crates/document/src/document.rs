@@ -189,6 +189,14 @@ impl Document {
         Ok(self.read_text::<EditHead>(&edit)?.command)
     }
 
+    /// The objects before the first edit of the history.
+    ///
+    /// # Errors
+    /// Of reading.
+    pub fn first_state(&mut self) -> Result<State, DocumentError> {
+        self.state_at(0)
+    }
+
     /// Why the journal could not be shortened after the last edit, if so. The edit itself is safe.
     pub fn trouble(&self) -> Option<&DocumentError> {
         self.trouble.as_ref()

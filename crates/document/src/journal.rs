@@ -23,6 +23,15 @@ const START: u64 = 12;
 /// Bytes in front of a record's two parts: kind, their lengths, their checksums, checksum of all these.
 const HEAD: usize = 32;
 
+/// Whether a file begins as documents do. False if it cannot be read.
+pub fn is_document(path: &Path) -> bool {
+    let mut start = [0; MAGIC.len()];
+    path.is_file()
+        && File::open(path)
+            .and_then(|mut f| f.read_exact(&mut start))
+            .is_ok_and(|()| start == MAGIC)
+}
+
 /// Where a record is. Its first part tells what it is, its second holds the bulk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Record {

@@ -20,5 +20,6 @@ pub use change::Change;
 pub use document::{Document, Lost, Opened, Options};
 pub use entry::{EditCounts, EditInfo};
 pub use error::DocumentError;
+pub use journal::is_document;
 pub use object::{Object, Properties};
 pub use state::State;

@@ -231,7 +231,9 @@ impl HierarchicalSpline<f64> {
                 Arc::new(Corrections::new(*functions.mask(), values.collect()))
             };
             let bricks = self.corrections(level).into_iter();
-            bricks.map(|(key, functions)| (key, rounded(&functions))).collect()
+            bricks
+                .map(|(key, functions)| (key, rounded(&functions)))
+                .collect()
         };
         let levels = (0..self.level_count()).map(level).collect();
         HierarchicalSpline::try_from_corrections(self.lattice, self.slope(), levels)
