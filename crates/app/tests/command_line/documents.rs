@@ -123,3 +123,28 @@ fn documents_that_cannot_be_used_say_why_and_stay_as_they_are() {
     bench.json("sculpt torn.isoclay --script out.toml --object cow");
     assert!(bench.json("history torn.isoclay").get("notes").is_none());
 }
+
+/// A file that may grow no further stands for a disk that fills up in the middle of an edit.
+#[test]
+fn an_edit_that_finds_no_room_leaves_the_document_as_it_was() {
+    let bench = ball();
+    bench.json("new clay.isoclay ball.iclay");
+    let before = std::fs::read(bench.path("clay.isoclay")).unwrap();
+    // POSIX counts blocks of 512 bytes; some of the edit fits.
+    let room = before.len() / 512 + 2;
+    let program = env!("CARGO_BIN_EXE_isoclay");
+    let limited = std::process::Command::new("sh")
+        .arg("-c")
+        .arg(format!(
+            "trap '' XFSZ; ulimit -f {room}; exec {program} sculpt clay.isoclay --script out.toml"
+        ))
+        .current_dir(&bench.directory)
+        .output()
+        .unwrap();
+    let said = String::from_utf8(limited.stderr).unwrap();
+    assert_eq!(limited.status.code(), Some(4), "{said}");
+    assert!(said.contains("clay.isoclay: writing failed"), "{said}");
+    assert_eq!(std::fs::read(bench.path("clay.isoclay")).unwrap(), before);
+    let after = bench.json("sculpt clay.isoclay --script out.toml");
+    assert_eq!(after["done"], 1);
+}
