@@ -156,6 +156,36 @@ impl Galerkin {
         ((rx * ny + ry) * nz + rz).min(n - 1)
     }
 
+    /// Largest distance along each axis of two coefficients that share a spring.
+    pub(crate) fn reach(&self) -> [usize; 3] {
+        self.reach
+    }
+
+    /// The factor of the rows and columns of some coefficients, whose numbers ascend.
+    ///
+    /// # Errors
+    /// [`NotPositive`].
+    pub(crate) fn factorize_part<T: Real>(
+        &mut self,
+        s: &StepMatrix<T>,
+        numbers: &[usize],
+        into: &mut BandCholesky<T>,
+    ) -> Result<(), NotPositive> {
+        self.accumulate(s);
+        let [_, ny, nz] = self.dims;
+        let place = |i: usize| [i / nz / ny, i / nz % ny, i % nz];
+        let (galerkin, band) = (&*self, into.band());
+        factorize_raised(into, |raised, into| {
+            into.clear();
+            for (row, &i) in numbers.iter().enumerate() {
+                for column in row.saturating_sub(band)..=row {
+                    let v = galerkin.element(place(numbers[column]), place(i));
+                    into.set(row, column, if row == column { v * (1.0 + raised) } else { v });
+                }
+            }
+        })
+    }
+
     /// Coefficients along each axis.
     pub fn dims(&self) -> [usize; 3] {
         self.dims
@@ -222,20 +252,8 @@ impl Galerkin {
         into: &mut BandCholesky<T>,
     ) -> Result<(), NotPositive> {
         self.accumulate(s);
-        let mut raised = 0.0;
-        loop {
-            self.write(raised, into);
-            match into.factorize() {
-                Err(_) if raised < 1e-2 => {
-                    raised = if raised == 0.0 {
-                        RAISED * T::UNIT_ROUND_OFF
-                    } else {
-                        RAISED * raised
-                    };
-                }
-                done => return done,
-            }
-        }
+        let galerkin = &*self;
+        factorize_raised(into, |raised, into| galerkin.write(raised, into))
     }
 
     /// Writes `AᵀSA` into a band of the right size.
@@ -281,6 +299,28 @@ impl Galerkin {
     pub fn diagonal_of<T: Real>(&mut self, s: &StepMatrix<T>) -> &[f64] {
         self.accumulate(s);
         &self.sums
+    }
+}
+
+/// The factor of the matrix that `write` writes with its diagonal larger by a share: by none, or by as little as makes it
+/// positive definite in the working precision.
+fn factorize_raised<T: Real>(
+    into: &mut BandCholesky<T>,
+    write: impl Fn(f64, &mut BandCholesky<T>),
+) -> Result<(), NotPositive> {
+    let mut raised = 0.0;
+    loop {
+        write(raised, into);
+        match into.factorize() {
+            Err(_) if raised < 1e-2 => {
+                raised = if raised == 0.0 {
+                    RAISED * T::UNIT_ROUND_OFF
+                } else {
+                    RAISED * raised
+                };
+            }
+            done => return done,
+        }
     }
 }
 
