@@ -148,3 +148,42 @@ fn an_edit_that_finds_no_room_leaves_the_document_as_it_was() {
     let after = bench.json("sculpt clay.isoclay --script out.toml");
     assert_eq!(after["done"], 1);
 }
+
+/// Each stroke is an edit; an error names the stroke or the line, and the edits before it stay.
+#[test]
+fn a_session_carves_and_adds_stroke_by_stroke() {
+    let bench = ball();
+    bench.json("new clay.isoclay ball.iclay");
+    bench.write(
+        "session.toml",
+        r#"
+[[stroke]]
+carve = { shape = { sphere = { radius = 0.2 } }, along = [[0.0, -0.4, 1.0], [0.0, 0.4, 1.0]], blend = 0.05 }
+[[stroke]]
+object = "ball"
+add = { shape = { torus = { axis = [0, 1, 0], major = 0.6, minor = 0.1 } }, along = [[0.5, 0.0, 0.0]] }
+"#,
+    );
+    let done = bench.json("sculpt clay.isoclay --script session.toml");
+    assert_eq!(done["done"], 2);
+    let replayed = bench.json("replay clay.isoclay");
+    assert_eq!(replayed["field_sha256"], done["field_sha256"]);
+    // A torus through a ball: what juts out has a hole.
+    let mesh = bench.json("mesh clay.isoclay -o clay.ply --check");
+    assert_eq!(mesh["quality"]["open_edges"], 0, "{mesh}");
+    bench.write(
+        "half.toml",
+        "[[stroke]]\ncarve = { shape = { sphere = { radius = 0.1 } }, along = [[1.0, 0.0, 0.0]] }\n[[stroke]]\n",
+    );
+    let run = bench.run("sculpt clay.isoclay --script half.toml");
+    assert_eq!(run.code, 3);
+    assert!(
+        run.stderr.contains("stroke 2") && run.stderr.contains("carve or add"),
+        "{}",
+        run.stderr
+    );
+    assert_eq!(bench.json("history clay.isoclay")["done"], 2);
+    bench.write("typo.toml", "[[stroke]]\n\ncarv = 1\n");
+    let run = bench.run("sculpt clay.isoclay --script typo.toml");
+    assert!(run.stderr.contains("line 3"), "{}", run.stderr);
+}
