@@ -1,21 +1,20 @@
 //! The methods that solve a step, behind one interface.
 
 use bspline::Real;
-use serde::{Deserialize, Serialize};
 
-use super::background::{Background, Work};
+use super::background::Background;
 use super::band_cholesky::{BandCholesky, NotPositive};
 use super::border::Border;
 use super::dot::dot;
 use super::fast_diagonalization::FastDiagonalization;
 use super::galerkin::Galerkin;
 use super::pcg::{CoefficientSystem, ConjugateGradients, PcgReport, Preconditioner, System, add_scaled};
-use super::renewal::{Renewal, Renewed, Stage};
+use super::renewal::{Renewal, Renewed};
 use super::report::{ITERATED, Method, SolveError, SolveReport, SolverOptions};
 use super::sample_multigrid::SampleMultigrid;
 use super::v_cycle::VCycle;
 use crate::lattice::{Lattice, TensorProduct, TensorWorkspace};
-use crate::springs::{SpringWeights, StepMatrix, Weights};
+use crate::springs::StepMatrix;
 use crate::units::{binary_unit, largest};
 
 /// Residual, in units of rounding of single precision, at which solves by a factor stop.
@@ -52,18 +51,18 @@ pub struct StepSolver<T> {
     steps: Vec<[isize; 3]>,
     method: Method,
     diagonalization: FastDiagonalization<T>,
-    painted: Painted<T>,
+    pub(super) painted: Painted<T>,
     /// What `painted` was made for.
-    painted_for: Option<StepMatrix<T>>,
+    pub(super) painted_for: Option<StepMatrix<T>>,
     /// Whether the solver was prepared since it began anew.
-    begun: bool,
+    pub(super) begun: bool,
     /// Slow solves in a row.
-    slow: usize,
+    pub(super) slow: usize,
     /// The factor that will take the place of the one at hand.
-    renewal: Option<Box<Renewal<T>>>,
+    pub(super) renewal: Option<Box<Renewal<T>>>,
     inverse: Option<SampleInverse>,
     iteration: ConjugateGradients<T>,
-    border: Option<Box<Border<T>>>,
+    pub(super) border: Option<Box<Border<T>>>,
     factorizations: usize,
     b: Vec<T>,
     samples: [Vec<T>; 2],
@@ -72,7 +71,7 @@ pub struct StepSolver<T> {
 
 /// Made when the first painted matrix comes.
 #[derive(Clone, Debug)]
-enum Painted<T> {
+pub(super) enum Painted<T> {
     None,
     Direct(Box<(Galerkin, BandCholesky<T>)>),
     Background(Box<Background<T>>),
@@ -81,62 +80,9 @@ enum Painted<T> {
     SampleMultigrid(Box<SampleMultigrid<T>>),
 }
 
-/// All of a solver that is neither its lattice nor made from the matrix at hand: the matrix that it was prepared for, how
-/// far the factor is that is made beside the steps, and that which will take its place.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct SolverHistory<T> {
-    matrix: MatrixRecord<T>,
-    progress: Option<Work>,
-    slow: usize,
-    renewal: Option<(MatrixRecord<T>, Stage)>,
-}
-
-/// The weights of a [`StepMatrix`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-struct MatrixRecord<T> {
-    mass: Weights<T>,
-    springs: Vec<Weights<T>>,
-}
-
-impl<T: Real> MatrixRecord<T> {
-    fn of(matrix: &StepMatrix<T>) -> Self {
-        Self {
-            mass: matrix.mass.clone(),
-            springs: matrix.springs.iter().map(|s| s.weights.clone()).collect(),
-        }
-    }
-
-    /// With the springs of `like`.
-    fn matrix(&self, like: &StepMatrix<T>) -> StepMatrix<T> {
-        let springs = like.springs.iter().zip(&self.springs);
-        let springs = springs.map(|(s, w)| SpringWeights {
-            direction: s.direction,
-            weights: w.clone(),
-        });
-        StepMatrix::new(like.dims(), self.mass.clone(), springs.collect())
-    }
-
-    fn fits(&self, like: &StepMatrix<T>) -> bool {
-        let samples = like.dims().iter().product();
-        let fit = |w: &Weights<T>| match w {
-            Weights::Constant(_) => true,
-            Weights::Each(list) => list.len() == samples,
-        };
-        self.springs.len() == like.springs.len() && fit(&self.mass) && self.springs.iter().all(fit)
-    }
-}
-
-impl<T: Real> SolverHistory<T> {
-    /// Whether its matrices have as many samples and springs as `like`.
-    pub fn fits(&self, like: &StepMatrix<T>) -> bool {
-        let renewal = self.renewal.as_ref().is_none_or(|(m, _)| m.fits(like));
-        self.matrix.fits(like) && renewal
-    }
-}
-
 impl<T: Real> Painted<T> {
     /// The factor on the coefficients, if there is one, and what assembles it.
-    fn factor(&mut self) -> Option<(&mut Galerkin, &mut BandCholesky<T>)> {
+    pub(super) fn factor(&mut self) -> Option<(&mut Galerkin, &mut BandCholesky<T>)> {
         match self {
             Self::Direct(direct) => Some((&mut direct.0, &mut direct.1)),
             Self::Background(background) => Some(background.factor()),
@@ -321,49 +267,6 @@ impl<T: Real> StepSolver<T> {
         self.factorizations
     }
 
-    /// What the next solves depend on beside the matrix; nothing before the first [`prepare`](Self::prepare) and of
-    /// constant material.
-    pub(crate) fn history(&self) -> Option<SolverHistory<T>> {
-        let matrix = self.painted_for.as_ref().filter(|_| self.begun)?;
-        let renewal = self.renewal.as_ref().map(|r| r.state());
-        Some(SolverHistory {
-            matrix: MatrixRecord::of(matrix),
-            slow: self.slow,
-            renewal: renewal.map(|(matrix, stage)| (MatrixRecord::of(matrix), stage)),
-            progress: match &self.painted {
-                Painted::Background(background) => Some(background.progress()),
-                _ => None,
-            },
-        })
-    }
-
-    /// Goes to where another solver was, of whose matrix `like` has the springs; its constraints follow with
-    /// [`set_border`](Self::set_border), those of the time included.
-    ///
-    /// # Errors
-    /// [`SolveError`] if the matrix of a damaged history is not positive definite.
-    pub(crate) fn resume(
-        &mut self,
-        history: &SolverHistory<T>,
-        like: &StepMatrix<T>,
-    ) -> Result<(), SolveError> {
-        let s = history.matrix.matrix(like);
-        let border = self.border.take();
-        self.prepare(&s)?;
-        if let (Painted::Background(background), Some(progress)) = (&mut self.painted, history.progress) {
-            background.resume(&s, progress);
-        }
-        self.slow = history.slow;
-        if let (Some((matrix, stage)), Some((galerkin, factor))) = (&history.renewal, self.painted.factor()) {
-            let mut renewal = Renewal::new(matrix.matrix(like), factor);
-            self.renewal = renewal.resume(*stage, galerkin).then(|| Box::new(renewal));
-        }
-        self.settle_method();
-        self.border = border;
-        self.prepare_border(&s);
-        Ok(())
-    }
-
     /// Fits the constraints to what solves now.
     fn renew_border(&mut self) {
         if let Some(matrix) = self.painted_for.take() {
@@ -372,7 +275,7 @@ impl<T: Real> StepSolver<T> {
         }
     }
 
-    fn prepare_border(&mut self, s: &StepMatrix<T>) {
+    pub(super) fn prepare_border(&mut self, s: &StepMatrix<T>) {
         if let Some(border) = &mut self.border {
             let preconditioner = active(self.method, &mut self.painted, &mut self.diagonalization);
             border.prepare(|r, z| preconditioner.apply(s, r, z));
@@ -533,7 +436,7 @@ impl<T: Real> StepSolver<T> {
         }
     }
 
-    fn settle_method(&mut self) {
+    pub(super) fn settle_method(&mut self) {
         self.method = match &self.painted {
             Painted::None => Method::FastDiagonalization,
             Painted::Direct(_) => Method::Direct,
