@@ -35,16 +35,7 @@ impl<T: Real> RestrictedAxis<T> {
             0.0 <= a && a <= b && b <= CELLS as f64,
             "[{a}, {b}] is not within [0, {CELLS}]"
         );
-        let a = a.clamp(0.0, CELLS as f64);
-        let b = b.clamp(a, CELLS as f64);
-        let mut rows = Self {
-            count: 0,
-            start: [0; COEFFICIENTS],
-            weights: [[T::zero(); 4]; COEFFICIENTS],
-        };
-        // Cells in which a starts and b ends.
-        let ka = (a.floor() as usize).min(CELLS - 1);
-        let kb = (b.ceil() as usize).max(1) - 1;
+        let (mut rows, [a, b], [ka, kb]) = Self::begin(a, b);
         if a == b {
             rows.push(ka, [a, a, a]);
             return rows;
@@ -80,15 +71,7 @@ impl<T: Real> RestrictedAxis<T> {
     /// Rows for the derivative on `[a, b]`, by cells: they weigh differences `d_k = c_{k+1} - c_k`, the coefficients of a
     /// quadratic spline, three at a time; the fourth weight is 0. Otherwise as [`Self::new`].
     pub fn of_slopes(a: f64, b: f64) -> Self {
-        let a = a.clamp(0.0, CELLS as f64);
-        let b = b.clamp(a, CELLS as f64);
-        let mut rows = Self {
-            count: 0,
-            start: [0; COEFFICIENTS],
-            weights: [[T::zero(); 4]; COEFFICIENTS],
-        };
-        let ka = (a.floor() as usize).min(CELLS - 1);
-        let kb = (b.ceil() as usize).max(1) - 1;
+        let (mut rows, [a, b], [ka, kb]) = Self::begin(a, b);
         rows.push_slope(ka, [a, a]);
         if a == b {
             return rows;
@@ -104,6 +87,22 @@ impl<T: Real> RestrictedAxis<T> {
         }
         rows.push_slope(kb, [b, b]);
         rows
+    }
+
+    /// No rows, the ends within the cells, and the cells in which `a` starts and `b` ends.
+    fn begin(a: f64, b: f64) -> (Self, [f64; 2], [usize; 2]) {
+        let a = a.clamp(0.0, CELLS as f64);
+        let b = b.clamp(a, CELLS as f64);
+        let rows = Self {
+            count: 0,
+            start: [0; COEFFICIENTS],
+            weights: [[T::zero(); 4]; COEFFICIENTS],
+        };
+        let cells = [
+            (a.floor() as usize).min(CELLS - 1),
+            (b.ceil() as usize).max(1) - 1,
+        ];
+        (rows, [a, b], cells)
     }
 
     /// Number of rows, `1 ..= 11`.
@@ -143,13 +142,7 @@ impl<T: Real> RestrictedAxis<T> {
             d[1] * s1[1][1] + d[2] * s1[2][0],
             d[2] * s1[2][1],
         ];
-        debug_assert!(
-            w.iter().all(|w| *w >= 0.0),
-            "negative weight {w:?} in cell {k} at {u:?}"
-        );
-        self.start[self.count] = k as u8;
-        self.weights[self.count] = w.map(T::from_f64);
-        self.count += 1;
+        self.push_row(k, w);
     }
 
     /// Appends the blossom of cell `k` of a quadratic spline at `u`.
@@ -164,10 +157,11 @@ impl<T: Real> RestrictedAxis<T> {
             s2[1] * s1[1][1],
             0.0,
         ];
-        debug_assert!(
-            w.iter().all(|w| *w >= 0.0),
-            "negative weight {w:?} in cell {k} at {u:?}"
-        );
+        self.push_row(k, w);
+    }
+
+    fn push_row(&mut self, k: usize, w: [f64; 4]) {
+        debug_assert!(w.iter().all(|w| *w >= 0.0), "negative weight {w:?} in cell {k}");
         self.start[self.count] = k as u8;
         self.weights[self.count] = w.map(T::from_f64);
         self.count += 1;

@@ -5,11 +5,11 @@ mod common;
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex};
 
-use bspline::Field;
+use bspline::{Field, HierarchicalSpline};
 use common::{cloud, fit, oriented, to_depth};
 use fitting::phantoms::{CloudOptions, SampledCloud, Solid, SplitMix64};
 use fitting::points::{LEAST_COEFFICIENTS, PointOptions, fit_points};
-use fitting::{Cancel, Control, FitError, StopReason};
+use fitting::{Cancel, Control, FitError, FitReport, StopReason};
 use glam::DVec3;
 
 /// A ball of 4000 points in which something is wrong.
@@ -329,17 +329,69 @@ fn a_robust_fit_survives_points_that_all_contradict_each_other() {
         (dust, anyhow(3000)),
     ];
     for (positions, normals) in clouds {
-        let samples = SampledCloud {
-            positions,
-            normals,
-            holes: Vec::new(),
-        };
-        let options = PointOptions {
-            robust: true,
-            ..to_depth(6)
-        };
-        let (field, report) = fit::<f32>(&samples, &options).expect("weights that stay");
+        let (field, report) = fitted_robustly(positions, normals).expect("weights that stay");
         assert!(field.value(DVec3::splat(0.4)).is_finite() && report.rms.is_finite());
         assert!(report.used_count >= 10, "{}", report.used_count);
     }
+}
+
+/// Small clouds without sense: each ends with a field or an error, robust or not.
+#[test]
+fn small_clouds_without_sense_end_with_a_field_or_an_error() {
+    let mut random = SplitMix64::new(8);
+    let mut anyhow = |n: usize| (0..n).map(|_| random.normal3()).collect::<Vec<DVec3>>();
+    let sphere: Vec<DVec3> = anyhow(60).iter().map(|p| p.normalize()).collect();
+    let on_axes = |ps: Vec<DVec3>, axes: DVec3| ps.iter().map(|p| *p * axes).collect::<Vec<_>>();
+    let pairs = |ps: &[DVec3]| [ps, ps].concat();
+    let facing_away = [sphere.clone(), sphere.iter().map(|n| -*n).collect()].concat();
+    let with_dust = [sphere.clone(), anyhow(60)].concat();
+    let clouds = [
+        ("ten", anyhow(10), anyhow(10)),
+        ("line", on_axes(anyhow(40), DVec3::X), anyhow(40)),
+        (
+            "nearly a line",
+            on_axes(anyhow(40), DVec3::new(1.0, 1e-6, 1e-6)),
+            anyhow(40),
+        ),
+        (
+            "plane",
+            on_axes(anyhow(60), DVec3::new(1.0, 1.0, 0.0)),
+            anyhow(60),
+        ),
+        ("two spots", (0..40).map(|i| sphere[i % 2]).collect(), anyhow(40)),
+        (
+            "tiny",
+            on_axes(sphere.clone(), DVec3::splat(1e-30)),
+            sphere.clone(),
+        ),
+        (
+            "far",
+            sphere.iter().map(|p| *p * 1e-3 + 1e6).collect(),
+            sphere.clone(),
+        ),
+        ("pairs", pairs(&sphere), facing_away),
+        ("half dust", with_dust.clone(), with_dust),
+    ];
+    for (name, positions, normals) in clouds {
+        if let Ok((field, report)) = fitted_robustly(positions, normals) {
+            let inside = field.value(field.lattice().world_box().center());
+            assert!(inside.is_finite() && report.rms.is_finite(), "{name}");
+        }
+    }
+}
+
+fn fitted_robustly(
+    positions: Vec<DVec3>,
+    normals: Vec<DVec3>,
+) -> Result<(HierarchicalSpline<f32>, FitReport), FitError> {
+    let samples = SampledCloud {
+        positions,
+        normals,
+        holes: Vec::new(),
+    };
+    let options = PointOptions {
+        robust: true,
+        ..to_depth(6)
+    };
+    fit::<f32>(&samples, &options)
 }

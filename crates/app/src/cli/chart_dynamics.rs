@@ -3,11 +3,10 @@ use std::path::PathBuf;
 
 use fitting::{Cancel, FitError};
 
-use super::charts::publish;
 use super::cost::cpu_seconds;
 use super::failure::{Failure, OrFail, Outcome};
 use super::progress::Bar;
-use super::staged::StagedFiles;
+use super::staged::{StagedFiles, publish};
 use crate::charts::{Chart, DynamicsError, Extent, Line, Run, cost, sampling, sweep};
 
 /// Arguments of `isoclay charts dynamics`.

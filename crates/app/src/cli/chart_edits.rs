@@ -4,12 +4,11 @@ use std::path::PathBuf;
 
 use fitting::Cancel;
 
-use super::charts::publish;
 use super::failure::{Failure, OrFail, Outcome};
 use super::fineness::failed;
 use super::progress::Bar;
 use super::quantity::between;
-use super::staged::StagedFiles;
+use super::staged::{StagedFiles, publish};
 use crate::charts::{Chart, edit_costs};
 
 /// Arguments of `isoclay charts edits`.

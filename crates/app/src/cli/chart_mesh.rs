@@ -5,14 +5,13 @@ use std::path::PathBuf;
 use bspline::Frame;
 use fitting::Cancel;
 
-use super::charts::publish;
 use super::cost::cpu_seconds;
 use super::failure::{Failure, OrFail, Outcome};
 use super::field::OpenField;
 use super::fineness::failed;
 use super::progress::Bar;
 use super::source::{FIELDS, Source};
-use super::staged::StagedFiles;
+use super::staged::{StagedFiles, publish};
 use crate::charts::{Chart, MeshSubject, MeshTrial};
 
 /// Arguments of `isoclay charts mesh`.

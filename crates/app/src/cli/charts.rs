@@ -16,7 +16,7 @@ use super::phantom::Name;
 use super::progress::Bar;
 use super::quantity::between;
 use super::source::{SAMPLES, Source, scratch};
-use super::staged::StagedFiles;
+use super::staged::{StagedFiles, publish};
 use super::{chart_dynamics, chart_edits, chart_mesh, chart_orient};
 use crate::charts::{Chart, Configuration, Input, Measurement, Scene, noise, outliers, sweeps};
 
@@ -103,16 +103,6 @@ pub fn run(args: &Args) -> Outcome {
         Subject::Edits(args) => chart_edits::run(args, &cancel),
         Subject::Hard(args) => hard(args, &cancel),
     }
-}
-
-/// Gives charts their names and tells them.
-pub fn publish(staged: StagedFiles, quiet: bool) -> Outcome {
-    for path in staged.publish()? {
-        if !quiet {
-            writeln!(io::stdout().lock(), "written  {}", path.display()).or_limit()?;
-        }
-    }
-    Ok(())
 }
 
 /// Draws what noise and outliers do to a phantom.

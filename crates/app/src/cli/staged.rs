@@ -1,4 +1,5 @@
 use std::fs;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use formats::FormatError;
@@ -20,7 +21,7 @@ pub struct StagedFiles {
 impl StagedFiles {
     /// Makes the directory that `option` names, if it is missing.
     pub fn new(option: &str, directory: &Path) -> Outcome<Self> {
-        let fail = |e: std::io::Error| {
+        let fail = |e: io::Error| {
             Failure::limit(format!(
                 "{option} {}: no file can be made there ({e}); name another directory",
                 directory.display()
@@ -105,8 +106,18 @@ impl StagedFiles {
 
     fn copy(&self, name: &str, target: &Path) -> Outcome {
         let mut whole = fs::File::open(self.hidden(name)).or_limit()?;
-        formats::atomic::replace(target, |out| std::io::copy(&mut whole, out).map(drop)).map_err(writing)
+        formats::atomic::replace(target, |out| io::copy(&mut whole, out).map(drop)).map_err(writing)
     }
+}
+
+/// Gives charts their names and tells them.
+pub fn publish(staged: StagedFiles, quiet: bool) -> Outcome {
+    for path in staged.publish()? {
+        if !quiet {
+            writeln!(io::stdout().lock(), "written  {}", path.display()).or_limit()?;
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]

@@ -89,7 +89,7 @@ pub const ROWS: &[Row] = &[
     ("sample", "--memory", "@volume --memory *lots", "2GiB"),
     ("mesh check eval picture simulate", "--memory", "@cloud --memory *2Gib", "2GiB"),
     ("phantom", "--memory", "sphere -o out.ply --memory *lots", "2GiB"),
-    ("charts_fit charts_dynamics charts_hard charts_orient", "--memory", "-o charts --memory *lots", "2GiB"),
+    ("charts_fit charts_dynamics charts_hard charts_orient charts_edits", "--memory", "-o charts --memory *lots", "2GiB"),
     ("fit mesh check eval picture simulate", "--threads", "@cloud --threads *0", "1 to 1024"),
     ("fit", "--threads", "@cloud --threads *100000", "1 to 1024"),
     ("sample", "--threads", "@volume --threads *two", "1 to 1024"),

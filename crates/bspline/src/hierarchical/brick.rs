@@ -211,12 +211,21 @@ pub fn active_slots(mask: &[u64; BRICK]) -> impl Iterator<Item = usize> {
 
 /// Whether the support of one of the functions `mask` reaches into the brick `back` bricks behind on each axis
 /// (0 or 1): the functions in slots 0, 1 and 2 do.
-pub(super) fn reaches(mask: &[u64; BRICK], back: [usize; 3]) -> bool {
+fn reaches(mask: &[u64; BRICK], back: [usize; 3]) -> bool {
     const Y_LOW: u64 = 0x00ff_ffff;
     const Z_LOW: u64 = 0x0707_0707_0707_0707;
     let planes = if back[0] == 1 { 3 } else { BRICK };
     let rows = if back[1] == 1 { Y_LOW } else { !0 } & if back[2] == 1 { Z_LOW } else { !0 };
     mask[..planes].iter().any(|w| w & rows != 0)
+}
+
+/// The bricks behind one whose cells read its functions `mask`.
+pub(super) fn readers(key: BrickKey, mask: [u64; BRICK]) -> impl Iterator<Item = BrickKey> {
+    (1..8usize).filter_map(move |octant| {
+        let back = [octant >> 2, octant >> 1 & 1, octant & 1];
+        let is_read = (0..3).all(|a| key.0[a] as usize >= back[a]) && reaches(&mask, back);
+        is_read.then(|| BrickKey(std::array::from_fn(|a| key.0[a] - back[a] as u32)))
+    })
 }
 
 /// The stored part of a level: bricks with active functions, in key order.

@@ -1,7 +1,6 @@
 use std::sync::Arc;
 
-use super::brick::{BRICK, LevelCorrections};
-use super::edit::readers;
+use super::brick::{BRICK, LevelCorrections, readers};
 use super::graft::{Graft, grafted};
 use super::node::Node;
 use super::renew::renewed;

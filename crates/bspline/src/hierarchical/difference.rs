@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use super::brick::{BRICK, Corrections, active_slots};
-use super::edit::readers;
+use super::brick::{BRICK, Corrections, active_slots, readers};
+use super::functions::check_functions;
 use super::graft::Graft;
 use super::node::Node;
 use super::{BrickKey, HierarchicalSpline};
@@ -91,8 +91,7 @@ impl<T: Real> HierarchicalSpline<T> {
                 return Err(DiffError::Version { level, key: key.0 });
             }
             if let Some(new) = &change.new {
-                super::spline::check_functions(&self.lattice, level, key, new)
-                    .map_err(|_| DiffError::Lattice)?;
+                check_functions(&self.lattice, level, key, new).map_err(|_| DiffError::Lattice)?;
             }
             let readers = readers(key, changed(change));
             grafts.extend(readers.map(|key| Graft::stale(&self.lattice, level, key)));

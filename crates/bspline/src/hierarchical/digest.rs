@@ -7,9 +7,15 @@ use crate::Real;
 /// Functions below a node from which on its children are hashed side by side.
 const SIDE_BY_SIDE: u64 = 20_000;
 
-/// SHA-256 of a node: whether it has functions, these, then the digests of the children that hold some, each behind its octant
-/// (`docs/format.md`).
-pub(super) fn of<T: Real>(node: &Node<T>) -> [u8; 32] {
+impl<T: Real> Node<T> {
+    /// SHA-256 over the functions here and below, however deep the tree above is: whether the node has functions, these,
+    /// then the digests of the children that hold some, each behind its octant (`docs/format.md`).
+    pub fn digest(&self) -> &[u8; 32] {
+        self.digest.get_or_init(|| of(self))
+    }
+}
+
+fn of<T: Real>(node: &Node<T>) -> [u8; 32] {
     if node.count >= SIDE_BY_SIDE {
         node.children.par_iter().flatten().for_each(|c| {
             c.digest();

@@ -5,18 +5,13 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::brick::{BRICK, Corrections, DenseCorrections, HALO, HALO_LEN, reaches};
+use super::brick::{BRICK, Corrections, DenseCorrections, HALO, HALO_LEN, readers};
+use super::functions::{EditError, MAX_LEVELS, check_function, check_functions};
 use super::graft::{Graft, grafted};
 use super::prolong::prolong;
 use super::renew::renewed;
-use super::spline::check_functions;
 use super::{BrickKey, HierarchicalSpline, Lattice};
 use crate::{KnotVector, Real, TensorSpline};
-
-/// Most levels that an edit may lead to.
-pub const MAX_LEVELS: usize = 21;
-/// Most cells of a level on an axis.
-const MAX_CELLS: u64 = 1 << 30;
 
 /// What is added to the coefficient of one function.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,53 +59,6 @@ pub struct BrickEdit<T> {
     pub add: Corrections<T>,
 }
 
-/// Why coefficients cannot be changed.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum EditError {
-    /// Too deep.
-    #[error("level {level} is deeper than {max}, the deepest that this lattice can have")]
-    Level {
-        /// Level asked for.
-        level: usize,
-        /// Deepest possible one.
-        max: usize,
-    },
-    /// No such function.
-    #[error("level {level} has {count:?} functions; there is none with the number {function:?}")]
-    Function {
-        /// Level asked for.
-        level: usize,
-        /// Function asked for.
-        function: [u32; 3],
-        /// Functions on each axis.
-        count: [u32; 3],
-    },
-    /// The coefficient would be NaN or infinite.
-    #[error("function {function:?} of level {level} would get the coefficient {value}; it has to be finite")]
-    NotFinite {
-        /// Level of the function.
-        level: usize,
-        /// Number of the function.
-        function: [u32; 3],
-        /// What it would be.
-        value: f64,
-    },
-    /// A patch does not stand on the functions of a level.
-    #[error("the patch's knots are none of the lattice's: {why}")]
-    NotDyadic {
-        /// What is different.
-        why: &'static str,
-    },
-    /// A block's values do not fit its shape.
-    #[error("a block of {shape:?} functions takes as many values; there are {found}")]
-    Length {
-        /// Functions on each axis.
-        shape: [usize; 3],
-        /// Values given.
-        found: usize,
-    },
-}
-
 impl<T: Real> HierarchicalSpline<T> {
     /// The field with coefficients added, in the order given; functions that were not active become so.
     ///
@@ -122,20 +70,26 @@ impl<T: Real> HierarchicalSpline<T> {
         for edit in edits {
             check_function(&self.lattice, edit.level, edit.function)?;
         }
-        // Edits of one brick stand together, and keep their order.
-        let mut order: Vec<(usize, BrickKey, usize)> = (edits.iter().enumerate())
-            .map(|(i, edit)| (edit.level, BrickKey::of(edit.function), i))
-            .collect();
-        order.sort_unstable();
-        let same_brick =
-            |a: &(usize, BrickKey, usize), b: &(usize, BrickKey, usize)| (a.0, a.1) == (b.0, b.1);
-        let groups: Vec<_> = order.chunk_by(same_brick).collect();
-        let changed = groups.into_par_iter().with_min_len(1000).map(|group| {
-            let mut brick = ChangedBrick::of(self, group[0].0, group[0].1);
-            for (.., i) in group {
-                let LevelEdit { function, delta, .. } = edits[*i];
-                brick.put(function, |old| Some(old.unwrap_or(T::zero()) + delta))?;
-            }
+        let place = |edit: &LevelEdit<T>| (edit.level, BrickKey::of(edit.function));
+        self.edited_by_brick(edits, place, |brick, edit| {
+            brick.put(edit.function, |old| Some(old.unwrap_or(T::zero()) + edit.delta))
+        })
+    }
+
+    /// The field with edits put into their bricks, brick beside brick; those of one brick in their order.
+    fn edited_by_brick<E: Sync>(
+        &self,
+        edits: &[E],
+        place: impl Fn(&E) -> (usize, BrickKey),
+        put: impl Fn(&mut ChangedBrick<T>, &E) -> Result<(), EditError> + Sync,
+    ) -> Result<Self, EditError> {
+        let mut order: Vec<_> = edits.iter().map(|edit| (place(edit), edit)).collect();
+        order.sort_by_key(|(place, _)| *place);
+        let groups: Vec<_> = order.chunk_by(|a, b| a.0 == b.0).collect();
+        let changed = groups.into_par_iter().with_min_len(64).map(|group| {
+            let (level, key) = group[0].0;
+            let mut brick = ChangedBrick::of(self, level, key);
+            group.iter().try_for_each(|(_, edit)| put(&mut brick, edit))?;
             Ok(brick)
         });
         // The first error, whichever thread meets one first.
@@ -191,25 +145,18 @@ impl<T: Real> HierarchicalSpline<T> {
         for edit in edits {
             check_functions(&self.lattice, edit.level, edit.key, &edit.add)?;
         }
-        let mut order: Vec<&BrickEdit<T>> = edits.iter().collect();
-        order.sort_by_key(|edit| (edit.level, edit.key));
-        let groups: Vec<_> = order
-            .chunk_by(|a, b| (a.level, a.key) == (b.level, b.key))
-            .collect();
-        let changed = groups.into_par_iter().with_min_len(64).map(|group| {
-            let mut brick = ChangedBrick::of(self, group[0].level, group[0].key);
-            for edit in group {
+        self.edited_by_brick(
+            edits,
+            |edit| (edit.level, edit.key),
+            |brick, edit| {
                 let corner = edit.key.0.map(|k| k * BRICK as u32);
-                for (slot, delta) in edit.add.iter() {
+                edit.add.iter().try_for_each(|(slot, delta)| {
                     let at = [slot / 64, slot / 8 % 8, slot % 8];
                     let function = std::array::from_fn(|a| corner[a] + at[a] as u32);
-                    brick.put(function, |old| Some(old.unwrap_or(T::zero()) + delta))?;
-                }
-            }
-            Ok(brick)
-        });
-        let changed: Vec<Result<_, EditError>> = changed.collect();
-        Ok(self.with_bricks(changed.into_iter().collect::<Result<_, _>>()?))
+                    brick.put(function, |old| Some(old.unwrap_or(T::zero()) + delta))
+                })
+            },
+        )
     }
 
     /// Coefficients `first .. first + count` of the total spline of `level` (function numbers as in [`LevelEdit`]), last
@@ -326,27 +273,6 @@ fn last_of(first: [u32; 3], count: [usize; 3]) -> [u32; 3] {
     })
 }
 
-/// Whether a lattice has the functions of a level up to number `function`.
-pub(super) fn check_function(lattice: &Lattice, level: usize, function: [u32; 3]) -> Result<(), EditError> {
-    let most = u64::from(lattice.cells.into_iter().max().expect("three axes"));
-    let max = (0..MAX_LEVELS)
-        .rev()
-        .find(|l| most << l <= MAX_CELLS)
-        .unwrap_or(0);
-    if level > max {
-        return Err(EditError::Level { level, max });
-    }
-    let count = lattice.cells_at(level).map(|n| n + 3);
-    if (0..3).any(|a| function[a] >= count[a]) {
-        return Err(EditError::Function {
-            level,
-            function,
-            count,
-        });
-    }
-    Ok(())
-}
-
 fn keys_between(first: BrickKey, last: BrickKey) -> impl Iterator<Item = BrickKey> {
     let range = move |a: usize| first.0[a]..=last.0[a];
     range(0).flat_map(move |x| range(1).flat_map(move |y| range(2).map(move |z| BrickKey([x, y, z]))))
@@ -455,13 +381,4 @@ impl<T: Real> HierarchicalSpline<T> {
             ..self.clone()
         }
     }
-}
-
-/// The bricks behind one whose cells read its functions `mask`.
-pub(super) fn readers(key: BrickKey, mask: [u64; BRICK]) -> impl Iterator<Item = BrickKey> {
-    (1..8usize).filter_map(move |octant| {
-        let back = [octant >> 2, octant >> 1 & 1, octant & 1];
-        let is_read = (0..3).all(|a| key.0[a] as usize >= back[a]) && reaches(&mask, back);
-        is_read.then(|| BrickKey(std::array::from_fn(|a| key.0[a] - back[a] as u32)))
-    })
 }

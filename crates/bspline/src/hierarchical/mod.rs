@@ -20,6 +20,7 @@ mod difference;
 mod digest;
 mod edit;
 mod evaluate;
+mod functions;
 mod graft;
 mod grid;
 mod kernel;
@@ -31,7 +32,6 @@ mod prolong;
 mod renew;
 mod slopes;
 mod spline;
-mod surface;
 mod totals;
 mod versions;
 mod view;
@@ -41,7 +41,8 @@ pub use brick::{
     BRICK, BRICK_LEN, BrickKey, Corrections, DenseCorrections, HALO, HALO_LEN, LevelCorrections, active_slots,
 };
 pub use difference::{BrickChange, BrickDiff, DiffError};
-pub use edit::{BlockEdit, BrickEdit, Change, EditError, LevelEdit, MAX_LEVELS};
+pub use edit::{BlockEdit, BrickEdit, Change, LevelEdit};
+pub use functions::{EditError, MAX_LEVELS};
 pub use lattice::Lattice;
 pub use local::{LocalField, LocalFields};
 pub use motion::Motion;

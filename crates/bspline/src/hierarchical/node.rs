@@ -1,9 +1,9 @@
 use std::fmt;
 use std::sync::{Arc, OnceLock};
 
+use super::Lattice;
 use super::brick::{BRICK, BrickKey, Corrections, HALO_LEN};
 use super::totals::min_max;
-use super::{Lattice, digest};
 use crate::Real;
 
 /// A node of the tree of bricks: the functions of one brick, what evaluation reads of its cells, and a summary of all
@@ -165,11 +165,6 @@ impl<T: Real> Node<T> {
         if visit(self) {
             self.children.iter().flatten().for_each(|c| c.walk(visit));
         }
-    }
-
-    /// SHA-256 over the functions here and below, however deep the tree above is.
-    pub fn digest(&self) -> &[u8; 32] {
-        self.digest.get_or_init(|| digest::of(self))
     }
 }
 

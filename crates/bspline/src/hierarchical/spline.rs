@@ -5,9 +5,9 @@ use glam::{DAffine3, DVec3};
 use sha2::{Digest, Sha256};
 
 use super::brick::{BRICK, HALO_LEN};
-use super::edit::{EditError, check_function};
+use super::functions::{EditError, check_functions};
 use super::node::{Node, octant};
-use super::{BrickKey, Corrections, Lattice, LevelCorrections, build, kernel};
+use super::{BrickKey, Lattice, LevelCorrections, build, kernel};
 use crate::Real;
 use crate::placed_box::PlacedBox;
 
@@ -285,33 +285,4 @@ pub(super) fn finest_over<T: Real>(root: &Node<T>, finest: usize, cell: [u32; 3]
 #[inline]
 fn octant_of(cell: [u32; 3], shift: usize) -> usize {
     octant(cell, shift + BRICK.ilog2() as usize)
-}
-
-/// Whether a lattice has the functions of a brick, and their coefficients are numbers.
-pub(super) fn check_functions<T: Real>(
-    lattice: &Lattice,
-    level: usize,
-    key: BrickKey,
-    functions: &Corrections<T>,
-) -> Result<(), EditError> {
-    let function = |slot: usize| -> [u32; 3] {
-        let at = [slot / BRICK / BRICK, slot / BRICK % BRICK, slot % BRICK];
-        std::array::from_fn(|a| key.0[a].saturating_mul(BRICK as u32).saturating_add(at[a] as u32))
-    };
-    let mut last = [0; 3];
-    for (slot, value) in functions.iter() {
-        let at = function(slot);
-        last = std::array::from_fn(|a| at[a].max(last[a]));
-        if !value.is_finite() {
-            return Err(EditError::NotFinite {
-                level,
-                function: at,
-                value: value.as_f64(),
-            });
-        }
-    }
-    match functions.count() {
-        0 => Ok(()),
-        _ => check_function(lattice, level, last),
-    }
 }

@@ -1,8 +1,8 @@
 //! One level of a field fit: which functions take part, and what they add.
 
-use bspline::hierarchical::{BRICK, BrickEdit, BrickKey, DenseCorrections};
+use bspline::hierarchical::{BRICK, BrickEdit, BrickKey, Corrections, DenseCorrections, active_slots};
 use bspline::{Aabb, Field, Frame, HierarchicalSpline, Real};
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DMat3, DVec3};
 use rayon::prelude::*;
 
 use super::{Aim, FieldFitOptions};
@@ -64,6 +64,9 @@ impl Block {
     /// Replaces what lies outside the lattice's box, where coefficients do not reach, by straight lines from inside.
     fn go_on_outside(&mut self, last: [i64; 3]) {
         for axis in 0..3 {
+            if self.lo[axis] >= 0 && self.lo[axis] + self.count[axis] as i64 - 1 <= last[axis] {
+                continue;
+            }
             let is_outside = |knot: &[i64; 3]| !(0..=last[axis]).contains(&knot[axis]);
             let outside: Vec<[i64; 3]> = self.knots().filter(is_outside).collect();
             for knot in outside {
@@ -85,23 +88,50 @@ impl Block {
         }
     }
 
-    /// Slope of the target by knot numbers, from the neighbours that there are.
-    fn slope(&self, knot: [i64; 3]) -> DVec3 {
-        let value = |by: i64, axis: usize| {
-            let mut at = knot;
-            at[axis] += by;
-            self.index(at).map(|i| self.target[i])
-        };
-        DVec3::from_array(std::array::from_fn(|axis| {
-            let (back, ahead) = (value(-1, axis), value(1, axis));
-            let own = value(0, axis).unwrap_or(0.0);
-            match (back, ahead) {
-                (Some(a), Some(b)) => 0.5 * (b - a),
-                (Some(a), None) => own - a,
-                (None, Some(b)) => b - own,
-                (None, None) => 0.0,
+    /// `combine` of every value with those before and behind it on an axis; `beyond` stands for what lies beside the block.
+    fn along<V: Copy>(&self, axis: usize, values: &[V], beyond: V, combine: impl Fn(V, V, V) -> V) -> Vec<V> {
+        let stride: usize = self.count[axis + 1..].iter().product();
+        let mut combined = Vec::with_capacity(values.len());
+        for slab in values.chunks(self.count[axis] * stride) {
+            for (i, &own) in slab.iter().enumerate() {
+                let before = if i >= stride { slab[i - stride] } else { beyond };
+                let behind = slab.get(i + stride).copied().unwrap_or(beyond);
+                combined.push(combine(before, own, behind));
             }
-        }))
+        }
+        combined
+    }
+
+    /// Length of the target's slope in the world at every knot, from the neighbours that there are; `world_from_knot`
+    /// takes the slope by knots there.
+    fn slopes(&self, world_from_knot: DMat3) -> Vec<f64> {
+        let [x, y, z] = [0, 1, 2].map(|axis| {
+            // No value of the target is NaN: it marks a neighbour that there is not.
+            self.along(axis, &self.target, f64::NAN, |a, own, b| {
+                match (a.is_nan(), b.is_nan()) {
+                    (false, false) => 0.5 * (b - a),
+                    (true, false) => b - own,
+                    (false, true) => own - a,
+                    (true, true) => 0.0,
+                }
+            })
+        });
+        let slope = |((x, y), z): ((&f64, &f64), &f64)| (world_from_knot * DVec3::new(*x, *y, *z)).length();
+        x.iter().zip(&y).zip(&z).map(slope).collect()
+    }
+
+    /// Whether anything is true at a knot or at one of the 26 about it.
+    fn spread(&self, marks: Vec<bool>) -> Vec<bool> {
+        (0..3).fold(marks, |marks, axis| {
+            self.along(axis, &marks, false, |a, own, b| a | own | b)
+        })
+    }
+
+    /// Coefficients of the functions centred on the knots: the quasi-interpolant of the rest, which is 0 beside the block.
+    fn coefficients(&self) -> Vec<f64> {
+        (0..3).fold(self.rest.clone(), |values, axis| {
+            self.along(axis, &values, 0.0, |a, own, b| (8.0 * own - a - b) / 6.0)
+        })
     }
 }
 
@@ -193,13 +223,11 @@ impl<T: Real> LevelFit<'_, T> {
     pub fn correct(&self, edits: &mut [BrickEdit<T>]) -> u64 {
         let samples = edits.par_iter_mut().map(|edit| {
             let block = self.block(edit.key);
-            let active = edit.add.mask();
-            let mut again = DenseCorrections::empty();
-            for slot in bspline::hierarchical::active_slots(active) {
-                let at = [slot / 64, slot / 8 % 8, slot % 8];
-                again.set(at, T::from_f64(quasi_interpolant(&block, knot_of(edit.key, at))));
-            }
-            edit.add = again.pack();
+            let coefficients = block.coefficients();
+            let at = |slot: usize| knot_of(edit.key, [slot / 64, slot / 8 % 8, slot % 8]);
+            let value = |slot: usize| block.index(at(slot)).map_or(0.0, |i| coefficients[i]);
+            let values = active_slots(edit.add.mask()).map(|slot| T::from_f64(value(slot)));
+            edit.add = Corrections::new(*edit.add.mask(), values.collect());
             block.rest.len() as u64
         });
         samples.sum()
@@ -216,31 +244,46 @@ impl<T: Real> LevelFit<'_, T> {
                 p.x, p.y, p.z
             )));
         }
-        let judged: Vec<Judgement> = block.knots().map(|knot| self.judge(&block, knot)).collect();
+        let slopes = match self.options.aim {
+            Aim::Surface { .. } => {
+                let to_world = self.field.lattice_from_world().matrix3.transpose();
+                block.slopes(to_world * (1.0 / self.spacing(self.level)))
+            }
+            Aim::Density { .. } => vec![0.0; block.rest.len()],
+        };
+        let (lo, hi) = self.judged();
+        let judged: Vec<Judgement> = (block.knots().enumerate())
+            .map(|(i, knot)| match is_between(lo, knot, hi) {
+                true => self.judge(block.target[i], block.rest[i], slopes[i]),
+                false => Judgement::default(),
+            })
+            .collect();
         let mut round = Round {
             samples: block.rest.len() as u64,
             ..Round::default()
         };
         let (own_lo, own_hi) = (knot_of(key, [0; 3]), knot_of(key, [BRICK - 1; 3]));
-        let is_own = |knot: [i64; 3]| (0..3).all(|a| (own_lo[a]..=own_hi[a]).contains(&knot[a]));
         for (knot, judgement) in block.knots().zip(&judged) {
-            if is_own(knot) && judgement.counts {
+            if judgement.counts && is_between(own_lo, knot, own_hi) {
                 round.worst = round.worst.max(judgement.off);
                 round.over_tolerance += usize::from(judgement.exceeds);
                 round.wrong_signs += usize::from(judgement.wrong_sign);
             }
         }
-        let exceeds = |knot: [i64; 3]| block.index(knot).is_some_and(|i| judged[i].exceeds);
         if self.is_first || judged.iter().any(|j| j.exceeds) {
             round.open.push(key);
         }
+        let takes_part = block.spread(judged.iter().map(|j| j.exceeds).collect());
+        if self.level > self.options.finest || !takes_part.contains(&true) {
+            return Ok(round);
+        }
+        let coefficients = block.coefficients();
         let (lo, hi) = self.allowed();
         let mut add = DenseCorrections::empty();
-        for knot in knots_between(own_lo, own_hi) {
-            let is_allowed = (0..3).all(|a| (lo[a]..=hi[a]).contains(&knot[a]));
-            if is_allowed && knots_between(knot.map(|k| k - 1), knot.map(|k| k + 1)).any(exceeds) {
+        for (i, knot) in block.knots().enumerate() {
+            if takes_part[i] && is_between(own_lo, knot, own_hi) && is_between(lo, knot, hi) {
                 let slot = std::array::from_fn(|a| (knot[a] - own_lo[a]) as usize);
-                add.set(slot, T::from_f64(quasi_interpolant(&block, knot)));
+                add.set(slot, T::from_f64(coefficients[i]));
             }
         }
         if add.mask != [0; BRICK] {
@@ -253,13 +296,8 @@ impl<T: Real> LevelFit<'_, T> {
         Ok(round)
     }
 
-    fn judge(&self, block: &Block, knot: [i64; 3]) -> Judgement {
-        let (lo, hi) = self.judged();
-        if !(0..3).all(|a| (lo[a]..=hi[a]).contains(&knot[a])) {
-            return Judgement::default();
-        }
-        let i = block.index(knot).expect("a knot of the block");
-        let (t, rest) = (block.target[i], block.rest[i]);
+    /// Of a knot where the target is `t` and changes by `slope` per world length.
+    fn judge(&self, t: f64, rest: f64, slope: f64) -> Judgement {
         match self.options.aim {
             Aim::Density { tolerance } => Judgement {
                 off: rest.abs(),
@@ -268,9 +306,6 @@ impl<T: Real> LevelFit<'_, T> {
                 wrong_sign: false,
             },
             Aim::Surface { iso, tolerance } => {
-                let from_world = self.field.lattice_from_world().matrix3;
-                let slope = from_world.transpose() * block.slope(knot) / self.spacing(self.level);
-                let slope = slope.length();
                 let height = (t - iso).abs();
                 // Next to a crease the surface may be rounded by an interval of the finest level.
                 let rounding = tolerance + self.world_spacing(self.options.finest);
@@ -367,15 +402,8 @@ impl<T: Real> LevelFit<'_, T> {
     }
 }
 
-/// Coefficient of the function centred on a knot, from the rest there and beside it; beyond the block it is 0.
-fn quasi_interpolant(block: &Block, knot: [i64; 3]) -> f64 {
-    const WEIGHTS: [f64; 3] = [-1.0 / 6.0, 8.0 / 6.0, -1.0 / 6.0];
-    let mut sum = 0.0;
-    for at in knots_between(knot.map(|k| k - 1), knot.map(|k| k + 1)) {
-        let weight: f64 = (0..3).map(|a| WEIGHTS[(at[a] - knot[a] + 1) as usize]).product();
-        sum += weight * block.index(at).map_or(0.0, |i| block.rest[i]);
-    }
-    sum
+fn is_between(lo: [i64; 3], knot: [i64; 3], hi: [i64; 3]) -> bool {
+    (0..3).all(|a| (lo[a]..=hi[a]).contains(&knot[a]))
 }
 
 /// The knot on which the function in a slot of a brick is centred.

@@ -1,7 +1,7 @@
 //! Any field written back into a box of a hierarchical spline: what a tool leaves becomes coefficients.
 //!
 //! No system is solved. On each level the rest `target - field`, sampled at the knots, is added by the quasi-interpolant
-//! of the cubic B-spline, `c_i = (8 r_i - r_{i-1} - r_{i+1})/6` on each axis, which is exact for cubics [Lyche75]; done
+//! of the cubic B-spline, `c_i = (8 r_i - r_{i-1} - r_{i+1})/6` on each axis, which is exact for cubics \[Lyche75\]; done
 //! twice it is next to interpolation. A function takes part where the rest at its knot or next to it exceeds the
 //! tolerance near the surface, or where the two signs differ. So the cost is that of the box, on every level that of the
 //! surface in it, and the field beside it costs nothing.
@@ -105,7 +105,6 @@ pub fn fit_field<T: Real>(
         let mut round = fit.run(&keys)?;
         report.samples += round.samples;
         if level > options.finest {
-            // Nothing is added here: it is only told how far off the field is.
             report.worst = round.worst;
             report.over_tolerance = round.over_tolerance;
             report.wrong_signs = round.wrong_signs;

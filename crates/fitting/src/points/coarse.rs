@@ -9,7 +9,7 @@ use bspline::Real;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::clusters::{Cluster, clusters, coarser, doubt_the_sparse};
-use super::full_grid::{FullGrid, add_bending, bending_diagonal};
+use super::full_grid::{FullGrid, add_bending, bending_diagonal, bending_entry};
 use super::samples::{BASE_DEPTH, Samples};
 use super::stencil::{Spot, gather, scatter, scatter_squares};
 
@@ -161,33 +161,33 @@ impl Operator<f64> {
         for (spot, a, _) in &self.data {
             let w = spot.t.map(bspline::cubic::values::<f64>);
             let d = spot.t.map(bspline::cubic::first::<f64>);
-            let mut rows = [[0.0; 4]; 64];
+            // Value and slopes of the 64 functions, and where they stand.
+            let mut rows = [[0.0; 64]; 4];
             let mut at = [0; 64];
             for i in 0..64 {
                 let (x, y, z) = (i / 16, i / 4 % 4, i % 4);
                 at[i] = spot.start + (x * m + y) * m + z;
-                rows[i] = [
-                    w[0][x] * w[1][y] * w[2][z],
-                    gw.sqrt() * d[0][x] * w[1][y] * w[2][z],
-                    gw.sqrt() * w[0][x] * d[1][y] * w[2][z],
-                    gw.sqrt() * w[0][x] * w[1][y] * d[2][z],
-                ];
+                rows[0][i] = w[0][x] * w[1][y] * w[2][z];
+                rows[1][i] = gw.sqrt() * d[0][x] * w[1][y] * w[2][z];
+                rows[2][i] = gw.sqrt() * w[0][x] * d[1][y] * w[2][z];
+                rows[3][i] = gw.sqrt() * w[0][x] * w[1][y] * d[2][z];
             }
-            for i in 0..64 {
-                for j in 0..=i {
-                    let dot: f64 = (0..4).map(|c| rows[i][c] * rows[j][c]).sum();
-                    matrix[(at[i], at[j])] += a * dot;
+            for j in 0..64 {
+                let mut column = [0.0; 64];
+                for row in &rows {
+                    for i in 0..64 {
+                        column[i] += row[i] * row[j];
+                    }
+                }
+                for i in j..64 {
+                    matrix[(at[i], at[j])] += a * column[i];
                 }
             }
         }
-        let mut unit = FullGrid::zeros(self.n);
+        let place = |i: usize| [i / (m * m), i / m % m, i % m];
         for column in 0..m * m * m {
-            unit.values[column] = 1.0;
-            let mut bent = FullGrid::zeros(self.n);
-            add_bending(&unit, self.bending, &mut bent);
-            unit.values[column] = 0.0;
-            for (row, b) in bent.values.iter().enumerate().skip(column) {
-                matrix[(row, column)] += b;
+            for row in column..m * m * m {
+                matrix[(row, column)] += self.bending * bending_entry(m, place(row), place(column));
             }
         }
         matrix

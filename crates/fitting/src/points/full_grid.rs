@@ -124,24 +124,38 @@ pub(crate) fn add_bending<T: Real>(x: &FullGrid<T>, mu: T, out: &mut FullGrid<T>
     }
 }
 
-/// Diagonal of the operator of [`add_bending`] times `mu`, at slot `(x, y, z)`.
-pub(crate) fn bending_diagonal(m: usize, at: [usize; 3]) -> f64 {
-    let first = at.map(|i| if i == 0 || i == m - 1 { 1.0 } else { 2.0 });
-    let second = at.map(|i| {
-        let tap = |center: isize, w: f64| {
-            if center >= 1 && center <= m as isize - 2 {
-                w * w
-            } else {
-                0.0
-            }
-        };
-        let i = i as isize;
-        tap(i - 1, 1.0) + tap(i, 2.0) + tap(i + 1, 1.0)
+/// Entry of the operator of [`add_bending`] with `μ = 1`, for the slots `a` and `b`.
+pub(crate) fn bending_entry(m: usize, a: [usize; 3], b: [usize; 3]) -> f64 {
+    if (0..3).any(|axis| a[axis].abs_diff(b[axis]) > 2) {
+        return 0.0;
+    }
+    let equal: [f64; 3] = std::array::from_fn(|axis| f64::from(a[axis] == b[axis]));
+    let first: [f64; 3] = std::array::from_fn(|axis| match a[axis].abs_diff(b[axis]) {
+        0 if a[axis] == 0 || a[axis] == m - 1 => 1.0,
+        0 => 2.0,
+        1 => -1.0,
+        _ => 0.0,
     });
-    second[0]
-        + second[1]
-        + second[2]
-        + 2.0 * (first[0] * first[1] + first[0] * first[2] + first[1] * first[2])
+    let second: [f64; 3] = std::array::from_fn(|axis| {
+        let tap = |center: usize, i: usize| match center.abs_diff(i) {
+            0 => -2.0,
+            1 => 1.0,
+            _ => 0.0,
+        };
+        let centers = a[axis].saturating_sub(1).max(1)..(a[axis] + 2).min(m - 1);
+        centers.map(|c| tap(c, a[axis]) * tap(c, b[axis])).sum()
+    });
+    let mut sum = 0.0;
+    for axis in 0..3 {
+        let [next, last] = [(axis + 1) % 3, (axis + 2) % 3];
+        sum += second[axis] * equal[next] * equal[last] + 2.0 * equal[axis] * first[next] * first[last];
+    }
+    sum
+}
+
+/// Diagonal of the operator of [`add_bending`] with `μ = 1`, at slot `(x, y, z)`.
+pub(crate) fn bending_diagonal(m: usize, at: [usize; 3]) -> f64 {
+    bending_entry(m, at, at)
 }
 
 /// Calls `f` with the start of every block `[m][stride]` of an array of `m³`.
@@ -179,4 +193,29 @@ fn second_gram<T: Real>(x: &[T], m: usize, stride: usize, w: T, out: &mut [T]) {
             }
         }
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn entries_are_those_of_the_operator() {
+        let mut unit = FullGrid::<f64>::zeros(4);
+        let m = unit.width();
+        let place = |i: usize| [i / (m * m), i / m % m, i % m];
+        for column in 0..m * m * m {
+            let mut bent = FullGrid::zeros(4);
+            unit.values[column] = 1.0;
+            add_bending(&unit, 1.0, &mut bent);
+            unit.values[column] = 0.0;
+            for (row, found) in bent.values.iter().enumerate() {
+                assert_eq!(
+                    bending_entry(m, place(row), place(column)),
+                    *found,
+                    "{row} {column}"
+                );
+            }
+        }
+    }
 }
