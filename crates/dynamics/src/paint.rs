@@ -74,6 +74,8 @@ impl<T: Real> Patch<T> {
             return Err(e.into());
         }
         self.cache.paints += 1;
+        // A spring counts where it starts, which may be a sample before the box.
+        self.cache.painted_on = self.cache.painted_on.joined(paint.at.grown(1, dims));
         Ok(())
     }
 

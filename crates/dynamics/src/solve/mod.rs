@@ -8,6 +8,7 @@ mod fast_diagonalization;
 mod galerkin;
 mod history;
 mod lanczos;
+mod mean;
 mod orthonormal;
 mod pcg;
 mod renewal;

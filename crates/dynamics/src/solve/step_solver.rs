@@ -13,7 +13,7 @@ use super::renewal::{Renewal, Renewed};
 use super::report::{ITERATED, Method, SolveError, SolveReport, SolverOptions};
 use super::sample_multigrid::SampleMultigrid;
 use super::v_cycle::VCycle;
-use crate::lattice::{Lattice, TensorProduct, TensorWorkspace};
+use crate::lattice::{Lattice, SampleBox, TensorProduct, TensorWorkspace};
 use crate::springs::StepMatrix;
 use crate::units::{binary_unit, largest};
 
@@ -198,6 +198,48 @@ impl<T: Real> StepSolver<T> {
         self.begun = true;
         self.settle_method();
         self.prepare_border(s);
+        Ok(())
+    }
+
+    /// Whether nothing that it was made for differs from a matrix.
+    pub(crate) fn is_made_for(&self, s: &StepMatrix<T>) -> bool {
+        self.method == Method::FastDiagonalization || self.painted_for.as_ref() == Some(s)
+    }
+
+    /// Whether it can follow paint at the cost of the box.
+    pub(crate) fn follows_paint(&self) -> bool {
+        let follows = matches!(self.painted, Painted::Background(_) | Painted::VCycle(_));
+        follows && self.begun && self.painted_for.is_some()
+    }
+
+    /// Follows a matrix that differs in a box of samples only from the one that it was prepared for, springs being counted
+    /// where they start. A V-cycle does, at the cost of the box. A factor does not: it serves on as it is, or gives way to
+    /// the V-cycle until it is made anew.
+    ///
+    /// # Errors
+    /// [`SolveError`] if it is not positive definite.
+    pub(crate) fn repaint(&mut self, s: &StepMatrix<T>, at: SampleBox) -> Result<(), SolveError> {
+        if !self.follows_paint() {
+            return Ok(());
+        }
+        let mut matrix = self.painted_for.take().expect("asked above");
+        self.forget_renewal();
+        match &mut self.painted {
+            Painted::Background(background) => {
+                let all = SampleBox::all(s.dims());
+                let at = if background.is_stale() { all } else { at };
+                matrix.copy_on(s, at);
+                background.repaint(&matrix, at)?;
+            }
+            Painted::VCycle(cycle) => {
+                matrix.copy_on(s, at);
+                cycle.fit(&matrix, at)?;
+            }
+            _ => unreachable!("asked above"),
+        }
+        self.painted_for = Some(matrix);
+        self.settle_method();
+        self.renew_border();
         Ok(())
     }
 
