@@ -49,6 +49,7 @@ pub mod response;
 mod rest;
 pub mod snapshot;
 pub mod solve;
+pub mod sparse;
 pub mod springs;
 pub mod study;
 mod units;

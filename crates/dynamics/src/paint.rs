@@ -83,7 +83,7 @@ impl<T: Real> Patch<T> {
     /// Of all matter.
     fn lump_again(&mut self) -> Result<(), MatterError> {
         let (lumped, springs) = self
-            .matter
+            .masked_matter(&self.matter)
             .in_units(self.cache.solver.lattice(), self.neighbours)?;
         self.lumped = lumped;
         self.network.paint(&springs);
@@ -96,16 +96,18 @@ impl<T: Real> Patch<T> {
         let lattice = self.cache.solver.lattice();
         let dims = lattice.sample_dims();
         let near = paint.at.grown(1, dims);
+        let matter = self.masked_matter(&self.matter);
         let changed: Vec<Vec<(usize, f64)>> = self
             .neighbours
             .directions()
             .into_iter()
             .enumerate()
             .map(|(n, direction)| {
-                let weight = self.matter.spring_weight(lattice, n, direction);
+                let weight = matter.spring_weight(lattice, n, direction);
                 near.indices(dims).map(|i| (i, weight(i))).collect()
             })
             .collect();
+        drop(matter);
         let all = changed.iter().flatten().map(|(_, k)| *k);
         let (least, largest) = all.fold((f64::INFINITY, 0.0_f64), |(l, h), k| (l.min(k), h.max(k)));
         if !largest.is_finite() {

@@ -36,6 +36,7 @@ fn surface(tolerance: f64, finest: usize) -> FieldFitOptions {
     FieldFitOptions {
         aim: Aim::Surface { iso: 0.0, tolerance },
         finest,
+        look: true,
     }
 }
 
@@ -85,7 +86,9 @@ fn a_target_is_fitted_into_an_empty_field() {
     let torus = Torus::new(DVec3::new(0.3, -0.2, 0.1), DVec3::Z, 6.0, 2.0).unwrap();
     for tolerance in [0.1, 0.01, 0.001] {
         let (field, report) = fitted(&torus, &empty(), &whole(), &surface(tolerance, 4));
-        assert_eq!((report.wrong_signs, report.over_tolerance), (0, 0), "{report:?}");
+        let left = report.left.unwrap();
+        assert_eq!((left.wrong_signs, left.over_tolerance), (0, 0), "{report:?}");
+        assert!(left.worst < tolerance);
         let errors = surface_errors(&torus, &field, &whole(), |_| true);
         let worst = errors.iter().copied().fold(0.0, f64::max);
         assert!(
@@ -115,7 +118,7 @@ fn a_tool_changes_its_box_and_no_bit_beside_it() {
     );
     let (finest, tolerance) = (4, 0.01);
     let (field, report) = fitted(&target, &onto, &within, &surface(tolerance, finest));
-    assert_eq!(report.wrong_signs, 0, "{report:?}");
+    assert_eq!(report.left.unwrap().wrong_signs, 0, "{report:?}");
     // One finest interval is 1/16 to 1/12.8; off the crease the tolerance holds, on it the surface is rounded.
     let interval = 1.25 / 16.0;
     let off_crease = |p: DVec3| onto.value(p).abs().max(tool.value(p).abs()) > 3.0 * interval;
@@ -185,6 +188,7 @@ fn densities_are_met_at_every_point() {
         let options = FieldFitOptions {
             aim: Aim::Density { tolerance },
             finest: 3,
+            look: true,
         };
         let (field, report) = fitted(&target, &empty(), &whole(), &options);
         let mut worst = 0.0f64;

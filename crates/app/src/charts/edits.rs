@@ -262,6 +262,7 @@ fn carved(ball: &Ball, across: f64) -> f64 {
             tolerance: 0.05 * ball.cell(),
         },
         finest: ball.level,
+        look: false,
     };
     let time = median(15, |i| {
         let middle = ball.stroke(i);

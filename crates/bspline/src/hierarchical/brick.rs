@@ -122,9 +122,12 @@ impl<T: Real> Corrections<T> {
         (before + (self.mask[word] & ((1 << bit) - 1)).count_ones()) as usize
     }
 
-    /// [`reaches`] for the active functions.
-    pub(crate) fn reaches(&self, back: [usize; 3]) -> bool {
-        reaches(&self.mask, back)
+    /// Whether the support of an active function reaches into the brick `back` bricks behind on each axis (0 or 1).
+    pub(super) fn reaches(&self, back: [usize; 3]) -> bool {
+        self.mask
+            .iter()
+            .zip(read_slots(back))
+            .any(|(w, read)| w & read != 0)
     }
 
     /// Adds the coefficients of the slots below `count` on each axis to `target`, 11 wide, from `start` on.
@@ -202,29 +205,49 @@ impl<T: Real> From<&Corrections<T>> for DenseCorrections<T> {
 
 /// Numbers of the slots of a mask, in order.
 pub fn active_slots(mask: &[u64; BRICK]) -> impl Iterator<Item = usize> {
-    mask.iter().enumerate().flat_map(|(word, &bits)| {
-        let next = |bits: &u64| Some(bits & (bits - 1)).filter(|rest| *rest != 0);
-        std::iter::successors(Some(bits).filter(|bits| *bits != 0), next)
-            .map(move |bits| 64 * word + bits.trailing_zeros() as usize)
+    let words = mask.iter().enumerate();
+    words.flat_map(|(x, &word)| bits(word).map(move |bit| 64 * x + bit))
+}
+
+/// Numbers of the bits that are set, in order.
+fn bits(word: u64) -> impl Iterator<Item = usize> {
+    let next = |word: &u64| Some(word & (word - 1)).filter(|rest| *rest != 0);
+    std::iter::successors(Some(word).filter(|word| *word != 0), next)
+        .map(|word| word.trailing_zeros() as usize)
+}
+
+/// Slots that are active in one of two bricks alone, or with another coefficient.
+pub(super) fn differing<T: Real>(a: Option<&Corrections<T>>, b: Option<&Corrections<T>>) -> [u64; BRICK] {
+    let [mask_a, mask_b] = [a, b].map(|c| c.map_or([0; BRICK], |c| c.mask));
+    let [mut a, mut b] = [a, b].map(|c| c.map_or(&[][..], |c| &c.values));
+    std::array::from_fn(|x| {
+        let (here, there) = (mask_a[x], mask_b[x]);
+        let (values_a, values_b);
+        (values_a, a) = a.split_at(here.count_ones() as usize);
+        (values_b, b) = b.split_at(there.count_ones() as usize);
+        if here == there && values_a == values_b {
+            return 0;
+        }
+        let (mut values_a, mut values_b) = (values_a.iter(), values_b.iter());
+        bits(here | there).fold(here ^ there, |changed, slot| {
+            let a = (here >> slot & 1 == 1).then(|| values_a.next());
+            let b = (there >> slot & 1 == 1).then(|| values_b.next());
+            changed | u64::from(a != b) << slot
+        })
     })
 }
 
-/// Whether the support of one of the functions `mask` reaches into the brick `back` bricks behind on each axis
-/// (0 or 1): the functions in slots 0, 1 and 2 do.
-fn reaches(mask: &[u64; BRICK], back: [usize; 3]) -> bool {
+/// Slots of a brick that the one `back` bricks behind on each axis (0 or 1) reads: 0, 1 and 2 where it is behind.
+pub(super) fn read_slots(back: [usize; 3]) -> [u64; BRICK] {
     const Y_LOW: u64 = 0x00ff_ffff;
     const Z_LOW: u64 = 0x0707_0707_0707_0707;
-    let planes = if back[0] == 1 { 3 } else { BRICK };
     let rows = if back[1] == 1 { Y_LOW } else { !0 } & if back[2] == 1 { Z_LOW } else { !0 };
-    mask[..planes].iter().any(|w| w & rows != 0)
-}
-
-/// The bricks behind one whose cells read its functions `mask`.
-pub(super) fn readers(key: BrickKey, mask: [u64; BRICK]) -> impl Iterator<Item = BrickKey> {
-    (1..8usize).filter_map(move |octant| {
-        let back = [octant >> 2, octant >> 1 & 1, octant & 1];
-        let is_read = (0..3).all(|a| key.0[a] as usize >= back[a]) && reaches(&mask, back);
-        is_read.then(|| BrickKey(std::array::from_fn(|a| key.0[a] - back[a] as u32)))
+    std::array::from_fn(|x| {
+        if back[0] == 1 && x >= HALO - BRICK {
+            0
+        } else {
+            rows
+        }
     })
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::brick::{BRICK, Corrections, active_slots, readers};
+use super::brick::{Corrections, differing};
 use super::functions::check_functions;
 use super::graft::Graft;
 use super::node::Node;
@@ -93,27 +93,16 @@ impl<T: Real> HierarchicalSpline<T> {
             if let Some(new) = &change.new {
                 check_functions(&self.lattice, level, key, new).map_err(|_| DiffError::Lattice)?;
             }
-            let readers = readers(key, changed(change));
-            grafts.extend(readers.map(|key| Graft::stale(&self.lattice, level, key)));
-            let functions = change.new.clone().filter(|c| c.count() > 0);
-            grafts.push(Graft::functions(&self.lattice, level, key, functions));
+            let changed = differing(change.old.as_deref(), change.new.as_deref());
+            grafts.push(Graft::new(
+                &self.lattice,
+                (level, key),
+                changed,
+                change.new.clone(),
+            ));
         }
         Ok(self.with_grafts(grafts))
     }
-}
-
-/// Slots whose coefficients differ.
-fn changed<T: Real>(change: &BrickChange<T>) -> [u64; BRICK] {
-    let mask = |c: &Option<Arc<Corrections<T>>>| c.as_ref().map_or([0; BRICK], |c| *c.mask());
-    let (old, new) = (mask(&change.old), mask(&change.new));
-    let mut changed: [u64; BRICK] = std::array::from_fn(|x| old[x] ^ new[x]);
-    if let (Some(a), Some(b)) = (&change.old, &change.new) {
-        let both: [u64; BRICK] = std::array::from_fn(|x| old[x] & new[x]);
-        for slot in active_slots(&both) {
-            changed[slot / 64] |= u64::from(a.get(slot) != b.get(slot)) << (slot % 64);
-        }
-    }
-    changed
 }
 
 fn collect<'a, T: Real>(

@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::brick::{BRICK, Corrections, DenseCorrections, HALO, HALO_LEN, readers};
+use super::brick::{BRICK, Corrections, DenseCorrections, HALO, HALO_LEN};
 use super::functions::{EditError, MAX_LEVELS, check_function, check_functions};
-use super::graft::{Graft, grafted};
+use super::graft::Graft;
 use super::prolong::prolong;
 use super::renew::renewed;
 use super::{BrickKey, HierarchicalSpline, Lattice};
@@ -90,11 +90,12 @@ impl<T: Real> HierarchicalSpline<T> {
             let (level, key) = group[0].0;
             let mut brick = ChangedBrick::of(self, level, key);
             group.iter().try_for_each(|(_, edit)| put(&mut brick, edit))?;
-            Ok(brick)
+            Ok(brick.graft(&self.lattice))
         });
         // The first error, whichever thread meets one first.
-        let changed: Vec<Result<_, EditError>> = changed.collect();
-        Ok(self.with_bricks(changed.into_iter().collect::<Result<_, _>>()?))
+        let grafts: Vec<Result<_, EditError>> = changed.collect();
+        let grafts = grafts.into_iter().filter_map(Result::transpose);
+        Ok(self.with_grafts(grafts.collect::<Result<_, _>>()?))
     }
 
     /// The field with blocks of coefficients changed, in the order given.
@@ -132,7 +133,12 @@ impl<T: Real> HierarchicalSpline<T> {
                     .put_block(edit, last)?;
             }
         }
-        Ok(self.with_bricks(bricks.into_values().collect()))
+        let bricks: Vec<_> = bricks.into_values().collect();
+        let grafts = bricks
+            .into_par_iter()
+            .with_min_len(64)
+            .filter_map(|brick| brick.graft(&self.lattice));
+        Ok(self.with_grafts(grafts.collect()))
     }
 
     /// The field with coefficients added brick by brick; of several edits of one brick all are added, in order.
@@ -350,34 +356,23 @@ impl<T: Real> ChangedBrick<T> {
         }
         Ok(())
     }
+
+    /// What the tree is to do, if anything has changed.
+    fn graft(self, lattice: &Lattice) -> Option<Graft<T>> {
+        let functions = || Some(Arc::new(self.corrections.pack()));
+        let graft = || Graft::new(lattice, (self.level, self.key), self.changed, functions());
+        (self.changed != [0; BRICK]).then(graft)
+    }
 }
 
 impl<T: Real> HierarchicalSpline<T> {
-    fn with_bricks(&self, bricks: Vec<ChangedBrick<T>>) -> Self {
-        let mut grafts = Vec::new();
-        for brick in bricks.into_iter().filter(|b| b.changed != [0; BRICK]) {
-            let ChangedBrick { level, key, .. } = brick;
-            let readers = readers(key, brick.changed);
-            grafts.extend(readers.map(|key| Graft::stale(&self.lattice, level, key)));
-            let functions = Some(brick.corrections.pack()).filter(|c| c.count() > 0);
-            grafts.push(Graft::functions(
-                &self.lattice,
-                level,
-                key,
-                functions.map(Arc::new),
-            ));
-        }
-        self.with_grafts(grafts)
-    }
-
-    /// The field with other functions in some bricks, whose readers are among the grafts.
+    /// The field with other functions in some bricks.
     pub(super) fn with_grafts(&self, grafts: Vec<Graft<T>>) -> Self {
         if grafts.is_empty() {
             return self.clone();
         }
-        let grafted = grafted(&self.lattice, Some(&self.root), grafts);
         Self {
-            root: renewed(&self.lattice, Some(&self.root), &grafted),
+            root: renewed(&self.lattice, Some(&self.root), grafts),
             ..self.clone()
         }
     }

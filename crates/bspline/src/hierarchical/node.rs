@@ -89,34 +89,6 @@ impl<T: Real> Node<T> {
         node
     }
 
-    /// A node whose summary is still to be made; `work` bricks below lack their totals.
-    pub fn skeleton(
-        (level, key): (i8, BrickKey),
-        totals: Option<Arc<[T; HALO_LEN]>>,
-        corrections: Option<Arc<Corrections<T>>>,
-        children: Children<T>,
-        work: usize,
-    ) -> Self {
-        Self {
-            level,
-            key,
-            totals,
-            corrections,
-            hull: [T::infinity(), T::neg_infinity()],
-            count: 0,
-            brick_count: work as u64,
-            level_count: 0,
-            bend: OnceLock::new(),
-            digest: OnceLock::new(),
-            children,
-        }
-    }
-
-    /// Level and key.
-    pub fn place(&self) -> (i8, BrickKey) {
-        (self.level, self.key)
-    }
-
     /// Whether any of the box's cells lie in the node.
     pub fn holds_cells(&self) -> bool {
         self.brick_count > 0
@@ -183,8 +155,14 @@ pub(super) fn crown(lattice: &Lattice) -> i8 {
     bricks.next_power_of_two().trailing_zeros() as i8
 }
 
-/// Whether a brick covers cells of the box.
+/// Whether a place has cells of the box in it.
+pub(super) fn meets_cells(lattice: &Lattice, (level, key): (i8, BrickKey)) -> bool {
+    let [above, below] = [-level, level].map(|shift| shift.max(0) as u32);
+    let start = |a: usize| (u64::from(key.0[a]) * BRICK as u64) << above;
+    (0..3).all(|a| start(a) < u64::from(lattice.cells[a]) << below)
+}
+
+/// Whether it is a brick with cells of the box.
 pub(super) fn covers_cells(lattice: &Lattice, (level, key): (i8, BrickKey)) -> bool {
-    let end = |a: usize| (u64::from(lattice.cells[a]) << level).div_ceil(BRICK as u64);
-    level >= 0 && (0..3).all(|a| u64::from(key.0[a]) < end(a))
+    level >= 0 && meets_cells(lattice, (level, key))
 }

@@ -61,36 +61,49 @@ pub(crate) fn prolong<T: Real>(parent: &[T; HALO_LEN], octant: [usize; 3], child
     refine_block::<T, SPAN, HALO>(&source, &mut work, child);
 }
 
+/// One of the totals that [`prolong`] makes, to the bit: number `at` of the child.
+pub(super) fn prolonged_at<T: Real>(parent: &[T; HALO_LEN], octant: [usize; 3], at: [usize; 3]) -> T {
+    let start = (4 * octant[0] * HALO + 4 * octant[1]) * HALO + 4 * octant[2];
+    refined(at[0], |x| {
+        refined(at[1], |y| {
+            refined(at[2], |z| parent[start + (x * HALO + y) * HALO + z])
+        })
+    })
+}
+
+/// Coefficient `j` of the finer level along a line of the coarser one's.
+#[inline(always)]
+fn refined<T: Real>(j: usize, coarse: impl Fn(usize) -> T) -> T {
+    let p = j / 2;
+    if j.is_multiple_of(2) {
+        (coarse(p) + coarse(p + 1)) * T::from_f64(0.5)
+    } else {
+        (coarse(p) + T::from_f64(6.0) * coarse(p + 1) + coarse(p + 2)) * T::from_f64(0.125)
+    }
+}
+
 #[inline(always)]
 fn refine_line<T: Real>(source: &[T], target: &mut [T]) {
-    let (half, eighth, six) = (T::from_f64(0.5), T::from_f64(0.125), T::from_f64(6.0));
-    for j in 0..target.len() {
-        let p = j / 2;
-        target[j] = if j % 2 == 0 {
-            (source[p] + source[p + 1]) * half
-        } else {
-            (source[p] + six * source[p + 1] + source[p + 2]) * eighth
-        };
+    for (j, target) in target.iter_mut().enumerate() {
+        *target = refined(j, |p| source[p]);
     }
 }
 
 /// The same rule for whole rows: `target` is child row `j`, `source[start..]` its first parent row, `stride` apart.
 #[inline(always)]
 fn refine_rows<T: Real>(source: &[T], start: usize, stride: usize, j: usize, target: &mut [T]) {
-    let (half, eighth, six) = (T::from_f64(0.5), T::from_f64(0.125), T::from_f64(6.0));
+    // Slices of one length, so that no index is checked.
     let n = target.len();
-    let (a, b) = (
-        &source[start..start + n],
-        &source[start + stride..start + stride + n],
-    );
+    let row = |p: usize| &source[start + p * stride..][..n];
+    let (a, b) = (row(0), row(1));
     if j.is_multiple_of(2) {
         for z in 0..n {
-            target[z] = (a[z] + b[z]) * half;
+            target[z] = refined(0, |p| [a[z], b[z]][p]);
         }
     } else {
-        let c = &source[start + 2 * stride..start + 2 * stride + n];
+        let c = row(2);
         for z in 0..n {
-            target[z] = (a[z] + six * b[z] + c[z]) * eighth;
+            target[z] = refined(1, |p| [a[z], b[z], c[z]][p]);
         }
     }
 }

@@ -1,52 +1,54 @@
-//! Totals and summaries of a grafted tree.
+//! A tree with other functions in some bricks, made by copying the paths to what changes.
 
 use std::sync::{Arc, Mutex};
 
 use rayon::prelude::*;
 
 use super::Lattice;
-use super::brick::HALO_LEN;
-use super::node::{Children, Node, covers_cells};
-use super::window::Window;
+use super::brick::{BrickKey, HALO_LEN};
+use super::graft::Graft;
+use super::node::{Children, Node, covers_cells, crown, meets_cells};
+use super::window::{Slots, Window, has_same_bits};
 use crate::Real;
 
 /// Bricks below a node from which on its children are made side by side: about a millisecond's work, as waking another
 /// thread may take a tenth of that.
-const SIDE_BY_SIDE: u64 = 200;
+const SIDE_BY_SIDE: usize = 200;
 
-/// Makes the totals that are missing in `grafted`, and those that follow from others; nodes that come out as they are in
-/// `old` are `old`'s. Bricks that no function reaches are left out.
+/// Bricks that read the functions of one, about: its own and those behind it.
+const READERS: usize = 3;
+
+/// The tree `old`, or one without functions, with `grafts` put in. Nodes that come out as they were are `old`'s. Bricks
+/// that no function reaches are left out, but for those of level 0.
 pub(super) fn renewed<T: Real>(
     lattice: &Lattice,
     old: Option<&Arc<Node<T>>>,
-    grafted: &Arc<Node<T>>,
+    mut grafts: Vec<Graft<T>>,
 ) -> Arc<Node<T>> {
-    // A whole field's totals are asked for here, not by the threads: so they take the place of what the caller has freed.
-    let mut blank = Vec::new();
-    if old.is_none() {
-        grafted.walk(&mut |node| {
-            blank.extend(covers_cells(lattice, node.place()).then(|| Arc::new([T::zero(); HALO_LEN])));
-            true
-        });
-    }
-    let root = Renewal {
+    Graft::sort(&mut grafts);
+    let mut root = Renewal {
         lattice,
-        blank: &Mutex::new(blank),
+        blank: &Mutex::default(),
         old,
-        grafted,
-        window: Window::root(grafted),
+        place: (-crown(lattice), BrickKey([0; 3])),
+        window: Window::root(old.map(|old| &**old), &grafts),
         parent: None,
     };
+    // A whole field's totals are asked for here, not by the threads: so they take the place of what the caller has freed.
+    let count = if old.is_none() { root.most_bricks() } else { 0 };
+    let blank = Mutex::new((0..count).map(|_| Arc::new([T::zero(); HALO_LEN])).collect());
+    root.blank = &blank;
     root.run(false).expect("level 0 has cells")
 }
 
-/// One node in the old tree and in the grafted one.
+/// One place of the tree.
 struct Renewal<'a, T> {
     lattice: &'a Lattice,
     /// Totals that are all 0, to be filled; when there are none left they are allocated.
     blank: &'a Mutex<Vec<Arc<[T; HALO_LEN]>>>,
     old: Option<&'a Arc<Node<T>>>,
-    grafted: &'a Arc<Node<T>>,
+    /// Level and key.
+    place: (i8, BrickKey),
     window: Window<'a, T>,
     parent: Option<&'a [T; HALO_LEN]>,
 }
@@ -54,73 +56,124 @@ struct Renewal<'a, T> {
 impl<T: Real> Renewal<'_, T> {
     /// The new node, none if nothing needs it. `is_forced`: the parent's totals have changed.
     fn run(&self, is_forced: bool) -> Option<Arc<Node<T>>> {
-        let (old, grafted) = (self.old, self.grafted);
-        if !is_forced && old.is_some_and(|old| Arc::ptr_eq(old, grafted)) {
-            return Some(grafted.clone());
+        let is_kept = if self.old.is_some() {
+            !is_forced
+        } else {
+            !self.is_always_there()
+        };
+        if is_kept && self.window.is_quiet() {
+            return self.old.cloned();
         }
-        let (totals, has_changed) = self.totals(is_forced);
+        let changed = self.window.changed();
+        let is_read = changed.as_flattened().iter().any(|&word| word != 0);
+        if is_kept && !is_read && !self.window.has_grafts_below() {
+            return self.old.cloned();
+        }
+        let (totals, has_changed) = self.totals(&changed, is_forced);
         let children = self.children(totals.as_deref(), has_changed);
-        let is_brick = totals.is_some();
-        let is_needed = !is_brick
-            || grafted.level == 0
+        let is_needed = self.is_always_there()
             || children.iter().flatten().any(|c| c.holds_cells())
             || self.window.has_functions();
         let totals = totals.filter(|_| is_needed);
-        if totals.is_none() && grafted.corrections.is_none() && children.iter().all(Option::is_none) {
+        let corrections = self.window.own_corrections();
+        let is_empty = totals.is_none() && corrections.is_none() && children.iter().all(Option::is_none);
+        if is_empty {
             return None;
         }
-        if let Some(old) = old
-            && is_same(&old.totals, &totals)
-            && is_same(&old.corrections, &grafted.corrections)
-            && old.children.iter().zip(&children).all(|(a, b)| is_same(a, b))
+        if let Some(old) = self.old
+            && is_shared(old.totals.as_ref(), totals.as_ref())
+            && is_shared(old.corrections.as_ref(), corrections)
+            && old
+                .children
+                .iter()
+                .zip(&children)
+                .all(|(a, b)| is_shared(a.as_ref(), b.as_ref()))
         {
             return Some(old.clone());
         }
         Some(Arc::new(Node::new(
-            grafted.place(),
+            self.place,
             totals,
-            grafted.corrections.clone(),
+            corrections.cloned(),
             children,
         )))
     }
 
+    /// Whether the place has a node even if no function reaches it: level 0, and what leads there.
+    fn is_always_there(&self) -> bool {
+        self.place.0 <= 0 && meets_cells(self.lattice, self.place)
+    }
+
+    /// Whether the place may come to have totals.
+    fn may_have_totals(&self) -> bool {
+        covers_cells(self.lattice, self.place)
+            && (self.old.is_some_and(|old| old.holds_cells())
+                || self.is_always_there()
+                || self.window.has_grafts_below()
+                || self.window.has_functions())
+    }
+
+    /// Bricks with totals here and below at most, where there is no old node.
+    fn most_bricks(&self) -> usize {
+        if self.window.is_quiet() && !self.is_always_there() {
+            return 0;
+        }
+        let below: usize = (0..8).map(|octant| self.child(octant, None).most_bricks()).sum();
+        below + usize::from(self.may_have_totals())
+    }
+
     /// Totals of the brick, if it has cells, and whether they are others than in the old tree.
-    fn totals(&self, is_forced: bool) -> (Option<Arc<[T; HALO_LEN]>>, bool) {
-        let grafted = self.grafted;
-        if !covers_cells(self.lattice, grafted.place()) {
+    fn totals(&self, changed: &Slots, is_forced: bool) -> (Option<Arc<[T; HALO_LEN]>>, bool) {
+        if !self.may_have_totals() {
             return (None, false);
         }
-        if let (Some(kept), false) = (&grafted.totals, is_forced) {
-            return (Some(kept.clone()), false);
+        let octant = self.place.1.octant();
+        let old = self.old.and_then(|old| old.totals.as_ref());
+        if let (Some(old), false) = (old, is_forced)
+            && let Some(totals) = self.window.patched(changed, old, self.parent, octant)
+        {
+            let has_changed = !Arc::ptr_eq(&totals, old);
+            return (Some(totals), has_changed);
         }
         let kept = self.blank.lock().expect("no thread panics with it").pop();
         let mut totals = kept.unwrap_or_else(|| Arc::new([T::zero(); HALO_LEN]));
         let blank = Arc::get_mut(&mut totals).expect("just made");
-        self.window.fill(self.parent, grafted.key.octant(), blank);
-        match self.old.and_then(|old| old.totals.as_ref()) {
-            Some(old) if same_bits(old, &totals) => (Some(old.clone()), false),
+        self.window.fill(self.parent, octant, blank);
+        let is_same = |old: &[T]| old.iter().zip(&*totals).all(|(a, b)| has_same_bits(*a, *b));
+        match old {
+            Some(old) if is_same(&**old) => (Some(old.clone()), false),
             _ => (Some(totals), true),
         }
     }
 
+    fn child<'b>(&'b self, octant: usize, totals: Option<&'b [T; HALO_LEN]>) -> Renewal<'b, T> {
+        let (level, key) = self.place;
+        Renewal {
+            lattice: self.lattice,
+            blank: self.blank,
+            old: self.old.and_then(|old| old.children[octant].as_ref()),
+            place: (level + 1, key.child(octant)),
+            window: self.window.child(octant),
+            parent: totals,
+        }
+    }
+
     fn children(&self, totals: Option<&[T; HALO_LEN]>, has_changed: bool) -> Children<T> {
+        let reached = self.window.reached_children();
+        let is_built = self.old.is_none() && self.place.0 < 0;
         let child = |octant: usize| {
-            let grafted = self.grafted.children[octant].as_ref()?;
-            let child = Renewal {
-                lattice: self.lattice,
-                blank: self.blank,
-                old: self.old.and_then(|old| old.children[octant].as_ref()),
-                grafted,
-                window: self.window.child(octant),
-                parent: totals,
-            };
-            child.run(has_changed)
+            let old = self.old.and_then(|old| old.children[octant].as_ref());
+            if reached[octant] || is_built || old.is_some() && has_changed {
+                self.child(octant, totals).run(has_changed)
+            } else {
+                old.cloned()
+            }
         };
-        let work = match (self.old, has_changed) {
-            (Some(old), true) => self.grafted.brick_count.max(old.brick_count),
-            _ => self.grafted.brick_count,
-        };
-        if work < SIDE_BY_SIDE {
+        let forced = self
+            .old
+            .filter(|_| has_changed)
+            .map_or(0, |old| old.brick_count as usize);
+        if forced.max(READERS * self.window.graft_count()) < SIDE_BY_SIDE {
             return std::array::from_fn(child);
         }
         let made: Vec<_> = (0..8).into_par_iter().with_max_len(1).map(child).collect();
@@ -128,16 +181,11 @@ impl<T: Real> Renewal<'_, T> {
     }
 }
 
-fn is_same<N: ?Sized>(a: &Option<Arc<N>>, b: &Option<Arc<N>>) -> bool {
+/// Both none or one and the same.
+fn is_shared<N: ?Sized>(a: Option<&Arc<N>>, b: Option<&Arc<N>>) -> bool {
     match (a, b) {
         (Some(a), Some(b)) => Arc::ptr_eq(a, b),
         (None, None) => true,
         _ => false,
     }
-}
-
-/// Equal, and zeros of the same sign.
-fn same_bits<T: Real>(a: &[T; HALO_LEN], b: &[T; HALO_LEN]) -> bool {
-    let same = |(x, y): (&T, &T)| x == y && x.is_sign_negative() == y.is_sign_negative();
-    a.iter().zip(b).all(same)
 }

@@ -1,54 +1,223 @@
-use super::brick::{BRICK, HALO, HALO_LEN};
+use std::sync::Arc;
+
+use super::brick::{BRICK, Corrections, HALO, HALO_LEN, active_slots, read_slots};
+use super::graft::Graft;
 use super::node::Node;
-use super::prolong::prolong;
+use super::prolong::{prolong, prolonged_at};
 use crate::Real;
 
-/// A node and its seven upper neighbours: all whose functions reach into the node's cells. Number `4x + 2y + z`, each
-/// 0 or 1.
-#[derive(Clone, Copy)]
-pub(super) struct Window<'a, T>([Option<&'a Node<T>>; 8]);
+/// Totals of a brick up to which they are made one by one: what costs as much as all 1331 at once.
+const FEW: u32 = 64;
+
+/// A place in the tree and its seven upper neighbours: all whose functions reach into its cells. Number `4x + 2y + z`,
+/// each 0 or 1.
+pub(super) struct Window<'a, T> {
+    places: [Place<'a, T>; 8],
+    /// Steps from the root down.
+    depth: u8,
+}
+
+/// What stands at a place, and what is to change there and below.
+struct Place<'a, T> {
+    node: Option<&'a Node<T>>,
+    grafts: &'a [Graft<T>],
+}
+
+impl<T> Clone for Place<'_, T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T> Copy for Place<'_, T> {}
+
+/// Slots of the eight places.
+pub(super) type Slots = [[u64; BRICK]; 8];
 
 impl<'a, T: Real> Window<'a, T> {
-    /// About the root, which spans all functions.
-    pub fn root(root: &'a Node<T>) -> Self {
-        let mut window = [None; 8];
-        window[0] = Some(root);
-        Self(window)
+    /// About the root, which spans all functions. The grafts are in their order.
+    pub fn root(root: Option<&'a Node<T>>, grafts: &'a [Graft<T>]) -> Self {
+        let nothing = Place {
+            node: None,
+            grafts: &[],
+        };
+        let mut places = [nothing; 8];
+        places[0] = Place { node: root, grafts };
+        Self { places, depth: 0 }
     }
 
-    /// About a child of the node.
+    /// About a child.
     pub fn child(&self, octant: usize) -> Self {
-        Self(std::array::from_fn(|ahead| {
-            // Per axis 0, 1 or 2 halves from the node's start.
+        let depth = self.depth + 1;
+        let places = std::array::from_fn(|ahead| {
+            // Per axis 0, 1 or 2 halves from the place's start.
             let halves = [2, 1, 0].map(|a| (octant >> a & 1) + (ahead >> a & 1));
-            let number = |at: [usize; 3]| 4 * at[0] + 2 * at[1] + at[2];
-            let parent = self.0[number(halves.map(|h| h / 2))]?;
-            parent.children[number(halves.map(|h| h % 2))].as_deref()
-        }))
+            let parent = self.places[number(halves.map(|h| h / 2), 2)];
+            parent.child(number(halves.map(|h| h % 2), 2), depth)
+        });
+        Self { places, depth }
     }
 
-    /// Whether any active function reaches into the node's cells.
+    /// Whether nothing changes in it.
+    pub fn is_quiet(&self) -> bool {
+        self.places.iter().all(|place| place.grafts.is_empty())
+    }
+
+    /// Bricks that change at the place or below.
+    pub fn graft_count(&self) -> usize {
+        self.places[0].grafts.len()
+    }
+
+    /// Whether anything changes below the eight places.
+    pub fn has_grafts_below(&self) -> bool {
+        self.places
+            .iter()
+            .any(|place| !place.below(self.depth).is_empty())
+    }
+
+    /// The children about whose windows something changes, there or below.
+    pub fn reached_children(&self) -> [bool; 8] {
+        let mut reached = [false; 8];
+        for (n, place) in self.places.iter().enumerate() {
+            let mut grafts = place.below(self.depth);
+            while let Some(first) = grafts.first() {
+                let octant = first.octant(self.depth + 1);
+                let end = grafts.partition_point(|g| g.octant(self.depth + 1) <= octant);
+                let (here, rest) = grafts.split_at(end);
+                grafts = rest;
+                let behind = Graft::reach_behind(here, self.depth + 1);
+                // Halves from the place's start; a child's window spans its own half and the next.
+                let half: [usize; 3] = std::array::from_fn(|a| 2 * ahead(n)[a] + ahead(octant)[a]);
+                for (child, reached) in reached.iter_mut().enumerate() {
+                    *reached |= (0..3).all(|a| match half[a].wrapping_sub(ahead(child)[a]) {
+                        0 => true,
+                        1 => behind[a],
+                        _ => false,
+                    });
+                }
+            }
+        }
+        reached
+    }
+
+    /// Functions at the place from now on.
+    pub fn own_corrections(&self) -> Option<&'a Arc<Corrections<T>>> {
+        self.places[0].corrections(self.depth)
+    }
+
+    /// Whether any function that is active from now on reaches into the place's cells.
     pub fn has_functions(&self) -> bool {
-        (0..8).any(|ahead| {
-            let corrections = self.0[ahead].and_then(|n| n.corrections.as_deref());
-            corrections.is_some_and(|c| c.reaches([ahead >> 2, ahead >> 1 & 1, ahead & 1]))
+        self.corrections()
+            .any(|(ahead, corrections)| corrections.is_some_and(|c| c.reaches(ahead)))
+    }
+
+    /// Functions of the eight from now on, and how many bricks ahead they stand.
+    fn corrections(&self) -> impl Iterator<Item = ([usize; 3], Option<&'a Arc<Corrections<T>>>)> {
+        let all = self.places.iter().enumerate();
+        all.map(|(n, place)| (ahead(n), place.corrections(self.depth)))
+    }
+
+    /// Slots whose change reaches into the place's cells.
+    pub fn changed(&self) -> Slots {
+        std::array::from_fn(|n| match self.places[n].own(self.depth) {
+            Some(graft) => {
+                let read = read_slots(ahead(n));
+                std::array::from_fn(|x| graft.changed[x] & read[x])
+            }
+            None => [0; BRICK],
         })
     }
 
-    /// Totals of the node: its parent's, prolonged, and the corrections of the window.
+    /// Totals of the place: its parent's, prolonged, and the corrections of the window.
     #[inline(never)]
     pub fn fill(&self, parent: Option<&[T; HALO_LEN]>, octant: [usize; 3], blank: &mut [T; HALO_LEN]) {
         if let Some(parent) = parent {
             prolong(parent, octant, blank);
         }
-        for ahead in 0..8usize {
-            let Some(c) = self.0[ahead].and_then(|n| n.corrections.as_deref()) else {
-                continue;
-            };
-            let ahead = [ahead >> 2, ahead >> 1 & 1, ahead & 1];
+        for (ahead, corrections) in self.corrections() {
+            let Some(corrections) = corrections else { continue };
             let count = ahead.map(|a| if a == 1 { HALO - BRICK } else { BRICK });
-            let start = BRICK * ((ahead[0] * HALO + ahead[1]) * HALO + ahead[2]);
-            c.add_to(count, blank, start);
+            corrections.add_to(count, blank, BRICK * number(ahead, HALO));
         }
     }
+
+    /// [`Self::fill`] where only the `changed` slots are others than when the totals were `old`. None if they are so
+    /// many that filling is cheaper.
+    #[inline(never)]
+    pub fn patched(
+        &self,
+        changed: &Slots,
+        old: &Arc<[T; HALO_LEN]>,
+        parent: Option<&[T; HALO_LEN]>,
+        octant: [usize; 3],
+    ) -> Option<Arc<[T; HALO_LEN]>> {
+        let count: u32 = changed.as_flattened().iter().map(|w| w.count_ones()).sum();
+        if count > FEW {
+            return None;
+        }
+        let mut totals = old.clone();
+        for (slots, (ahead, corrections)) in changed.iter().zip(self.corrections()) {
+            for slot in active_slots(slots) {
+                let within = [slot / 64, slot / 8 % 8, slot % 8];
+                let at = std::array::from_fn(|a| BRICK * ahead[a] + within[a]);
+                let mut total = parent.map_or(T::zero(), |parent| prolonged_at(parent, octant, at));
+                if let Some(correction) = corrections.and_then(|c| c.get(slot)) {
+                    total += correction;
+                }
+                let at = number(at, HALO);
+                if !has_same_bits(totals[at], total) {
+                    Arc::make_mut(&mut totals)[at] = total;
+                }
+            }
+        }
+        Some(totals)
+    }
+}
+
+impl<'a, T: Real> Place<'a, T> {
+    /// What changes at the place itself.
+    #[inline]
+    fn own(&self, depth: u8) -> Option<&'a Graft<T>> {
+        self.grafts.first().filter(|g| g.depth == depth)
+    }
+
+    /// What changes below it.
+    fn below(&self, depth: u8) -> &'a [Graft<T>] {
+        &self.grafts[usize::from(self.own(depth).is_some())..]
+    }
+
+    fn corrections(&self, depth: u8) -> Option<&'a Arc<Corrections<T>>> {
+        match self.own(depth) {
+            Some(graft) => graft.corrections.as_ref(),
+            None => self.node.and_then(|node| node.corrections.as_ref()),
+        }
+    }
+
+    /// A place one step down, at a depth.
+    fn child(&self, octant: usize, depth: u8) -> Self {
+        let mut grafts = self.grafts;
+        if !grafts.is_empty() {
+            grafts = self.below(depth - 1);
+            let start = grafts.partition_point(|g| g.octant(depth) < octant);
+            let end = grafts.partition_point(|g| g.octant(depth) <= octant);
+            grafts = &grafts[start..end];
+        }
+        let node = self.node.and_then(|node| node.children[octant].as_deref());
+        Self { node, grafts }
+    }
+}
+
+/// Bricks ahead on each axis of number `n` in a window.
+fn ahead(n: usize) -> [usize; 3] {
+    [n >> 2, n >> 1 & 1, n & 1]
+}
+
+/// Place of `at` in a cube of edge `n`, z fastest.
+fn number(at: [usize; 3], n: usize) -> usize {
+    (at[0] * n + at[1]) * n + at[2]
+}
+
+/// Equal, and zeros of the same sign.
+pub(super) fn has_same_bits<T: Real>(a: T, b: T) -> bool {
+    a == b && a.is_sign_negative() == b.is_sign_negative()
 }

@@ -158,6 +158,37 @@ impl Galerkin {
         ((rx * ny + ry) * nz + rz).min(n - 1)
     }
 
+    /// Largest distance along each axis of two coefficients that share a spring.
+    pub(crate) fn reach(&self) -> [usize; 3] {
+        self.reach
+    }
+
+    /// The factor of the rows and columns of some coefficients, whose numbers ascend.
+    ///
+    /// # Errors
+    /// [`NotPositive`].
+    pub(crate) fn factorize_part<T: Real>(
+        &mut self,
+        s: &StepMatrix<T>,
+        numbers: &[usize],
+        into: &mut BandCholesky<T>,
+    ) -> Result<(), NotPositive> {
+        self.accumulate(s);
+        let [_, ny, nz] = self.dims;
+        let place = |i: usize| [i / nz / ny, i / nz % ny, i % nz];
+        let (galerkin, band) = (&*self, into.band());
+        factorize_raised(into, 0, |raised, _, into| {
+            into.clear();
+            for (row, &i) in numbers.iter().enumerate() {
+                for column in row.saturating_sub(band)..=row {
+                    let v = galerkin.element(place(numbers[column]), place(i));
+                    into.set(row, column, if row == column { v * (1.0 + raised) } else { v });
+                }
+            }
+        })?;
+        Ok(())
+    }
+
     /// Coefficients along each axis.
     pub fn dims(&self) -> [usize; 3] {
         self.dims
@@ -307,21 +338,7 @@ impl Galerkin {
         into: &mut BandCholesky<T>,
         first: usize,
     ) -> Result<f64, NotPositive> {
-        let (mut raised, mut from) = (0.0, into.slice_of(first));
-        loop {
-            self.write(raised, from, into);
-            match into.factorize_from(from) {
-                Err(_) if raised < 1e-2 => {
-                    raised = if raised == 0.0 {
-                        RAISED * T::UNIT_ROUND_OFF
-                    } else {
-                        RAISED * raised
-                    };
-                    from = 0;
-                }
-                done => return done.map(|()| raised),
-            }
-        }
+        factorize_raised(into, first, |raised, from, into| self.write(raised, from, into))
     }
 
     /// Writes `AᵀSA` into a band of the right size.
@@ -386,6 +403,30 @@ impl Galerkin {
     /// The sums that are there: of a plan for the diagonal, the diagonal.
     pub fn sums(&self) -> &[f64] {
         &self.sums
+    }
+}
+
+/// The factor of the matrix whose rows from some row on `write` writes with their diagonal larger by a share, returned: by none,
+/// or by as little as makes it positive definite in the working precision. Rows before `first` have their factor already.
+fn factorize_raised<T: Real>(
+    into: &mut BandCholesky<T>,
+    first: usize,
+    write: impl Fn(f64, usize, &mut BandCholesky<T>),
+) -> Result<f64, NotPositive> {
+    let (mut raised, mut from) = (0.0, into.slice_of(first));
+    loop {
+        write(raised, from, into);
+        match into.factorize_from(from) {
+            Err(_) if raised < 1e-2 => {
+                raised = if raised == 0.0 {
+                    RAISED * T::UNIT_ROUND_OFF
+                } else {
+                    RAISED * raised
+                };
+                from = 0;
+            }
+            done => return done.map(|()| raised),
+        }
     }
 }
 

@@ -1,5 +1,7 @@
 //! The methods that solve a step, behind one interface.
 
+use std::sync::Arc;
+
 use bspline::Real;
 
 use super::background::Background;
@@ -14,6 +16,7 @@ use super::report::{ITERATED, Method, SolveError, SolveReport, SolverOptions};
 use super::sample_multigrid::SampleMultigrid;
 use super::v_cycle::VCycle;
 use crate::lattice::{Lattice, SampleBox, TensorProduct, TensorWorkspace};
+use crate::sparse::{Mask, MaskedSolver, MaskedWay, Projected};
 use crate::springs::StepMatrix;
 use crate::units::{binary_unit, largest};
 
@@ -61,6 +64,8 @@ pub struct StepSolver<T> {
     /// The factor that will take the place of the one at hand.
     pub(super) renewal: Option<Box<Renewal<T>>>,
     inverse: Option<SampleInverse>,
+    /// Which coefficients move, if not all.
+    mask: Option<Arc<Mask>>,
     iteration: ConjugateGradients<T>,
     pub(super) border: Option<Box<Border<T>>>,
     factorizations: usize,
@@ -78,6 +83,7 @@ pub(super) enum Painted<T> {
     VCycle(Box<VCycle<T>>),
     SampleDirect(BandCholesky<T>),
     SampleMultigrid(Box<SampleMultigrid<T>>),
+    Masked(Box<MaskedSolver<T>>),
 }
 
 impl<T: Real> Painted<T> {
@@ -140,6 +146,7 @@ impl<T: Real> StepSolver<T> {
                 p: vec![0.0; m],
                 workspace: TensorWorkspace::new(),
             }),
+            mask: None,
             iteration: ConjugateGradients::new(lattice.coefficient_count()),
             border: None,
             factorizations: 0,
@@ -177,7 +184,7 @@ impl<T: Real> StepSolver<T> {
     /// [`SolveError`] if it is not positive definite.
     pub fn prepare(&mut self, s: &StepMatrix<T>) -> Result<(), SolveError> {
         // Springs across diagonals are no tensor product where the lattice ends.
-        if s.is_uniform() && s.springs.len() == 3 {
+        if s.is_uniform() && s.springs.len() == 3 && self.mask.is_none() {
             self.diagonalization.set_constant(s);
             self.method = Method::FastDiagonalization;
             self.begun = false;
@@ -244,9 +251,9 @@ impl<T: Real> StepSolver<T> {
     }
 
     /// Makes factors and cycles for a matrix.
-    fn make(&mut self, s: &StepMatrix<T>) -> Result<(), NotPositive> {
+    fn make(&mut self, s: &StepMatrix<T>) -> Result<(), SolveError> {
         self.factorizations += 1;
-        match &mut self.painted {
+        let made: Result<(), NotPositive> = match &mut self.painted {
             Painted::None => unreachable!("made before it is prepared"),
             Painted::Direct(direct) => {
                 let (galerkin, factor) = &mut **direct;
@@ -259,7 +266,9 @@ impl<T: Real> StepSolver<T> {
                 factor.factorize()
             }
             Painted::SampleMultigrid(multigrid) => multigrid.prepare(s),
-        }
+            Painted::Masked(masked) => return masked.prepare(s),
+        };
+        Ok(made?)
     }
 
     fn forget_renewal(&mut self) {
@@ -320,7 +329,13 @@ impl<T: Real> StepSolver<T> {
     pub(super) fn prepare_border(&mut self, s: &StepMatrix<T>) {
         if let Some(border) = &mut self.border {
             let preconditioner = active(self.method, &mut self.painted, &mut self.diagonalization);
-            border.prepare(|r, z| preconditioner.apply(s, r, z));
+            let mask = self.mask.as_deref();
+            border.prepare(|r, z| {
+                preconditioner.apply(s, r, z);
+                if let Some(mask) = mask {
+                    mask.hold(z);
+                }
+            });
         }
     }
 
@@ -335,7 +350,36 @@ impl<T: Real> StepSolver<T> {
         self.border.as_deref_mut()
     }
 
+    /// Lets only the coefficients of a mask move, all others being 0; in force from the next [`prepare`](Self::prepare) on.
+    pub(crate) fn set_mask(&mut self, mask: Option<Arc<Mask>>) {
+        self.mask = mask;
+        self.painted = Painted::None;
+        self.painted_for = None;
+    }
+
+    /// How a patch with this mask is solved by these options.
+    pub(crate) fn masked_way(&self) -> Option<MaskedWay> {
+        let mask = self.mask.as_deref()?;
+        Some(self.options.masked.or_best(&self.lattice, mask))
+    }
+
+    /// Lets what belongs to coefficients that do not move be 0.
+    pub(crate) fn hold(&self, list: &mut [T]) {
+        if let Some(mask) = &self.mask {
+            mask.hold(list);
+        }
+    }
+
     fn make_painted(&self) -> Painted<T> {
+        if let Some(mask) = &self.mask {
+            return Painted::Masked(Box::new(MaskedSolver::new(
+                &self.lattice,
+                mask.clone(),
+                &self.steps,
+                self.options.masked,
+                self.options.v_cycle,
+            )));
+        }
         let [_, my, mz] = self.lattice.sample_dims();
         let (n, m) = (self.lattice.coefficient_count(), self.lattice.sample_count());
         let few = n
@@ -392,6 +436,9 @@ impl<T: Real> StepSolver<T> {
             self.b.copy_from_slice(g);
         } else {
             self.lattice.gather(g, &mut self.b, &mut self.workspace);
+            if let Some(mask) = &self.mask {
+                mask.hold(&mut self.b);
+            }
         }
         // Solved for an impulse of about one, whose squares no precision loses.
         let unit = self.impulse_unit();
@@ -486,6 +533,7 @@ impl<T: Real> StepSolver<T> {
             Painted::Background(_) | Painted::VCycle(_) => Method::VCycle,
             Painted::SampleDirect(_) => Method::SampleDirect,
             Painted::SampleMultigrid(_) => Method::SampleMultigrid,
+            Painted::Masked(masked) => masked.method(),
         };
     }
 
@@ -504,6 +552,9 @@ impl<T: Real> StepSolver<T> {
     pub(crate) fn solve_coefficients(&mut self, s: &StepMatrix<T>, b: &[T], x: &mut [T]) {
         debug_assert!(self.inverse.is_none());
         self.b.copy_from_slice(b);
+        if let Some(mask) = &self.mask {
+            mask.hold(&mut self.b);
+        }
         self.iterate(s, x, None, self.options.iterations, 16.0 * T::UNIT_ROUND_OFF);
     }
 
@@ -517,7 +568,8 @@ impl<T: Real> StepSolver<T> {
         tolerance: f64,
     ) -> PcgReport {
         let preconditioner = active(self.method, &mut self.painted, &mut self.diagonalization);
-        let mut system = CoefficientSystem {
+        let mask = self.mask.as_deref();
+        let system = CoefficientSystem {
             lattice: &self.lattice,
             matrix: s,
             preconditioner: &mut Dynamic(preconditioner),
@@ -525,13 +577,18 @@ impl<T: Real> StepSolver<T> {
             workspace: &mut self.workspace,
         };
         match (dx, &mut self.border) {
-            (None, _) => self.iteration.solve(&mut system, &self.b, x, cap, tolerance),
+            (None, _) => {
+                let mut system = Projected { system, mask };
+                self.iteration.solve(&mut system, &self.b, x, cap, tolerance)
+            }
             (Some(dx), None) => {
                 dx.fill(T::zero());
-                let mut system = Sampled { system, dx };
+                let system = Sampled { system, dx };
+                let mut system = Projected { system, mask };
                 self.iteration.solve(&mut system, &self.b, x, cap, tolerance)
             }
             (Some(dx), Some(border)) => {
+                let mut system = Projected { system, mask };
                 let report = border.solve(&mut system, &self.b, x, cap, tolerance);
                 self.lattice.sample(x, dx, &mut self.workspace);
                 report
@@ -565,6 +622,7 @@ fn active<'a, T: Real>(
     diagonalization: &'a mut FastDiagonalization<T>,
 ) -> &'a mut dyn Preconditioner<T> {
     match (method, painted) {
+        (_, Painted::Masked(masked)) => &mut **masked,
         (Method::Direct, Painted::Direct(direct)) => &mut direct.1,
         (Method::Direct | Method::VCycle, Painted::Background(background)) => &mut **background,
         (Method::VCycle, Painted::VCycle(cycle)) => &mut **cycle,
