@@ -65,6 +65,24 @@ pub const ROWS: &[Row] = &[
     ("sample", "--format", "@volume --format *docx", "nrrd"),
     ("fit check convert", "--as", "@cloud --as *solid", "mesh"),
     ("fit check", "--as", "@volume --as *mesh", "leave it out"),
+    // Documents.
+    ("new", "document", "*clay.isoclay field.iclay", "another name"),
+    ("new", "fields", "new.isoclay *nowhere.iclay", "check the path"),
+    ("new", "fields", "new.isoclay *cloud.ply", "isoclay fit"),
+    ("sculpt history undo redo replay export", "document", "*nowhere.isoclay @script @out", "check the path"),
+    ("sculpt history undo redo replay export", "document", "*field.iclay @script @out", "document of this program"),
+    ("sculpt", "--script", "clay.isoclay --script *nowhere.toml", "check the path"),
+    ("sculpt", "--script", "clay.isoclay --script *notes.docx", "line 1"),
+    ("sculpt", "--object", "clay.isoclay --script scene.toml --object *cow", "field"),
+    ("export", "--object", "clay.isoclay -o out.iclay --object *cow", "field"),
+    ("export", "--output", "clay.isoclay -o *out.ply", ".iclay"),
+    ("undo redo", "steps", "clay.isoclay *0", "above zero"),
+    ("sculpt", "--threads", "clay.isoclay --script scene.toml --threads *0", "1 to 1024"),
+    ("replay", "--threads", "clay.isoclay --threads *0", "1 to 1024"),
+    ("new", "--memory", "new.isoclay field.iclay --memory *lots", "2GiB"),
+    ("sculpt", "--memory", "clay.isoclay --script scene.toml --memory *lots", "2GiB"),
+    ("history undo redo replay", "--memory", "clay.isoclay --memory *lots", "2GiB"),
+    ("export", "--memory", "clay.isoclay -o out.iclay --memory *lots", "2GiB"),
     // How a fit is made.
     ("mesh", "--triangles", "field.iclay -o out.ply --triangles *3", "whole number"),
     ("mesh", "--triangles", "field.iclay -o out.ply --triangles *1e5", "whole number"),
@@ -167,6 +185,7 @@ pub fn out(command: &str) -> &'static str {
         "fit" => "-o out.iclay",
         "mesh" => "-o out.ply",
         "picture" => "-o out.png",
+        "export" => "-o out.iclay",
         _ => "",
     }
 }

@@ -7,7 +7,7 @@ use sha2::{Digest, Sha256};
 use super::brick::{BRICK, HALO_LEN};
 use super::functions::{EditError, check_functions};
 use super::node::{Node, octant};
-use super::{BrickKey, Lattice, LevelCorrections, build, kernel};
+use super::{BrickKey, Corrections, Lattice, LevelCorrections, build, kernel};
 use crate::Real;
 use crate::placed_box::PlacedBox;
 
@@ -216,6 +216,27 @@ impl<T: Real> HierarchicalSpline<T> {
             _ => finest_over(&self.root, finest, cell),
         };
         Place::new(brick, finest, cell, q)
+    }
+}
+
+impl HierarchicalSpline<f64> {
+    /// In single precision, coefficients rounded to the nearest.
+    ///
+    /// # Errors
+    /// [`EditError::NotFinite`] for a coefficient beyond single precision.
+    pub fn to_single(&self) -> Result<HierarchicalSpline<f32>, EditError> {
+        let level = |level| {
+            let rounded = |functions: &Corrections<f64>| {
+                let values = functions.values().iter().map(|&v| v as f32);
+                Arc::new(Corrections::new(*functions.mask(), values.collect()))
+            };
+            let bricks = self.corrections(level).into_iter();
+            bricks
+                .map(|(key, functions)| (key, rounded(&functions)))
+                .collect()
+        };
+        let levels = (0..self.level_count()).map(level).collect();
+        HierarchicalSpline::try_from_corrections(self.lattice, self.slope(), levels)
     }
 }
 
