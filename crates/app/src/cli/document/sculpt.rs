@@ -43,7 +43,7 @@ pub enum Command {
     /// A scene, as it was written.
     Scene { object: String, script: String },
     /// One stroke of a session.
-    Stroke { object: String, stroke: Stroke },
+    Stroke { object: String, stroke: Box<Stroke> },
 }
 
 impl Command {
@@ -79,7 +79,10 @@ impl Command {
             };
             Ok((
                 format!("{verb} {object}: stroke {number} of {file}"),
-                Self::Stroke { object, stroke },
+                Self::Stroke {
+                    object,
+                    stroke: Box::new(stroke),
+                },
             ))
         });
         commands.collect()
