@@ -8,7 +8,7 @@ use bspline::polygonize::{PolygonizeOptions, check_mesh, polygonize};
 use bspline::{Aabb, Field, Frame};
 use fitting::Control;
 use glam::{DAffine3, DVec3};
-use tools::geometric::{Geometric, GeometricError, Operation};
+use tools::geometric::{Geometric, GeometricError, Operation, block as block_of};
 use tools::session::Session;
 
 /// Cells of the block's box, half a world length each.
@@ -99,6 +99,52 @@ fn tools_take_and_put_their_volume() {
                 0.5 * whole
             );
         }
+    }
+}
+
+/// Cubes, plates and rods of few and many intervals: their own volume, faces where they belong, room about them.
+#[test]
+fn a_block_is_as_large_as_asked() {
+    for (size, spacing) in [
+        ([10.0, 6.0, 4.0], 0.2),
+        ([1.0, 1.0, 1.0], 0.25),
+        ([40.0, 2.0, 2.0], 0.5),
+        ([3e3, 3e3, 200.0], 50.0),
+        ([2e-6, 1e-6, 1e-6], 1e-7),
+    ] {
+        let size = DVec3::from_array(size);
+        let made = block_of(size, spacing, &mut Control::default()).unwrap();
+        let within = made.lattice().world_box();
+        assert!(within.max.cmpge(0.9 * size).all() && within.min.cmple(-0.9 * size).all());
+        // The middles of the faces.
+        for axis in 0..3 {
+            for side in [-0.5, 0.5] {
+                let mut face = DVec3::ZERO;
+                face[axis] = side * size[axis];
+                let off = made.value(face).abs();
+                assert!(off <= 0.05 * spacing, "{size}: face {face} is off by {off}");
+            }
+        }
+        let frame = Frame::over(&within, (within.size() / spacing * 4.0).as_uvec3().to_array());
+        let (mesh, _) = polygonize(&made, &frame, &PolygonizeOptions::default()).unwrap();
+        let check = check_mesh(&mesh);
+        assert!(check.is_closed_manifold());
+        // Edges are rounded by about an interval.
+        let edges = 4.0 * (size.x + size.y + size.z) * spacing * spacing;
+        let (found, whole) = (check.volume, size.element_product());
+        assert!(
+            (found - whole).abs() < 0.2 * edges + 1e-3 * whole,
+            "{size}: {found} of {whole}"
+        );
+    }
+    for (size, spacing) in [
+        (DVec3::ONE, 0.6),
+        (DVec3::ONE, f64::NAN),
+        (DVec3::ZERO, 0.1),
+        (DVec3::ONE, 1e-9),
+    ] {
+        let refused = block_of(size, spacing, &mut Control::default());
+        assert!(matches!(refused, Err(GeometricError::Shape(_))));
     }
 }
 

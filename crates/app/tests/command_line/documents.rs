@@ -1,6 +1,6 @@
 //! Documents: edits by scenes, undone and done again, and what leaves them.
 
-use super::common::Bench;
+use super::common::{Bench, number};
 
 const SCENE: &str = r#"
 field = "unused"
@@ -186,4 +186,33 @@ add = { shape = { torus = { axis = [0, 1, 0], major = 0.6, minor = 0.1 } }, alon
     bench.write("typo.toml", "[[stroke]]\n\ncarv = 1\n");
     let run = bench.run("sculpt clay.isoclay --script typo.toml");
     assert!(run.stderr.contains("line 3"), "{}", run.stderr);
+}
+
+#[test]
+fn a_block_is_made_from_nothing_and_shaped() {
+    let bench = Bench::new();
+    bench.json("new block.isoclay --box 10,6,4 --spacing 0.4 --unit mm");
+    let mesh = bench.json("mesh block.isoclay -o block.ply --check");
+    let volume = number(&mesh["quality"], "volume");
+    assert!((volume - 240.0).abs() < 2.0, "{mesh}");
+    bench.write(
+        "drill.toml",
+        "[[stroke]]\nobject = \"block\"\ncarve = { shape = { cylinder = { axis = [0, 0, 1], radius = 1.0, height = 9.0 } }, along = [[1, 0, 0]] }\n",
+    );
+    bench.json("sculpt block.isoclay --script drill.toml");
+    let drilled = bench.json("mesh block.isoclay -o drilled.ply --check");
+    let taken = volume - number(&drilled["quality"], "volume");
+    let whole = 4.0 * std::f64::consts::PI;
+    assert!((taken / whole - 1.0).abs() < 0.02, "{taken} of {whole}");
+    for (arguments, word) in [
+        ("new a.isoclay --box 10", "--spacing"),
+        ("new a.isoclay --spacing 1", "--box"),
+        ("new a.isoclay --box 1 --spacing 0.9", "from 2"),
+        ("new a.isoclay", "FIELD"),
+    ] {
+        let run = bench.run(arguments);
+        assert_eq!(run.code, 2, "{arguments}");
+        assert!(run.stderr.contains(word), "{arguments}: {}", run.stderr);
+    }
+    assert!(!bench.path("a.isoclay").exists());
 }

@@ -4,6 +4,7 @@
 //! is written back into the coefficients that it touches by [`fit_field`]. A distance `d` of the tool counts as `c + d·|∇f|`, so
 //! that depths and blends are lengths on any field.
 
+mod block;
 mod shape;
 
 use std::sync::Arc;
@@ -15,6 +16,7 @@ use fitting::field::{Aim, FieldFitOptions, FieldFitReport, fit_field};
 use fitting::{Control, FitError};
 use serde::{Deserialize, Serialize};
 
+pub use block::block;
 pub use shape::Shape;
 
 use crate::number::{NonNegative, Point, Positive};
