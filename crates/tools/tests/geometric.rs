@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use bspline::hierarchical::{BrickKey, DenseCorrections, HierarchicalSpline, Lattice};
+use bspline::hierarchical::{HierarchicalSpline, Lattice};
 use bspline::polygonize::{PolygonizeOptions, check_mesh, polygonize};
 use bspline::{Aabb, Field, Frame};
 use fitting::Control;
@@ -20,21 +20,7 @@ fn block() -> HierarchicalSpline<f32> {
         world_from_lattice: DAffine3::from_scale(DVec3::splat(0.5)),
         cells: [CELLS; 3],
     };
-    let bricks = (CELLS + 2) / 8 + 1;
-    let level = (0..bricks.pow(3)).map(|n| {
-        let key = [n / bricks / bricks, n / bricks % bricks, n % bricks];
-        let mut functions = DenseCorrections::empty();
-        for slot in 0..512 {
-            let at = [slot / 64, slot / 8 % 8, slot % 8];
-            let function: [u32; 3] = std::array::from_fn(|a| 8 * key[a] + at[a] as u32);
-            if function.iter().all(|&f| f < CELLS + 3) {
-                let z = 0.5 * (f64::from(function[2]) - 1.0);
-                functions.set(at, (SLOPE * (12.0 - z) + ISO) as f32);
-            }
-        }
-        (BrickKey(key), Arc::new(functions.pack()))
-    });
-    HierarchicalSpline::from_corrections(lattice, SLOPE, vec![level.collect()])
+    HierarchicalSpline::schoenberg(lattice, SLOPE, |p| SLOPE * (12.0 - p.z) + ISO).unwrap()
 }
 
 const SLOPE: f64 = 40.0;

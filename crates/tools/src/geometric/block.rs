@@ -1,6 +1,4 @@
-use std::sync::Arc;
-
-use bspline::hierarchical::{BRICK, BrickKey, DenseCorrections, Lattice};
+use bspline::hierarchical::Lattice;
 use bspline::primitives::Cuboid;
 use bspline::{Field, HierarchicalSpline};
 use fitting::Control;
@@ -55,8 +53,8 @@ pub fn block(
         ),
         cells: cells.to_array().map(|n| n as u32),
     };
-    let coarse =
-        HierarchicalSpline::from_corrections(lattice, 1.0, vec![sampled(&solid, &lattice).collect()]);
+    let coarse = HierarchicalSpline::schoenberg(lattice, 1.0, |p| solid.value(p))
+        .map_err(|e| GeometricError::Shape(e.to_string()))?;
     let options = FieldFitOptions {
         aim: Aim::Surface {
             iso: 0.0,
@@ -67,30 +65,4 @@ pub fn block(
     };
     let (field, _, _) = fit_field(&solid, &coarse, &lattice.world_box(), &options, control)?;
     Ok(field)
-}
-
-/// A field's values at the knots of level 0, as coefficients of its functions.
-fn sampled(
-    field: &dyn Field,
-    lattice: &Lattice,
-) -> impl Iterator<Item = (BrickKey, Arc<bspline::hierarchical::Corrections<f32>>)> {
-    let bricks = lattice.cells.map(|n| (n + 2) / BRICK as u32 + 1);
-    (0..bricks[0]).flat_map(move |x| {
-        (0..bricks[1]).flat_map(move |y| {
-            (0..bricks[2]).map(move |z| {
-                let key = BrickKey([x, y, z]);
-                let mut functions = DenseCorrections::empty();
-                for slot in 0..BRICK.pow(3) {
-                    let at = [slot / (BRICK * BRICK), slot / BRICK % BRICK, slot % BRICK];
-                    let number: [u32; 3] = std::array::from_fn(|a| BRICK as u32 * key.0[a] + at[a] as u32);
-                    if (0..3).all(|a| number[a] < lattice.cells[a] + 3) {
-                        let knot = DVec3::from_array(number.map(f64::from)) - 1.0;
-                        let value = field.value(lattice.world_from_lattice.transform_point3(knot));
-                        functions.set(at, value as f32);
-                    }
-                }
-                (key, Arc::new(functions.pack()))
-            })
-        })
-    })
 }
