@@ -34,8 +34,9 @@ impl<T: Real> Patch<T> {
     /// Gives the samples of a box other matter, per volume; all is then as after [`set_matter`](Self::set_matter) with the
     /// same, to the bit. Stiffness costs the box, all else a list.
     ///
-    /// A factor or cycle that is there serves on as long as it solves a step to 10⁻³ of the impulse within the usual
-    /// iterations. If that takes more than two of them several times in a row, a factor of the matter as it is by then is made
+    /// A V-cycle follows at the cost of the box and takes over from a factor beside the steps, which is begun again when some
+    /// steps have gone by without paint. A small factor serves on as long as it solves a step to 10⁻³ of the impulse within the
+    /// usual iterations; if that takes more than two of them several times in a row, one of the matter as it is by then is made
     /// beside the steps and takes its place.
     ///
     /// # Errors
@@ -76,6 +77,8 @@ impl<T: Real> Patch<T> {
             return Err(e.into());
         }
         self.cache.paints += 1;
+        // A spring counts where it starts, which may be a sample before the box.
+        self.cache.painted_on = self.cache.painted_on.joined(paint.at.grown(1, dims));
         Ok(())
     }
 

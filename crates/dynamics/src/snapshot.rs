@@ -214,7 +214,13 @@ impl<T: Real> Patch<T> {
                 self.fill_matrix(damping, stiffness, unit);
                 self.cache.solver.prepare(&self.cache.matrix)?;
             }
-            let paints = if s.painted { u64::MAX } else { now.paints };
+            // Where is not written down: what follows paint costs its box, but comes out the same if that is larger.
+            let paints = if s.painted {
+                self.cache.painted_on = self.lattice().all_samples();
+                u64::MAX
+            } else {
+                now.paints
+            };
             self.cache.prepared = Some(Prepared {
                 version: Version { paints, ..now },
                 damping,
