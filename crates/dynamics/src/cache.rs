@@ -2,6 +2,7 @@
 
 use bspline::Real;
 
+use crate::lattice::SampleBox;
 use crate::response::StaticSolver;
 use crate::solve::StepSolver;
 use crate::springs::StepMatrix;
@@ -23,6 +24,8 @@ pub(crate) struct Cache<T> {
     pub changes: u64,
     /// Counts paint, which what was made before may survive.
     pub paints: u64,
+    /// Where weights have changed by paint since the solver was made for them.
+    pub painted_on: SampleBox,
     /// Bound of explicit steps with the version it is of.
     pub limit: Option<(Version, f64)>,
     /// Of static problems, painted and of reference; no bit depends on whether they are there.
@@ -62,6 +65,7 @@ impl<T: Real> Cache<T> {
             prepared: None,
             changes: 0,
             paints: 0,
+            painted_on: SampleBox::default(),
             limit: None,
             statics: [None, None],
         }

@@ -5,6 +5,7 @@ use super::independent::Independent;
 use crate::lattice::{Lattice, TensorWorkspace};
 use crate::patch::{Patch, PatchError};
 use crate::solve::{Border, spring_value};
+use crate::sparse::Mask;
 
 /// The constraints of a patch, as rows on the unknowns of its solver: the coefficients, or on a square lattice the
 /// samples.
@@ -29,9 +30,14 @@ impl<T: Real> Held<T> {
         lattice: &Lattice<T>,
         base: &[T],
         sigma2: f64,
+        mask: Option<&Mask>,
     ) -> Result<Self, ConstraintError> {
         let rows = constraints.iter().map(|c| Row::new(c, lattice, base));
-        let rows: Vec<Row> = rows.collect::<Result<_, _>>()?;
+        let mut rows: Vec<Row> = rows.collect::<Result<_, _>>()?;
+        if let Some(mask) = mask {
+            let moves = |term: &(usize, f64)| mask.moving().binary_search(&term.0).is_ok();
+            rows.iter_mut().for_each(|row| row.terms.retain(moves));
+        }
         let mut on_unknowns = rows.clone();
         if lattice.is_square() {
             // r·p = (A⁻ᵀr)·d
@@ -152,6 +158,7 @@ impl<T: Real> Patch<T> {
                 self.cache.solver.lattice(),
                 &self.base,
                 sigma2,
+                self.mask.as_deref(),
             )?)),
         };
         self.cache

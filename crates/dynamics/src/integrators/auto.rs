@@ -98,7 +98,7 @@ impl Work {
             Method::Direct => 1150.0 * n + n * self.bands[0] * self.bands[0],
             Method::SampleDirect => self.samples * self.bands[1] * self.bands[1],
             Method::SampleMultigrid => 3000.0 * self.samples,
-            Method::VCycle => cycle,
+            _ => cycle,
         };
         let beside = if factor && method == Method::VCycle {
             of(Method::Direct)
@@ -186,7 +186,7 @@ impl<T: Real> Patch<T> {
     }
 
     fn has_even_mass(&self) -> bool {
-        self.lumped.mass.is_constant() && self.lumped.damping.is_constant()
+        self.mask.is_none() && self.lumped.mass.is_constant() && self.lumped.damping.is_constant()
     }
 
     /// The method that a matrix takes on so many coefficients.

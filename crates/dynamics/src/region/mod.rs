@@ -27,6 +27,7 @@
 
 mod cells;
 mod change;
+mod mask;
 mod moved;
 mod parts;
 mod scene;
@@ -37,6 +38,7 @@ mod watch;
 
 pub use cells::{Cells, MAX_EDGE, MAX_SIZE, MIN_CELLS};
 pub use change::{Change, Viewer};
+pub use mask::RegionMask;
 pub use scene::Scene;
 pub use sleep::{Schedule, Thresholds, Turn};
 pub use snapshot::RegionSnapshot;
@@ -175,6 +177,9 @@ pub enum RegionError {
         /// Level asked for.
         to: usize,
     },
+    /// Moved with a mask.
+    #[error("a region with a mask stays where it is; release it, and cut another with a mask of its own")]
+    Masked,
     /// Baked onto a field on other knots.
     #[error("the region was cut out of a field on another lattice; bake it onto a version of that field")]
     OtherLattice,
