@@ -3,7 +3,6 @@
 use bspline::{KnotVector, Real};
 use serde::{Deserialize, Serialize};
 
-use crate::cache::{Prepared, Version};
 use crate::constraints::{Constraint, Held};
 use crate::lattice::{Axis, Lattice, LatticeError, Rim};
 use crate::matter::Matter;
@@ -11,6 +10,7 @@ use crate::patch::{Patch, PatchError, State, finite};
 use crate::solve::{SolverHistory, SolverOptions};
 use crate::sparse::MaskRecord;
 use crate::springs::{Law, Neighbours, Plasticity, Rest, SpringWeights, StepMatrix, Weights};
+use crate::version::{Prepared, Version};
 
 /// All of a patch that later bits depend on: state, matter, and of the solvers what they were made for. Factors are not in
 /// it; they come out the same when they are made again.
