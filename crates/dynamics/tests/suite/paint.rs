@@ -173,6 +173,16 @@ fn dabs_at_24_32_cost_no_factor_and_few_iterations() {
     }
 }
 
+/// A patch and what is restored from its snapshot end with the same bits.
+fn goes_on(p: &Patch<f32>, steps: usize) {
+    let (mut on, mut anew) = (p.clone(), Patch::restore(&p.snapshot()).unwrap());
+    for step in 0..steps {
+        on.step(Integrator::Paper, 0.4).unwrap();
+        anew.step(Integrator::Paper, 0.4).unwrap();
+        assert!(on.state() == anew.state(), "step {step}");
+    }
+}
+
 /// Cycles and sums that followed paint have the bits of those that are made for all of the matter, as a restored patch
 /// makes them.
 #[test]
@@ -209,22 +219,30 @@ fn what_follows_paint_is_what_is_made_anew() {
             let substance = *substance.get(dab % 9).unwrap_or(&Substance::Stiffness);
             let values = vec![value; at.len()];
             p.paint(substance, OnBox { at, values: &values }).unwrap();
+            // Also with paint that no step has seen.
+            goes_on(&p, 1);
             if dab % 3 == 1 {
                 continue;
             }
             let mut other = p.clone();
             p.step(Integrator::Paper, 0.4).unwrap();
             if law == linear {
-                // Other matter is all looked at anew; of the 4-D law tangents beside the paint are too.
+                // Other matter is all looked at anew, in another unit perhaps; of the 4-D law tangents beside the paint are too.
                 other.set_matter(p.matter().clone()).unwrap();
                 other.step(Integrator::Paper, 0.4).unwrap();
-                assert!(p.state() == other.state(), "{neighbours:?} dab {dab}");
+                let pairs = p.state().w.iter().zip(&other.state().w);
+                let apart = pairs.fold(0.0_f32, |m, (a, b)| m.max((a - b).abs()));
+                let size = other.state().w.iter().fold(0.0_f32, |m, b| m.max(b.abs()));
+                assert!(
+                    apart < 1e-4 * size,
+                    "{neighbours:?} dab {dab}: {apart:.1e} of {size:.1e}"
+                );
             }
-            let mut anew = Patch::restore(&p.snapshot()).unwrap();
-            let mut on = p.clone();
-            on.step(Integrator::Paper, 0.4).unwrap();
-            anew.step(Integrator::Paper, 0.4).unwrap();
-            assert!(on.state() == anew.state(), "{law:?} {neighbours:?} dab {dab}");
+            goes_on(&p, 1);
+        }
+        // Until the factor is there that is begun when the brush rests.
+        if n == 15 {
+            goes_on(&p, 45);
         }
         let made = p.factorizations();
         assert!(made <= 5, "{law:?} {neighbours:?}: {made} made");
