@@ -348,17 +348,21 @@ impl Document {
         }
     }
 
-    /// Forgets the oldest edits, so that the file takes half its quota.
+    /// Forgets the oldest edits, so that the file takes about half its quota.
     fn shorten(&mut self) -> Result<(), DocumentError> {
         let object_bytes = self
             .layout
             .snapshots
             .last()
             .map_or(0, |(_, record)| record.size());
-        let mut kept = object_bytes;
+        // Objects beyond the quota leave room for some edits all the same.
+        let room = (self.options.quota / 2)
+            .saturating_sub(object_bytes)
+            .max(self.options.quota / 4);
+        let mut kept = 0;
         let fits = |record: &&Record| {
             kept += record.size();
-            kept <= self.options.quota / 2
+            kept <= room
         };
         let first = self.layout.edits.len() - self.layout.edits.iter().rev().take_while(fits).count();
         let first = first.min(self.layout.done);

@@ -286,6 +286,34 @@ fn a_file_keeps_to_its_quota_by_forgetting_the_oldest_edits() {
     assert_eq!(document.state().sha256(), *hashes.last().unwrap());
 }
 
+/// Where the objects alone outgrow the quota, some edits are kept all the same.
+#[test]
+fn what_is_larger_than_its_quota_can_still_be_undone() {
+    let directory = tempdir().unwrap();
+    let path = directory.path().join("large.isoclay");
+    let first = State::new().with("a", object(&common::large())).unwrap();
+    let quota = 20_000;
+    let mut document = Document::create(
+        &path,
+        first,
+        Options {
+            quota,
+            ..Options::default()
+        },
+    )
+    .unwrap();
+    assert!(document.size() > quota);
+    for number in 0..200 {
+        let before = document.state().sha256();
+        let next = dented(document.state(), "a", number);
+        document.commit("dent", Value::Null, next).unwrap();
+        assert_eq!(document.undo(1).unwrap(), 1);
+        assert_eq!(document.state().sha256(), before);
+        document.redo(1).unwrap();
+    }
+    assert!(document.counts().unwrap().forgotten > 0);
+}
+
 #[test]
 fn states_refuse_what_makes_no_sense() {
     let ball = object(&ball());

@@ -59,7 +59,9 @@ impl<T: Real> Patch<T> {
         let list = quantity.paint(samples);
         let before = paint.at.crop(list, dims);
         paint.at.paste(list, dims, paint.values);
-        let done = if substance == Substance::Stiffness && !was_constant && !self.own_springs {
+        // Under a mask samples outside follow those inside.
+        let local = !self.own_springs && self.mask.is_none();
+        let done = if substance == Substance::Stiffness && !was_constant && local {
             self.stiffen(paint)
         } else {
             self.lump_again()
@@ -96,18 +98,16 @@ impl<T: Real> Patch<T> {
         let lattice = self.cache.solver.lattice();
         let dims = lattice.sample_dims();
         let near = paint.at.grown(1, dims);
-        let matter = self.masked_matter(&self.matter);
         let changed: Vec<Vec<(usize, f64)>> = self
             .neighbours
             .directions()
             .into_iter()
             .enumerate()
             .map(|(n, direction)| {
-                let weight = matter.spring_weight(lattice, n, direction);
+                let weight = self.matter.spring_weight(lattice, n, direction);
                 near.indices(dims).map(|i| (i, weight(i))).collect()
             })
             .collect();
-        drop(matter);
         let all = changed.iter().flatten().map(|(_, k)| *k);
         let (least, largest) = all.fold((f64::INFINITY, 0.0_f64), |(l, h), k| (l.min(k), h.max(k)));
         if !largest.is_finite() {

@@ -283,8 +283,8 @@ fn not_loaded(source: &Source, e: FormatError) -> Failure {
     }
 }
 
-/// Writes a fitted field; returns its SHA-256.
-pub fn save(output: &Output, field: &AnyField, report: &FitReport, meta: FieldMeta) -> Outcome<String> {
+/// A report as it stands in a file.
+pub fn stored_text(report: &FitReport) -> String {
     let stored = StoredReport {
         input_count: report.input_count,
         used_count: report.used_count,
@@ -306,8 +306,13 @@ pub fn save(output: &Output, field: &AnyField, report: &FitReport, meta: FieldMe
             unsure_count: s.unsure_count,
         }),
     };
+    serde_json::to_string(&stored).expect("a struct of plain fields is always JSON")
+}
+
+/// Writes a fitted field; returns its SHA-256.
+pub fn save(output: &Output, field: &AnyField, report: &FitReport, meta: FieldMeta) -> Outcome<String> {
     let meta = FieldMeta {
-        report: serde_json::to_string(&stored).expect("a struct of plain fields is always JSON"),
+        report: stored_text(report),
         leaves: report.leaves.iter().map(record).collect(),
         sign_confidence: report
             .signs

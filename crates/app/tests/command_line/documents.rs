@@ -1,6 +1,6 @@
 //! Documents: edits by scenes, undone and done again, and what leaves them.
 
-use super::common::Bench;
+use super::common::{Bench, number};
 
 const SCENE: &str = r#"
 field = "unused"
@@ -147,4 +147,72 @@ fn an_edit_that_finds_no_room_leaves_the_document_as_it_was() {
     assert_eq!(std::fs::read(bench.path("clay.isoclay")).unwrap(), before);
     let after = bench.json("sculpt clay.isoclay --script out.toml");
     assert_eq!(after["done"], 1);
+}
+
+/// Each stroke is an edit; an error names the stroke or the line, and the edits before it stay.
+#[test]
+fn a_session_carves_and_adds_stroke_by_stroke() {
+    let bench = ball();
+    bench.json("new clay.isoclay ball.iclay");
+    bench.write(
+        "session.toml",
+        r#"
+[[stroke]]
+carve = { shape = { sphere = { radius = 0.2 } }, along = [[0.0, -0.4, 1.0], [0.0, 0.4, 1.0]], blend = 0.05 }
+[[stroke]]
+object = "ball"
+add = { shape = { torus = { axis = [0, 1, 0], major = 0.6, minor = 0.1 } }, along = [[0.5, 0.0, 0.0]] }
+"#,
+    );
+    let done = bench.json("sculpt clay.isoclay --script session.toml");
+    assert_eq!(done["done"], 2);
+    let replayed = bench.json("replay clay.isoclay");
+    assert_eq!(replayed["field_sha256"], done["field_sha256"]);
+    // A torus through a ball: what juts out has a hole.
+    let mesh = bench.json("mesh clay.isoclay -o clay.ply --check");
+    assert_eq!(mesh["quality"]["open_edges"], 0, "{mesh}");
+    bench.write(
+        "half.toml",
+        "[[stroke]]\ncarve = { shape = { sphere = { radius = 0.1 } }, along = [[1.0, 0.0, 0.0]] }\n[[stroke]]\n",
+    );
+    let run = bench.run("sculpt clay.isoclay --script half.toml");
+    assert_eq!(run.code, 3);
+    assert!(
+        run.stderr.contains("stroke 2") && run.stderr.contains("carve or add"),
+        "{}",
+        run.stderr
+    );
+    assert_eq!(bench.json("history clay.isoclay")["done"], 2);
+    bench.write("typo.toml", "[[stroke]]\n\ncarv = 1\n");
+    let run = bench.run("sculpt clay.isoclay --script typo.toml");
+    assert!(run.stderr.contains("line 3"), "{}", run.stderr);
+}
+
+#[test]
+fn a_block_is_made_from_nothing_and_shaped() {
+    let bench = Bench::new();
+    bench.json("new block.isoclay --box 10,6,4 --spacing 0.4 --unit mm");
+    let mesh = bench.json("mesh block.isoclay -o block.ply --check");
+    let volume = number(&mesh["quality"], "volume");
+    assert!((volume - 240.0).abs() < 2.0, "{mesh}");
+    bench.write(
+        "drill.toml",
+        "[[stroke]]\nobject = \"block\"\ncarve = { shape = { cylinder = { axis = [0, 0, 1], radius = 1.0, height = 9.0 } }, along = [[1, 0, 0]] }\n",
+    );
+    bench.json("sculpt block.isoclay --script drill.toml");
+    let drilled = bench.json("mesh block.isoclay -o drilled.ply --check");
+    let taken = volume - number(&drilled["quality"], "volume");
+    let whole = 4.0 * std::f64::consts::PI;
+    assert!((taken / whole - 1.0).abs() < 0.02, "{taken} of {whole}");
+    for (arguments, word) in [
+        ("new a.isoclay --box 10", "--spacing"),
+        ("new a.isoclay --spacing 1", "--box"),
+        ("new a.isoclay --box 1 --spacing 0.9", "from 2"),
+        ("new a.isoclay", "FIELD"),
+    ] {
+        let run = bench.run(arguments);
+        assert_eq!(run.code, 2, "{arguments}");
+        assert!(run.stderr.contains(word), "{arguments}: {}", run.stderr);
+    }
+    assert!(!bench.path("a.isoclay").exists());
 }

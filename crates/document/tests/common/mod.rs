@@ -1,9 +1,7 @@
 //! Small fields, and edits drawn at random.
 
-use std::sync::Arc;
-
 use bspline::AnyField;
-use bspline::hierarchical::{BrickKey, DenseCorrections, HierarchicalSpline, Lattice, LevelEdit};
+use bspline::hierarchical::{HierarchicalSpline, Lattice, LevelEdit};
 use document::{Object, Properties, State};
 use formats::field::FieldMeta;
 use glam::{DAffine3, DVec3};
@@ -35,22 +33,8 @@ fn of_cells(cells: u32) -> HierarchicalSpline<f32> {
         world_from_lattice: DAffine3::IDENTITY,
         cells: [cells; 3],
     };
-    let middle = f64::from(cells) / 2.0;
-    let bricks = (cells + 2) / 8 + 1;
-    let level = (0..bricks.pow(3)).map(|n| {
-        let key = [n / bricks / bricks, n / bricks % bricks, n % bricks];
-        let mut functions = DenseCorrections::empty();
-        for slot in 0..512 {
-            let at = [slot / 64, slot / 8 % 8, slot % 8];
-            let function: [u32; 3] = std::array::from_fn(|a| 8 * key[a] + at[a] as u32);
-            if function.iter().all(|&f| f < cells + 3) {
-                let knot = DVec3::from_array(function.map(f64::from)) - 1.0;
-                functions.set(at, (0.8 * middle - knot.distance(DVec3::splat(middle))) as f32);
-            }
-        }
-        (BrickKey(key), Arc::new(functions.pack()))
-    });
-    HierarchicalSpline::from_corrections(lattice, 1.0, vec![level.collect()])
+    let middle = DVec3::splat(f64::from(cells) / 2.0);
+    HierarchicalSpline::schoenberg(lattice, 1.0, |p| 0.8 * middle.x - p.distance(middle)).unwrap()
 }
 
 pub fn object(field: &HierarchicalSpline<f32>) -> Object {

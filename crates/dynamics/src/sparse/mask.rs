@@ -1,3 +1,5 @@
+use std::collections::VecDeque;
+
 use bspline::Real;
 use serde::{Deserialize, Serialize};
 
@@ -16,6 +18,8 @@ pub struct Mask {
     moving: Vec<usize>,
     held: Vec<usize>,
     parts: Vec<MaskPart>,
+    /// Of each sample the one inside whose matter it has: itself, or one of the nearest along the axes.
+    nearest: Vec<u32>,
 }
 
 /// Samples of a mask that springs join.
@@ -65,8 +69,8 @@ impl Mask {
     ///
     /// With [`Rim::Fixed`] the coefficients move all of whose samples lie inside: the change vanishes, with all its
     /// continuous derivatives, where the mask ends, as at the rim of a box. With [`Rim::Free`] those that reach a sample
-    /// inside, so that the matter inside ends freely; that outside weighs and bears [`OUTSIDE`](super::OUTSIDE) of what it
-    /// would, and follows.
+    /// inside, so that the matter inside ends freely; that outside is as the nearest inside but
+    /// [`OUTSIDE`](super::OUTSIDE) as heavy and stiff, and follows.
     ///
     /// # Errors
     /// [`MaskError`].
@@ -103,6 +107,7 @@ impl Mask {
         }
         let parts = parts(lattice, &inside, &moving, neighbours);
         Ok(Self {
+            nearest: nearest(lattice.sample_dims(), &inside),
             inside,
             rim,
             moving,
@@ -114,6 +119,11 @@ impl Mask {
     /// Whether each sample lies inside.
     pub fn inside(&self) -> &[bool] {
         &self.inside
+    }
+
+    /// Of each sample the one inside whose matter it has: itself, or one of the nearest along the axes.
+    pub fn nearest(&self, sample: usize) -> usize {
+        self.nearest[sample] as usize
     }
 
     /// What the coefficients at its border do.
@@ -145,6 +155,16 @@ impl Mask {
         }
     }
 
+    /// Of a quantity of the samples what it is under the mask: `share` of the nearest inside, where a sample is outside.
+    pub(crate) fn extend(&self, list: &mut [f64], share: f64) {
+        // Sources lie inside and keep their values.
+        for i in 0..list.len() {
+            if !self.inside[i] {
+                list[i] = share * list[self.nearest[i] as usize];
+            }
+        }
+    }
+
     /// Lets what belongs to coefficients that are held be 0.
     pub(crate) fn hold<T: Real>(&self, list: &mut [T]) {
         for &c in &self.held {
@@ -160,6 +180,29 @@ impl Mask {
             }
         }
     }
+}
+
+/// Samples inside that are nearest, counted in steps along the axes; of several the one met first.
+fn nearest(dims: [usize; 3], inside: &[bool]) -> Vec<u32> {
+    let mut source = vec![u32::MAX; inside.len()];
+    let mut queue: VecDeque<usize> = (0..inside.len()).filter(|i| inside[*i]).collect();
+    for &i in &queue {
+        source[i] = i as u32;
+    }
+    while let Some(i) = queue.pop_front() {
+        let at = [i / dims[2] / dims[1], i / dims[2] % dims[1], i % dims[2]];
+        for (a, step) in [dims[1] * dims[2], dims[2], 1].into_iter().enumerate() {
+            let below = (at[a] > 0).then(|| i - step);
+            let above = (at[a] + 1 < dims[a]).then(|| i + step);
+            for j in [below, above].into_iter().flatten() {
+                if source[j] == u32::MAX {
+                    source[j] = source[i];
+                    queue.push_back(j);
+                }
+            }
+        }
+    }
+    source
 }
 
 /// How many samples inside, and how many at all, each coefficient reaches.

@@ -11,9 +11,10 @@ use crate::matter::{Matter, Quantity};
 use crate::patch::{Patch, PatchError};
 use crate::springs::{SpringWeights, Weights};
 
-/// What matter outside a mask with a free rim weighs and bears, relative to what it would inside: enough for functions that
-/// reach hardly a sample to be determined, too little to be felt \[Parvizian07\].
-pub const OUTSIDE: f64 = 1e-6;
+/// What matter outside a mask with a free rim weighs and bears, relative to the nearest inside: without it functions that
+/// reach hardly a sample would not be determined \[Parvizian07\]. Less of it, and they swing far beyond what is inside to
+/// fit it; more, and it holds what ends freely.
+pub const OUTSIDE: f64 = 1e-3;
 
 impl<T: Real> Patch<T> {
     /// The patch with only what a mask leaves of it: coefficients that do not move stay 0, and forces outside the mask are
@@ -58,7 +59,7 @@ impl<T: Real> Patch<T> {
         self.mask.as_deref().filter(|m| m.rim() == Rim::Free)
     }
 
-    /// What matter is under the mask: lighter outside.
+    /// What matter is under the mask: outside that of the nearest sample inside, but lighter.
     pub(crate) fn masked_matter<'a>(&self, matter: &'a Matter) -> Cow<'a, Matter> {
         let Some(mask) = self.thinned() else {
             return Cow::Borrowed(matter);
@@ -77,9 +78,7 @@ impl<T: Real> Patch<T> {
                 Quantity::PerSample(list) => list.len() == mask.inside().len(),
             };
             if fits {
-                for (v, inside) in quantity.paint(mask.inside().len()).iter_mut().zip(mask.inside()) {
-                    *v *= if *inside { 1.0 } else { OUTSIDE };
-                }
+                mask.extend(quantity.paint(mask.inside().len()), OUTSIDE);
             }
         }
         Cow::Owned(matter)

@@ -18,6 +18,14 @@ use crate::springs::{SpringWeights, StepMatrix};
 
 /// Residual of the inner iteration of the sparse form.
 const INNER: f64 = 1e-8;
+/// Coefficients that move up to which they get a banded factor: its steps are faster than those of the cycle, which under a
+/// contrast does not converge on a mask.
+const BANDED: usize = 10_000;
+/// Coefficients of the box up to which its sums along the axes, 3 kB each, are taken for that.
+const SUMMED: usize = 40_000;
+/// Coefficients that move up to which the sparse factor, which knows nothing of the box, is made in larger ones.
+const FACTORIZED: usize = 4000;
+
 /// Its most iterations.
 const MOST_INNER: usize = 2000;
 
@@ -39,9 +47,11 @@ pub enum MaskedWay {
 impl MaskedWay {
     /// This one, or in place of [`Best`](Self::Best) the one that is expected to cost least, from what was measured
     /// (`docs/dynamics.md`).
-    pub(crate) fn or_best<T: Real>(self, _lattice: &Lattice<T>, mask: &Mask) -> Self {
+    pub(crate) fn or_best<T: Real>(self, lattice: &Lattice<T>, mask: &Mask) -> Self {
+        let moving = mask.moving().len();
         match self {
-            Self::Best if mask.moving().len() <= 6000 => Self::Band,
+            Self::Best if moving <= BANDED && lattice.coefficient_count() <= SUMMED => Self::Band,
+            Self::Best if moving <= FACTORIZED => Self::SparseFactor,
             Self::Best => Self::Cycle,
             other => other,
         }

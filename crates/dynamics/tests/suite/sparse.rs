@@ -322,13 +322,13 @@ impl Reference {
         patch.springs().clone().add_forces(&state.d, &mut force);
         let sigma2 = patch.springs().law().scale().powi(2);
         for (i, f) in force.iter_mut().enumerate() {
-            let share = patch.mask().map_or(1.0, |m| match (m.rim(), m.inside()[i]) {
-                (Rim::Free, false) => OUTSIDE,
-                _ => 1.0,
+            let (share, source) = patch.mask().map_or((1.0, i), |m| match (m.rim(), m.inside()[i]) {
+                (Rim::Free, false) => (OUTSIDE, m.nearest(i)),
+                _ => (1.0, i),
             });
             *f -= share
                 * sigma2
-                * patch.matter().ground.at(i)
+                * patch.matter().ground.at(source)
                 * patch.lattice().sample_volume()
                 * (state.d[i] - rest[i]);
         }

@@ -38,7 +38,7 @@ pub fn run(args: &Args) -> Outcome {
         let value = document.command(n).map_err(failure)?;
         let command: Command = serde_json::from_value(value)
             .map_err(|e| about(Failure::input(format!("cannot be done again ({e})"))))?;
-        state = command.run(&state, &cancel, &bar).map_err(about)?;
+        state = command.run(&state, &cancel, &bar, &mut notes).map_err(about)?;
         let found = hex(&state.sha256());
         if found != edit.sha256 {
             bar.clear();
