@@ -2,7 +2,7 @@ use std::any::Any;
 
 use glam::{DAffine3, DMat3, DVec3};
 
-use crate::Interval;
+use crate::{Interval, vectorized};
 
 /// An axis-aligned box in world coordinates, ends included.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -210,13 +210,21 @@ pub(crate) fn values_node_by_node<F: Field + ?Sized>(
         count.iter().product::<usize>(),
         "one output slot per node"
     );
-    let mut slot = out.iter_mut();
-    for i in 0..count[0] as i64 {
-        for j in 0..count[1] as i64 {
-            for k in 0..count[2] as i64 {
-                let node = frame.node([lo[0] + i, lo[1] + j, lo[2] + k]);
-                *slot.next().expect("length checked above") = field.value(node);
-            }
-        }
+    if count[2] == 0 {
+        return;
+    }
+    let [x, y, z] = lo.map(|n| n as f64);
+    let map = &frame.world_from_grid;
+    for (row, values) in out.chunks_exact_mut(count[2]).enumerate() {
+        let (i, j) = (x + (row / count[1]) as f64, y + (row % count[1]) as f64);
+        vectorized(
+            #[inline(always)]
+            || {
+                for (k, value) in values.iter_mut().enumerate() {
+                    let node = DVec3::new(i, j, z + f64::from(k as u32));
+                    *value = field.value(map.transform_point3(node));
+                }
+            },
+        );
     }
 }

@@ -2,9 +2,11 @@
 
 use bspline::Real;
 
-use crate::response::StaticSolver;
+use crate::lattice::SampleBox;
 use crate::solve::StepSolver;
 use crate::springs::StepMatrix;
+use crate::statics::StaticSolver;
+use crate::version::{Prepared, Version};
 
 /// Solvers and matrices of a patch.
 #[derive(Clone, Debug)]
@@ -23,31 +25,12 @@ pub(crate) struct Cache<T> {
     pub changes: u64,
     /// Counts paint, which what was made before may survive.
     pub paints: u64,
+    /// Where weights have changed by paint since the solver was made for them.
+    pub painted_on: SampleBox,
     /// Bound of explicit steps with the version it is of.
     pub limit: Option<(Version, f64)>,
     /// Of static problems, painted and of reference; no bit depends on whether they are there.
     pub statics: [Option<Box<StaticSolver>>; 2],
-}
-
-/// What a matrix depends on, counted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Version {
-    /// Matter and constraints that were set.
-    pub changes: u64,
-    /// Matter that was painted since.
-    pub paints: u64,
-}
-
-/// Key of the matrix that the solver was made for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Prepared {
-    pub version: Version,
-    pub damping: f64,
-    pub stiffness: f64,
-    /// Of the matrix.
-    pub unit: f64,
-    /// Residual of the first solve with it.
-    pub residual: f64,
 }
 
 impl<T: Real> Cache<T> {
@@ -62,6 +45,7 @@ impl<T: Real> Cache<T> {
             prepared: None,
             changes: 0,
             paints: 0,
+            painted_on: SampleBox::default(),
             limit: None,
             statics: [None, None],
         }

@@ -34,8 +34,9 @@ impl<T: Real> Patch<T> {
     /// Gives the samples of a box other matter, per volume; all is then as after [`set_matter`](Self::set_matter) with the
     /// same, to the bit. Stiffness costs the box, all else a list.
     ///
-    /// A factor or cycle that is there serves on as long as it solves a step to 10⁻³ of the impulse within the usual
-    /// iterations. If that takes more than two of them several times in a row, a factor of the matter as it is by then is made
+    /// A V-cycle follows at the cost of the box and takes over from a factor beside the steps, which is begun again when some
+    /// steps have gone by without paint. A small factor serves on as long as it solves a step to 10⁻³ of the impulse within the
+    /// usual iterations; if that takes more than two of them several times in a row, one of the matter as it is by then is made
     /// beside the steps and takes its place.
     ///
     /// # Errors
@@ -58,7 +59,9 @@ impl<T: Real> Patch<T> {
         let list = quantity.paint(samples);
         let before = paint.at.crop(list, dims);
         paint.at.paste(list, dims, paint.values);
-        let done = if substance == Substance::Stiffness && !was_constant && !self.own_springs {
+        // Under a mask samples outside follow those inside.
+        let local = !self.own_springs && self.mask.is_none();
+        let done = if substance == Substance::Stiffness && !was_constant && local {
             self.stiffen(paint)
         } else {
             self.lump_again()
@@ -74,13 +77,15 @@ impl<T: Real> Patch<T> {
             return Err(e.into());
         }
         self.cache.paints += 1;
+        // A spring counts where it starts, which may be a sample before the box.
+        self.cache.painted_on = self.cache.painted_on.joined(paint.at.grown(1, dims));
         Ok(())
     }
 
     /// Of all matter.
     fn lump_again(&mut self) -> Result<(), MatterError> {
         let (lumped, springs) = self
-            .matter
+            .masked_matter(&self.matter)
             .in_units(self.cache.solver.lattice(), self.neighbours)?;
         self.lumped = lumped;
         self.network.paint(&springs);

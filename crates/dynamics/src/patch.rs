@@ -1,16 +1,20 @@
 //! A dynamic patch: a lattice, its matter and springs, and how they move.
 
+use std::sync::Arc;
+
 use bspline::Real;
 use serde::{Deserialize, Serialize};
 
-use crate::cache::{Cache, Version};
+use crate::cache::Cache;
 use crate::constraints::Held;
 use crate::lattice::{Lattice, OnBox, SampleBox, TensorWorkspace};
 use crate::matter::{Matter, Quantity, ScaledMatter};
 pub use crate::patch_error::PatchError;
 use crate::solve::{SolverOptions, StepSolver};
+use crate::sparse::Mask;
 use crate::springs::{Law, Neighbours, Plasticity, SpringNetwork, SpringWeights, StepMatrix, Weights};
 use crate::units::largest;
+use crate::version::Version;
 
 /// Energies of a state.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -77,6 +81,8 @@ pub struct Patch<T> {
     /// Largest of them.
     pub(crate) external_size: f64,
     pub(crate) held: Option<Box<Held<T>>>,
+    /// Which samples and coefficients take part, if not all.
+    pub(crate) mask: Option<Arc<Mask>>,
     pub(crate) cache: Cache<T>,
     pub(crate) work: Scratch<T>,
     pub(crate) workspace: TensorWorkspace<T>,
@@ -157,6 +163,7 @@ impl<T: Real> Patch<T> {
             pushed: SampleBox::default(),
             external_size: 0.0,
             held: None,
+            mask: None,
             cache: Cache::new(StepSolver::new(lattice, &steps, options), matrix),
             work: Scratch {
                 g: zeros(m),
@@ -201,7 +208,7 @@ impl<T: Real> Patch<T> {
     }
 
     /// Puts the patch into a state given by changes of the coefficients and their rates, and from there by the least
-    /// change onto its hard constraints.
+    /// change onto its hard constraints. Coefficients that a [mask](Self::mask) holds stay 0.
     ///
     /// # Errors
     /// [`PatchError::Length`], [`PatchError::NotFinite`], [`PatchError::Overflow`]; the state is then the one before.
@@ -212,6 +219,10 @@ impl<T: Real> Patch<T> {
         self.work.before.copy_from(&self.state);
         self.state.p.copy_from_slice(p);
         self.state.v.copy_from_slice(v);
+        if let Some(mask) = &self.mask {
+            mask.hold(&mut self.state.p);
+            mask.hold(&mut self.state.v);
+        }
         self.sample_state();
         self.meet_constraints();
         self.keep_if_finite()
@@ -268,7 +279,9 @@ impl<T: Real> Patch<T> {
     /// # Errors
     /// [`PatchError::Matter`]; the old matter then stays.
     pub fn set_matter(&mut self, matter: Matter) -> Result<(), PatchError> {
-        let (lumped, springs) = matter.in_units(self.cache.solver.lattice(), self.neighbours)?;
+        let masked = self.masked_matter(&matter);
+        let (lumped, springs) = masked.in_units(self.cache.solver.lattice(), self.neighbours)?;
+        drop(masked);
         self.lumped = lumped;
         self.matter = matter;
         self.network.set_springs(&springs);
@@ -284,6 +297,13 @@ impl<T: Real> Patch<T> {
     /// [`PatchError::Directions`] for other directions than those of the patch, [`PatchError::Matter`] for a list of
     /// another length and for numbers that are negative or not finite; the old springs then stay.
     pub fn set_springs(&mut self, springs: &[SpringWeights<f64>]) -> Result<(), PatchError> {
+        self.check_springs(springs)?;
+        let springs = self.masked_springs(springs);
+        self.put_springs(&springs);
+        Ok(())
+    }
+
+    pub(crate) fn check_springs(&self, springs: &[SpringWeights<f64>]) -> Result<(), PatchError> {
         let steps = |s: &[SpringWeights<f64>]| s.iter().map(|s| s.direction.step).collect::<Vec<_>>();
         let needed: Vec<_> = self.neighbours.directions().iter().map(|d| d.step).collect();
         let found = steps(springs);
@@ -297,9 +317,13 @@ impl<T: Real> Patch<T> {
             };
             values.check("spring stiffness", self.base.len(), true)?;
         }
+        Ok(())
+    }
+
+    /// Springs that were checked, and are those of the mask.
+    pub(crate) fn put_springs(&mut self, springs: &[SpringWeights<f64>]) {
         self.network.set_springs(springs);
         self.own_springs = true;
-        Ok(())
     }
 
     /// Counts all that the matrix of a step depends on.
@@ -331,6 +355,9 @@ impl<T: Real> Patch<T> {
             self.external[row..row + self.pushed.count[2]].fill(T::zero());
         }
         force.at.paste(&mut self.external, dims, force.values);
+        if let Some(mask) = &self.mask {
+            mask.cut(&mut self.external);
+        }
         self.pushed = force.at;
         self.external_size = largest(force.values);
         Ok(())
@@ -339,6 +366,9 @@ impl<T: Real> Patch<T> {
     /// Changes the external forces.
     pub(crate) fn write_force(&mut self, write: impl FnOnce(&mut [T])) {
         write(&mut self.external);
+        if let Some(mask) = &self.mask {
+            mask.cut(&mut self.external);
+        }
         self.pushed = self.lattice().all_samples();
         self.external_size = largest(&self.external);
     }

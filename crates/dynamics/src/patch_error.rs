@@ -2,6 +2,7 @@ use crate::constraints::ConstraintError;
 use crate::lattice::SampleBox;
 use crate::matter::MatterError;
 use crate::solve::SolveError;
+use crate::sparse::MaskError;
 
 /// Why a patch cannot be made or moved.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -15,6 +16,9 @@ pub enum PatchError {
     /// Constraints are refused.
     #[error(transparent)]
     Constraint(#[from] ConstraintError),
+    /// A mask is refused.
+    #[error(transparent)]
+    Mask(#[from] MaskError),
     /// A list that does not fit the lattice.
     #[error("{found} {what} were given; the patch needs {needed}")]
     Length {

@@ -2,13 +2,15 @@
 
 use bspline::Real;
 
-use crate::cache::Version;
 use crate::integrators::Integrator;
 use crate::lattice::{Lattice, OnBox, Rim, SampleBox};
 use crate::matter::{Matter, Quantity};
 use crate::patch::{Patch, PatchError, finite};
 use crate::solve::{SolveReport, SolverOptions, StepSolver, VCycleOptions};
+use crate::sparse::Mask;
 use crate::springs::{Law, SpringWeights, StepMatrix, Weights};
+pub use crate::statics::Against;
+use crate::statics::StaticSolver;
 use crate::units::{binary_unit, largest};
 
 /// Residual at which static solves stop. Their errors are smooth and may be some hundred times as large.
@@ -36,33 +38,6 @@ impl<T: Real> Response<T> {
         let terms = places.zip(kernel.values);
         terms.map(|(i, j)| j.as_f64() * self.d[i].as_f64()).sum()
     }
-}
-
-/// Against which springs a static force works.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Against {
-    /// The matter as it is, constraints included; of the 4-D law the tangent of the present state.
-    Painted,
-    /// Linear springs of the same stiffness everywhere and no constraints: what a tool scales its force by, so that painted
-    /// matter shows.
-    Reference {
-        /// Stiffness per volume.
-        stiffness: f64,
-        /// Ground stiffness per volume.
-        ground: f64,
-    },
-}
-
-/// Solver of static problems, in double precision.
-#[derive(Clone, Debug)]
-pub(crate) struct StaticSolver {
-    against: Against,
-    /// Of the matter it is for.
-    version: Version,
-    matrix: StepMatrix<f64>,
-    /// Of the matrix, `σ²` included.
-    unit: f64,
-    solver: StepSolver<f64>,
 }
 
 impl<T: Real> Patch<T> {
@@ -147,6 +122,9 @@ impl<T: Real> Patch<T> {
         for (i, j) in load.at.indices(dims).zip(load.values) {
             self.work.g[i] = T::from_f64(factor * j.as_f64());
         }
+        if let Some(mask) = &self.mask {
+            mask.cut(&mut self.work.g);
+        }
     }
 
     /// Refuses loads that are not on this lattice.
@@ -174,6 +152,7 @@ impl<T: Real> Patch<T> {
             self.check_load(load)?;
         }
         let mut s = self.static_solver(against)?;
+        let mask = self.mask.clone();
         let (dims, count) = (self.lattice().sample_dims(), self.lattice().coefficient_count());
         let mut g = vec![0.0; self.base.len()];
         let (mut x, mut dx) = (vec![0.0; count], vec![0.0; self.base.len()]);
@@ -184,6 +163,9 @@ impl<T: Real> Patch<T> {
             g.fill(0.0);
             for (i, j) in load.at.indices(dims).zip(load.values) {
                 g[i] = j.as_f64() / size;
+            }
+            if let Some(mask) = &mask {
+                mask.cut(&mut g);
             }
             let solve = s.solver.solve(&s.matrix, &g, &mut x, &mut dx).checked()?;
             let residual = solve.iteration.residual;
@@ -222,7 +204,9 @@ impl<T: Real> Patch<T> {
                     ground: Quantity::Constant(ground),
                     ..Matter::default()
                 };
-                let lumped = matter.lumped::<f64>(&self.lattice().in_double(), self.neighbours)?;
+                let lumped = self
+                    .masked_matter(&matter)
+                    .lumped::<f64>(&self.lattice().in_double(), self.neighbours)?;
                 (lumped.ground, lumped.springs)
             }
         };
@@ -230,6 +214,11 @@ impl<T: Real> Patch<T> {
         let stiffest = springs.iter().fold(0.0_f64, |m, s| m.max(s.weights.range().1));
         let anchored = ground.range().1 > 0.0 || held.is_some();
         let fixed = self.lattice().axes().iter().any(|a| a.rim() == Rim::Fixed);
+        let floats = |m: &Mask| m.parts().iter().any(|p| p.floats);
+        let fixed = match &self.mask {
+            Some(mask) => !floats(mask),
+            None => fixed,
+        };
         if !(anchored || fixed && stiffest > 0.0) {
             return Err(PatchError::Unheld);
         }
@@ -274,7 +263,9 @@ impl<T: Real> Patch<T> {
             ..own
         };
         let steps = self.neighbours.directions().into_iter().map(|d| d.step);
-        StepSolver::new(self.lattice().in_double(), &steps.collect::<Vec<_>>(), options)
+        let mut solver = StepSolver::new(self.lattice().in_double(), &steps.collect::<Vec<_>>(), options);
+        solver.set_mask(self.mask.clone());
+        solver
     }
 
     pub(crate) fn exact_ground(&self) -> Weights<f64> {

@@ -75,6 +75,9 @@ impl<T: Real> Patch<T> {
         if !lattice.is_square() {
             self.balance(unit, &mut gathered);
         }
+        if let Some(mask) = &self.mask {
+            mask.hold(&mut gathered);
+        }
         let work = &mut self.work;
         (work.force, work.first_x) = (force, gathered);
         for (i, m) in work.first_dx.iter_mut().enumerate() {

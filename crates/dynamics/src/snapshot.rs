@@ -3,13 +3,14 @@
 use bspline::{KnotVector, Real};
 use serde::{Deserialize, Serialize};
 
-use crate::cache::{Prepared, Version};
 use crate::constraints::{Constraint, Held};
-use crate::lattice::{Axis, Lattice, LatticeError, Rim};
+use crate::lattice::{Axis, Lattice, LatticeError, Rim, SampleBox};
 use crate::matter::Matter;
 use crate::patch::{Patch, PatchError, State, finite};
 use crate::solve::{SolverHistory, SolverOptions};
+use crate::sparse::MaskRecord;
 use crate::springs::{Law, Neighbours, Plasticity, Rest, SpringWeights, StepMatrix, Weights};
+use crate::version::{Prepared, Version};
 
 /// All of a patch that later bits depend on: state, matter, and of the solvers what they were made for. Factors are not in
 /// it; they come out the same when they are made again.
@@ -30,10 +31,11 @@ pub struct PatchSnapshot<T> {
     anchor: Vec<T>,
     external: Vec<T>,
     constraints: Vec<Constraint>,
+    mask: Option<MaskRecord>,
     /// Damping, stiffness, unit and residual of [`Prepared`], as bits: some formats know no infinity.
     prepared: Option<[u64; 4]>,
-    /// Whether there was paint since.
-    painted: bool,
+    /// Where there was paint since.
+    painted: Option<SampleBox>,
     solver: Option<SolverHistory<T>>,
     /// Bits of the damping in the matrix of explicit steps.
     mass_prepared: Option<u64>,
@@ -117,8 +119,9 @@ impl<T: Real> Patch<T> {
             anchor: self.anchor.clone(),
             external: self.external.clone(),
             constraints: self.constraints().to_vec(),
+            mask: self.mask().map(MaskRecord::of),
             prepared: prepared.map(bits),
-            painted: prepared.is_some_and(|p| p.version != now),
+            painted: prepared.and_then(|p| (p.version != now).then_some(cache.painted_on)),
             solver,
             mass_prepared: mass_matrix.map(|m| m.1.to_bits()),
             mass_solver: cache.mass_solver.as_ref().and_then(|s| s.history()),
@@ -143,6 +146,10 @@ impl<T: Real> Patch<T> {
         let lattice = s.lattice().map_err(damaged)?;
         let (n, m) = (lattice.coefficient_count(), lattice.sample_count());
         let mut patch = Self::new(lattice, s.matter.clone(), s.law, s.neighbours, &s.base, s.options)?;
+        if let Some(mask) = &s.mask {
+            let mask = mask.mask(patch.lattice(), s.neighbours)?;
+            patch = patch.with_mask(mask)?;
+        }
         if let Some(weights) = &s.springs {
             let directions = s.neighbours.directions();
             if weights.len() != directions.len() {
@@ -153,7 +160,10 @@ impl<T: Real> Patch<T> {
                 direction,
                 weights: weights.clone(),
             });
-            patch.set_springs(&springs.collect::<Vec<_>>())?;
+            let springs: Vec<_> = springs.collect();
+            patch.check_springs(&springs)?;
+            // They are those of the mask already.
+            patch.put_springs(&springs);
         }
         let sizes = [(&s.state.p, n), (&s.state.v, n), (&s.state.d, m), (&s.state.w, m)];
         for (list, needed) in sizes.into_iter().chain([(&s.anchor, m), (&s.external, m)]) {
@@ -176,7 +186,8 @@ impl<T: Real> Patch<T> {
         patch.write_force(|external| external.copy_from_slice(&s.external));
         if !s.constraints.is_empty() {
             let sigma2 = s.law.scale().powi(2);
-            let held = Held::new(&s.constraints, patch.lattice(), &patch.base, sigma2)?;
+            let mask = patch.mask.as_deref();
+            let held = Held::new(&s.constraints, patch.lattice(), &patch.base, sigma2, mask)?;
             patch.cache.solver.set_border(Some(held.border(true)));
             patch.held = Some(Box::new(held));
         }
@@ -203,7 +214,16 @@ impl<T: Real> Patch<T> {
                 self.fill_matrix(damping, stiffness, unit);
                 self.cache.solver.prepare(&self.cache.matrix)?;
             }
-            let paints = if s.painted { u64::MAX } else { now.paints };
+            let paints = match s.painted {
+                Some(at) if !at.fits(self.lattice().sample_dims()) => {
+                    return Err(damaged("paint beside the samples"));
+                }
+                Some(at) => {
+                    self.cache.painted_on = at;
+                    u64::MAX
+                }
+                None => now.paints,
+            };
             self.cache.prepared = Some(Prepared {
                 version: Version { paints, ..now },
                 damping,

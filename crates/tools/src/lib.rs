@@ -1,4 +1,7 @@
-//! What a hand can do to a field. So far scripted [scenes](scene): kernels, paint, levels and formulas of matter; force tools,
-//! geometric tools and haptics are not built yet.
+//! What a hand can do to a field: scripted [scenes](scene) of forces, matter and constraints, and [geometric] tools that carve and
+//! add. A [session] is a row of strokes. Force tools and haptics are not built yet.
 
+pub mod geometric;
+pub mod number;
 pub mod scene;
+pub mod session;

@@ -60,9 +60,12 @@ macro_rules! either {
 pub(super) use either;
 
 impl OpenField {
-    /// Reads a field file.
+    /// Reads a field file, or the only object of a document.
     pub fn load(source: &Source) -> Outcome<Self> {
-        let loaded = formats::field::load(source.path(), &limits(None)).map_err(|e| not_loaded(source, e))?;
+        let loaded = match document::is_document(source.path()) {
+            true => only_object(source)?,
+            false => formats::field::load(source.path(), &limits(None)).map_err(|e| not_loaded(source, e))?,
+        };
         let stored: StoredReport = serde_json::from_str(&loaded.meta.report).map_err(|e| {
             Failure::input(format!(
                 "{}: its fit report cannot be read ({e}); fit the input again",
@@ -243,6 +246,25 @@ impl OpenField {
     }
 }
 
+/// The field of a document that has one object, in the object's own place.
+fn only_object(source: &Source) -> Outcome<LoadedField> {
+    let document = super::document::open(source.path(), &mut Vec::new())?;
+    let objects = document.state().objects();
+    let mut all = objects.values();
+    let (Some(object), None) = (all.next(), all.next()) else {
+        return Err(Failure::input(format!(
+            "{0}: has {1} objects; write one as a field first: isoclay export {0} --object NAME -o FIELD.iclay",
+            source.name(),
+            objects.len()
+        )));
+    };
+    Ok(LoadedField {
+        field: AnyField::F32(object.field.clone()),
+        meta: super::document::edited_meta(object),
+        skipped_chunks: Vec::new(),
+    })
+}
+
 /// What is wrong with a file that is no field: one of another kind has to be fitted first.
 fn not_loaded(source: &Source, e: FormatError) -> Failure {
     match formats::detect(source.path()) {
@@ -261,8 +283,8 @@ fn not_loaded(source: &Source, e: FormatError) -> Failure {
     }
 }
 
-/// Writes a fitted field; returns its SHA-256.
-pub fn save(output: &Output, field: &AnyField, report: &FitReport, meta: FieldMeta) -> Outcome<String> {
+/// A report as it stands in a file.
+pub fn stored_text(report: &FitReport) -> String {
     let stored = StoredReport {
         input_count: report.input_count,
         used_count: report.used_count,
@@ -284,8 +306,13 @@ pub fn save(output: &Output, field: &AnyField, report: &FitReport, meta: FieldMe
             unsure_count: s.unsure_count,
         }),
     };
+    serde_json::to_string(&stored).expect("a struct of plain fields is always JSON")
+}
+
+/// Writes a fitted field; returns its SHA-256.
+pub fn save(output: &Output, field: &AnyField, report: &FitReport, meta: FieldMeta) -> Outcome<String> {
     let meta = FieldMeta {
-        report: serde_json::to_string(&stored).expect("a struct of plain fields is always JSON"),
+        report: stored_text(report),
         leaves: report.leaves.iter().map(record).collect(),
         sign_confidence: report
             .signs

@@ -6,12 +6,14 @@ mod belongs;
 mod ceiling;
 mod chart_dynamics;
 mod chart_edits;
+mod chart_fields;
 mod chart_mesh;
 mod chart_orient;
 mod charts;
 mod check;
 mod convert;
 mod cost;
+mod document;
 mod end;
 mod eval;
 mod failure;
@@ -88,6 +90,20 @@ enum Command {
     Picture(picture::Args),
     /// Move a region of a field by a scripted scene: forces, matter and constraints over time
     Simulate(simulate::Args),
+    /// Make a document of fields, to be edited with a history
+    New(document::new::Args),
+    /// Edit an object of a document by a scene
+    Sculpt(document::sculpt::Args),
+    /// List the edits of a document
+    History(document::history::Args),
+    /// Undo the last edits of a document
+    Undo(document::undo::Args),
+    /// Do edits of a document again that were undone
+    Redo(document::undo::Args),
+    /// Do all edits of a document again and compare the result
+    Replay(document::replay::Args),
+    /// Write an object of a document as a field
+    Export(document::export::Args),
     /// Draw speed against accuracy
     Charts(charts::Args),
 }
@@ -127,6 +143,13 @@ pub fn main() -> ExitCode {
         Command::Phantom(a) => phantom::run(a),
         Command::Picture(a) => picture::run(a),
         Command::Simulate(a) => simulate::run(a),
+        Command::New(a) => document::new::run(a),
+        Command::Sculpt(a) => document::sculpt::run(a),
+        Command::History(a) => document::history::run(a),
+        Command::Undo(a) => document::undo::run(a, false),
+        Command::Redo(a) => document::undo::run(a, true),
+        Command::Replay(a) => document::replay::run(a),
+        Command::Export(a) => document::export::run(a),
         Command::Charts(a) => charts::run(a),
     });
     match outcome {
@@ -182,6 +205,12 @@ impl Command {
             Self::Phantom(a) => (a.json, is_stdout(&a.output)),
             Self::Picture(a) => (a.json, is_stdout(&a.output)),
             Self::Simulate(a) => (a.json, is_stdout(&a.output)),
+            Self::New(a) => (a.json, false),
+            Self::Sculpt(a) => (a.json, false),
+            Self::History(a) => (a.json, false),
+            Self::Undo(a) | Self::Redo(a) => (a.json, false),
+            Self::Replay(a) => (a.json, false),
+            Self::Export(a) => (a.json, is_stdout(&a.output)),
             Self::Charts(a) => (a.json(), false),
         }
     }

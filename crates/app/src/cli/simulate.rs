@@ -137,6 +137,16 @@ pub fn run(args: &Args) -> Outcome {
 
 /// Reads a scene; what is wrong is told with its line.
 fn read(script: &Source) -> Outcome<Scene> {
+    parsed(&text(script)?).map_err(|e| Failure::input(format!("{}: {e}", script.name())))
+}
+
+/// The scene that a text says; the message has the line of what is wrong.
+pub fn parsed(text: &str) -> Result<Scene, String> {
+    toml::from_str(text).map_err(|e| e.to_string().trim_end().into())
+}
+
+/// The text of a scene.
+pub fn text(script: &Source) -> Outcome<String> {
     const LARGEST: u64 = 16 << 20;
     let path = script.path();
     let about = |why: String| Failure::input(format!("{}: {why}", script.name()));
@@ -148,8 +158,7 @@ fn read(script: &Source) -> Outcome<Scene> {
             "has {size} bytes, and a scene at most {LARGEST}; is this the right file?"
         )));
     }
-    let text = std::fs::read_to_string(path).map_err(|e| about(e.to_string()))?;
-    toml::from_str(&text).map_err(|e| about(e.to_string().trim_end().into()))
+    std::fs::read_to_string(path).map_err(|e| about(e.to_string()))
 }
 
 /// A scene with all that its run needs.

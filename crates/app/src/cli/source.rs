@@ -57,7 +57,7 @@ pub const POINTS: &str =
 pub const VOLUMES: &str = "volumes .nii .hdr .nrrd .nhdr .mha .mhd .tif (each also .gz), directories of DICOM or .tif \
     slices, and voxels without a header by --shape and --voxel";
 /// What is made by `isoclay fit`.
-pub const FIELDS: &str = "fields .iclay, as isoclay fit writes them";
+pub const FIELDS: &str = "fields .iclay, as isoclay fit writes them, and documents .isoclay of one object";
 
 impl Source {
     /// The file `given`, or standard input for `-`; `format` names the format of a content that does not tell it.

@@ -19,7 +19,7 @@ pub struct VolumeChoice {
     stride: Option<OneOrThree<Step>>,
     /// Distances between neighbouring voxels in mm, in place of those in the file: one number, or three
     #[arg(long, value_name = "N|X,Y,Z", allow_hyphen_values = true)]
-    spacing: Option<OneOrThree<Spacing>>,
+    spacing: Option<OneOrThree<Length>>,
     /// Which volume of a time series, of echoes or channels to read, counted from 0
     #[arg(long, value_name = "N", value_parser = whole::<usize>, allow_negative_numbers = true)]
     volume: Option<usize>,
@@ -91,11 +91,11 @@ impl VolumeChoice {
         if self.dims.is_some() {
             return None;
         }
-        self.spacing.take().map(|s| s.0.map(|Spacing(s)| s))
+        self.spacing.take().map(|s| s.0.map(|Length(s)| s))
     }
 
     fn spacing(&self) -> Option<[f64; 3]> {
-        self.spacing.as_ref().map(|s| s.0.map(|Spacing(s)| s))
+        self.spacing.as_ref().map(|s| s.0.map(|Length(s)| s))
     }
 
     /// The options of the reader; `unit` is what the user says of the file.
@@ -159,14 +159,14 @@ fn whole<T: FromStr>(s: &str) -> Result<T, String> {
 struct Triple<T>([T; 3]);
 
 /// One value for all axes, or three with commas between.
-#[derive(Clone, Debug, PartialEq)]
-struct OneOrThree<T>([T; 3]);
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OneOrThree<T>(pub [T; 3]);
 
 /// A length above zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Spacing(f64);
+pub struct Length(pub f64);
 
-impl FromStr for Spacing {
+impl FromStr for Length {
     type Err = String;
     fn from_str(s: &str) -> Result<Self, String> {
         positive(s).map(Self)
@@ -247,10 +247,10 @@ mod tests {
             Ok(Triple([Range(1, 5), Range(2, 6), Range(0, 9)]))
         );
         assert_eq!("2".parse(), Ok(OneOrThree([Step(2); 3])));
-        assert_eq!("0.5,1,2".parse(), Ok(OneOrThree([0.5, 1.0, 2.0].map(Spacing))));
+        assert_eq!("0.5,1,2".parse(), Ok(OneOrThree([0.5, 1.0, 2.0].map(Length))));
         assert!(
             "1,0,1"
-                .parse::<OneOrThree<Spacing>>()
+                .parse::<OneOrThree<Length>>()
                 .unwrap_err()
                 .contains("above zero")
         );

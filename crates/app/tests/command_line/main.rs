@@ -2,6 +2,7 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod documents;
 mod meshes;
 #[path = "../common/wrong_values.rs"]
 mod wrong_values;
@@ -376,6 +377,7 @@ fn a_wrong_value_is_named_with_its_option_and_its_remedy() {
     bench.json("phantom sphere -o cloud.ply --count 500");
     bench.json("phantom head -o head.nii --size 16");
     bench.json("fit cloud.ply -o field.iclay --max-depth 6");
+    bench.json("new clay.isoclay field.iclay");
     bench.write("notes.docx", "some words");
     let region =
         "[region]\nmin = [-0.5, -0.5, 0.6]\nmax = [0.5, 0.5, 1.3]\n[time]\nduration = 0.01\nstep = 0.01\n";
@@ -394,6 +396,8 @@ fn a_wrong_value_is_named_with_its_option_and_its_remedy() {
                 typed += &match part {
                     "@cloud" | "@volume" => wrong_values::besides(command, part),
                     "@out" => wrong_values::out(command).to_string(),
+                    "@script" if command == "sculpt" => "--script scene.toml".into(),
+                    "@script" => String::new(),
                     part => part.replace('*', ""),
                 };
             }

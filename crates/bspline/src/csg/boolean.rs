@@ -180,12 +180,49 @@ impl Boolean {
             .collect()
     }
 
+    /// [`Self::live`] of two, but that the second may be left to its values: the bounds of a spline, which is the first
+    /// of most pairs, cost more than its values unless one only asks about a level.
+    fn live_pair<'a>(
+        &self,
+        [first, second]: [&'a Branch; 2],
+        frame: &Frame,
+        lo: [i64; 3],
+        hi: [i64; 3],
+    ) -> Vec<&'a Branch> {
+        let range = second.map_interval(second.field.frame_bounds(frame, lo, hi));
+        let beats = match self.operation {
+            Operation::Union => range.lo,
+            Operation::Intersection => range.hi,
+        };
+        let about = first.map_interval(first.field.frame_bounds_about(frame, lo, hi, first.map(beats)));
+        let is_beaten = match self.operation {
+            Operation::Union => about.hi < beats,
+            Operation::Intersection => about.lo > beats,
+        };
+        if is_beaten {
+            vec![second]
+        } else {
+            vec![first, second]
+        }
+    }
+
+    /// Whether a later branch within `range` can take the place of none of `best`.
+    fn is_beaten(&self, range: Interval, best: &[f64]) -> bool {
+        match self.operation {
+            Operation::Union => best.iter().all(|b| range.hi <= *b),
+            Operation::Intersection => best.iter().all(|b| range.lo >= *b),
+        }
+    }
+
     /// Values of the block of `count` nodes from node `start` of `grid`, of which only `candidates` can decide:
     /// divided until few of them live.
     fn fill(&self, candidates: &[&Branch], grid: &mut Grid, start: [usize; 3], count: [usize; 3]) {
         let lo: [i64; 3] = std::array::from_fn(|a| grid.lo[a] + start[a] as i64);
         let hi: [i64; 3] = std::array::from_fn(|a| lo[a] + count[a] as i64 - 1);
-        let live = self.live(candidates, |field| field.frame_bounds(grid.frame, lo, hi));
+        let live = match candidates {
+            [first, second] => self.live_pair([first, second], grid.frame, lo, hi),
+            _ => self.live(candidates, |field| field.frame_bounds(grid.frame, lo, hi)),
+        };
         let edge = BLOCK[usize::from(live.len() > 2)];
         if live.len() > 1 && count.iter().any(|n| *n > edge) {
             let halves: [usize; 3] = std::array::from_fn(|a| {
@@ -219,7 +256,8 @@ impl Boolean {
         }
     }
 
-    /// Values of one block from the branches that live there. `term` is as long as `out`.
+    /// Values of one block from the branches that may win there. `term` is room for those of one; of a pair
+    /// the second is left out where its bounds say that it beats none of the first's values.
     fn block_values(
         &self,
         live: &[&Branch],
@@ -232,8 +270,13 @@ impl Boolean {
         let (first, rest) = live.split_first().expect("a branch lives everywhere");
         first.field.frame_values(frame, lo, count, out);
         out.iter_mut().for_each(|v| *v = first.map(*v));
-        term.resize(if rest.is_empty() { 0 } else { out.len() }, 0.0);
+        let hi = std::array::from_fn(|a| lo[a] + count[a] as i64 - 1);
         for branch in rest {
+            let range = || branch.map_interval(branch.field.frame_bounds(frame, lo, hi));
+            if live.len() == 2 && self.is_beaten(range(), out) {
+                continue;
+            }
+            term.resize(out.len(), 0.0);
             branch.field.frame_values(frame, lo, count, term);
             for (o, t) in out.iter_mut().zip(term.iter()) {
                 let t = branch.map(*t);

@@ -4,10 +4,10 @@ use std::sync::Arc;
 use glam::{DAffine3, DVec3};
 use sha2::{Digest, Sha256};
 
-use super::brick::{BRICK, HALO_LEN};
+use super::brick::{BRICK, BRICK_LEN, DenseCorrections, HALO_LEN};
 use super::functions::{EditError, check_functions};
 use super::node::{Node, octant};
-use super::{BrickKey, Lattice, LevelCorrections, build, kernel};
+use super::{BrickKey, Corrections, Lattice, LevelCorrections, build, kernel};
 use crate::Real;
 use crate::placed_box::PlacedBox;
 
@@ -99,6 +99,37 @@ impl<T: Real> HierarchicalSpline<T> {
             },
             root: build::tree(&lattice, levels),
         })
+    }
+
+    /// A field of level 0 alone, whose coefficients are the values of `f` at their knots, world coordinates: Schoenberg's
+    /// approximation, exact where `f` is linear, which stays between the least and the largest of the values \[Schoenberg67\].
+    ///
+    /// # Errors
+    /// [`EditError::NotFinite`] for a value that is none.
+    ///
+    /// # Panics
+    /// As [`Self::try_from_corrections`].
+    pub fn schoenberg(lattice: Lattice, slope: f64, f: impl Fn(DVec3) -> f64) -> Result<Self, EditError> {
+        let bricks = lattice.cells.map(|n| (n + 2) / BRICK as u32 + 1);
+        let keys = (0..bricks[0]).flat_map(move |x| {
+            (0..bricks[1]).flat_map(move |y| (0..bricks[2]).map(move |z| BrickKey([x, y, z])))
+        });
+        let level = keys.map(|key| {
+            let mut functions = DenseCorrections::empty();
+            for slot in 0..BRICK_LEN {
+                let at = [slot / (BRICK * BRICK), slot / BRICK % BRICK, slot % BRICK];
+                let number: [u32; 3] = std::array::from_fn(|a| BRICK as u32 * key.0[a] + at[a] as u32);
+                if (0..3).all(|a| number[a] < lattice.cells[a] + 3) {
+                    let knot = DVec3::from_array(number.map(f64::from)) - 1.0;
+                    functions.set(
+                        at,
+                        T::from_f64(f(lattice.world_from_lattice.transform_point3(knot))),
+                    );
+                }
+            }
+            (key, Arc::new(functions.pack()))
+        });
+        Self::try_from_corrections(lattice, slope, vec![level.collect()])
     }
 
     /// Bricks of `level` that hold active functions, in key order. Takes time in proportion to their number.
@@ -216,6 +247,27 @@ impl<T: Real> HierarchicalSpline<T> {
             _ => finest_over(&self.root, finest, cell),
         };
         Place::new(brick, finest, cell, q)
+    }
+}
+
+impl HierarchicalSpline<f64> {
+    /// In single precision, coefficients rounded to the nearest.
+    ///
+    /// # Errors
+    /// [`EditError::NotFinite`] for a coefficient beyond single precision.
+    pub fn to_single(&self) -> Result<HierarchicalSpline<f32>, EditError> {
+        let level = |level| {
+            let rounded = |functions: &Corrections<f64>| {
+                let values = functions.values().iter().map(|&v| v as f32);
+                Arc::new(Corrections::new(*functions.mask(), values.collect()))
+            };
+            let bricks = self.corrections(level).into_iter();
+            bricks
+                .map(|(key, functions)| (key, rounded(&functions)))
+                .collect()
+        };
+        let levels = (0..self.level_count()).map(level).collect();
+        HierarchicalSpline::try_from_corrections(self.lattice, self.slope(), levels)
     }
 }
 

@@ -23,6 +23,7 @@ impl Sphere {
 }
 
 impl Field for Sphere {
+    #[inline(always)]
     fn value(&self, p: DVec3) -> f64 {
         self.radius - (p - self.center).length()
     }

@@ -33,7 +33,9 @@ impl<T: Real> System<T> for Stiffness<'_, T> {
             self.solver.lattice().sample(p, d, &mut self.workspace);
             self.stiffness.apply(d, s);
             self.solver.lattice().gather(s, q, &mut self.workspace);
-            dot(d, s)
+            let curvature = dot(d, s);
+            self.solver.hold(q);
+            curvature
         };
         for (row, stiffness) in self.springs {
             curvature += add_spring(row, *stiffness, p, q);
@@ -99,11 +101,10 @@ impl<T: Real> Patch<T> {
     pub(crate) fn mass_solver(&mut self) -> Box<StepSolver<T>> {
         self.cache.mass_solver.take().unwrap_or_else(|| {
             let steps = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
-            Box::new(StepSolver::new(
-                self.cache.solver.lattice().clone(),
-                &steps,
-                self.cache.solver.options(),
-            ))
+            let own = &self.cache.solver;
+            let mut solver = StepSolver::new(own.lattice().clone(), &steps, own.options());
+            solver.set_mask(self.mask.clone());
+            Box::new(solver)
         })
     }
 

@@ -1,10 +1,11 @@
 use bspline::Real;
 
-use crate::cache::Prepared;
+use crate::lattice::SampleBox;
 use crate::patch::{Patch, PatchError};
 use crate::solve::{ITERATED, Method, SolveReport};
 use crate::springs::{Law, Weights};
 use crate::units::binary_unit;
+use crate::version::Prepared;
 
 /// Beyond this ratio of step sizes a factor is not tried again: four in `Δt²` costs about eight iterations.
 const STALE: f64 = 4.0;
@@ -104,10 +105,20 @@ impl<T: Real> Patch<T> {
         let mut fresh = !near || (!same && (uniform || diagonalized));
         // A factor of matter before the last paint is no more than that.
         let painted = self.cache.prepared.is_some_and(|p| p.version != version);
+        // What follows paint does so for the matrix that it was made for; for another step it is made anew.
+        let follows = !fresh && painted && self.cache.solver.follows_paint();
+        let of_this_step = |p: Prepared| p.damping == damping && p.stiffness == stiffness;
+        let mut at =
+            (follows && self.cache.prepared.is_some_and(of_this_step)).then_some(self.cache.painted_on);
+        fresh |= follows;
         loop {
             if fresh {
                 self.cache.prepared = None;
-                self.cache.solver.prepare(&self.cache.matrix)?;
+                self.cache.painted_on = SampleBox::default();
+                match at.take() {
+                    Some(at) => self.cache.solver.repaint(&self.cache.matrix, at)?,
+                    None => self.cache.solver.prepare(&self.cache.matrix)?,
+                }
             }
             let usual = self.cache.solver.tolerance();
             let asked = match residual {
@@ -120,7 +131,16 @@ impl<T: Real> Patch<T> {
                     .solver
                     .solve_to(&self.cache.matrix, &work.g, &mut work.x, &mut work.dx, asked);
             let left = report.iteration.residual;
-            if fresh {
+            let known = self.cache.prepared.map_or(0.0, |p| p.residual);
+            // Those that iterate stop there.
+            let trusted = match report.method {
+                Method::VCycle | Method::SampleMultigrid => 3.0 * ITERATED,
+                _ => TRUSTED,
+            };
+            let solved = left <= trusted.max(2.0 * known) && report.iteration.negative_curvature.is_none();
+            // Beside the paint, what followed it may still be of tangents that have changed since.
+            let anew = fresh && self.cache.solver.is_made_for(&self.cache.matrix);
+            if fresh && (solved || anew) {
                 self.cache.prepared = Some(Prepared {
                     version,
                     damping,
@@ -130,13 +150,7 @@ impl<T: Real> Patch<T> {
                 });
                 return Ok(report.checked()?);
             }
-            let known = self.cache.prepared.map_or(0.0, |p| p.residual);
-            // Those that iterate stop there.
-            let trusted = match report.method {
-                Method::VCycle | Method::SampleMultigrid => 3.0 * ITERATED,
-                _ => TRUSTED,
-            };
-            if left <= trusted.max(2.0 * known) && report.iteration.negative_curvature.is_none() {
+            if solved {
                 return Ok(report);
             }
             fresh = true;

@@ -1,3 +1,5 @@
+use std::ops::Range;
+
 use bspline::Real;
 use nalgebra::DMatrix;
 
@@ -102,6 +104,25 @@ impl<T: Real> Banded<T> {
         Self::from_rows(self.columns, rows)
     }
 
+    /// Columns that the rows `rows` have weights in.
+    pub fn support(&self, rows: Range<usize>) -> Range<usize> {
+        let filled = rows.filter(|&i| !self.row(i).1.is_empty());
+        let ends = filled.map(|i| (self.row(i).0, self.row(i).0 + self.row(i).1.len()));
+        ends.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+            .map_or(0..0, |(a, b)| a..b)
+    }
+
+    /// The least stretch of rows with all that have weights in the columns `columns`.
+    pub fn reached(&self, columns: Range<usize>) -> Range<usize> {
+        let meets = |i: &usize| {
+            let (first, weights) = self.row(*i);
+            first < columns.end && columns.start < first + weights.len()
+        };
+        let first = (0..self.rows()).find(meets);
+        let last = (0..self.rows()).rfind(meets);
+        first.zip(last).map_or(0..0, |(a, b)| a..b + 1)
+    }
+
     /// All elements.
     pub fn to_dense(&self) -> DMatrix<f64> {
         let mut out = DMatrix::zeros(self.rows(), self.columns);
@@ -129,7 +150,7 @@ impl<T: Real> Banded<T> {
 
 /// `out = Σ_j w_j x_j`, where `x_j` are successive stretches as long as `out`. Four terms at a time, in order.
 #[inline(always)]
-fn combine<T: Real>(weights: &[T], x: &[T], out: &mut [T]) {
+pub(super) fn combine<T: Real>(weights: &[T], x: &[T], out: &mut [T]) {
     let n = out.len();
     let row = |j: usize| &x[j * n..(j + 1) * n];
     let whole = weights.len() / 4 * 4;

@@ -51,6 +51,22 @@ impl SampleBox {
         }
     }
 
+    /// The least box with this one and another.
+    pub fn joined(&self, other: Self) -> Self {
+        if self.is_empty() {
+            return other;
+        }
+        if other.is_empty() {
+            return *self;
+        }
+        let first: [usize; 3] = std::array::from_fn(|a| self.first[a].min(other.first[a]));
+        let end = |a: usize| (self.first[a] + self.count[a]).max(other.first[a] + other.count[a]);
+        Self {
+            first,
+            count: std::array::from_fn(|a| end(a) - first[a]),
+        }
+    }
+
     /// Numbers of its samples in a lattice of `dims` samples, z fastest.
     pub fn indices(&self, dims: [usize; 3]) -> impl Iterator<Item = usize> + use<> {
         let count = self.count[2];

@@ -1,7 +1,9 @@
+use std::ops::Range;
+
 use bspline::Real;
 use bspline::vectorized;
 
-use super::banded::{Banded, BandedLanes};
+use super::banded::{Banded, BandedLanes, combine};
 
 /// The tensor product of three banded matrices, applied axis by axis to arrays with z fastest.
 #[derive(Clone, Debug)]
@@ -102,6 +104,79 @@ impl<T: Real> TensorProduct<T> {
                             self.y.apply_planes(iz, a, b);
                         }
                         self.z.apply_lines(along_y, output);
+                    },
+                );
+            }
+        }
+    }
+
+    /// Rows of the first two factors that the inputs `x` and `y` reach.
+    pub fn reached(&self, [x, y]: [Range<usize>; 2]) -> [Range<usize>; 2] {
+        [self.x.reached(x), self.y.reached(y)]
+    }
+
+    /// Planes of the input that the planes `x` of the output are made of.
+    pub fn read_by(&self, x: Range<usize>) -> Range<usize> {
+        self.x.support(x)
+    }
+
+    /// The same of a box of outputs only, whole along z: those bits that [`apply`](Self::apply) writes there.
+    pub fn apply_on(
+        &self,
+        [xs, ys]: [Range<usize>; 2],
+        input: &[T],
+        output: &mut [T],
+        w: &mut TensorWorkspace<T>,
+    ) {
+        let ([_, iy, iz], [_, oy, oz]) = (self.input_dims(), self.output_dims());
+        let (from_x, from_y) = (self.x.support(xs.clone()), self.y.support(ys.clone()));
+        // Rows of y in a plane of which those from `first` on are there.
+        let along_y = |plane: &[T], first: usize, line: usize, out: &mut [T]| {
+            for (j, out) in ys.clone().zip(out.chunks_exact_mut(line)) {
+                let (begin, weights) = self.y.row(j);
+                let at = begin.saturating_sub(first) * line;
+                combine(weights, &plane[at..at + weights.len() * line], out);
+            }
+        };
+        let width = ys.len();
+        match self.order {
+            Order::FastFirst => {
+                let (lines, planes) = w.split(from_x.len() * from_y.len() * oz, from_x.len() * width * oz);
+                vectorized(
+                    #[inline(always)]
+                    || {
+                        let (rows, some) = (from_y.len() * oz, width * oz);
+                        for (n, i) in from_x.clone().enumerate() {
+                            let line = |j: usize| (i * iy + j) * iz;
+                            let plane = &mut lines[n * rows..(n + 1) * rows];
+                            self.z
+                                .apply_lines(&input[line(from_y.start)..line(from_y.end)], plane);
+                            along_y(plane, from_y.start, oz, &mut planes[n * some..(n + 1) * some]);
+                        }
+                        for i in xs.clone() {
+                            let (begin, weights) = self.x.row(i);
+                            let at = begin.saturating_sub(from_x.start) * width * oz;
+                            let line = |j: usize| (i * oy + j) * oz;
+                            let planes = &planes[at..at + weights.len() * width * oz];
+                            combine(weights, planes, &mut output[line(ys.start)..line(ys.end)]);
+                        }
+                    },
+                );
+            }
+            Order::SlowFirst => {
+                let (planes, lines) = w.split(iy * iz, width * iz);
+                vectorized(
+                    #[inline(always)]
+                    || {
+                        for i in xs.clone() {
+                            let (begin, weights) = self.x.row(i);
+                            let at = begin * iy * iz;
+                            combine(weights, &input[at..at + weights.len() * iy * iz], planes);
+                            along_y(planes, 0, iz, lines);
+                            let line = |j: usize| (i * oy + j) * oz;
+                            self.z
+                                .apply_lines(lines, &mut output[line(ys.start)..line(ys.end)]);
+                        }
                     },
                 );
             }

@@ -148,7 +148,7 @@ impl<T: Real> Region<T> {
     /// constraints are let go, the solvers begin anew. `matter` is that of the new cells.
     ///
     /// # Errors
-    /// As [`bake`](Self::bake) and [`new`](Self::new); [`RegionError::OtherLevel`].
+    /// As [`bake`](Self::bake) and [`new`](Self::new); [`RegionError::OtherLevel`], [`RegionError::Masked`].
     pub fn moved(
         &self,
         onto: &HierarchicalSpline<T>,
@@ -160,6 +160,9 @@ impl<T: Real> Region<T> {
                 from: self.cells.level,
                 to: cells.level,
             });
+        }
+        if self.patch.mask().is_some() {
+            return Err(RegionError::Masked);
         }
         let field = self.bake(onto)?;
         let options = RegionOptions {

@@ -161,7 +161,7 @@ impl<T: Real> Region<T> {
     /// Parts are boxes whose ends are samples: cells and samples have to meet more often than at the ends of the
     /// region, as they do every three cells with 4/3 samples a cell if the number of cells is a multiple of three. What
     /// sleeps stands still until it is off its balance by more than the threshold, which is looked at every few steps.
-    /// A part stays cut while only the forces change, and across sleep. Regions under constraints stay whole. Off at first.
+    /// A part stays cut while only the forces change, and across sleep. Regions under constraints or a mask stay whole. Off at first.
     pub fn set_parts_sleep(&mut self, parts: bool) {
         self.part = None;
         self.parts.forget();
@@ -191,7 +191,7 @@ impl<T: Real> Region<T> {
     /// A step of what is awake.
     pub(super) fn step_parts(&mut self, integrator: Integrator, dt: f64) -> Result<StepReport, PatchError> {
         let solves = solves(integrator) as f64;
-        if !self.parts.on || !self.patch.constraints().is_empty() {
+        if !self.parts.on || !self.patch.constraints().is_empty() || self.patch.mask().is_some() {
             self.part = None;
             return self.step_whole(integrator, dt);
         }

@@ -6,7 +6,7 @@ use super::band_cholesky::{BandCholesky, NotPositive, SLICE};
 use super::galerkin::Galerkin;
 use super::pcg::Preconditioner;
 use super::v_cycle::{VCycle, VCycleOptions};
-use crate::lattice::Lattice;
+use crate::lattice::{Lattice, SampleBox};
 use crate::springs::StepMatrix;
 
 /// A V-cycle without blocks, and the factor that takes its place. The work on the factor is a fixed part per solve, so
@@ -27,12 +27,16 @@ pub(super) struct Background<T> {
     stale: bool,
 }
 
+/// Solves after a dab of paint before a factor is begun: another dab would make it useless.
+const WAIT: usize = 12;
+
 /// What comes next, in the order of time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub(super) enum Work {
-    /// Nothing in the solve for which the V-cycle was prepared.
-    Prepared,
-    Assembly,
+    /// Nothing, so many solves after paint; nothing either in the solve for which the V-cycle was prepared.
+    Wait(usize),
+    /// One of the parts of the matrix, the last being to write it.
+    Assembly(usize),
     /// Rows from here on.
     Rows(usize),
     Done,
@@ -47,8 +51,8 @@ impl<T: Real> Background<T> {
             cycle: VCycle::new(lattice, steps, VCycleOptions { blocks: 0, ..options }),
             factor: BandCholesky::new(lattice.coefficient_count(), galerkin.band()),
             galerkin,
-            work: Work::Prepared,
-            made: Work::Prepared,
+            work: Work::Wait(WAIT),
+            made: Work::Wait(WAIT),
             failed: None,
             stale: false,
         }
@@ -60,10 +64,23 @@ impl<T: Real> Background<T> {
     /// [`NotPositive`] if the V-cycle cannot be prepared.
     pub fn prepare(&mut self, s: &StepMatrix<T>) -> Result<(), NotPositive> {
         self.cycle.prepare(s)?;
-        self.made = Work::Prepared;
+        self.made = Work::Wait(WAIT);
         self.failed = None;
         self.stale = false;
-        self.work = Work::Prepared;
+        self.work = Work::Wait(WAIT);
+        Ok(())
+    }
+
+    /// The same where the matrix has changed in a box only, and may soon change again.
+    ///
+    /// # Errors
+    /// [`NotPositive`] as [`prepare`](Self::prepare).
+    pub fn repaint(&mut self, s: &StepMatrix<T>, at: SampleBox) -> Result<(), NotPositive> {
+        self.cycle.fit(s, at)?;
+        self.made = Work::Wait(WAIT);
+        self.failed = None;
+        self.stale = false;
+        self.work = Work::Wait(0);
         Ok(())
     }
 
@@ -72,7 +89,7 @@ impl<T: Real> Background<T> {
     /// # Errors
     /// [`NotPositive`] if the V-cycle cannot be prepared.
     pub fn begin_again(&mut self, matrix: &StepMatrix<T>) -> Result<(), NotPositive> {
-        self.work = Work::Prepared;
+        self.work = Work::Wait(WAIT);
         if self.stale {
             self.cycle.prepare(matrix)?;
             self.stale = false;
@@ -83,6 +100,11 @@ impl<T: Real> Background<T> {
     /// The factor, and what assembles it.
     pub fn factor(&mut self) -> (&mut Galerkin, &mut BandCholesky<T>) {
         (&mut self.galerkin, &mut self.factor)
+    }
+
+    /// Whether the V-cycle is of another matrix than the factor.
+    pub fn is_stale(&self) -> bool {
+        self.stale
     }
 
     /// Told that the factor is now that of another matrix.
@@ -108,8 +130,10 @@ impl<T: Real> Background<T> {
     /// What follows on the work that is next now, which is done where it is not yet.
     fn next(&mut self, matrix: &StepMatrix<T>) -> Work {
         let next = match self.work {
-            Work::Prepared => Work::Assembly,
-            Work::Assembly => Work::Rows(0),
+            Work::Wait(solves) if solves < WAIT => Work::Wait(solves + 1),
+            Work::Wait(_) => Work::Assembly(0),
+            Work::Assembly(part) if part < self.galerkin.parts() => Work::Assembly(part + 1),
+            Work::Assembly(_) => Work::Rows(0),
             Work::Rows(row) if self.failed == Some(row) => Work::Impossible,
             Work::Rows(row) if row + SLICE >= self.factor.len() => Work::Done,
             Work::Rows(row) => Work::Rows(row + SLICE),
@@ -120,7 +144,7 @@ impl<T: Real> Background<T> {
         }
         self.made = next;
         match self.work {
-            Work::Assembly => self.galerkin.assemble(matrix, &mut self.factor),
+            Work::Assembly(part) => self.galerkin.assemble_part(matrix, part, &mut self.factor),
             Work::Rows(row) if self.factor.factorize_slice(row).is_err() => {
                 self.failed = Some(row);
                 self.made = Work::Impossible;
@@ -139,6 +163,9 @@ impl<T: Real> Background<T> {
 
     /// Goes to where another one was.
     pub fn resume(&mut self, matrix: &StepMatrix<T>, work: Work) {
+        if let Work::Wait(_) = work {
+            self.work = work;
+        }
         while self.work < work && !matches!(self.work, Work::Done | Work::Impossible) {
             self.work = self.next(matrix);
         }

@@ -80,7 +80,12 @@ impl<T: Real> BandCholesky<T> {
 
     /// Clears the matrix, to be filled by [`set`](Self::set) and factorized.
     pub fn clear(&mut self) {
-        self.rows.fill(T::zero());
+        self.clear_from(0);
+    }
+
+    /// Clears its rows from `row` on.
+    pub(super) fn clear_from(&mut self, row: usize) {
+        self.rows[row * self.layout.stride..].fill(T::zero());
     }
 
     /// Sets element `(i, j)`, `i - band <= j <= i`.
@@ -95,7 +100,20 @@ impl<T: Real> BandCholesky<T> {
     /// # Errors
     /// [`NotPositive`]; the contents are then of no use.
     pub fn factorize(&mut self) -> Result<(), NotPositive> {
-        (0..self.n)
+        self.factorize_from(0)
+    }
+
+    /// The row at which the elimination can begin again so that row `row` is made anew.
+    pub(super) fn slice_of(&self, row: usize) -> usize {
+        row / SLICE * SLICE
+    }
+
+    /// Overwrites the rows of the matrix from `row` on, a beginning of a slice, those before being done.
+    ///
+    /// # Errors
+    /// [`NotPositive`]; the contents are then of no use.
+    pub(super) fn factorize_from(&mut self, row: usize) -> Result<(), NotPositive> {
+        (row..self.n)
             .step_by(SLICE)
             .try_for_each(|row| self.factorize_slice(row))
     }

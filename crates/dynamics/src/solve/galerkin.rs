@@ -4,10 +4,12 @@
 //! samples with the matrices of *pairs* of 1-D functions gives all elements at once, at the cost of a few sampling
 //! operations per coefficient instead of 64² products per sample.
 
+use std::ops::Range;
+
 use bspline::Real;
 
 use super::band_cholesky::{BandCholesky, NotPositive};
-use crate::lattice::{Banded, Lattice, TensorProduct, TensorWorkspace};
+use crate::lattice::{Banded, Lattice, SampleBox, TensorProduct, TensorWorkspace};
 use crate::springs::{StepMatrix, Weights};
 
 /// First share, in units of rounding, that a diagonal is raised by, and the ratio of one try to the next.
@@ -156,6 +158,37 @@ impl Galerkin {
         ((rx * ny + ry) * nz + rz).min(n - 1)
     }
 
+    /// Largest distance along each axis of two coefficients that share a spring.
+    pub(crate) fn reach(&self) -> [usize; 3] {
+        self.reach
+    }
+
+    /// The factor of the rows and columns of some coefficients, whose numbers ascend.
+    ///
+    /// # Errors
+    /// [`NotPositive`].
+    pub(crate) fn factorize_part<T: Real>(
+        &mut self,
+        s: &StepMatrix<T>,
+        numbers: &[usize],
+        into: &mut BandCholesky<T>,
+    ) -> Result<(), NotPositive> {
+        self.accumulate(s);
+        let [_, ny, nz] = self.dims;
+        let place = |i: usize| [i / nz / ny, i / nz % ny, i % nz];
+        let (galerkin, band) = (&*self, into.band());
+        factorize_raised(into, 0, |raised, _, into| {
+            into.clear();
+            for (row, &i) in numbers.iter().enumerate() {
+                for column in row.saturating_sub(band)..=row {
+                    let v = galerkin.element(place(numbers[column]), place(i));
+                    into.set(row, column, if row == column { v * (1.0 + raised) } else { v });
+                }
+            }
+        })?;
+        Ok(())
+    }
+
     /// Coefficients along each axis.
     pub fn dims(&self) -> [usize; 3] {
         self.dims
@@ -178,30 +211,99 @@ impl Galerkin {
 
     /// Sums of all pairs.
     pub fn accumulate<T: Real>(&mut self, s: &StepMatrix<T>) {
+        for part in 0..self.parts() {
+            self.accumulate_part(s, part, [0..self.pair_dims[0], 0..self.pair_dims[1]]);
+        }
+    }
+
+    /// Sums anew what weights on a box of samples are part of, all others being as they were: the bits of
+    /// [`accumulate`](Self::accumulate). Returns the first coefficient that has changed.
+    pub fn accumulate_on<T: Real>(&mut self, s: &StepMatrix<T>, at: SampleBox) -> usize {
+        let pairs = self.pairs_touched(at);
+        if pairs.iter().any(Range::is_empty) {
+            return self.dims.iter().product();
+        }
+        for part in 0..self.parts() {
+            self.accumulate_part(s, part, pairs.clone());
+        }
+        let [_, ny, nz] = self.dims;
+        self.touched(at)[0].start * ny * nz
+    }
+
+    /// Coefficients along x and y whose sums the weights on a box of samples are part of.
+    pub fn touched(&self, at: SampleBox) -> [Range<usize>; 2] {
+        let [x, y] = self.pairs_touched(at);
+        let [rx, ry, _] = self.reach;
+        // Of a pair the first along x is the lesser; along y either may be.
+        let x = x.start / (rx + 1)..(x.end.div_ceil(rx + 1) + rx).min(self.dims[0]);
+        let y =
+            (y.start / (2 * ry + 1)).saturating_sub(ry)..(y.end.div_ceil(2 * ry + 1) + ry).min(self.dims[1]);
+        [x, y]
+    }
+
+    fn pairs_touched(&self, at: SampleBox) -> [Range<usize>; 2] {
+        // Diagonal springs act like mass at both of their ends.
+        let ends = usize::from(self.springs.len() > 3);
+        let samples = [0, 1].map(|k| at.first[k].saturating_sub(ends)..at.first[k] + at.count[k] + ends);
+        let products = self.springs.iter().flatten().chain([&self.mass]);
+        let reached = products.map(|p| p.reached(samples.clone()));
+        let join = |a: Range<usize>, b: Range<usize>| match (a.is_empty(), b.is_empty()) {
+            (true, _) => b,
+            (_, true) => a,
+            _ => a.start.min(b.start)..a.end.max(b.end),
+        };
+        let joined = reached.reduce(|[ax, ay], [bx, by]| [join(ax, bx), join(ay, by)]);
+        joined.unwrap_or([0..0, 0..0])
+    }
+
+    /// Into how many parts the sum falls: the mass, and the springs of each direction.
+    pub fn parts(&self) -> usize {
+        1 + self.springs.len()
+    }
+
+    /// One of the parts, in their order, of the sums of a box of pairs.
+    pub fn accumulate_part<T: Real>(&mut self, s: &StepMatrix<T>, part: usize, pairs: [Range<usize>; 2]) {
         let steps = s.springs.iter().map(|s| &s.direction.step);
         assert!(steps.eq(&self.steps), "springs as planned");
-        fill(&mut self.weights, &s.mass);
-        // A diagonal spring w (a - a')(a - a')ᵀ is w (aaᵀ + a'a'ᵀ), which acts like mass at its ends, less its cross
-        // terms; one along an axis is taken as the difference itself, since that one is a tensor product.
-        let weights = &mut self.weights;
-        s.for_each_spring(|i, j, w, n| {
-            if n >= 3 {
-                weights[i] += w.as_f64();
-                weights[j] += w.as_f64();
+        let plane = s.dims()[1] * s.dims()[2];
+        let Some(direction) = part.checked_sub(1) else {
+            let read = self.mass.read_by(pairs[0].clone());
+            fill(&mut self.weights, &s.mass, read.start * plane..read.end * plane);
+            // A diagonal spring w (a - a')(a - a')ᵀ is w (aaᵀ + a'a'ᵀ), which acts like mass at its ends, less its cross
+            // terms; one along an axis is taken as the difference itself, since that one is a tensor product.
+            if s.springs.len() > 3 {
+                let weights = &mut self.weights;
+                s.for_each_spring(|i, j, w, n| {
+                    if n >= 3 {
+                        weights[i] += w.as_f64();
+                        weights[j] += w.as_f64();
+                    }
+                });
             }
-        });
-        self.mass
-            .apply(&self.weights, &mut self.sums, &mut self.workspace);
-        for (products, springs) in self.springs.iter().zip(&s.springs) {
-            fill(&mut self.weights, &springs.weights);
-            let sign = if springs.direction.axis().is_some() {
-                1.0
-            } else {
-                -1.0
-            };
-            for product in products {
-                product.apply(&self.weights, &mut self.term, &mut self.workspace);
-                for (sum, t) in self.sums.iter_mut().zip(&self.term) {
+            self.mass
+                .apply_on(pairs, &self.weights, &mut self.sums, &mut self.workspace);
+            return;
+        };
+        let springs = &s.springs[direction];
+        for product in &self.springs[direction] {
+            let read = product.read_by(pairs[0].clone());
+            fill(
+                &mut self.weights,
+                &springs.weights,
+                read.start * plane..read.end * plane,
+            );
+        }
+        let sign = if springs.direction.axis().is_some() {
+            1.0
+        } else {
+            -1.0
+        };
+        let [_, py, pz] = self.pair_dims;
+        for product in &self.springs[direction] {
+            product.apply_on(pairs.clone(), &self.weights, &mut self.term, &mut self.workspace);
+            for x in pairs[0].clone() {
+                let plane = (x * py + pairs[1].start) * pz..(x * py + pairs[1].end) * pz;
+                for (sum, t) in self.sums[plane.clone()].iter_mut().zip(&self.term[plane]) {
                     *sum += sign * t;
                 }
             }
@@ -222,37 +324,49 @@ impl Galerkin {
         into: &mut BandCholesky<T>,
     ) -> Result<(), NotPositive> {
         self.accumulate(s);
-        let mut raised = 0.0;
-        loop {
-            self.write(raised, into);
-            match into.factorize() {
-                Err(_) if raised < 1e-2 => {
-                    raised = if raised == 0.0 {
-                        RAISED * T::UNIT_ROUND_OFF
-                    } else {
-                        RAISED * raised
-                    };
-                }
-                done => return done,
-            }
-        }
+        self.factorize_sums(into, 0).map(|_| ())
+    }
+
+    /// The same of the sums that are there, which have changed from coefficient `first` on since `into` was made of them:
+    /// its rows before stay. Returns the share that the diagonal was raised by; the rows of a factor that was raised are no
+    /// use to another.
+    ///
+    /// # Errors
+    /// As [`factorize`](Self::factorize).
+    pub fn factorize_sums<T: Real>(
+        &self,
+        into: &mut BandCholesky<T>,
+        first: usize,
+    ) -> Result<f64, NotPositive> {
+        factorize_raised(into, first, |raised, from, into| self.write(raised, from, into))
     }
 
     /// Writes `AᵀSA` into a band of the right size.
     pub fn assemble<T: Real>(&mut self, s: &StepMatrix<T>, into: &mut BandCholesky<T>) {
-        self.accumulate(s);
-        self.write(0.0, into);
+        for part in 0..=self.parts() {
+            self.assemble_part(s, part, into);
+        }
     }
 
-    /// Writes the matrix that was summed last, its diagonal larger by the share `raised`.
-    fn write<T: Real>(&self, raised: f64, into: &mut BandCholesky<T>) {
-        into.clear();
+    /// One part of this work, to be done in order: all but the last add to the sums, the last writes them.
+    pub fn assemble_part<T: Real>(&mut self, s: &StepMatrix<T>, part: usize, into: &mut BandCholesky<T>) {
+        if part < self.parts() {
+            self.accumulate_part(s, part, [0..self.pair_dims[0], 0..self.pair_dims[1]]);
+        } else {
+            self.write(0.0, 0, into);
+        }
+    }
+
+    /// Its rows from `first_row` on, the diagonal larger by the share `raised`.
+    fn write<T: Real>(&self, raised: f64, first_row: usize, into: &mut BandCholesky<T>) {
+        into.clear_from(first_row);
         let [nx, ny, nz] = self.dims;
         let [_, py, pz] = self.pair_dims;
         let [rx, ry, rz] = self.reach;
         let number = |i: usize, j: usize, k: usize| (i * ny + j) * nz + k;
-        for i in 0..nx {
-            for ox in 0..=rx.min(nx - 1 - i) {
+        let first_plane = first_row / (ny * nz);
+        for i in first_plane.saturating_sub(rx)..nx {
+            for ox in first_plane.saturating_sub(i)..=rx.min(nx - 1 - i) {
                 let plane = (i * (rx + 1) + ox) * py * pz;
                 for j in 0..ny {
                     // The other function is the later one.
@@ -268,6 +382,9 @@ impl Galerkin {
                             for k2 in from..(k + rz + 1).min(nz) {
                                 let v = self.sums[row + k * (2 * rz + 1) + k2 + rz - k];
                                 let (to, from) = (number(i + ox, j2, k2), number(i, j, k));
+                                if to < first_row {
+                                    continue;
+                                }
                                 into.set(to, from, if to == from { v * (1.0 + raised) } else { v });
                             }
                         }
@@ -282,13 +399,43 @@ impl Galerkin {
         self.accumulate(s);
         &self.sums
     }
+
+    /// The sums that are there: of a plan for the diagonal, the diagonal.
+    pub fn sums(&self) -> &[f64] {
+        &self.sums
+    }
 }
 
-fn fill<T: Real>(out: &mut [f64], weights: &Weights<T>) {
+/// The factor of the matrix whose rows from some row on `write` writes with their diagonal larger by a share, returned: by none,
+/// or by as little as makes it positive definite in the working precision. Rows before `first` have their factor already.
+fn factorize_raised<T: Real>(
+    into: &mut BandCholesky<T>,
+    first: usize,
+    write: impl Fn(f64, usize, &mut BandCholesky<T>),
+) -> Result<f64, NotPositive> {
+    let (mut raised, mut from) = (0.0, into.slice_of(first));
+    loop {
+        write(raised, from, into);
+        match into.factorize_from(from) {
+            Err(_) if raised < 1e-2 => {
+                raised = if raised == 0.0 {
+                    RAISED * T::UNIT_ROUND_OFF
+                } else {
+                    RAISED * raised
+                };
+                from = 0;
+            }
+            done => return done.map(|()| raised),
+        }
+    }
+}
+
+/// Writes the weights of a stretch of samples.
+fn fill<T: Real>(out: &mut [f64], weights: &Weights<T>, at: Range<usize>) {
     match weights {
-        Weights::Constant(w) => out.fill(w.as_f64()),
+        Weights::Constant(w) => out[at].fill(w.as_f64()),
         Weights::Each(w) => {
-            for (o, w) in out.iter_mut().zip(w) {
+            for (o, w) in out[at.clone()].iter_mut().zip(&w[at]) {
                 *o = w.as_f64();
             }
         }

@@ -10,7 +10,8 @@ use crate::springs::StepMatrix;
 /// What comes next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum Stage {
-    Assembly,
+    /// One of the parts of the matrix.
+    Assembly(usize),
     /// Rows from here on.
     Rows(usize),
 }
@@ -38,7 +39,7 @@ impl<T: Real> Renewal<T> {
         Self {
             matrix,
             factor: BandCholesky::new(old.len(), old.band()),
-            stage: Stage::Assembly,
+            stage: Stage::Assembly(0),
         }
     }
 
@@ -50,9 +51,13 @@ impl<T: Real> Renewal<T> {
     /// The next part of the work: the same after every solve, so that no step stalls and the same steps give the same bits.
     pub fn advance(&mut self, galerkin: &mut Galerkin) -> Renewed {
         match self.stage {
-            Stage::Assembly => {
-                galerkin.assemble(&self.matrix, &mut self.factor);
-                self.stage = Stage::Rows(0);
+            Stage::Assembly(part) => {
+                galerkin.assemble_part(&self.matrix, part, &mut self.factor);
+                self.stage = if part < galerkin.parts() {
+                    Stage::Assembly(part + 1)
+                } else {
+                    Stage::Rows(0)
+                };
                 Renewed::NotYet
             }
             Stage::Rows(row) => {

@@ -3,6 +3,7 @@
 use super::band_cholesky::NotPositive;
 use super::pcg::PcgReport;
 use super::v_cycle::VCycleOptions;
+use crate::sparse::{MaskedWay, NotDefinite};
 use serde::{Deserialize, Serialize};
 
 /// Limits of a solve.
@@ -21,6 +22,8 @@ pub struct SolverOptions {
     pub background_limit: usize,
     /// Of the V-cycle for more.
     pub v_cycle: VCycleOptions,
+    /// How a patch with a mask is solved.
+    pub masked: MaskedWay,
 }
 
 impl Default for SolverOptions {
@@ -31,11 +34,24 @@ impl Default for SolverOptions {
             direct_limit: 1000,
             background_limit: 6000,
             v_cycle: VCycleOptions::default(),
+            masked: MaskedWay::Best,
         }
     }
 }
 
 impl SolverOptions {
+    /// The method for so many free coefficients, `square` with as many samples; a V-cycle may give way to a factor that is made
+    /// beside the steps.
+    pub(crate) fn method(&self, uniform: bool, coefficients: usize, square: bool) -> Method {
+        match (uniform, square) {
+            (true, _) => Method::FastDiagonalization,
+            (_, true) if coefficients <= self.sample_direct_limit() => Method::SampleDirect,
+            (_, true) => Method::SampleMultigrid,
+            (_, false) if coefficients <= self.direct_limit => Method::Direct,
+            (_, false) => Method::VCycle,
+        }
+    }
+
     /// Free coefficients up to which the matrix of a lattice with as many samples is factorized.
     pub fn sample_direct_limit(&self) -> usize {
         4 * self.direct_limit
@@ -59,6 +75,10 @@ pub enum Method {
     SampleDirect,
     /// Multigrid on the samples: as many coefficients as samples.
     SampleMultigrid,
+    /// Sparse Cholesky factor: a patch with a mask.
+    SparseDirect,
+    /// Conjugate gradients on the sparse form: a patch with a mask.
+    SparseIteration,
 }
 
 impl Method {
@@ -70,6 +90,8 @@ impl Method {
             Self::VCycle => "v-cycle",
             Self::SampleDirect => "sample-direct",
             Self::SampleMultigrid => "sample-multigrid",
+            Self::SparseDirect => "sparse-direct",
+            Self::SparseIteration => "sparse-iteration",
         }
     }
 }
@@ -84,6 +106,12 @@ pub struct SolveReport {
 }
 
 impl SolveReport {
+    /// Whether what is left of the impulse is at most [`ITERATED`]; increments may be wrong by as much. An iteration that its
+    /// cap ended before has not converged: take a shorter step, more iterations, less contrast, or double precision.
+    pub fn converged(&self) -> bool {
+        self.iteration.residual <= ITERATED && self.iteration.negative_curvature.is_none()
+    }
+
     /// The worst of this solve and a later one.
     pub(crate) fn and(self, later: Self) -> Self {
         let (a, b) = (self.iteration, later.iteration);
@@ -128,4 +156,7 @@ pub enum SolveError {
     /// Not positive definite.
     #[error(transparent)]
     NotPositive(#[from] NotPositive),
+    /// Not positive definite, of a sparse form.
+    #[error(transparent)]
+    NotDefinite(#[from] NotDefinite),
 }

@@ -1,5 +1,7 @@
 //! Overlapping blocks of coefficients, each solved exactly: the additive Schwarz method, where material is painted.
 
+use std::ops::Range;
+
 use bspline::Real;
 use bspline::vectorized;
 
@@ -38,8 +40,16 @@ const LANES: usize = 8;
 
 impl<T: Real> Schwarz<T> {
     /// Inverts the blocks of the matrix that `galerkin` has summed in which `variation`, one number per coefficient,
-    /// has a largest value more than `contrast` times the smallest.
-    pub fn new(galerkin: &Galerkin, size: usize, stride: usize, variation: &[f64], contrast: f64) -> Self {
+    /// has a largest value more than `contrast` times the smallest. Of blocks made before, with the coefficients whose sums
+    /// have changed since, by their range along x and y, those beside these are taken over.
+    pub fn new(
+        galerkin: &Galerkin,
+        size: usize,
+        stride: usize,
+        variation: &[f64],
+        contrast: f64,
+        before: Option<(&Self, [Range<usize>; 2])>,
+    ) -> Self {
         let dims = galerkin.dims();
         let len = dims.map(|n| size.min(n));
         let starts = |a: usize| {
@@ -72,6 +82,14 @@ impl<T: Real> Schwarz<T> {
                     if high <= contrast * low {
                         continue;
                     }
+                    out.blocks.push(block);
+                    if let Some(kept) = before
+                        .as_ref()
+                        .and_then(|(old, changed)| old.kept(block, changed))
+                    {
+                        out.inverses.extend_from_slice(&kept[..n * pad]);
+                        continue;
+                    }
                     for a in 0..n {
                         for b in 0..=a {
                             let v = galerkin.element(block.place(a), block.place(b));
@@ -81,12 +99,19 @@ impl<T: Real> Schwarz<T> {
                     }
                     invert(&mut h, n, pad);
                     out.inverses.extend(h.iter().map(|&v| T::from_f64(v)));
-                    out.blocks.push(block);
                 }
             }
         }
         out.local = [vec![T::zero(); pad], vec![T::zero(); pad]];
         out
+    }
+
+    /// The inverse of a block that is among these, if nothing in it has changed.
+    fn kept(&self, block: Block, changed: &[Range<usize>; 2]) -> Option<&[T]> {
+        let beside =
+            |k: usize| block.start[k] + block.len[k] <= changed[k].start || changed[k].end <= block.start[k];
+        let index = self.blocks.binary_search_by_key(&block.start, |b| b.start).ok()?;
+        (beside(0) || beside(1)).then(|| &self.inverses[self.blocks[index].at..])
     }
 
     /// Number of blocks.

@@ -1,21 +1,20 @@
 //! The methods that solve a step, behind one interface.
 
-use bspline::Real;
-use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
-use super::background::{Background, Work};
-use super::band_cholesky::{BandCholesky, NotPositive};
+use bspline::Real;
+
+use super::band_cholesky::NotPositive;
 use super::border::Border;
-use super::dot::dot;
 use super::fast_diagonalization::FastDiagonalization;
-use super::galerkin::Galerkin;
-use super::pcg::{CoefficientSystem, ConjugateGradients, PcgReport, Preconditioner, System, add_scaled};
-use super::renewal::{Renewal, Renewed, Stage};
+use super::painted::{Dynamic, Painted, active, fill_band};
+use super::pcg::{CoefficientSystem, ConjugateGradients, PcgReport};
+use super::renewal::{Renewal, Renewed};
 use super::report::{ITERATED, Method, SolveError, SolveReport, SolverOptions};
-use super::sample_multigrid::SampleMultigrid;
-use super::v_cycle::VCycle;
-use crate::lattice::{Lattice, TensorProduct, TensorWorkspace};
-use crate::springs::{SpringWeights, StepMatrix, Weights};
+use super::systems::{SampleSystem, Sampled};
+use crate::lattice::{Lattice, SampleBox, TensorProduct, TensorWorkspace};
+use crate::sparse::{Mask, MaskedWay, Projected};
+use crate::springs::StepMatrix;
 use crate::units::{binary_unit, largest};
 
 /// Residual, in units of rounding of single precision, at which solves by a factor stop.
@@ -52,97 +51,24 @@ pub struct StepSolver<T> {
     steps: Vec<[isize; 3]>,
     method: Method,
     diagonalization: FastDiagonalization<T>,
-    painted: Painted<T>,
+    pub(super) painted: Painted<T>,
     /// What `painted` was made for.
-    painted_for: Option<StepMatrix<T>>,
+    pub(super) painted_for: Option<StepMatrix<T>>,
     /// Whether the solver was prepared since it began anew.
-    begun: bool,
+    pub(super) begun: bool,
     /// Slow solves in a row.
-    slow: usize,
+    pub(super) slow: usize,
     /// The factor that will take the place of the one at hand.
-    renewal: Option<Box<Renewal<T>>>,
+    pub(super) renewal: Option<Box<Renewal<T>>>,
     inverse: Option<SampleInverse>,
+    /// Which coefficients move, if not all.
+    mask: Option<Arc<Mask>>,
     iteration: ConjugateGradients<T>,
-    border: Option<Box<Border<T>>>,
+    pub(super) border: Option<Box<Border<T>>>,
     factorizations: usize,
     b: Vec<T>,
     samples: [Vec<T>; 2],
     workspace: TensorWorkspace<T>,
-}
-
-/// Made when the first painted matrix comes.
-#[derive(Clone, Debug)]
-enum Painted<T> {
-    None,
-    Direct(Box<(Galerkin, BandCholesky<T>)>),
-    Background(Box<Background<T>>),
-    VCycle(Box<VCycle<T>>),
-    SampleDirect(BandCholesky<T>),
-    SampleMultigrid(Box<SampleMultigrid<T>>),
-}
-
-/// All of a solver that is neither its lattice nor made from the matrix at hand: the matrix that it was prepared for, how
-/// far the factor is that is made beside the steps, and that which will take its place.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct SolverHistory<T> {
-    matrix: MatrixRecord<T>,
-    progress: Option<Work>,
-    slow: usize,
-    renewal: Option<(MatrixRecord<T>, Stage)>,
-}
-
-/// The weights of a [`StepMatrix`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-struct MatrixRecord<T> {
-    mass: Weights<T>,
-    springs: Vec<Weights<T>>,
-}
-
-impl<T: Real> MatrixRecord<T> {
-    fn of(matrix: &StepMatrix<T>) -> Self {
-        Self {
-            mass: matrix.mass.clone(),
-            springs: matrix.springs.iter().map(|s| s.weights.clone()).collect(),
-        }
-    }
-
-    /// With the springs of `like`.
-    fn matrix(&self, like: &StepMatrix<T>) -> StepMatrix<T> {
-        let springs = like.springs.iter().zip(&self.springs);
-        let springs = springs.map(|(s, w)| SpringWeights {
-            direction: s.direction,
-            weights: w.clone(),
-        });
-        StepMatrix::new(like.dims(), self.mass.clone(), springs.collect())
-    }
-
-    fn fits(&self, like: &StepMatrix<T>) -> bool {
-        let samples = like.dims().iter().product();
-        let fit = |w: &Weights<T>| match w {
-            Weights::Constant(_) => true,
-            Weights::Each(list) => list.len() == samples,
-        };
-        self.springs.len() == like.springs.len() && fit(&self.mass) && self.springs.iter().all(fit)
-    }
-}
-
-impl<T: Real> SolverHistory<T> {
-    /// Whether its matrices have as many samples and springs as `like`.
-    pub fn fits(&self, like: &StepMatrix<T>) -> bool {
-        let renewal = self.renewal.as_ref().is_none_or(|(m, _)| m.fits(like));
-        self.matrix.fits(like) && renewal
-    }
-}
-
-impl<T: Real> Painted<T> {
-    /// The factor on the coefficients, if there is one, and what assembles it.
-    fn factor(&mut self) -> Option<(&mut Galerkin, &mut BandCholesky<T>)> {
-        match self {
-            Self::Direct(direct) => Some((&mut direct.0, &mut direct.1)),
-            Self::Background(background) => Some(background.factor()),
-            _ => None,
-        }
-    }
 }
 
 /// `A⁻¹` in double precision.
@@ -152,22 +78,6 @@ struct SampleInverse {
     d: Vec<f64>,
     p: Vec<f64>,
     workspace: TensorWorkspace<f64>,
-}
-
-/// `S` on the samples.
-struct SampleSystem<'a, T, P> {
-    matrix: &'a StepMatrix<T>,
-    preconditioner: &'a mut P,
-}
-
-impl<T: Real, P: Preconditioner<T>> System<T> for SampleSystem<'_, T, P> {
-    fn apply(&mut self, p: &[T], q: &mut [T]) -> f64 {
-        self.matrix.apply(p, q);
-        dot(p, q)
-    }
-    fn precondition(&mut self, r: &[T], z: &mut [T]) {
-        self.preconditioner.apply(self.matrix, r, z);
-    }
 }
 
 impl<T: Real> StepSolver<T> {
@@ -194,6 +104,7 @@ impl<T: Real> StepSolver<T> {
                 p: vec![0.0; m],
                 workspace: TensorWorkspace::new(),
             }),
+            mask: None,
             iteration: ConjugateGradients::new(lattice.coefficient_count()),
             border: None,
             factorizations: 0,
@@ -231,7 +142,7 @@ impl<T: Real> StepSolver<T> {
     /// [`SolveError`] if it is not positive definite.
     pub fn prepare(&mut self, s: &StepMatrix<T>) -> Result<(), SolveError> {
         // Springs across diagonals are no tensor product where the lattice ends.
-        if s.is_uniform() && s.springs.len() == 3 {
+        if s.is_uniform() && s.springs.len() == 3 && self.mask.is_none() {
             self.diagonalization.set_constant(s);
             self.method = Method::FastDiagonalization;
             self.begun = false;
@@ -239,7 +150,7 @@ impl<T: Real> StepSolver<T> {
             return Ok(());
         }
         if matches!(self.painted, Painted::None) {
-            self.painted = self.make_painted();
+            self.painted = Painted::new(&self.lattice, &self.steps, &self.options, self.mask.as_ref());
         }
         if self.painted_for.as_ref() != Some(s) {
             self.painted_for = None;
@@ -255,10 +166,52 @@ impl<T: Real> StepSolver<T> {
         Ok(())
     }
 
-    /// Makes factors and cycles for a matrix.
-    fn make(&mut self, s: &StepMatrix<T>) -> Result<(), NotPositive> {
-        self.factorizations += 1;
+    /// Whether nothing that it was made for differs from a matrix.
+    pub(crate) fn is_made_for(&self, s: &StepMatrix<T>) -> bool {
+        self.method == Method::FastDiagonalization || self.painted_for.as_ref() == Some(s)
+    }
+
+    /// Whether it can follow paint at the cost of the box.
+    pub(crate) fn follows_paint(&self) -> bool {
+        let follows = matches!(self.painted, Painted::Background(_) | Painted::VCycle(_));
+        follows && self.begun && self.painted_for.is_some()
+    }
+
+    /// Follows a matrix that differs in a box of samples only from the one that it was prepared for, springs being counted
+    /// where they start. A V-cycle does, at the cost of the box. A factor does not: it serves on as it is, or gives way to
+    /// the V-cycle until it is made anew.
+    ///
+    /// # Errors
+    /// [`SolveError`] if it is not positive definite.
+    pub(crate) fn repaint(&mut self, s: &StepMatrix<T>, at: SampleBox) -> Result<(), SolveError> {
+        if !self.follows_paint() {
+            return Ok(());
+        }
+        let mut matrix = self.painted_for.take().expect("asked above");
+        self.forget_renewal();
         match &mut self.painted {
+            Painted::Background(background) => {
+                let all = SampleBox::all(s.dims());
+                let at = if background.is_stale() { all } else { at };
+                matrix.copy_on(s, at);
+                background.repaint(&matrix, at)?;
+            }
+            Painted::VCycle(cycle) => {
+                matrix.copy_on(s, at);
+                cycle.fit(&matrix, at)?;
+            }
+            _ => unreachable!("asked above"),
+        }
+        self.painted_for = Some(matrix);
+        self.settle_method();
+        self.renew_border();
+        Ok(())
+    }
+
+    /// Makes factors and cycles for a matrix.
+    fn make(&mut self, s: &StepMatrix<T>) -> Result<(), SolveError> {
+        self.factorizations += 1;
+        let made: Result<(), NotPositive> = match &mut self.painted {
             Painted::None => unreachable!("made before it is prepared"),
             Painted::Direct(direct) => {
                 let (galerkin, factor) = &mut **direct;
@@ -271,7 +224,9 @@ impl<T: Real> StepSolver<T> {
                 factor.factorize()
             }
             Painted::SampleMultigrid(multigrid) => multigrid.prepare(s),
-        }
+            Painted::Masked(masked) => return masked.prepare(s),
+        };
+        Ok(made?)
     }
 
     fn forget_renewal(&mut self) {
@@ -321,49 +276,6 @@ impl<T: Real> StepSolver<T> {
         self.factorizations
     }
 
-    /// What the next solves depend on beside the matrix; nothing before the first [`prepare`](Self::prepare) and of
-    /// constant material.
-    pub(crate) fn history(&self) -> Option<SolverHistory<T>> {
-        let matrix = self.painted_for.as_ref().filter(|_| self.begun)?;
-        let renewal = self.renewal.as_ref().map(|r| r.state());
-        Some(SolverHistory {
-            matrix: MatrixRecord::of(matrix),
-            slow: self.slow,
-            renewal: renewal.map(|(matrix, stage)| (MatrixRecord::of(matrix), stage)),
-            progress: match &self.painted {
-                Painted::Background(background) => Some(background.progress()),
-                _ => None,
-            },
-        })
-    }
-
-    /// Goes to where another solver was, of whose matrix `like` has the springs; its constraints follow with
-    /// [`set_border`](Self::set_border), those of the time included.
-    ///
-    /// # Errors
-    /// [`SolveError`] if the matrix of a damaged history is not positive definite.
-    pub(crate) fn resume(
-        &mut self,
-        history: &SolverHistory<T>,
-        like: &StepMatrix<T>,
-    ) -> Result<(), SolveError> {
-        let s = history.matrix.matrix(like);
-        let border = self.border.take();
-        self.prepare(&s)?;
-        if let (Painted::Background(background), Some(progress)) = (&mut self.painted, history.progress) {
-            background.resume(&s, progress);
-        }
-        self.slow = history.slow;
-        if let (Some((matrix, stage)), Some((galerkin, factor))) = (&history.renewal, self.painted.factor()) {
-            let mut renewal = Renewal::new(matrix.matrix(like), factor);
-            self.renewal = renewal.resume(*stage, galerkin).then(|| Box::new(renewal));
-        }
-        self.settle_method();
-        self.border = border;
-        self.prepare_border(&s);
-        Ok(())
-    }
-
     /// Fits the constraints to what solves now.
     fn renew_border(&mut self) {
         if let Some(matrix) = self.painted_for.take() {
@@ -372,10 +284,16 @@ impl<T: Real> StepSolver<T> {
         }
     }
 
-    fn prepare_border(&mut self, s: &StepMatrix<T>) {
+    pub(super) fn prepare_border(&mut self, s: &StepMatrix<T>) {
         if let Some(border) = &mut self.border {
             let preconditioner = active(self.method, &mut self.painted, &mut self.diagonalization);
-            border.prepare(|r, z| preconditioner.apply(s, r, z));
+            let mask = self.mask.as_deref();
+            border.prepare(|r, z| {
+                preconditioner.apply(s, r, z);
+                if let Some(mask) = mask {
+                    mask.hold(z);
+                }
+            });
         }
     }
 
@@ -390,33 +308,23 @@ impl<T: Real> StepSolver<T> {
         self.border.as_deref_mut()
     }
 
-    fn make_painted(&self) -> Painted<T> {
-        let [_, my, mz] = self.lattice.sample_dims();
-        let (n, m) = (self.lattice.coefficient_count(), self.lattice.sample_count());
-        let few = n
-            <= if self.inverse.is_some() {
-                self.options.sample_direct_limit()
-            } else {
-                self.options.direct_limit
-            };
-        match (self.inverse.is_some(), few) {
-            (true, true) => Painted::SampleDirect(BandCholesky::new(m, ((my + 1) * mz + 1).min(m - 1))),
-            (true, false) => {
-                Painted::SampleMultigrid(Box::new(SampleMultigrid::new(self.lattice.sample_dims())))
-            }
-            (false, true) => {
-                let galerkin = Galerkin::new(&self.lattice, &self.steps);
-                let factor = BandCholesky::new(n, galerkin.band());
-                Painted::Direct(Box::new((galerkin, factor)))
-            }
-            (false, false) if n <= self.options.background_limit => Painted::Background(Box::new(
-                Background::new(&self.lattice, &self.steps, self.options.v_cycle),
-            )),
-            (false, false) => Painted::VCycle(Box::new(VCycle::new(
-                &self.lattice,
-                &self.steps,
-                self.options.v_cycle,
-            ))),
+    /// Lets only the coefficients of a mask move, all others being 0; in force from the next [`prepare`](Self::prepare) on.
+    pub(crate) fn set_mask(&mut self, mask: Option<Arc<Mask>>) {
+        self.mask = mask;
+        self.painted = Painted::None;
+        self.painted_for = None;
+    }
+
+    /// How a patch with this mask is solved by these options.
+    pub(crate) fn masked_way(&self) -> Option<MaskedWay> {
+        let mask = self.mask.as_deref()?;
+        Some(self.options.masked.or_best(&self.lattice, mask))
+    }
+
+    /// Lets what belongs to coefficients that do not move be 0.
+    pub(crate) fn hold(&self, list: &mut [T]) {
+        if let Some(mask) = &self.mask {
+            mask.hold(list);
         }
     }
 
@@ -447,6 +355,9 @@ impl<T: Real> StepSolver<T> {
             self.b.copy_from_slice(g);
         } else {
             self.lattice.gather(g, &mut self.b, &mut self.workspace);
+            if let Some(mask) = &self.mask {
+                mask.hold(&mut self.b);
+            }
         }
         // Solved for an impulse of about one, whose squares no precision loses.
         let unit = self.impulse_unit();
@@ -533,7 +444,7 @@ impl<T: Real> StepSolver<T> {
         }
     }
 
-    fn settle_method(&mut self) {
+    pub(super) fn settle_method(&mut self) {
         self.method = match &self.painted {
             Painted::None => Method::FastDiagonalization,
             Painted::Direct(_) => Method::Direct,
@@ -541,6 +452,7 @@ impl<T: Real> StepSolver<T> {
             Painted::Background(_) | Painted::VCycle(_) => Method::VCycle,
             Painted::SampleDirect(_) => Method::SampleDirect,
             Painted::SampleMultigrid(_) => Method::SampleMultigrid,
+            Painted::Masked(masked) => masked.method(),
         };
     }
 
@@ -559,6 +471,9 @@ impl<T: Real> StepSolver<T> {
     pub(crate) fn solve_coefficients(&mut self, s: &StepMatrix<T>, b: &[T], x: &mut [T]) {
         debug_assert!(self.inverse.is_none());
         self.b.copy_from_slice(b);
+        if let Some(mask) = &self.mask {
+            mask.hold(&mut self.b);
+        }
         self.iterate(s, x, None, self.options.iterations, 16.0 * T::UNIT_ROUND_OFF);
     }
 
@@ -572,7 +487,8 @@ impl<T: Real> StepSolver<T> {
         tolerance: f64,
     ) -> PcgReport {
         let preconditioner = active(self.method, &mut self.painted, &mut self.diagonalization);
-        let mut system = CoefficientSystem {
+        let mask = self.mask.as_deref();
+        let system = CoefficientSystem {
             lattice: &self.lattice,
             matrix: s,
             preconditioner: &mut Dynamic(preconditioner),
@@ -580,76 +496,22 @@ impl<T: Real> StepSolver<T> {
             workspace: &mut self.workspace,
         };
         match (dx, &mut self.border) {
-            (None, _) => self.iteration.solve(&mut system, &self.b, x, cap, tolerance),
+            (None, _) => {
+                let mut system = Projected { system, mask };
+                self.iteration.solve(&mut system, &self.b, x, cap, tolerance)
+            }
             (Some(dx), None) => {
                 dx.fill(T::zero());
-                let mut system = Sampled { system, dx };
+                let system = Sampled { system, dx };
+                let mut system = Projected { system, mask };
                 self.iteration.solve(&mut system, &self.b, x, cap, tolerance)
             }
             (Some(dx), Some(border)) => {
+                let mut system = Projected { system, mask };
                 let report = border.solve(&mut system, &self.b, x, cap, tolerance);
                 self.lattice.sample(x, dx, &mut self.workspace);
                 report
             }
         }
-    }
-}
-
-/// Sums the solution on the samples from what the iteration samples anyway.
-struct Sampled<'a, 'b, T, P> {
-    system: CoefficientSystem<'a, T, P>,
-    dx: &'b mut [T],
-}
-
-impl<T: Real, P: Preconditioner<T>> System<T> for Sampled<'_, '_, T, P> {
-    fn apply(&mut self, p: &[T], q: &mut [T]) -> f64 {
-        self.system.apply(p, q)
-    }
-    fn precondition(&mut self, r: &[T], z: &mut [T]) {
-        self.system.precondition(r, z);
-    }
-    fn moved(&mut self, alpha: T) {
-        add_scaled(self.dx, alpha, &self.system.samples[0]);
-    }
-}
-
-/// What the matrix was prepared with.
-fn active<'a, T: Real>(
-    method: Method,
-    painted: &'a mut Painted<T>,
-    diagonalization: &'a mut FastDiagonalization<T>,
-) -> &'a mut dyn Preconditioner<T> {
-    match (method, painted) {
-        (Method::Direct, Painted::Direct(direct)) => &mut direct.1,
-        (Method::Direct | Method::VCycle, Painted::Background(background)) => &mut **background,
-        (Method::VCycle, Painted::VCycle(cycle)) => &mut **cycle,
-        (Method::SampleDirect, Painted::SampleDirect(factor)) => factor,
-        (Method::SampleMultigrid, Painted::SampleMultigrid(multigrid)) => &mut **multigrid,
-        _ => diagonalization,
-    }
-}
-
-/// A preconditioner behind a pointer.
-struct Dynamic<'a, T>(&'a mut dyn Preconditioner<T>);
-
-impl<T> Preconditioner<T> for Dynamic<'_, T> {
-    fn apply(&mut self, s: &StepMatrix<T>, r: &[T], z: &mut [T]) {
-        self.0.apply(s, r, z);
-    }
-}
-
-/// Writes `S` itself into a band.
-fn fill_band<T: Real>(s: &StepMatrix<T>, into: &mut BandCholesky<T>) {
-    into.clear();
-    let [mx, my, mz] = s.dims();
-    let mut diagonal: Vec<f64> = (0..mx * my * mz).map(|i| s.mass.at(i).as_f64()).collect();
-    s.for_each_spring(|i, j, w, _| {
-        let (i, j) = (i.min(j), i.max(j));
-        diagonal[i] += w.as_f64();
-        diagonal[j] += w.as_f64();
-        into.set(j, i, -w.as_f64());
-    });
-    for (i, d) in diagonal.into_iter().enumerate() {
-        into.set(i, i, d);
     }
 }

@@ -4,12 +4,14 @@ use bspline::Real;
 use serde::{Deserialize, Serialize};
 
 use super::band_cholesky::{BandCholesky, NotPositive};
+use super::chebyshev::Chebyshev;
 use super::fast_diagonalization::FastDiagonalization;
 use super::galerkin::Galerkin;
 use super::lanczos::Lanczos;
+use super::mean::GeometricMean;
 use super::pcg::{CoefficientSystem, Preconditioner, add_scaled};
 use super::schwarz::Schwarz;
-use crate::lattice::{Lattice, TensorProduct, TensorWorkspace};
+use crate::lattice::{Lattice, SampleBox, TensorProduct, TensorWorkspace};
 use crate::springs::{StepMatrix, Weights};
 
 /// Where the Chebyshev polynomials begin, relative to the largest eigenvalue.
@@ -86,23 +88,14 @@ pub struct VCycle<T> {
     coarsest: Lattice<T>,
     assembly: Galerkin,
     factor: BandCholesky<T>,
+    /// By which share the diagonal of the factor was raised.
+    raised: f64,
+    /// Of the mass, and of the springs of each direction.
+    means: Vec<GeometricMean>,
     right: Vec<Vec<T>>,
     solution: Vec<Vec<T>>,
     samples: [Vec<T>; 2],
     workspace: TensorWorkspace<T>,
-}
-
-/// Geometric mean of the weights, those far below the largest raised to it by `floor`.
-fn geometric_mean<T: Real>(weights: &Weights<T>, floor: f64) -> f64 {
-    match weights {
-        Weights::Constant(w) => w.as_f64(),
-        Weights::Each(w) => {
-            let largest = w.iter().fold(0.0_f64, |m, w| m.max(w.as_f64()));
-            let low = (floor * largest).max(f64::MIN_POSITIVE);
-            let logs: f64 = w.iter().map(|w| libm::log(w.as_f64().max(low))).sum();
-            libm::exp(logs / w.len() as f64)
-        }
-    }
 }
 
 impl<T: Real> VCycle<T> {
@@ -170,6 +163,8 @@ impl<T: Real> VCycle<T> {
             coarsest: here,
             assembly,
             factor,
+            raised: 0.0,
+            means: vec![GeometricMean::default(); steps.len() + 1],
         }
     }
 
@@ -201,11 +196,24 @@ impl<T: Real> VCycle<T> {
     /// # Errors
     /// [`NotPositive`] if the coarsest level cannot be factorized.
     pub fn prepare(&mut self, s: &StepMatrix<T>) -> Result<(), NotPositive> {
-        self.assembly.factorize(s, &mut self.factor)?;
-        let mass = geometric_mean(&s.mass, 1e-9);
+        self.fit(s, SampleBox::all(s.dims()))
+    }
+
+    /// The same where the matrix differs from the one before on a box of samples only, springs being counted where they
+    /// start. What is made is no other, to the bit, but sums cost the box.
+    ///
+    /// # Errors
+    /// [`NotPositive`] as [`prepare`](Self::prepare).
+    pub(super) fn fit(&mut self, s: &StepMatrix<T>, at: SampleBox) -> Result<(), NotPositive> {
+        let first = self.assembly.accumulate_on(s, at);
+        let first = if self.raised == 0.0 { first } else { 0 };
+        self.raised = f64::INFINITY;
+        self.raised = self.assembly.factorize_sums(&mut self.factor, first)?;
+        let dims = s.dims();
+        let mass = self.means[0].of(&s.mass, dims, at);
         let mut along = [0.0; 3];
-        for spring in &s.springs {
-            let b = geometric_mean(&spring.weights, 1e-9);
+        for (spring, mean) in s.springs.iter().zip(&mut self.means[1..]) {
+            let b = mean.of(&spring.weights, dims, at);
             for (a, step) in along.iter_mut().zip(spring.direction.step) {
                 *a += b * (step * step) as f64;
             }
@@ -213,7 +221,8 @@ impl<T: Real> VCycle<T> {
         for l in 0..self.levels.len() {
             let level = &mut self.levels[l];
             level.smoother.set(mass, along);
-            let actual = level.diagonal.diagonal_of(s);
+            level.diagonal.accumulate_on(s, at);
+            let actual = level.diagonal.sums();
             for (i, scale) in level.smoother.scale_mut().iter_mut().enumerate() {
                 let unit = &level.unit_diagonals;
                 let constant =
@@ -222,21 +231,36 @@ impl<T: Real> VCycle<T> {
                 *scale = T::from_f64((constant / actual[i]).sqrt());
             }
             self.levels[l].largest_eigenvalue = self.largest_eigenvalue(s, l, false);
-            let level = &mut self.levels[l];
-            level.schwarz = None;
-            let range = |(low, high): (f64, f64), v: &f64| (low.min(*v), high.max(*v));
-            let (low, high) = level.variation.iter().fold((f64::INFINITY, 0.0), range);
-            if let (Some(all), true) = (&mut level.all, high > self.options.block_onset * low) {
-                all.accumulate(s);
-                let (size, stride) = (self.options.blocks, self.options.stride);
-                let blocks = Schwarz::new(all, size, stride, &level.variation, self.options.block_contrast);
-                level.schwarz = (blocks.block_count() > 0).then_some(blocks);
-                if level.schwarz.is_some() {
-                    self.levels[l].schwarz_eigenvalue = self.largest_eigenvalue(s, l, true);
-                }
-            }
+            self.fit_blocks(s, l, at);
         }
         Ok(())
+    }
+
+    /// The blocks of a level, where its material asks for them.
+    fn fit_blocks(&mut self, s: &StepMatrix<T>, l: usize, at: SampleBox) {
+        let (options, level) = (self.options, &mut self.levels[l]);
+        let range = |(low, high): (f64, f64), v: &f64| (low.min(*v), high.max(*v));
+        let (low, high) = level.variation.iter().fold((f64::INFINITY, 0.0), range);
+        let before = level.schwarz.take();
+        let Some(all) = &mut level.all else { return };
+        if high <= options.block_onset * low {
+            return;
+        }
+        // Sums are of the matrix for which there were blocks.
+        match before {
+            Some(_) => all.accumulate_on(s, at),
+            None => {
+                all.accumulate(s);
+                0
+            }
+        };
+        let kept = before.as_ref().map(|blocks| (blocks, all.touched(at)));
+        let (size, stride) = (options.blocks, options.stride);
+        let blocks = Schwarz::new(all, size, stride, &level.variation, options.block_contrast, kept);
+        level.schwarz = (blocks.block_count() > 0).then_some(blocks);
+        if level.schwarz.is_some() {
+            self.levels[l].schwarz_eigenvalue = self.largest_eigenvalue(s, l, true);
+        }
     }
 
     /// Of the smoother, or of the blocks, times `H`; 10 % above the estimate.
@@ -342,18 +366,8 @@ impl<T: Real> VCycle<T> {
             blocks: schwarz.as_mut().filter(|_| blocks),
         };
         let (theta, delta) = (largest * (1.0 + LOWER) / 2.0, largest * (1.0 - LOWER) / 2.0);
-        let sigma = theta / delta;
-        let mut rho = 1.0 / sigma;
-        for step in 0..degree {
+        for (step, (keep, take)) in Chebyshev::new(theta, delta).take(degree).enumerate() {
             smoother.apply(s, r, z);
-            let (keep, take) = if step == 0 {
-                (0.0, 1.0 / theta)
-            } else {
-                let next = 1.0 / (2.0 * sigma - rho);
-                let out = (next * rho, 2.0 * next / delta);
-                rho = next;
-                out
-            };
             let (keep, take) = (T::from_f64(keep), T::from_f64(take));
             if step == 0 {
                 for (d, z) in d.iter_mut().zip(z.iter()) {

@@ -119,7 +119,10 @@ impl<T: Real> Patch<T> {
     /// The forms of this patch, assembled.
     pub fn sparse_forms(&self) -> SparseForms {
         let lattice = self.lattice();
-        let sampling = Sampling::whole(lattice);
+        let sampling = match self.mask() {
+            Some(mask) => Sampling::new(lattice, mask.moving()),
+            None => Sampling::whole(lattice),
+        };
         let count = lattice.sample_count();
         let sigma2 = self.springs().law().scale().powi(2);
         let on_samples = |value: &dyn Fn(usize) -> f64| sampling.galerkin(&diagonal(count, value));
@@ -129,11 +132,14 @@ impl<T: Real> Patch<T> {
         let mut stiffness = sampling.galerkin(&springs.map(|v| sigma2 * v));
         let rows = self.constraint_springs();
         if !rows.is_empty() {
-            let n = lattice.coefficient_count();
-            let mut pulled = sprs::TriMat::new((rows.len(), n));
+            let columns = sampling.matrix().cols();
+            let column = |c: usize| self.mask().map_or(Some(c), |m| m.moving().binary_search(&c).ok());
+            let mut pulled = sprs::TriMat::new((rows.len(), columns));
             for (r, (terms, weight)) in rows.iter().enumerate() {
                 for (c, w) in *terms {
-                    pulled.add_triplet(r, *c, weight.sqrt() * w);
+                    if let Some(c) = column(*c) {
+                        pulled.add_triplet(r, c, weight.sqrt() * w);
+                    }
                 }
             }
             let pulled: CsMat<f64> = pulled.to_csr();

@@ -9,7 +9,17 @@
 mod dissection;
 mod factor;
 mod forms;
+mod mask;
+mod masked;
+mod projected;
+mod solver;
 
 pub use dissection::nested_dissection;
-pub use factor::SparseCholesky;
+pub use factor::{NotDefinite, SparseCholesky};
 pub use forms::{Sampling, SparseForms, multiply};
+pub(crate) use mask::MaskRecord;
+pub use mask::{Mask, MaskError, MaskPart};
+pub use masked::OUTSIDE;
+pub(crate) use projected::Projected;
+pub(crate) use solver::MaskedSolver;
+pub use solver::MaskedWay;

@@ -2,6 +2,7 @@ use bspline::Real;
 use bspline::vectorized;
 
 use super::neighbours::Direction;
+use crate::lattice::SampleBox;
 
 /// A number per sample, or the same for all.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -109,6 +110,30 @@ impl<T: Real> StepMatrix<T> {
         out.constant_rows = vec![T::zero(); (out.springs.len() + 1) * dims[2]];
         out.refresh();
         out
+    }
+
+    /// Takes over the weights on a box of samples.
+    pub(crate) fn copy_on(&mut self, from: &Self, at: SampleBox) {
+        let (dims, count) = (self.dims, self.dims.iter().product());
+        let to = [&mut self.mass]
+            .into_iter()
+            .chain(self.springs.iter_mut().map(|s| &mut s.weights));
+        let from = [&from.mass]
+            .into_iter()
+            .chain(from.springs.iter().map(|s| &s.weights));
+        for (to, from) in to.zip(from) {
+            if to == from {
+                continue;
+            }
+            if let Weights::Constant(w) = to {
+                *to = Weights::Each(vec![*w; count]);
+            }
+            if let Weights::Each(list) = to {
+                for i in at.indices(dims) {
+                    list[i] = from.at(i);
+                }
+            }
+        }
     }
 
     /// To be called after a constant weight was changed in place.

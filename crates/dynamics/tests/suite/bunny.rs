@@ -17,6 +17,8 @@ use fitting::mesh::{MeshOptions, fit_mesh};
 use glam::DVec3;
 use nalgebra::{Complex, DMatrix, DVector};
 
+use crate::region::Stroke;
+
 fn fitted<T: Real>() -> HierarchicalSpline<T> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data/bunny.obj.gz");
     let file = std::fs::File::open(path).expect("comes with the project");
@@ -183,6 +185,36 @@ fn beside_is_untouched<T: Real>(
         changed += usize::from(!same);
     }
     assert!(beside > 10_000 && changed > 300, "{beside} {changed}");
+}
+
+/// The first place on the surface straight above those of a line through the body.
+fn over_the_back(field: &HierarchicalSpline<f32>, along: DVec3, reach: f64, steps: usize) -> Vec<DVec3> {
+    let middle = deepest(field);
+    let way = |s: usize| 2.0 * s as f64 / (steps - 1) as f64 - 1.0;
+    let from = (0..steps).map(|s| middle + way(s) * reach * along);
+    from.map(|p| foot(field, p, DVec3::Y)).collect()
+}
+
+#[test]
+fn a_region_that_follows_a_stroke_over_the_back_ends_where_a_large_one_does() {
+    let field = SINGLE.clone();
+    let edge = field.lattice().spacing(0).x;
+    println!(
+        "cells {:?} of {edge:.3}, slope {:.3}",
+        field.lattice().cells,
+        field.slope()
+    );
+    for along in [DVec3::X, DVec3::new(0.8, 0.0, 0.6), DVec3::Z] {
+        let path = over_the_back(&field, along, 5.0 * edge, 60);
+        let stroke = Stroke {
+            law: linear(1.0 / field.slope()),
+            field: field.clone(),
+            path,
+        };
+        let kept = stroke.apart(&stroke.whole(), &stroke.following(stroke.half(8), 8, true));
+        println!("along {along}: {:.2} % of the peak", 100.0 * kept);
+        assert!(kept < 0.02, "along {along}: {kept:.4}");
+    }
 }
 
 #[test]

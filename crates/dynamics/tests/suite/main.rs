@@ -7,6 +7,7 @@ mod common;
 mod constraints;
 mod increment;
 mod lattice;
+mod masked;
 mod motion;
 mod paint;
 mod plasticity;

@@ -180,7 +180,7 @@ fn kept_and_recut_regions_are_the_same_after_each_of_twenty_strokes() {
 }
 
 /// A snapshot less what is only counted for reports.
-fn without_counters(region: &Region<f32>) -> serde_json::Value {
+pub fn without_counters(region: &Region<f32>) -> serde_json::Value {
     let mut value = serde_json::to_value(region.snapshot()).unwrap();
     let parts = value["parts"].as_object_mut().unwrap();
     parts.remove("operations");
@@ -298,7 +298,7 @@ fn damaged_snapshots_are_refused() {
 }
 
 /// Which lists of two snapshots differ.
-fn different(a: &serde_json::Value, b: &serde_json::Value) -> String {
+pub fn different(a: &serde_json::Value, b: &serde_json::Value) -> String {
     let mut places = Vec::new();
     paths(a, String::new(), &mut places);
     let differ = |p: &&String| a.pointer(p) != b.pointer(p);

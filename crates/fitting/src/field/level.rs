@@ -1,427 +1,273 @@
 //! One level of a field fit: which functions take part, and what they add.
 
-use bspline::hierarchical::{BRICK, BrickEdit, BrickKey, Corrections, DenseCorrections, active_slots};
-use bspline::{Aabb, Field, Frame, HierarchicalSpline, Real};
-use glam::{DAffine3, DMat3, DVec3};
-use rayon::prelude::*;
+use std::collections::BTreeMap;
 
-use super::{Aim, FieldFitOptions};
+use bspline::hierarchical::{BRICK, BrickEdit, BrickKey, DenseCorrections};
+use bspline::{Field, HierarchicalSpline, Real};
+use glam::DVec3;
+
+use super::FieldFitOptions;
+use super::judge::{Judge, Left, between_knots, children};
+use super::region::Region;
+use super::sample::sample;
+use super::tiles::{Mask, NONE, Rows, TILE, TileKey, Tiles, Values, between, places, stencil};
 use crate::FitError;
 
-/// Cells of a level on each side of the surface in which its distance counts.
-const NEAR: f64 = 3.0;
+/// Side and middle of the cubic B-spline at the knots.
+const SAMPLES: [f64; 2] = [1.0 / 6.0, 4.0 / 6.0];
+/// The same of the quasi-interpolant's coefficients \[Lyche75\].
+const QUASI: [f64; 2] = [-1.0 / 6.0, 8.0 / 6.0];
 
 /// Target and field compared on one level.
-#[derive(Clone, Copy)]
 pub(super) struct LevelFit<'a, T> {
     pub target: &'a dyn Field,
     pub field: &'a HierarchicalSpline<T>,
-    pub level: usize,
-    /// The box, in lattice coordinates.
-    pub within: &'a Aabb,
+    pub region: Region<'a>,
     pub options: &'a FieldFitOptions,
     /// Whether no coarser level was fitted: then all of the box counts.
     pub is_first: bool,
 }
 
-/// What one level found.
-#[derive(Default)]
+/// What one level adds, and where the next has to look.
 pub(super) struct Round<T> {
     pub edits: Vec<BrickEdit<T>>,
-    /// Bricks below which the next level has to look.
-    pub open: Vec<BrickKey>,
+    /// Tiles about the knots that are still in question: of the next level, or of the cells' middles on the finest.
+    pub open: Vec<TileKey>,
     pub samples: u64,
-    pub worst: f64,
-    pub over_tolerance: usize,
-    pub wrong_signs: usize,
 }
 
-/// Values at the knots round a brick, z fastest.
-struct Block {
-    /// Number of the first knot.
-    lo: [i64; 3],
-    count: [usize; 3],
-    target: Vec<f64>,
-    /// `target - field`.
-    rest: Vec<f64>,
-}
-
-impl Block {
-    fn index(&self, knot: [i64; 3]) -> Option<usize> {
-        let at: [i64; 3] = std::array::from_fn(|a| knot[a] - self.lo[a]);
-        let is_inside = (0..3).all(|a| (0..self.count[a] as i64).contains(&at[a]));
-        let [x, y, z] = at.map(|i| i as usize);
-        is_inside.then(|| (x * self.count[1] + y) * self.count[2] + z)
-    }
-
-    fn knots(&self) -> impl Iterator<Item = [i64; 3]> {
-        knots_between(
-            self.lo,
-            std::array::from_fn(|a| self.lo[a] + self.count[a] as i64 - 1),
-        )
-    }
-
-    /// Replaces what lies outside the lattice's box, where coefficients do not reach, by straight lines from inside.
-    fn go_on_outside(&mut self, last: [i64; 3]) {
-        for axis in 0..3 {
-            if self.lo[axis] >= 0 && self.lo[axis] + self.count[axis] as i64 - 1 <= last[axis] {
-                continue;
-            }
-            let is_outside = |knot: &[i64; 3]| !(0..=last[axis]).contains(&knot[axis]);
-            let outside: Vec<[i64; 3]> = self.knots().filter(is_outside).collect();
-            for knot in outside {
-                let face = knot[axis].clamp(0, last[axis]);
-                let step = (face - knot[axis]).signum();
-                let inside = |by: i64| {
-                    let mut at = knot;
-                    at[axis] = face + by * step;
-                    self.index(at)
-                };
-                let Some(first) = inside(0) else { continue };
-                let steps = (face - knot[axis]).abs() as f64;
-                let second = inside(1).unwrap_or(first);
-                let own = self.index(knot).expect("a knot of the block");
-                for values in [&mut self.target, &mut self.rest] {
-                    values[own] = values[first] + steps * (values[first] - values[second]);
-                }
-            }
-        }
-    }
-
-    /// `combine` of every value with those before and behind it on an axis; `beyond` stands for what lies beside the block.
-    fn along<V: Copy>(&self, axis: usize, values: &[V], beyond: V, combine: impl Fn(V, V, V) -> V) -> Vec<V> {
-        let stride: usize = self.count[axis + 1..].iter().product();
-        let mut combined = Vec::with_capacity(values.len());
-        for slab in values.chunks(self.count[axis] * stride) {
-            for (i, &own) in slab.iter().enumerate() {
-                let before = if i >= stride { slab[i - stride] } else { beyond };
-                let behind = slab.get(i + stride).copied().unwrap_or(beyond);
-                combined.push(combine(before, own, behind));
-            }
-        }
-        combined
-    }
-
-    /// Length of the target's slope in the world at every knot, from the neighbours that there are; `world_from_knot`
-    /// takes the slope by knots there.
-    fn slopes(&self, world_from_knot: DMat3) -> Vec<f64> {
-        let [x, y, z] = [0, 1, 2].map(|axis| {
-            // No value of the target is NaN: it marks a neighbour that there is not.
-            self.along(axis, &self.target, f64::NAN, |a, own, b| {
-                match (a.is_nan(), b.is_nan()) {
-                    (false, false) => 0.5 * (b - a),
-                    (true, false) => b - own,
-                    (false, true) => own - a,
-                    (true, true) => 0.0,
-                }
-            })
-        });
-        let slope = |((x, y), z): ((&f64, &f64), &f64)| (world_from_knot * DVec3::new(*x, *y, *z)).length();
-        x.iter().zip(&y).zip(&z).map(slope).collect()
-    }
-
-    /// Whether anything is true at a knot or at one of the 26 about it.
-    fn spread(&self, marks: Vec<bool>) -> Vec<bool> {
-        (0..3).fold(marks, |marks, axis| {
-            self.along(axis, &marks, false, |a, own, b| a | own | b)
-        })
-    }
-
-    /// Coefficients of the functions centred on the knots: the quasi-interpolant of the rest, which is 0 beside the block.
-    fn coefficients(&self) -> Vec<f64> {
-        (0..3).fold(self.rest.clone(), |values, axis| {
-            self.along(axis, &values, 0.0, |a, own, b| (8.0 * own - a - b) / 6.0)
-        })
-    }
-}
-
-/// What a knot says of the fit.
-#[derive(Clone, Copy, Default)]
-struct Judgement {
-    /// Rest as a world length, or as a density.
-    off: f64,
-    counts: bool,
-    exceeds: bool,
-    wrong_sign: bool,
+/// Target and rest at the knots of some tiles.
+struct Samples {
+    tiles: Tiles,
+    target: Vec<Values>,
+    rest: Vec<Values>,
+    count: u64,
 }
 
 impl<T: Real> LevelFit<'_, T> {
-    /// Bricks of the level that hold functions or knots of the box.
-    pub fn all_bricks(&self) -> Vec<BrickKey> {
-        let (lo, hi) = self.judged();
-        let [first, last] = [lo, hi].map(brick_of);
-        keys_between(first, last).collect()
+    /// All tiles of the box.
+    pub fn all_tiles(&self) -> Vec<TileKey> {
+        let (lo, hi) = self.region.sampled();
+        let [first, last] = [lo, hi].map(|knot| knot.map(|k| k.div_euclid(TILE as i64) as i32));
+        let range = |a: usize| first[a]..=last[a];
+        let rows = range(0).flat_map(|x| range(1).map(move |y| [x, y]));
+        rows.flat_map(|[x, y]| range(2).map(move |z| [x, y, z])).collect()
     }
 
-    /// Bricks of the level under `parents` that the surface may meet.
-    pub fn children(&self, parents: Vec<BrickKey>) -> Vec<BrickKey> {
-        let (lo, hi) = self.judged();
-        let [first, last] = [lo, hi].map(brick_of);
-        let all = parents
-            .into_iter()
-            .flat_map(|p| (0..8).map(move |octant| p.child(octant)));
-        let inside = |key: &BrickKey| (0..3).all(|a| (first.0[a]..=last.0[a]).contains(&key.0[a]));
-        let keys: Vec<BrickKey> = all.filter(inside).collect();
-        let keep: Vec<bool> = keys.par_iter().map(|key| self.may_matter(*key)).collect();
-        keys.into_iter()
-            .zip(keep)
-            .filter(|(_, keep)| *keep)
-            .map(|(key, _)| key)
-            .collect()
-    }
-
-    /// Whether the surface of target or field may come near a brick.
-    fn may_matter(&self, key: BrickKey) -> bool {
-        let Aim::Surface { iso, .. } = self.options.aim else {
-            return true;
-        };
-        let reach = NEAR * self.spacing(self.level.min(self.options.finest));
-        let knot = |by: f64| {
-            DVec3::from_array(
-                key.0
-                    .map(|k| (8.0 * f64::from(k) + by) * self.spacing(self.level)),
-            )
-        };
-        let b = Aabb::new(knot(-2.0) - reach, knot(7.0) + reach);
-        let b = b.transformed(&self.field.lattice().world_from_lattice);
-        self.target.bounds(&b).contains(iso) || self.field.bounds(&b).contains(iso)
-    }
-
-    /// Compares target and field at the knots of `keys` and says what the functions there should add.
-    pub fn run(&self, keys: &[BrickKey]) -> Result<Round<T>, FitError> {
-        let rounds: Vec<Result<Round<T>, FitError>> = keys.par_iter().map(|key| self.brick(*key)).collect();
-        let mut all = Round::default();
-        for round in rounds {
-            let round = round?;
-            // What is added reaches into the bricks beside.
-            all.open
-                .extend(round.edits.iter().flat_map(|edit| self.bricks_about(edit.key)));
-            all.edits.extend(round.edits);
-            all.open.extend(round.open);
-            all.samples += round.samples;
-            all.worst = all.worst.max(round.worst);
-            all.over_tolerance += round.over_tolerance;
-            all.wrong_signs += round.wrong_signs;
-        }
-        all.open.sort_unstable();
-        all.open.dedup();
-        Ok(all)
-    }
-
-    /// A brick and those beside it, as far as the box goes.
-    fn bricks_about(&self, key: BrickKey) -> impl Iterator<Item = BrickKey> + use<T> {
-        let (lo, hi) = self.judged();
-        let [first, last] = [lo, hi].map(brick_of);
-        let first = BrickKey(std::array::from_fn(|a| {
-            first.0[a].max(key.0[a].saturating_sub(1))
-        }));
-        let last = BrickKey(std::array::from_fn(|a| last.0[a].min(key.0[a] + 1)));
-        keys_between(first, last)
-    }
-
-    /// Replaces what `edits` add by what their functions should add now; returns the number of samples.
-    pub fn correct(&self, edits: &mut [BrickEdit<T>]) -> u64 {
-        let samples = edits.par_iter_mut().map(|edit| {
-            let block = self.block(edit.key);
-            let coefficients = block.coefficients();
-            let at = |slot: usize| knot_of(edit.key, [slot / 64, slot / 8 % 8, slot % 8]);
-            let value = |slot: usize| block.index(at(slot)).map_or(0.0, |i| coefficients[i]);
-            let values = active_slots(edit.add.mask()).map(|slot| T::from_f64(value(slot)));
-            edit.add = Corrections::new(*edit.add.mask(), values.collect());
-            block.rest.len() as u64
+    /// Compares target and field in `keys` and says what the functions there should add.
+    pub fn run(&self, keys: Vec<TileKey>) -> Result<Round<T>, FitError> {
+        let samples = self.samples(keys)?;
+        let Samples {
+            tiles, target, rest, ..
+        } = &samples;
+        let judge = self.judge();
+        let (lo, hi) = self.region.judged();
+        let exceeding = tiles.map(|i| {
+            let judged = between(tiles.keys[i], lo, hi);
+            judge.exceeding(tiles, i, &judged, target, rest)
         });
-        samples.sum()
-    }
-
-    fn brick(&self, key: BrickKey) -> Result<Round<T>, FitError> {
-        let block = self.block(key);
-        if let Some(bad) = block.target.iter().position(|t| !t.is_finite()) {
-            let at = block.knots().nth(bad).expect("a value for each knot");
-            let q = DVec3::from_array(at.map(|k| k as f64)) * self.spacing(self.level);
-            let p = self.field.lattice().world_from_lattice.transform_point3(q);
-            return Err(FitError::Degenerate(format!(
-                "the target is not finite at ({}, {}, {}); fit a field that is finite in the box",
-                p.x, p.y, p.z
-            )));
-        }
-        let slopes = match self.options.aim {
-            Aim::Surface { .. } => {
-                let to_world = self.field.lattice_from_world().matrix3.transpose();
-                block.slopes(to_world * (1.0 / self.spacing(self.level)))
-            }
-            Aim::Density { .. } => vec![0.0; block.rest.len()],
-        };
-        let (lo, hi) = self.judged();
-        let judged: Vec<Judgement> = (block.knots().enumerate())
-            .map(|(i, knot)| match is_between(lo, knot, hi) {
-                true => self.judge(block.target[i], block.rest[i], slopes[i]),
-                false => Judgement::default(),
-            })
+        // A function takes part where a knot beside its own exceeds the tolerance.
+        let spread = tiles.map(|i| tiles.spread(i, &exceeding, 1));
+        let (first, last) = self.region.allowed();
+        let takes_part: Vec<Mask> = (spread.iter().zip(&tiles.keys))
+            .map(|(spread, key)| and(spread, &between(*key, first, last)))
             .collect();
-        let mut round = Round {
-            samples: block.rest.len() as u64,
-            ..Round::default()
-        };
-        let (own_lo, own_hi) = (knot_of(key, [0; 3]), knot_of(key, [BRICK - 1; 3]));
-        for (knot, judgement) in block.knots().zip(&judged) {
-            if judgement.counts && is_between(own_lo, knot, own_hi) {
-                round.worst = round.worst.max(judgement.off);
-                round.over_tolerance += usize::from(judgement.exceeds);
-                round.wrong_signs += usize::from(judgement.wrong_sign);
-            }
-        }
-        if self.is_first || judged.iter().any(|j| j.exceeds) {
-            round.open.push(key);
-        }
-        let takes_part = block.spread(judged.iter().map(|j| j.exceeds).collect());
-        if self.level > self.options.finest || !takes_part.contains(&true) {
-            return Ok(round);
-        }
-        let coefficients = block.coefficients();
-        let (lo, hi) = self.allowed();
-        let mut add = DenseCorrections::empty();
-        for (i, knot) in block.knots().enumerate() {
-            if takes_part[i] && is_between(own_lo, knot, own_hi) && is_between(lo, knot, hi) {
-                let slot = std::array::from_fn(|a| (knot[a] - own_lo[a]) as usize);
-                add.set(slot, T::from_f64(coefficients[i]));
-            }
-        }
-        if add.mask != [0; BRICK] {
-            round.edits.push(BrickEdit {
-                level: self.level,
-                key,
-                add: add.pack(),
-            });
-        }
-        Ok(round)
+        let coefficients = self.coefficients(tiles, rest, &takes_part);
+        Ok(Round {
+            edits: self.edits(&tiles.keys, &takes_part, &coefficients),
+            open: self.open(&samples, &judge, &spread),
+            samples: samples.count,
+        })
     }
 
-    /// Of a knot where the target is `t` and changes by `slope` per world length.
-    fn judge(&self, t: f64, rest: f64, slope: f64) -> Judgement {
-        match self.options.aim {
-            Aim::Density { tolerance } => Judgement {
-                off: rest.abs(),
-                counts: true,
-                exceeds: rest.abs() > tolerance,
-                wrong_sign: false,
-            },
-            Aim::Surface { iso, tolerance } => {
-                let height = (t - iso).abs();
-                // Next to a crease the surface may be rounded by an interval of the finest level.
-                let rounding = tolerance + self.world_spacing(self.options.finest);
-                let wrong_sign = (t > iso) != (t - rest > iso) && height > rounding * slope;
-                // Coarser levels prepare a wider band, so that nothing large is left where a finer one begins.
-                let band = self.level.min(self.options.finest);
-                let is_near = height <= NEAR * self.world_spacing(band) * slope;
-                let is_over = rest.abs() > tolerance * slope;
-                Judgement {
-                    off: if slope > 0.0 { rest.abs() / slope } else { 0.0 },
-                    counts: is_near || wrong_sign,
-                    exceeds: is_over && (is_near || self.is_first) || wrong_sign,
-                    wrong_sign,
+    /// What is left at the middles of cells in `keys`; with the number of samples.
+    pub fn look(&self, keys: Vec<TileKey>) -> Result<(Left, u64), FitError> {
+        let Samples {
+            tiles,
+            target,
+            rest,
+            count,
+        } = self.samples(keys)?;
+        let judge = self.judge();
+        let (lo, hi) = self.region.judged();
+        let left = tiles.map(|i| {
+            let judged = between(tiles.keys[i], lo, hi);
+            judge.left(&tiles, i, &judged, &target, &rest)
+        });
+        let add = |all: Left, one: Left| Left {
+            worst: all.worst.max(one.worst),
+            over_tolerance: all.over_tolerance + one.over_tolerance,
+            wrong_signs: all.wrong_signs + one.wrong_signs,
+        };
+        Ok((left.into_iter().fold(Left::default(), add), count))
+    }
+
+    fn judge(&self) -> Judge {
+        let region = &self.region;
+        let to_world = self.field.lattice_from_world().matrix3.transpose();
+        let [cell, finest] = [region.level, region.finest].map(|level| region.world_spacing(level));
+        Judge::new(
+            self.options.aim,
+            to_world * (1.0 / region.spacing(region.level)),
+            cell,
+            finest,
+            self.is_first,
+        )
+    }
+
+    fn samples(&self, mut keys: Vec<TileKey>) -> Result<Samples, FitError> {
+        let (lo, hi) = self.region.sampled();
+        keys.retain(|key| between(*key, lo, hi) != NONE);
+        let tiles = Tiles::new(keys);
+        let fields = [self.target, self.field as &dyn Field];
+        let (target, rest, counts) =
+            tiles.fill_both(|i, target, rest| sample(fields, &self.region, tiles.keys[i], target, rest));
+        for (key, target) in tiles.keys.iter().zip(&target) {
+            let inside = between(*key, lo, hi);
+            if let Some(bad) = places(&inside).find(|i| !target[*i].is_finite()) {
+                return Err(self.not_finite(*key, bad));
+            }
+        }
+        let count = counts.into_iter().sum();
+        Ok(Samples {
+            tiles,
+            target,
+            rest,
+            count,
+        })
+    }
+
+    fn not_finite(&self, key: TileKey, place: usize) -> FitError {
+        let at = knot_of(key, place);
+        let p = self.region.frame().node(at);
+        let DVec3 { x, y, z } = p;
+        FitError::Degenerate(format!(
+            "the target is not finite at ({x}, {y}, {z}); fit a field that is finite in the box"
+        ))
+    }
+
+    /// The quasi-interpolant of the rest, and of what that leaves at the knots, in the functions that take part.
+    ///
+    /// Only the sum is cut off where functions do not take part: where all that reach a point do, it is interpolated as
+    /// if there were no cut.
+    fn coefficients(&self, tiles: &Tiles, rest: &[Values], takes_part: &[Mask]) -> Vec<Values> {
+        let (first, last) = self.region.sampled();
+        let convolved = |i: usize, values: &[Values], weights: [f64; 2], out: &mut Values| {
+            let rows = Rows::of(&between(tiles.keys[i], first, last));
+            stencil(&tiles.padded(i, &rows, values, None), &rows, weights, out);
+        };
+        let once = tiles.fill(|i, out| {
+            if tiles.is_any_near(i, takes_part) {
+                convolved(i, rest, QUASI, out);
+            }
+        });
+        let left = tiles.fill(|i, out| {
+            if tiles.is_any_near(i, takes_part) {
+                convolved(i, &once, SAMPLES, out);
+                out.iter_mut().zip(&rest[i]).for_each(|(o, r)| *o = r - *o);
+            }
+        });
+        tiles.fill(|i, out| {
+            if takes_part[i] != NONE {
+                convolved(i, &left, QUASI, out);
+                out.iter_mut().zip(&once[i]).for_each(|(o, first)| *o += first);
+            }
+        })
+    }
+
+    /// Coefficients of the functions that take part, brick by brick.
+    fn edits(&self, keys: &[TileKey], takes_part: &[Mask], coefficients: &[Values]) -> Vec<BrickEdit<T>> {
+        let mut bricks: BTreeMap<BrickKey, DenseCorrections<T>> = BTreeMap::new();
+        for ((key, mask), values) in keys.iter().zip(takes_part).zip(coefficients) {
+            for (x, word) in mask.iter().enumerate() {
+                for (y, bits) in word.to_le_bytes().into_iter().enumerate() {
+                    if bits == 0 {
+                        continue;
+                    }
+                    // Function `k + 1` is centred on knot `k`.
+                    let [fx, fy, fz] = knot_of(*key, (x * TILE + y) * TILE).map(|k| k + 1);
+                    let row = &values[(x * TILE + y) * TILE..][..TILE];
+                    for part in [0..TILE - 1, TILE - 1..TILE] {
+                        let bits = bits >> part.start & (((1u16 << part.len()) - 1) as u8);
+                        if bits == 0 {
+                            continue;
+                        }
+                        let function = [fx, fy, fz + part.start as i64];
+                        let first = function.map(|f| f.max(0) as u32);
+                        let brick = bricks
+                            .entry(BrickKey::of(first))
+                            .or_insert_with(DenseCorrections::empty);
+                        for z in (0..part.len()).filter(|z| bits >> z & 1 == 1) {
+                            let slot = [
+                                first[0] as usize % BRICK,
+                                first[1] as usize % BRICK,
+                                (function[2] + z as i64) as usize % BRICK,
+                            ];
+                            brick.set(slot, T::from_f64(row[part.start + z]));
+                        }
+                    }
                 }
             }
         }
-    }
-
-    /// Values at the knots of a brick's functions and one further on each side, as far as the box asks for them.
-    fn block(&self, key: BrickKey) -> Block {
-        let ((lo, hi), (first, last)) = (self.judged(), self.allowed());
-        let start: [i64; 3] = std::array::from_fn(|a| (knot_of(key, [0; 3])[a]).max(lo[a].min(first[a])) - 1);
-        let end: [i64; 3] =
-            std::array::from_fn(|a| (knot_of(key, [BRICK - 1; 3])[a]).min(hi[a].max(last[a])) + 1);
-        let count: [usize; 3] = std::array::from_fn(|a| (end[a] - start[a] + 1).max(0) as usize);
-        let spacing = self.spacing(self.level);
-        let frame = Frame {
-            world_from_grid: self.field.lattice().world_from_lattice
-                * DAffine3::from_scale(DVec3::splat(spacing)),
-            cells: [1; 3],
+        let level = self.region.level;
+        let edit = |(key, brick): (BrickKey, DenseCorrections<T>)| BrickEdit {
+            level,
+            key,
+            add: brick.pack(),
         };
-        let mut target = vec![0.0; count.iter().product()];
-        let mut rest = target.clone();
-        self.target.frame_values(&frame, start, count, &mut target);
-        self.field.frame_values(&frame, start, count, &mut rest);
-        rest.iter_mut().zip(&target).for_each(|(r, t)| *r = t - *r);
-        let mut block = Block {
-            lo: start,
-            count,
-            target,
-            rest,
-        };
-        block.go_on_outside(self.field.lattice().cells_at(self.level).map(i64::from));
-        block
+        bricks.into_iter().map(edit).collect()
     }
 
-    /// Width of a cell of a level, in lattice coordinates.
-    fn spacing(&self, level: usize) -> f64 {
-        1.0 / (1u64 << level) as f64
-    }
-
-    fn world_spacing(&self, level: usize) -> f64 {
-        self.field.lattice().spacing(level).max_element()
-    }
-
-    /// First and last knot on each axis that lie in the box.
-    fn judged(&self) -> ([i64; 3], [i64; 3]) {
-        let (lo, hi) = self.knots_in(0.0, 0);
-        let last = self.field.lattice().cells_at(self.level).map(i64::from);
-        (lo.map(|k| k.max(0)), std::array::from_fn(|a| hi[a].min(last[a])))
-    }
-
-    /// First and last knot of functions whose support stays within the box and two finest cells beside it, which is one
-    /// support of the finest level.
-    fn allowed(&self) -> ([i64; 3], [i64; 3]) {
-        self.knots_in(2.0 * self.spacing(self.options.finest), 2)
-    }
-
-    /// Knots of the box widened by `reach` but for the outer `rim`; up to the lattice's last functions where the box
-    /// reaches its faces.
-    fn knots_in(&self, reach: f64, rim: i64) -> ([i64; 3], [i64; 3]) {
-        let spacing = self.spacing(self.level);
-        let last = self
-            .field
-            .lattice()
-            .cells_at(self.level)
-            .map(|n| i64::from(n) + 1);
-        let extent = self.field.lattice().extent();
-        let lo = std::array::from_fn(|a| {
-            let start = self.within.min[a];
-            match start <= 0.0 {
-                true => -1,
-                false => ((start - reach) / spacing).ceil() as i64 + rim,
+    /// Where something changed, or should have, as far as the surface is near.
+    fn open(&self, samples: &Samples, judge: &Judge, spread: &[Mask]) -> Vec<TileKey> {
+        let is_last = self.region.level == self.options.finest;
+        if is_last && !self.options.look {
+            return Vec::new();
+        }
+        let Samples {
+            tiles, target, rest, ..
+        } = samples;
+        let own = tiles.map(|i| {
+            // A change reaches two knots further.
+            let reached = match self.is_first && !is_last {
+                true => [!0; TILE],
+                false => tiles.spread(i, spread, 2),
+            };
+            if reached == NONE {
+                return NONE;
             }
+            judge.near(tiles, i, &reached, target, rest)
         });
-        let hi = std::array::from_fn(|a| {
-            let end = self.within.max[a];
-            match end >= extent[a] {
-                true => last[a],
-                false => (((end + reach) / spacing).floor() as i64 - rim).min(last[a]),
-            }
-        });
-        (lo, hi)
+        let mut open: Vec<(TileKey, Mask)> = tiles.keys.iter().copied().zip(own).collect();
+        // Beside the tiles nothing is known but that a change reaches there.
+        let mut beside: Vec<TileKey> = (tiles.keys.iter().zip(spread))
+            .filter(|(_, mask)| **mask != NONE)
+            .flat_map(|(key, _)| about(*key))
+            .filter(|key| tiles.keys.binary_search(key).is_err())
+            .collect();
+        beside.sort_unstable();
+        beside.dedup();
+        open.extend(
+            beside
+                .into_iter()
+                .map(|key| (key, tiles.spread_to(key, spread, 2))),
+        );
+        match is_last {
+            true => between_knots(&open),
+            false => children(&open),
+        }
     }
 }
 
-fn is_between(lo: [i64; 3], knot: [i64; 3], hi: [i64; 3]) -> bool {
-    (0..3).all(|a| (lo[a]..=hi[a]).contains(&knot[a]))
+fn about(key: TileKey) -> impl Iterator<Item = TileKey> {
+    (0..27).map(move |n| [key[0] + n / 9 - 1, key[1] + n / 3 % 3 - 1, key[2] + n % 3 - 1])
 }
 
-/// The knot on which the function in a slot of a brick is centred.
-fn knot_of(key: BrickKey, slot: [usize; 3]) -> [i64; 3] {
-    std::array::from_fn(|a| i64::from(key.0[a]) * BRICK as i64 + slot[a] as i64 - 1)
+fn knot_of(key: TileKey, place: usize) -> [i64; 3] {
+    let at = [place / TILE / TILE, place / TILE % TILE, place % TILE];
+    std::array::from_fn(|a| i64::from(key[a]) * TILE as i64 + at[a] as i64)
 }
 
-/// The brick with the function that is centred on a knot.
-fn brick_of(knot: [i64; 3]) -> BrickKey {
-    BrickKey(knot.map(|k| (k + 1).max(0) as u32 / BRICK as u32))
-}
-
-fn knots_between(lo: [i64; 3], hi: [i64; 3]) -> impl Iterator<Item = [i64; 3]> {
-    let range = move |a: usize| lo[a]..=hi[a];
-    range(0).flat_map(move |x| range(1).flat_map(move |y| range(2).map(move |z| [x, y, z])))
-}
-
-fn keys_between(first: BrickKey, last: BrickKey) -> impl Iterator<Item = BrickKey> {
-    let range = move |a: usize| first.0[a]..=last.0[a];
-    range(0).flat_map(move |x| range(1).flat_map(move |y| range(2).map(move |z| BrickKey([x, y, z]))))
+fn and(a: &Mask, b: &Mask) -> Mask {
+    std::array::from_fn(|x| a[x] & b[x])
 }

@@ -6,14 +6,23 @@
 //! tolerance near the surface, or where the two signs differ. So the cost is that of the box, on every level that of the
 //! surface in it, and the field beside it costs nothing.
 
+mod judge;
 mod level;
+mod prune;
+mod region;
+mod sample;
+mod tiles;
 
 use std::time::Instant;
 
 use crate::{Control, FitError};
 use bspline::hierarchical::{BrickDiff, EditError, MAX_LEVELS};
 use bspline::{Aabb, Field, HierarchicalSpline, Real};
+pub use judge::Left;
 use level::LevelFit;
+use prune::dead_functions;
+use region::Region;
+use tiles::in_pool;
 
 /// How close a field has to come to its target, where, and how fine it may become.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,6 +31,9 @@ pub struct FieldFitOptions {
     pub aim: Aim,
     /// Finest level that may be used.
     pub finest: usize,
+    /// Whether the fit looks at the end at the middles of the finest cells that it changed, for as many samples more as
+    /// there are, and reports what is left there.
+    pub look: bool,
 }
 
 /// Where a target matters.
@@ -49,14 +61,12 @@ pub struct FieldFitReport {
     pub levels: Vec<usize>,
     /// Functions that took part, over all levels.
     pub functions: usize,
+    /// Functions of the old surface that were taken out, as the new one is far from them.
+    pub taken_out: usize,
     /// Points at which target and field were compared.
     pub samples: u64,
-    /// Largest rest among the knots of the level beyond the finest used, where it matters: a world length, or a density.
-    pub worst: f64,
-    /// How many of those knots exceed the tolerance: at creases, or where the finest level does not suffice.
-    pub over_tolerance: usize,
-    /// Knots at which the signs differ further from the surface than the tolerance and one finest interval.
-    pub wrong_signs: usize,
+    /// What the look at the end found, if there was one.
+    pub left: Option<Left>,
     /// Wall time.
     pub seconds: f64,
 }
@@ -82,43 +92,53 @@ pub fn fit_field<T: Real>(
     check(options, extent.min_element())?;
     let mut report = FieldFitReport::default();
     let mut field = onto.clone();
+    let region = |level, is_between| Region {
+        lattice: onto.lattice(),
+        level,
+        finest: options.finest,
+        within: &local,
+        is_between,
+    };
     let across = |level: &usize| extent.min_element() * (1u64 << *level) as f64 >= ACROSS;
     let first = (0..options.finest).find(across).unwrap_or(options.finest);
-    let mut open = None;
-    for level in first..=options.finest + 1 {
-        control.step(
-            "field",
-            (level - first) as f64 / (options.finest + 2 - first) as f64,
-        )?;
+    let mut open = Vec::new();
+    for level in first..=options.finest {
+        let done = (level - first) as f64 / (options.finest + 2 - first) as f64;
+        control.step("field", done)?;
         let fit = LevelFit {
             target,
             field: &field,
-            level,
-            within: &local,
+            region: region(level, false),
             options,
-            is_first: open.is_none(),
+            is_first: level == first,
         };
-        let keys = match open {
-            None => fit.all_bricks(),
-            Some(parents) => fit.children(parents),
-        };
-        let mut round = fit.run(&keys)?;
+        let keys = if level == first { fit.all_tiles() } else { open };
+        let round = in_pool(keys.len(), || fit.run(keys))?;
         report.samples += round.samples;
-        if level > options.finest {
-            report.worst = round.worst;
-            report.over_tolerance = round.over_tolerance;
-            report.wrong_signs = round.wrong_signs;
-            break;
-        }
         if !round.edits.is_empty() {
             report.levels.push(level);
             report.functions += round.edits.iter().map(|e| e.add.count()).sum::<usize>();
-            let once = field.added(&round.edits).map_err(not_added)?;
-            let again = LevelFit { field: &once, ..fit };
-            report.samples += again.correct(&mut round.edits);
-            field = once.added(&round.edits).map_err(not_added)?;
+            field = field.added(&round.edits).map_err(not_added)?;
         }
-        open = Some(round.open);
+        open = round.open;
+    }
+    if let Aim::Surface { iso, .. } = options.aim {
+        let dead = dead_functions(onto, &field, iso, first, |level| region(level, false));
+        let before = field.coefficient_count();
+        field = field.edited_blocks(&dead).map_err(not_added)?;
+        report.taken_out = before - field.coefficient_count();
+    }
+    if options.look {
+        let fit = LevelFit {
+            target,
+            field: &field,
+            region: region(options.finest, true),
+            options,
+            is_first: false,
+        };
+        let (left, samples) = in_pool(open.len(), || fit.look(open))?;
+        report.samples += samples;
+        report.left = Some(left);
     }
     let difference = onto.difference(&field).expect("versions of one field");
     report.seconds = start.elapsed().as_secs_f64();

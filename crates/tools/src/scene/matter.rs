@@ -7,9 +7,9 @@ use dynamics::springs::{Plasticity, Weights};
 use glam::DVec3;
 
 use super::error::{SimulateError, wrong};
-use super::number::Point;
 use super::place::Samples;
 use super::script::{Amount, Material, Paint, Scene, Substance};
+use crate::number::Point;
 
 /// Matter and scale of rest lengths.
 #[derive(Clone, Debug, PartialEq)]

@@ -9,7 +9,7 @@ mod holds;
 mod load;
 mod matter;
 mod motion;
-mod number;
+
 mod place;
 mod script;
 mod when;

@@ -7,8 +7,8 @@ use serde::Deserialize;
 use serde::de::{self, Deserializer, Visitor};
 
 use super::formula::Formula;
-use super::number::{Finite, NonNegative, Point, Positive};
 use super::when::When;
+use crate::number::{Finite, NonNegative, Point, Positive};
 
 /// A scene.
 #[derive(Clone, Debug, Deserialize)]

@@ -1,6 +1,6 @@
 use serde::Deserialize;
 
-use super::number::{NonNegative, Positive};
+use crate::number::{NonNegative, Positive};
 
 /// When something acts, in seconds from the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]

@@ -17,6 +17,8 @@ use dynamics::matter::{Matter, Quantity};
 use dynamics::region::{Cells, Region, RegionOptions};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
+pub use moving::Stroke;
+
 const INTEGRATORS: [Integrator; 4] = [
     Integrator::Paper,
     Integrator::Symplectic,

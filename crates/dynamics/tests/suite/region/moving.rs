@@ -16,12 +16,20 @@ use super::{CELLS, Random, damped, field, options, push, pushed};
 
 /// A half-space with bumps on cells of edge 1.
 fn plain(cells: [u32; 3]) -> HierarchicalSpline<f32> {
+    let middle = 0.5 * f64::from(cells[2]);
+    rough(cells, |p| middle - p.z)
+}
+
+/// Coefficients from their places on cells of edge 1, with bumps.
+fn rough(cells: [u32; 3], f: impl Fn(DVec3) -> f64) -> HierarchicalSpline<f32> {
     let mut random = Random(17);
     let mut bricks = BTreeMap::new();
     for x in 0..cells[0] + 3 {
         for y in 0..cells[1] + 3 {
             for z in 0..cells[2] + 3 {
-                let value = 0.5 * f64::from(cells[2]) - f64::from(z) + 0.3 * random.unit();
+                // The function with the number s is largest at s - 1.
+                let place = DVec3::new(f64::from(x), f64::from(y), f64::from(z)) - 1.0;
+                let value = f(place) + 0.3 * random.unit();
                 let key = BrickKey([x, y, z].map(|s| s / 8));
                 let brick = bricks
                     .entry(key)
@@ -37,24 +45,14 @@ fn plain(cells: [u32; 3]) -> HierarchicalSpline<f32> {
     HierarchicalSpline::from_corrections(lattice, 1.0, vec![bricks])
 }
 
-/// Standard deviation of the tool: 1.5 sample distances.
-const R: f64 = 1.125;
+/// Standard deviation of the tool in edges of cells: 1.5 sample distances.
+pub const R: f64 = 1.125;
 
-/// Clay whose bumps are as wide as the tool, and so light that it does not swing: λ = 1, δ = r, σ = κ = 1.
-fn clay() -> Matter {
-    Matter {
-        mass: Quantity::Constant(0.1 / (R * R)),
-        damping: Quantity::Constant(1.0 / (R * R)),
-        ..Matter::default()
-    }
-}
-
-struct Stroke {
-    law: Law,
-    field: HierarchicalSpline<f32>,
-    from: DVec3,
-    to: DVec3,
-    steps: usize,
+/// A tool that pulls clay along a path, a place a step, through a field of level 0.
+pub struct Stroke {
+    pub law: Law,
+    pub field: HierarchicalSpline<f32>,
+    pub path: Vec<DVec3>,
 }
 
 impl Stroke {
@@ -65,65 +63,87 @@ impl Stroke {
         }
     }
 
-    fn at(&self, step: usize) -> DVec3 {
-        self.from.lerp(self.to, step as f64 / self.steps as f64)
+    fn edge(&self) -> f64 {
+        self.field.lattice().spacing(0).x
+    }
+
+    /// 6 r to the effective rim, and the way of the tool in half of the steps between two cuts.
+    pub fn half(&self, every: usize) -> f64 {
+        let ways = self.path.windows(2).map(|w| w[0].distance(w[1]));
+        (6.0 * R + 0.58) * self.edge() + 0.5 * every as f64 * ways.fold(0.0, f64::max)
+    }
+
+    /// Clay whose bumps are as wide as the tool, and so light that it does not swing: λ = κ = 1, δ = r.
+    fn clay(&self) -> Matter {
+        let damping = (self.law.scale() / (R * self.edge())).powi(2);
+        Matter {
+            mass: Quantity::Constant(0.1 * damping),
+            damping: Quantity::Constant(damping),
+            ..Matter::default()
+        }
     }
 
     fn cut(&self, field: &HierarchicalSpline<f32>, cells: Cells) -> Region<f32> {
-        let mut region = Region::new(field, cells, clay(), &self.options()).unwrap();
+        let mut region = Region::new(field, cells, self.clay(), &self.options()).unwrap();
         let plasticity = Plasticity::Clay { rate: 1.0 };
         region.patch_mut().set_plasticity(plasticity).unwrap();
         region
     }
 
-    fn step(&self, region: &mut Region<f32>, step: usize) {
-        let (at, kernel) = region.patch().lattice().gaussian(region.local(self.at(step)), R);
-        let values: Vec<f32> = kernel.iter().map(|k| 8.0 * *k as f32).collect();
+    fn step(&self, region: &mut Region<f32>, at: DVec3) {
+        let r = R * self.edge();
+        let (at, kernel) = region.patch().lattice().gaussian(region.local(at), r);
+        // As high as a few cells, whatever their edge and the slope of the field.
+        let size = 8.0 * self.law.scale() * self.edge().powi(2);
+        let values: Vec<f32> = kernel.iter().map(|k| (size * *k) as f32).collect();
         region.set_force_on(OnBox { at, values: &values }).unwrap();
         region.step(Integrator::Paper, 0.1).unwrap();
     }
 
     /// In one region of all cells.
-    fn whole(&self) -> HierarchicalSpline<f32> {
+    pub fn whole(&self) -> HierarchicalSpline<f32> {
         let all = Cells {
             level: 0,
             first: [0; 3],
             count: self.field.lattice().cells,
         };
         let mut region = self.cut(&self.field, all);
-        (0..self.steps).for_each(|s| self.step(&mut region, s));
+        self.path.iter().for_each(|p| self.step(&mut region, *p));
         region.release_clay(&self.field).unwrap()
     }
 
     /// In one that is cut anew every few steps with `half` of cells to each side, keeping its motion or not.
-    fn following(&self, half: f64, every: usize, keeping: bool) -> HierarchicalSpline<f32> {
-        let round = |step| Cells::around(&self.field, 0, self.at(step), DVec3::splat(half)).unwrap();
+    pub fn following(&self, half: f64, every: usize, keeping: bool) -> HierarchicalSpline<f32> {
+        let last = self.path.len() - 1;
+        let place = |step: usize| self.path[step.min(last)];
+        let round = |step| Cells::around(&self.field, 0, place(step), DVec3::splat(half)).unwrap();
         let mut onto = self.field.clone();
         let mut region = self.cut(&onto, round(every / 2));
-        for step in 0..self.steps {
+        for step in 0..=last {
             if step > 0 && step % every == 0 {
                 let cells = round(step + every / 2);
                 (onto, region) = if keeping {
-                    region.moved(&onto, cells, clay()).unwrap()
+                    region.moved(&onto, cells, self.clay()).unwrap()
                 } else {
                     let baked = region.bake(&onto).unwrap();
                     let cut = self.cut(&baked, cells);
                     (baked, cut)
                 };
             }
-            self.step(&mut region, step);
+            self.step(&mut region, place(step));
         }
         region.release_clay(&onto).unwrap()
     }
 
     /// Largest difference at the samples, over the peak of `a`.
-    fn apart(&self, a: &HierarchicalSpline<f32>, b: &HierarchicalSpline<f32>) -> f64 {
+    pub fn apart(&self, a: &HierarchicalSpline<f32>, b: &HierarchicalSpline<f32>) -> f64 {
         let cells = self.field.lattice().cells;
         let (mut apart, mut peak) = (0.0_f64, 0.0_f64);
         for x in 0..2 * cells[0] {
             for y in 0..2 * cells[1] {
                 for z in 0..2 * cells[2] {
                     let p = 0.5 * DVec3::new(f64::from(x), f64::from(y), f64::from(z));
+                    let p = self.field.lattice().world_from_lattice.transform_point3(p);
                     apart = apart.max((a.value(p) - b.value(p)).abs());
                     peak = peak.max((a.value(p) - self.field.value(p)).abs());
                 }
@@ -133,18 +153,21 @@ impl Stroke {
     }
 }
 
+fn line(from: DVec3, to: DVec3, steps: usize) -> Vec<DVec3> {
+    (0..steps)
+        .map(|s| from.lerp(to, s as f64 / steps as f64))
+        .collect()
+}
+
 #[test]
 fn a_region_that_follows_a_stroke_ends_where_a_large_one_does() {
     let stroke = Stroke {
         law: Law::Linear { scale: 1.0 },
         field: plain([45, 30, 30]),
-        from: DVec3::new(12.0, 14.0, 15.0),
-        to: DVec3::new(33.0, 17.0, 15.5),
-        steps: 93,
+        path: line(DVec3::new(12.0, 14.0, 15.0), DVec3::new(33.0, 17.0, 15.5), 93),
     };
     let whole = stroke.whole();
-    // 6 r to the effective rim, and the way of the tool between two cuts.
-    let half = 6.0 * R + 0.58 + 0.5 * 8.0 * 0.225;
+    let half = stroke.half(8);
     let kept = stroke.apart(&whole, &stroke.following(half, 8, true));
     let lost = stroke.apart(&whole, &stroke.following(half, 8, false));
     println!("kept {kept:.4}, lost {lost:.4}");
@@ -153,17 +176,31 @@ fn a_region_that_follows_a_stroke_ends_where_a_large_one_does() {
 }
 
 #[test]
+fn a_region_that_follows_a_stroke_round_a_ball_does_so_too() {
+    let centre = DVec3::splat(16.5);
+    let on_ball = |angle: f64| centre + 8.0 * DVec3::new(angle.sin(), 0.3 * angle, angle.cos()).normalize();
+    let stroke = Stroke {
+        law: Law::Linear { scale: 1.0 },
+        field: rough([33; 3], |p| 8.0 - (p - centre).length()),
+        // A quarter of the way round.
+        path: (0..56)
+            .map(|s| on_ball(-0.8 + 1.6 * f64::from(s) / 56.0))
+            .collect(),
+    };
+    let kept = stroke.apart(&stroke.whole(), &stroke.following(stroke.half(8), 8, true));
+    println!("ball: kept {kept:.4}");
+    assert!(kept < 0.02, "{kept:.4}");
+}
+
+#[test]
 fn springs_of_the_four_d_law_are_carried_too() {
     let stroke = Stroke {
         law: Law::FourD { scale: 1.0 },
         field: plain([33, 27, 27]),
-        from: DVec3::new(12.0, 13.0, 13.5),
-        to: DVec3::new(20.0, 14.0, 13.5),
-        steps: 36,
+        path: line(DVec3::new(12.0, 13.0, 13.5), DVec3::new(20.0, 14.0, 13.5), 36),
     };
     let whole = stroke.whole();
-    let half = 6.0 * R + 0.58 + 0.5 * 8.0 * 0.225;
-    let kept = stroke.apart(&whole, &stroke.following(half, 8, true));
+    let kept = stroke.apart(&whole, &stroke.following(stroke.half(8), 8, true));
     println!("4-d kept {kept:.4}");
     assert!(kept < 0.02, "{kept:.4}");
 }

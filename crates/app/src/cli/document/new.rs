@@ -1,0 +1,106 @@
+use std::path::PathBuf;
+
+use document::{Document, Object, State};
+use fitting::{Cancel, Control, FitReport};
+use formats::Unit;
+use formats::field::{AnyField, FieldMeta, SourceKind};
+use glam::DVec3;
+use tools::geometric::block;
+
+use super::{Told, failure, options};
+use crate::cli::failure::{Failure, Outcome};
+use crate::cli::field::{OpenField, stored_text};
+use crate::cli::interrupt;
+use crate::cli::progress::Bar;
+use crate::cli::quantity::positive;
+use crate::cli::source::{FIELDS, Source};
+use crate::cli::volume_choice::{Length, OneOrThree};
+
+/// Arguments of `isoclay new`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Document to make (.isoclay)
+    document: PathBuf,
+    /// Fields (.iclay) that become its objects, under the names of their files
+    #[arg(required_unless_present = "block", value_name = "FIELD")]
+    fields: Vec<PathBuf>,
+    /// Object to start from: a block about the origin with edges of these lengths, one number or three with commas between
+    #[arg(
+        long = "box",
+        id = "block",
+        value_name = "SIZE",
+        requires = "spacing",
+        allow_negative_numbers = true
+    )]
+    block: Option<OneOrThree<Length>>,
+    /// Finest knot interval of the block: the least that can be shaped is a few of it
+    #[arg(long, value_name = "LENGTH", requires = "block", value_parser = positive, allow_negative_numbers = true)]
+    spacing: Option<f64>,
+    /// Unit of the block's lengths: um, mm, cm or m
+    #[arg(long, requires = "block")]
+    unit: Option<Unit>,
+    /// Print one JSON object instead of a table
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Finest knot interval over what a mesh of a block may be off by, as for a fit.
+const TOLERANCE: f64 = 0.02;
+
+/// Makes a document of fields, or of a block.
+pub fn run(args: &Args) -> Outcome {
+    let mut state = State::new();
+    let mut notes = Vec::new();
+    for path in &args.fields {
+        let source = Source::open(path, None, FIELDS, &Cancel::new())?;
+        let open = OpenField::load(&source)?;
+        let name = path
+            .file_stem()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned();
+        if state.objects().contains_key(&name) {
+            return Err(Failure::usage(format!(
+                "{}: another field has the name {name:?} already; rename one of the files",
+                source.name()
+            )));
+        }
+        let loaded = open.loaded();
+        if matches!(loaded.field, AnyField::F64(_)) {
+            notes.push(format!(
+                "{name}: documents hold single precision; the field was rounded to it"
+            ));
+        }
+        let object = Object::new(&loaded.field, loaded.meta.clone())
+            .map_err(|e| Failure::input(format!("{}: {e}", source.name())))?;
+        state = state.with(&name, object).map_err(failure)?;
+    }
+    if let (Some(OneOrThree(size)), Some(spacing)) = (args.block, args.spacing) {
+        let cancel = interrupt::cancel();
+        let bar = Bar::new();
+        let shown = bar.clone();
+        let mut control = Control {
+            cancel,
+            on_progress: Box::new(move |p| shown.show("shaping", p.fraction)),
+            ..Control::default()
+        };
+        let size = DVec3::from_array(size.map(|s| s.0));
+        let field = block(size, spacing, &mut control).map_err(|e| Failure::usage(format!("--box: {e}")))?;
+        bar.clear();
+        let report = FitReport {
+            tolerance: TOLERANCE * spacing,
+            ..FitReport::default()
+        };
+        let meta = FieldMeta {
+            source: SourceKind::Other,
+            unit: args.unit.unwrap_or_default(),
+            iso: Some(0.0),
+            report: stored_text(&report),
+            ..FieldMeta::default()
+        };
+        let object = Object::new(&AnyField::F32(field), meta).map_err(Failure::input)?;
+        state = state.with("block", object).map_err(failure)?;
+    }
+    let mut document = Document::create(&args.document, state, options()).map_err(failure)?;
+    Told::of(&mut document, notes)?.print(args.json)
+}

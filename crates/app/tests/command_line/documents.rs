@@ -1,0 +1,218 @@
+//! Documents: edits by scenes, undone and done again, and what leaves them.
+
+use super::common::{Bench, number};
+
+const SCENE: &str = r#"
+field = "unused"
+[region]
+min = [-0.6, -0.6, 0.5]
+max = [0.6, 0.6, 1.1]
+[[pull]]
+at = [0.0, 0.0, 1.0]
+radius = 0.2
+strength = STRENGTH
+[release]
+as = "clay"
+[plasticity]
+rate = 20.0
+[material]
+mass = 0.01
+damping = 0.1
+[time]
+duration = 0.1
+step = 0.01
+"#;
+
+fn ball() -> Bench {
+    let bench = Bench::new();
+    bench.json("phantom sphere -o cloud.ply --count 2000");
+    bench.json("fit cloud.ply -o ball.iclay --max-depth 6");
+    for (name, strength) in [("out.toml", "4.0"), ("in.toml", "-3.0")] {
+        bench.write(name, SCENE.replace("STRENGTH", strength));
+    }
+    bench
+}
+
+#[test]
+fn a_document_is_edited_undone_done_again_and_replayed() {
+    let bench = ball();
+    let fields = |v: &serde_json::Value| v["field_sha256"]["ball"].as_str().unwrap().to_string();
+    let first = bench.json("new clay.isoclay ball.iclay");
+    assert_eq!(
+        fields(&first),
+        bench.json("info ball.iclay")["field_sha256"].as_str().unwrap()
+    );
+    let out = bench.json("sculpt clay.isoclay --script out.toml --threads 1");
+    let both = bench.json("sculpt clay.isoclay --script in.toml --threads 8");
+    assert_ne!(fields(&out), fields(&first));
+    assert_ne!(fields(&both), fields(&out));
+    // A scene on a field and on an object of a document leave the same.
+    let simulated = bench.json("simulate out.toml --field ball.iclay -o pulled.iclay");
+    assert_eq!(simulated["field_sha256"].as_str().unwrap(), fields(&out));
+    assert_eq!(fields(&bench.json("undo clay.isoclay 2")), fields(&first));
+    assert_eq!(fields(&bench.json("redo clay.isoclay")), fields(&out));
+    let past_the_end = bench.json("redo clay.isoclay 5");
+    assert_eq!(fields(&past_the_end), fields(&both));
+    assert!(past_the_end["notes"][0].as_str().unwrap().contains("1 of 5"));
+    for threads in [1, 2, 8] {
+        let replayed = bench.json(&format!("replay clay.isoclay --threads {threads}"));
+        assert_eq!(fields(&replayed), fields(&both));
+    }
+    let history = bench.run("history clay.isoclay");
+    assert!(history.stdout.contains("out.toml on ball") && history.stdout.contains("in.toml on ball"));
+    bench.json("undo clay.isoclay");
+    assert!(
+        bench
+            .run("history clay.isoclay")
+            .stdout
+            .contains("in.toml on ball  (undone)")
+    );
+    let exported = bench.json("export clay.isoclay -o now.iclay");
+    assert_eq!(exported["field_sha256"].as_str().unwrap(), fields(&out));
+    // What takes a field takes a document of one object.
+    let mesh = bench.json("mesh clay.isoclay -o a.ply");
+    assert_eq!(
+        mesh["triangles"],
+        bench.json("mesh now.iclay -o b.ply")["triangles"]
+    );
+    assert_eq!(
+        std::fs::read(bench.path("a.ply")).unwrap(),
+        std::fs::read(bench.path("b.ply")).unwrap()
+    );
+}
+
+#[test]
+fn documents_that_cannot_be_used_say_why_and_stay_as_they_are() {
+    let bench = ball();
+    std::fs::copy(bench.path("ball.iclay"), bench.path("cow.iclay")).unwrap();
+    bench.json("new two.isoclay ball.iclay cow.iclay");
+    let before = std::fs::read(bench.path("two.isoclay")).unwrap();
+    bench.write(
+        "far.toml",
+        SCENE
+            .replace("min = [-0.6", "min = [-99.0")
+            .replace("STRENGTH", "1"),
+    );
+    bench.write(
+        "typo.toml",
+        SCENE.replace("strength = STRENGTH", "strenght = 1.0"),
+    );
+    for (arguments, code, word) in [
+        ("new two.isoclay ball.iclay", 2, "exists already"),
+        ("new three.isoclay ball.iclay ball.iclay", 2, "rename"),
+        ("sculpt two.isoclay --script out.toml", 2, "--object"),
+        ("sculpt two.isoclay --script far.toml --object cow", 3, "far.toml"),
+        (
+            "sculpt two.isoclay --script typo.toml --object cow",
+            3,
+            "strenght",
+        ),
+        ("mesh two.isoclay -o out.ply", 3, "isoclay export"),
+        ("export two.isoclay -o out.iclay", 2, "--object"),
+    ] {
+        let run = bench.run(arguments);
+        assert_eq!(run.code, code, "{arguments}: {}", run.stderr);
+        assert!(run.stderr.contains(word), "{arguments}: {}", run.stderr);
+    }
+    assert_eq!(std::fs::read(bench.path("two.isoclay")).unwrap(), before);
+    assert!(!bench.path("three.isoclay").exists());
+    // A torn end is left out and told; the next edit takes its place.
+    bench.write("torn.isoclay", [&before[..], &[1, 2, 3]].concat());
+    let torn = bench.json("history torn.isoclay");
+    assert!(torn["notes"][0].as_str().unwrap().contains("not whole"));
+    bench.json("sculpt torn.isoclay --script out.toml --object cow");
+    assert!(bench.json("history torn.isoclay").get("notes").is_none());
+}
+
+/// A file that may grow no further stands for a disk that fills up in the middle of an edit.
+#[test]
+fn an_edit_that_finds_no_room_leaves_the_document_as_it_was() {
+    let bench = ball();
+    bench.json("new clay.isoclay ball.iclay");
+    let before = std::fs::read(bench.path("clay.isoclay")).unwrap();
+    // POSIX counts blocks of 512 bytes; some of the edit fits.
+    let room = before.len() / 512 + 2;
+    let program = env!("CARGO_BIN_EXE_isoclay");
+    let limited = std::process::Command::new("sh")
+        .arg("-c")
+        .arg(format!(
+            "trap '' XFSZ; ulimit -f {room}; exec {program} sculpt clay.isoclay --script out.toml"
+        ))
+        .current_dir(&bench.directory)
+        .output()
+        .unwrap();
+    let said = String::from_utf8(limited.stderr).unwrap();
+    assert_eq!(limited.status.code(), Some(4), "{said}");
+    assert!(said.contains("clay.isoclay: writing failed"), "{said}");
+    assert_eq!(std::fs::read(bench.path("clay.isoclay")).unwrap(), before);
+    let after = bench.json("sculpt clay.isoclay --script out.toml");
+    assert_eq!(after["done"], 1);
+}
+
+/// Each stroke is an edit; an error names the stroke or the line, and the edits before it stay.
+#[test]
+fn a_session_carves_and_adds_stroke_by_stroke() {
+    let bench = ball();
+    bench.json("new clay.isoclay ball.iclay");
+    bench.write(
+        "session.toml",
+        r#"
+[[stroke]]
+carve = { shape = { sphere = { radius = 0.2 } }, along = [[0.0, -0.4, 1.0], [0.0, 0.4, 1.0]], blend = 0.05 }
+[[stroke]]
+object = "ball"
+add = { shape = { torus = { axis = [0, 1, 0], major = 0.6, minor = 0.1 } }, along = [[0.5, 0.0, 0.0]] }
+"#,
+    );
+    let done = bench.json("sculpt clay.isoclay --script session.toml");
+    assert_eq!(done["done"], 2);
+    let replayed = bench.json("replay clay.isoclay");
+    assert_eq!(replayed["field_sha256"], done["field_sha256"]);
+    // A torus through a ball: what juts out has a hole.
+    let mesh = bench.json("mesh clay.isoclay -o clay.ply --check");
+    assert_eq!(mesh["quality"]["open_edges"], 0, "{mesh}");
+    bench.write(
+        "half.toml",
+        "[[stroke]]\ncarve = { shape = { sphere = { radius = 0.1 } }, along = [[1.0, 0.0, 0.0]] }\n[[stroke]]\n",
+    );
+    let run = bench.run("sculpt clay.isoclay --script half.toml");
+    assert_eq!(run.code, 3);
+    assert!(
+        run.stderr.contains("stroke 2") && run.stderr.contains("carve or add"),
+        "{}",
+        run.stderr
+    );
+    assert_eq!(bench.json("history clay.isoclay")["done"], 2);
+    bench.write("typo.toml", "[[stroke]]\n\ncarv = 1\n");
+    let run = bench.run("sculpt clay.isoclay --script typo.toml");
+    assert!(run.stderr.contains("line 3"), "{}", run.stderr);
+}
+
+#[test]
+fn a_block_is_made_from_nothing_and_shaped() {
+    let bench = Bench::new();
+    bench.json("new block.isoclay --box 10,6,4 --spacing 0.4 --unit mm");
+    let mesh = bench.json("mesh block.isoclay -o block.ply --check");
+    let volume = number(&mesh["quality"], "volume");
+    assert!((volume - 240.0).abs() < 2.0, "{mesh}");
+    bench.write(
+        "drill.toml",
+        "[[stroke]]\nobject = \"block\"\ncarve = { shape = { cylinder = { axis = [0, 0, 1], radius = 1.0, height = 9.0 } }, along = [[1, 0, 0]] }\n",
+    );
+    bench.json("sculpt block.isoclay --script drill.toml");
+    let drilled = bench.json("mesh block.isoclay -o drilled.ply --check");
+    let taken = volume - number(&drilled["quality"], "volume");
+    let whole = 4.0 * std::f64::consts::PI;
+    assert!((taken / whole - 1.0).abs() < 0.02, "{taken} of {whole}");
+    for (arguments, word) in [
+        ("new a.isoclay --box 10", "--spacing"),
+        ("new a.isoclay --spacing 1", "--box"),
+        ("new a.isoclay --box 1 --spacing 0.9", "from 2"),
+        ("new a.isoclay", "FIELD"),
+    ] {
+        let run = bench.run(arguments);
+        assert_eq!(run.code, 2, "{arguments}");
+        assert!(run.stderr.contains(word), "{arguments}: {}", run.stderr);
+    }
+    assert!(!bench.path("a.isoclay").exists());
+}

@@ -1,0 +1,246 @@
+//! What differs between two states, as a value that leads from either to the other.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use bspline::hierarchical::BrickDiff;
+use formats::ReadLimits;
+use formats::field::{decode, decode_difference, encode, encode_difference};
+use serde::{Deserialize, Serialize};
+
+use crate::error::{damaged, fault};
+use crate::{DocumentError, Object, Properties, State};
+
+/// What an edit does to one object.
+#[derive(Clone, Debug)]
+pub enum Change {
+    /// Puts it in.
+    Added {
+        /// Its name.
+        object: String,
+        /// All of it.
+        new: Object,
+    },
+    /// Takes it out.
+    Removed {
+        /// Its name.
+        object: String,
+        /// All of it.
+        old: Object,
+    },
+    /// Changes bricks of its field.
+    Field {
+        /// Its name.
+        object: String,
+        /// The bricks.
+        diff: BrickDiff<f32>,
+    },
+    /// Changes its properties.
+    Properties {
+        /// Its name.
+        object: String,
+        /// Before.
+        old: Properties,
+        /// After.
+        new: Properties,
+    },
+}
+
+/// A [`Change`] as the journal has it: what stands in its JSON; fields and differences follow as bytes.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(tag = "change", rename_all = "lowercase", deny_unknown_fields)]
+pub(crate) enum ChangeHead {
+    Added {
+        object: String,
+        properties: Properties,
+        bytes: u64,
+    },
+    Removed {
+        object: String,
+        properties: Properties,
+        bytes: u64,
+    },
+    Field {
+        object: String,
+        bytes: u64,
+    },
+    Properties {
+        object: String,
+        old: Properties,
+        new: Properties,
+    },
+}
+
+impl Change {
+    /// All that leads from one state to another, in the order of names: first what goes, then what comes or changes.
+    pub fn between(old: &State, new: &State) -> Vec<Self> {
+        let mut changes = Vec::new();
+        let mut later = Vec::new();
+        for (name, before) in old.objects() {
+            let object = name.clone();
+            let removed = |object| Self::Removed {
+                object,
+                old: before.clone(),
+            };
+            let Some(after) = new.objects().get(name) else {
+                changes.push(removed(object));
+                continue;
+            };
+            // Fields on other lattices, or with another origin, have no bricks in common.
+            let is_same = Arc::ptr_eq(&before.meta, &after.meta) || before.meta == after.meta;
+            let Some(diff) = before.field.difference(&after.field).ok().filter(|_| is_same) else {
+                changes.push(removed(object.clone()));
+                later.push(Self::Added {
+                    object,
+                    new: after.clone(),
+                });
+                continue;
+            };
+            if !diff.bricks.is_empty() {
+                later.push(Self::Field {
+                    object: object.clone(),
+                    diff,
+                });
+            }
+            if before.properties != after.properties {
+                let (old, new) = (before.properties.clone(), after.properties.clone());
+                later.push(Self::Properties { object, old, new });
+            }
+        }
+        let come = new
+            .objects()
+            .iter()
+            .filter(|(name, _)| !old.objects().contains_key(*name));
+        changes.extend(later);
+        changes.extend(come.map(|(name, new)| Self::Added {
+            object: name.clone(),
+            new: new.clone(),
+        }));
+        changes
+    }
+
+    /// The way back.
+    pub fn reversed(&self) -> Self {
+        match self.clone() {
+            Self::Added { object, new } => Self::Removed { object, old: new },
+            Self::Removed { object, old } => Self::Added { object, new: old },
+            Self::Field { object, diff } => Self::Field {
+                object,
+                diff: diff.reversed(),
+            },
+            Self::Properties { object, old, new } => Self::Properties {
+                object,
+                old: new,
+                new: old,
+            },
+        }
+    }
+
+    /// Takes a state from the one side of the change to the other. The message says why it is on neither.
+    pub(crate) fn apply(&self, state: &mut State) -> Result<(), String> {
+        match self {
+            Self::Added { object, new } => state.set(object, Some(new.clone())),
+            Self::Removed { object, .. } => state.set(object, None),
+            Self::Field { object, diff } => {
+                let mut changed = state.object(object).map_err(|e| e.to_string())?.clone();
+                changed.field = changed.field.applied(diff).map_err(|e| e.to_string())?;
+                state.set(object, Some(changed));
+            }
+            Self::Properties { object, new, .. } => {
+                let mut changed = state.object(object).map_err(|e| e.to_string())?.clone();
+                changed.properties = new.clone();
+                state.set(object, Some(changed));
+            }
+        }
+        Ok(())
+    }
+
+    /// As the journal has it; appends what is not JSON to `bytes`.
+    pub(crate) fn write(&self, path: &Path, bytes: &mut Vec<u8>) -> Result<ChangeHead, DocumentError> {
+        let mut put = |part: Result<Vec<u8>, formats::Fault>| {
+            let part = part.map_err(|f| fault(path, f))?;
+            bytes.extend_from_slice(&part);
+            Ok::<_, DocumentError>(part.len() as u64)
+        };
+        Ok(match self {
+            Self::Added { object, new } => ChangeHead::Added {
+                object: object.clone(),
+                properties: new.properties.clone(),
+                bytes: put(encode(&new.field, &new.meta))?,
+            },
+            Self::Removed { object, old } => ChangeHead::Removed {
+                object: object.clone(),
+                properties: old.properties.clone(),
+                bytes: put(encode(&old.field, &old.meta))?,
+            },
+            Self::Field { object, diff } => ChangeHead::Field {
+                object: object.clone(),
+                bytes: put(encode_difference(diff))?,
+            },
+            Self::Properties { object, old, new } => ChangeHead::Properties {
+                object: object.clone(),
+                old: old.clone(),
+                new: new.clone(),
+            },
+        })
+    }
+
+    /// Reads one of the changes that lead from or to `beside`, a state that has the lattices of its objects.
+    pub(crate) fn read(
+        head: &ChangeHead,
+        rest: &mut &[u8],
+        beside: &State,
+        limits: &ReadLimits,
+        path: &Path,
+    ) -> Result<Self, DocumentError> {
+        let mut take = |count: u64| {
+            let count = usize::try_from(count).ok().filter(|&n| n <= rest.len());
+            let (own, others) =
+                rest.split_at(count.ok_or_else(|| damaged(path, "a change is shorter than it says"))?);
+            *rest = others;
+            Ok::<_, DocumentError>(own)
+        };
+        let object_of = |bytes: &[u8], properties: &Properties| {
+            let loaded = decode(bytes, limits).map_err(|f| fault(path, f))?;
+            let mut object =
+                Object::new(&loaded.field, loaded.meta).map_err(|e| damaged(path, e.to_string()))?;
+            object.properties = properties.clone();
+            Ok::<_, DocumentError>(object)
+        };
+        Ok(match head {
+            ChangeHead::Added {
+                object,
+                properties,
+                bytes,
+            } => Self::Added {
+                object: object.clone(),
+                new: object_of(take(*bytes)?, properties)?,
+            },
+            ChangeHead::Removed {
+                object,
+                properties,
+                bytes,
+            } => Self::Removed {
+                object: object.clone(),
+                old: object_of(take(*bytes)?, properties)?,
+            },
+            ChangeHead::Field { object, bytes } => {
+                let lattice = *beside
+                    .object(object)
+                    .map_err(|e| damaged(path, e.to_string()))?
+                    .field
+                    .lattice();
+                let diff = decode_difference(take(*bytes)?, &lattice, limits).map_err(|f| fault(path, f))?;
+                Self::Field {
+                    object: object.clone(),
+                    diff,
+                }
+            }
+            ChangeHead::Properties { object, old, new } => Self::Properties {
+                object: object.clone(),
+                old: old.clone(),
+                new: new.clone(),
+            },
+        })
+    }
+}

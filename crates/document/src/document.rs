@@ -1,0 +1,598 @@
+//! A document: a state, and the journal that leads to it.
+
+use std::path::{Path, PathBuf};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use formats::ReadLimits;
+use formats::field::{decode, encode};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::Value;
+
+use crate::entry::{EditCounts, EditHead, EditInfo, Kind, MoveHead, ObjectHead, SnapshotHead, hex};
+use crate::error::{damaged, fault};
+use crate::journal::{Journal, Parts, Record, Tail};
+use crate::{Change, DocumentError, Object, State};
+
+/// How a document is kept.
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    /// Bytes that the file may grow to before the oldest edits are forgotten. What the objects take themselves, and what
+    /// is undone, is kept in any case.
+    pub quota: u64,
+    /// What reading may take.
+    pub limits: ReadLimits,
+}
+
+impl Default for Options {
+    /// A gibibyte.
+    fn default() -> Self {
+        Self {
+            quota: 1 << 30,
+            limits: ReadLimits::default(),
+        }
+    }
+}
+
+/// Objects that are edited, and a file that has every edit before it shows. See the crate's documentation.
+#[derive(Debug)]
+pub struct Document {
+    path: PathBuf,
+    /// None once another program has taken the file, which can happen only while it is shortened.
+    journal: Option<Journal>,
+    options: Options,
+    state: State,
+    layout: Layout,
+    /// Set where the file goes on beyond what could be followed: it is copied before it is written to.
+    is_partial: bool,
+    trouble: Option<DocumentError>,
+}
+
+/// What opening a document found.
+#[derive(Debug)]
+pub struct Opened {
+    /// The document.
+    pub document: Document,
+    /// What of the file could not be read, if anything.
+    pub lost: Option<Lost>,
+}
+
+/// What of a document could not be read. All before it is there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lost {
+    /// Bytes at the end of the file that cannot be followed.
+    pub bytes: u64,
+    /// Whether it is no more than what a crash leaves of the edit in hand. Anything else is copied beside the document,
+    /// under its name with `.damaged`, before the document is next written to.
+    pub is_torn: bool,
+    /// What was met.
+    pub why: String,
+}
+
+/// What the journal's records make.
+#[derive(Clone, Debug, Default)]
+struct Layout {
+    /// Edits, the oldest first.
+    edits: Vec<Record>,
+    /// How many of them are done.
+    done: usize,
+    /// Snapshots, and how many edits each has in it.
+    snapshots: Vec<(usize, Record)>,
+}
+
+impl Document {
+    /// A new document.
+    ///
+    /// # Errors
+    /// [`DocumentError::Exists`]; I/O.
+    pub fn create(path: &Path, state: State, options: Options) -> Result<Self, DocumentError> {
+        if path.symlink_metadata().is_ok() {
+            return Err(DocumentError::Exists(path.into()));
+        }
+        state.check_all()?;
+        Journal::create(
+            path,
+            [snapshot(path, &state, 0).map(|parts| (Kind::Snapshot, parts))],
+        )?;
+        Ok(Self::open(path, options)?.document)
+    }
+
+    /// Opens a document and takes it for itself until it is dropped.
+    ///
+    /// # Errors
+    /// [`DocumentError::InUse`]; [`DocumentError::File`] for a file that is no document, is newer than this program, has no
+    /// snapshot that can be read, or is larger than the limits allow.
+    pub fn open(path: &Path, options: Options) -> Result<Opened, DocumentError> {
+        let (mut journal, records, mut tail) = Journal::open(path)?;
+        let length = journal.size() + tail.bytes;
+        let (mut layout, mut trouble) = Layout::read(&mut journal, &records)?;
+        let (state, reached, on_the_way) = layout.reach(&mut journal, &options.limits)?;
+        if reached < layout.done {
+            // All before this edit leads to where it was made.
+            journal.cut(&layout.edits[reached]);
+            layout.forget_after(reached);
+            trouble = on_the_way;
+        }
+        if trouble.is_some() {
+            tail = Tail {
+                bytes: length - journal.size(),
+                is_torn: false,
+            };
+        }
+        let lost = (tail.bytes > 0).then(|| Lost {
+            bytes: tail.bytes,
+            is_torn: tail.is_torn,
+            why: trouble.map_or("the last record is not whole".into(), |error| error.to_string()),
+        });
+        let document = Self {
+            path: path.into(),
+            is_partial: lost.as_ref().is_some_and(|lost| !lost.is_torn),
+            journal: Some(journal),
+            options,
+            state,
+            layout,
+            trouble: None,
+        };
+        Ok(Opened { document, lost })
+    }
+
+    /// All objects as they are.
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    /// Where the document is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Bytes of the file.
+    pub fn size(&self) -> u64 {
+        self.journal.as_ref().map_or(0, Journal::size)
+    }
+
+    /// How many edits there are.
+    ///
+    /// # Errors
+    /// Of reading.
+    pub fn counts(&mut self) -> Result<EditCounts, DocumentError> {
+        let (_, first) = self.layout.snapshots[0];
+        let forgotten = self.read_text::<SnapshotHead>(&first)?.forgotten;
+        Ok(EditCounts {
+            done: self.layout.done,
+            undone: self.layout.edits.len() - self.layout.done,
+            forgotten,
+        })
+    }
+
+    /// What is told of each edit, the oldest first; the first [`EditCounts::done`] of them are done.
+    ///
+    /// # Errors
+    /// Of reading.
+    pub fn history(&mut self) -> Result<Vec<EditInfo>, DocumentError> {
+        let edits = self.layout.edits.clone();
+        edits
+            .iter()
+            .map(|edit| Ok(self.read_text::<EditHead>(edit)?.info))
+            .collect()
+    }
+
+    /// What was asked for by edit `n` of the history.
+    ///
+    /// # Errors
+    /// Of reading.
+    ///
+    /// # Panics
+    /// If there are not that many.
+    pub fn command(&mut self, n: usize) -> Result<Value, DocumentError> {
+        let edit = self.layout.edits[n];
+        Ok(self.read_text::<EditHead>(&edit)?.command)
+    }
+
+    /// The objects before the first edit of the history.
+    ///
+    /// # Errors
+    /// Of reading.
+    pub fn first_state(&mut self) -> Result<State, DocumentError> {
+        self.state_at(0)
+    }
+
+    /// Why the journal could not be shortened after the last edit, if so. The edit itself is safe.
+    pub fn trouble(&self) -> Option<&DocumentError> {
+        self.trouble.as_ref()
+    }
+
+    /// Goes over to another state: what differs is on the disk before this returns. Edits that were undone are no more.
+    /// False if nothing differs; then nothing is done.
+    ///
+    /// # Errors
+    /// Of writing; the document is as before.
+    pub fn commit(&mut self, title: &str, command: Value, state: State) -> Result<bool, DocumentError> {
+        let changes = Change::between(&self.state, &state);
+        if changes.is_empty() {
+            return Ok(false);
+        }
+        let mut bulk = Vec::new();
+        let heads = changes.iter().map(|change| change.write(&self.path, &mut bulk));
+        let changes = heads.collect::<Result<_, _>>()?;
+        let head = EditHead {
+            info: EditInfo {
+                title: title.into(),
+                time: SystemTime::now()
+                    .duration_since(UNIX_EPOCH)
+                    .map_or(0, |t| t.as_secs()),
+                sha256: hex(state.sha256()),
+            },
+            command,
+            changes,
+        };
+        let record = self.append(
+            Kind::Edit,
+            &Parts {
+                text: json(&head),
+                bulk,
+            },
+        )?;
+        self.layout.forget_after(self.layout.done);
+        self.layout.edits.push(record);
+        self.layout.done += 1;
+        self.state = state;
+        self.trouble = self.tidy().err();
+        Ok(true)
+    }
+
+    /// Undoes up to `count` edits; tells how many.
+    ///
+    /// # Errors
+    /// Of reading and writing; the document is as before.
+    pub fn undo(&mut self, count: usize) -> Result<usize, DocumentError> {
+        let count = count.min(self.layout.done);
+        self.go_to(self.layout.done - count)?;
+        Ok(count)
+    }
+
+    /// Does up to `count` edits again that were undone; tells how many.
+    ///
+    /// # Errors
+    /// Of reading and writing; the document is as before.
+    pub fn redo(&mut self, count: usize) -> Result<usize, DocumentError> {
+        let count = count.min(self.layout.edits.len() - self.layout.done);
+        self.go_to(self.layout.done + count)?;
+        Ok(count)
+    }
+
+    fn go_to(&mut self, done: usize) -> Result<(), DocumentError> {
+        if done == self.layout.done {
+            return Ok(());
+        }
+        let state = self.state_at(done)?;
+        self.append(
+            Kind::Move,
+            &Parts {
+                text: json(&MoveHead { done: done as u64 }),
+                bulk: Vec::new(),
+            },
+        )?;
+        self.layout.done = done;
+        self.state = state;
+        Ok(())
+    }
+
+    /// The state with that many edits done, by way of the changes from the one at hand.
+    fn state_at(&mut self, done: usize) -> Result<State, DocumentError> {
+        let journal = self
+            .journal
+            .as_mut()
+            .ok_or_else(|| DocumentError::InUse(self.path.clone()))?;
+        let (mut state, limits) = (self.state.clone(), &self.options.limits);
+        for edit in self.layout.edits[done.min(self.layout.done)..self.layout.done]
+            .iter()
+            .rev()
+        {
+            state = followed(journal, edit, &state, false, limits)?;
+        }
+        for edit in &self.layout.edits[self.layout.done..done.max(self.layout.done)] {
+            state = followed(journal, edit, &state, true, limits)?;
+        }
+        let expected = match done.checked_sub(1) {
+            Some(last) => {
+                read_text::<EditHead>(journal, &self.layout.edits[last])?
+                    .info
+                    .sha256
+            }
+            None => read_text::<SnapshotHead>(journal, &self.layout.snapshots[0].1)?.sha256,
+        };
+        match hex(state.sha256()) == expected {
+            true => Ok(state),
+            false => Err(damaged(
+                &self.path,
+                "the edits do not lead back to where they came from",
+            )),
+        }
+    }
+
+    fn read_text<T: DeserializeOwned>(&mut self, record: &Record) -> Result<T, DocumentError> {
+        let journal = self
+            .journal
+            .as_mut()
+            .ok_or_else(|| DocumentError::InUse(self.path.clone()))?;
+        read_text(journal, record)
+    }
+
+    fn append(&mut self, kind: Kind, parts: &Parts) -> Result<Record, DocumentError> {
+        let journal = self
+            .journal
+            .as_mut()
+            .ok_or_else(|| DocumentError::InUse(self.path.clone()))?;
+        if self.is_partial {
+            let copy = free_name(&self.path);
+            journal.copy(&copy)?;
+            self.is_partial = false;
+        }
+        journal.append(kind, parts)
+    }
+
+    /// Writes a snapshot where the way from the last one has become longer than a snapshot, and forgets the oldest edits
+    /// where the file has outgrown its quota.
+    fn tidy(&mut self) -> Result<(), DocumentError> {
+        let &(at, last) = self.layout.snapshots.last().expect("a document begins with one");
+        let way: u64 = self.layout.edits[at..].iter().map(Record::size).sum();
+        if way > last.size().max(SHORT) {
+            let parts = snapshot(&self.path, &self.state, 0)?;
+            let record = self.append(Kind::Snapshot, &parts)?;
+            self.layout.snapshots.push((self.layout.done, record));
+        }
+        match self.size() > self.options.quota {
+            true => self.shorten(),
+            false => Ok(()),
+        }
+    }
+
+    /// Forgets the oldest edits, so that the file takes about half its quota.
+    fn shorten(&mut self) -> Result<(), DocumentError> {
+        let object_bytes = self
+            .layout
+            .snapshots
+            .last()
+            .map_or(0, |(_, record)| record.size());
+        // Objects beyond the quota leave room for some edits all the same.
+        let room = (self.options.quota / 2)
+            .saturating_sub(object_bytes)
+            .max(self.options.quota / 4);
+        let mut kept = 0;
+        let fits = |record: &&Record| {
+            kept += record.size();
+            kept <= room
+        };
+        let first = self.layout.edits.len() - self.layout.edits.iter().rev().take_while(fits).count();
+        let first = first.min(self.layout.done);
+        let left: u64 = self.layout.edits[first..].iter().map(Record::size).sum::<u64>() + object_bytes;
+        // What little it gains is not worth a new file.
+        if left > self.size() / 4 * 3 {
+            return Ok(());
+        }
+        let forgotten = self.counts()?.forgotten + first as u64;
+        let base = self.state_at(first)?;
+        let mut journal = self
+            .journal
+            .take()
+            .ok_or_else(|| DocumentError::InUse(self.path.clone()))?;
+        let start = snapshot(&self.path, &base, forgotten).map(|parts| (Kind::Snapshot, parts));
+        let edits = &self.layout.edits[first..];
+        let done = (self.layout.done - first) as u64;
+        let end = Parts {
+            text: json(&MoveHead { done }),
+            bulk: Vec::new(),
+        };
+        let written = Journal::create(
+            &self.path,
+            std::iter::once(start)
+                .chain(edits.iter().map(|edit| Ok((Kind::Edit, journal.read(edit)?))))
+                .chain([Ok((Kind::Move, end))]),
+        );
+        if let Err(error) = written {
+            self.journal = Some(journal);
+            return Err(error);
+        }
+        let (mut journal, records, _) = Journal::open(&self.path)?;
+        (self.layout, _) = Layout::read(&mut journal, &records)?;
+        self.journal = Some(journal);
+        Ok(())
+    }
+}
+
+/// Bytes of edits that need no snapshot, however small the objects are.
+const SHORT: u64 = 1 << 20;
+
+impl Layout {
+    /// What records make, as far as they can be understood: the first one that cannot is cut off with all behind it.
+    fn read(
+        journal: &mut Journal,
+        records: &[Record],
+    ) -> Result<(Self, Option<DocumentError>), DocumentError> {
+        let (mut layout, mut trouble) = (Self::default(), None);
+        for record in records {
+            match record.kind {
+                Kind::Snapshot => layout.snapshots.push((layout.done, *record)),
+                Kind::Edit => {
+                    layout.forget_after(layout.done);
+                    layout.edits.push(*record);
+                    layout.done += 1;
+                }
+                Kind::Move => match read_text::<MoveHead>(journal, record) {
+                    Ok(head) => layout.done = (head.done as usize).min(layout.edits.len()),
+                    Err(error) => {
+                        journal.cut(record);
+                        trouble = Some(error);
+                        break;
+                    }
+                },
+            }
+        }
+        match layout.snapshots.first() {
+            Some((0, _)) => Ok((layout, trouble)),
+            _ => Err(damaged(journal.path(), "it does not begin with its objects")),
+        }
+    }
+
+    /// Drops edits from a number on, and the snapshots that have them in them.
+    fn forget_after(&mut self, count: usize) {
+        self.edits.truncate(count);
+        self.snapshots.retain(|(at, _)| *at <= count);
+        self.done = self.done.min(count);
+    }
+
+    /// The state that all done edits make, or the last one on the way to it that can be reached: how many edits are in it,
+    /// and what was in the way.
+    fn reach(
+        &self,
+        journal: &mut Journal,
+        limits: &ReadLimits,
+    ) -> Result<(State, usize, Option<DocumentError>), DocumentError> {
+        let mut best: Option<(State, usize)> = None;
+        let mut trouble = None;
+        for (at, record) in self.snapshots.iter().rev().filter(|(at, _)| *at <= self.done) {
+            let mut state = match restored(journal, record, limits) {
+                Ok(state) => state,
+                Err(error) => {
+                    trouble.get_or_insert(error);
+                    continue;
+                }
+            };
+            let mut reached = *at;
+            for edit in &self.edits[*at..self.done] {
+                match followed(journal, edit, &state, true, limits) {
+                    Ok(next) => (state, reached) = (next, reached + 1),
+                    Err(error) => {
+                        trouble.get_or_insert(error);
+                        break;
+                    }
+                }
+            }
+            if best.as_ref().is_none_or(|(_, most)| reached > *most) {
+                best = Some((state, reached));
+            }
+            if reached == self.done {
+                break;
+            }
+        }
+        let nothing = || damaged(journal.path(), "it does not begin with its objects");
+        match best {
+            Some((state, reached)) => Ok((state, reached, trouble)),
+            None => Err(trouble.unwrap_or_else(nothing)),
+        }
+    }
+}
+
+/// All objects as a record.
+fn snapshot(path: &Path, state: &State, forgotten: u64) -> Result<Parts, DocumentError> {
+    let mut bulk = Vec::new();
+    let mut objects = Vec::new();
+    for (name, object) in state.objects() {
+        let bytes = encode(&object.field, &object.meta).map_err(|f| fault(path, f))?;
+        objects.push(ObjectHead::new(name, object, bytes.len() as u64));
+        bulk.extend(bytes);
+    }
+    let sha256 = hex(state.sha256());
+    Ok(Parts {
+        text: json(&SnapshotHead {
+            forgotten,
+            objects,
+            sha256,
+        }),
+        bulk,
+    })
+}
+
+/// The objects of a snapshot.
+fn restored(journal: &mut Journal, record: &Record, limits: &ReadLimits) -> Result<State, DocumentError> {
+    let parts = journal.read(record)?;
+    let path = journal.path();
+    let head: SnapshotHead = from_json(path, &parts.text)?;
+    let (mut state, mut rest) = (State::new(), &parts.bulk[..]);
+    for ObjectHead {
+        name,
+        properties,
+        bytes,
+    } in head.objects
+    {
+        let count = usize::try_from(bytes).ok().filter(|&n| n <= rest.len());
+        let (own, others) =
+            rest.split_at(count.ok_or_else(|| damaged(path, "a snapshot is shorter than it says"))?);
+        rest = others;
+        let loaded = decode(own, limits).map_err(|f| fault(path, f))?;
+        let mut object = Object::new(&loaded.field, loaded.meta).map_err(|e| damaged(path, e.to_string()))?;
+        object.properties = properties;
+        state.set(&name, Some(object));
+    }
+    checked(path, state, &head.sha256)
+}
+
+/// The state that an edit leads to from another, forth or back.
+fn followed(
+    journal: &mut Journal,
+    edit: &Record,
+    from: &State,
+    forth: bool,
+    limits: &ReadLimits,
+) -> Result<State, DocumentError> {
+    let parts = journal.read(edit)?;
+    let path = journal.path();
+    let head: EditHead = from_json(path, &parts.text)?;
+    let mut rest = &parts.bulk[..];
+    let changes = head
+        .changes
+        .iter()
+        .map(|change| Change::read(change, &mut rest, from, limits, path));
+    let mut changes: Vec<Change> = changes.collect::<Result<_, _>>()?;
+    if !forth {
+        changes = changes.iter().rev().map(Change::reversed).collect();
+    }
+    let mut state = from.clone();
+    for change in &changes {
+        change.apply(&mut state).map_err(|why| damaged(path, why))?;
+    }
+    match forth {
+        true => checked(path, state, &head.info.sha256),
+        false => Ok(state),
+    }
+}
+
+/// A state that is what it says it is.
+fn checked(path: &Path, state: State, sha256: &str) -> Result<State, DocumentError> {
+    state.check_all().map_err(|e| damaged(path, e.to_string()))?;
+    match hex(state.sha256()) == sha256 {
+        true => Ok(state),
+        false => Err(damaged(
+            path,
+            "a state does not have the hash that was stored with it",
+        )),
+    }
+}
+
+fn json(head: &impl Serialize) -> Vec<u8> {
+    serde_json::to_vec(head).expect("heads are plain values with text for keys")
+}
+
+fn from_json<T: DeserializeOwned>(path: &Path, text: &[u8]) -> Result<T, DocumentError> {
+    serde_json::from_slice(text).map_err(|e| damaged(path, format!("a record cannot be understood ({e})")))
+}
+
+fn read_text<T: DeserializeOwned>(journal: &mut Journal, record: &Record) -> Result<T, DocumentError> {
+    let text = journal.text(record)?;
+    from_json(journal.path(), &text)
+}
+
+/// A name for the copy of a damaged document that no file has.
+fn free_name(path: &Path) -> PathBuf {
+    let named = |end: String| {
+        let mut name = path.as_os_str().to_os_string();
+        name.push(end);
+        PathBuf::from(name)
+    };
+    let numbered = (2..).map(|n| named(format!(".damaged-{n}")));
+    std::iter::once(named(".damaged".into()))
+        .chain(numbered)
+        .find(|name| name.symlink_metadata().is_err())
+        .expect("numbers do not end")
+}

@@ -1,0 +1,25 @@
+//! Documents: objects that are edited, and a journal from which nothing is lost.
+//!
+//! A [`Document`] is one file. It begins with a snapshot of all objects; every edit is appended as the difference that it
+//! made, and is on the disk before it shows. So the file is the undo history, the crash journal and the record of where a
+//! result comes from, in one. Opening reads the nearest snapshot and the differences after it; nothing is computed again.
+//! `docs/document.md` has the format.
+//!
+//! A [`State`] is a value: cheap to copy, and copies share all that is equal. An edit makes a new one;
+//! [`Document::commit`] finds out what differs.
+
+mod change;
+mod document;
+mod entry;
+mod error;
+mod journal;
+mod object;
+mod state;
+
+pub use change::Change;
+pub use document::{Document, Lost, Opened, Options};
+pub use entry::{EditCounts, EditInfo};
+pub use error::DocumentError;
+pub use journal::is_document;
+pub use object::{Object, Properties};
+pub use state::State;

@@ -1,0 +1,83 @@
+use std::sync::Arc;
+
+use bspline::hierarchical::EditError;
+use bspline::{AnyField, HierarchicalSpline};
+use formats::field::FieldMeta;
+use glam::{DAffine3, DMat3, DVec3};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+/// A solid of a document. Cheap to copy.
+#[derive(Clone, Debug)]
+pub struct Object {
+    /// The field whose surface it has.
+    pub field: HierarchicalSpline<f32>,
+    /// What came with the field: unit, iso value, report of the fit.
+    pub meta: Arc<FieldMeta>,
+    /// What a user may set without a change of the field.
+    pub properties: Properties,
+}
+
+/// What a user may set of an object without a change of its field.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Properties {
+    /// Map from the object's own world to that of its parent: three columns, then the translation. Finite, invertible.
+    pub placement: [[f64; 3]; 4],
+    /// The object that it moves with.
+    pub parent: Option<String>,
+}
+
+impl Default for Properties {
+    /// Where the field is, with no parent.
+    fn default() -> Self {
+        Self::placed(DAffine3::IDENTITY)
+    }
+}
+
+impl Properties {
+    /// Placed by a map, with no parent.
+    pub fn placed(map: DAffine3) -> Self {
+        let DMat3 {
+            x_axis,
+            y_axis,
+            z_axis,
+        } = map.matrix3;
+        Self {
+            placement: [x_axis, y_axis, z_axis, map.translation].map(|c| c.to_array()),
+            parent: None,
+        }
+    }
+
+    /// Map from the object's own world to that of its parent.
+    pub fn parent_from_object(&self) -> DAffine3 {
+        let [x, y, z, t] = self.placement.map(DVec3::from_array);
+        DAffine3::from_mat3_translation(DMat3::from_cols(x, y, z), t)
+    }
+}
+
+impl Object {
+    /// An object where its field is. Documents hold single precision: coefficients of double precision are rounded to the
+    /// nearest.
+    ///
+    /// # Errors
+    /// [`EditError::NotFinite`] for a coefficient beyond single precision.
+    pub fn new(field: &AnyField, meta: FieldMeta) -> Result<Self, EditError> {
+        Ok(Self {
+            field: field.to_single()?,
+            meta: Arc::new(meta),
+            properties: Properties::default(),
+        })
+    }
+
+    /// Names field and properties; what came with the field does not enter.
+    pub(crate) fn hash_into(&self, hash: &mut Sha256) {
+        hash.update(self.field.sha256());
+        for value in self.properties.placement.as_flattened() {
+            hash.update(value.to_le_bytes());
+        }
+        let parent = self.properties.parent.as_deref().unwrap_or_default();
+        hash.update((parent.len() as u64).to_le_bytes());
+        hash.update(parent);
+    }
+}

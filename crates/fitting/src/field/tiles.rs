@@ -1,0 +1,277 @@
+//! Values at the knots of a level in tiles of 8³, and what is done with them: stencils and masks that look into the
+//! tiles beside.
+
+use std::ops::Range;
+
+use bspline::vectorized;
+use rayon::prelude::*;
+
+/// Knots along a tile.
+pub(super) const TILE: usize = 8;
+const LEN: usize = TILE * TILE * TILE;
+/// A tile and one knot beside it.
+const PADDED: usize = TILE + 2;
+/// Tiles from which on the threads share them: some tenths of a millisecond's work. Waking another takes a part of that.
+const SIDE_BY_SIDE: usize = 24;
+
+/// Tile `k` holds the knots `8k .. 8k + 8`, as the cells of a brick begin.
+pub(super) type TileKey = [i32; 3];
+/// Values of a tile, z fastest.
+pub(super) type Values = [f64; LEN];
+/// One bit per knot: word `x`, bit `8y + z`.
+pub(super) type Mask = [u64; TILE];
+
+/// A tile's values and those one knot beside.
+pub(super) type Padded = [f64; PADDED * PADDED * PADDED];
+
+/// Rows of a tile along z that matter: a range on x and one on y.
+#[derive(Clone, Debug)]
+pub(super) struct Rows {
+    pub x: Range<usize>,
+    pub y: Range<usize>,
+}
+
+impl Rows {
+    /// Those with a knot of a mask.
+    pub fn of(mask: &Mask) -> Self {
+        let plane = mask.iter().fold(0, |all, word| all | word).to_le_bytes();
+        let ends = |is_set: &dyn Fn(usize) -> bool| {
+            let first = (0..TILE).find(|i| is_set(*i)).unwrap_or(0);
+            let last = (0..TILE).rev().find(|i| is_set(*i));
+            first..last.map_or(first, |last| last + 1)
+        };
+        Self {
+            x: ends(&|x| mask[x] != 0),
+            y: ends(&|y| plane[y] != 0),
+        }
+    }
+}
+
+pub(super) const NONE: Mask = [0; TILE];
+const ABSENT: u32 = u32::MAX;
+
+/// Tiles of a level in order, and where those beside each stand.
+pub(super) struct Tiles {
+    pub keys: Vec<TileKey>,
+    neighbours: Vec<[u32; 27]>,
+}
+
+impl Tiles {
+    /// Of `keys`, sorted.
+    pub fn new(keys: Vec<TileKey>) -> Self {
+        let neighbours = each((0..keys.len()).collect(), |i: usize| {
+            let mut all = [ABSENT; 27];
+            for (column, row) in all.chunks_exact_mut(3).enumerate() {
+                let [x, y, z] = keys[i];
+                let at = [x + column as i32 / 3 - 1, y + column as i32 % 3 - 1];
+                let first = [at[0], at[1], z - 1];
+                let start = keys.partition_point(|k| *k < first);
+                for (n, key) in keys.iter().enumerate().skip(start).take(3) {
+                    let ahead = i64::from(key[2]) - i64::from(first[2]);
+                    if [key[0], key[1]] == at && (0..3).contains(&ahead) {
+                        row[ahead as usize] = n as u32;
+                    }
+                }
+            }
+            all
+        });
+        Self { keys, neighbours }
+    }
+
+    /// What `of` gives for each tile, in order, whatever the number of threads.
+    pub fn map<R: Send>(&self, of: impl Fn(usize) -> R + Sync + Send) -> Vec<R> {
+        each((0..self.keys.len()).collect(), of)
+    }
+
+    /// Values of each tile as `of` writes them over zeros.
+    pub fn fill(&self, of: impl Fn(usize, &mut Values) + Sync + Send) -> Vec<Values> {
+        let mut values = vec![[0.0; LEN]; self.keys.len()];
+        let all = values.iter_mut().enumerate().collect();
+        each(all, |(i, values)| of(i, values));
+        values
+    }
+
+    /// Two values of each tile as `of` writes them over zeros, and what it gives.
+    pub fn fill_both<R: Send>(
+        &self,
+        of: impl Fn(usize, &mut Values, &mut Values) -> R + Sync + Send,
+    ) -> (Vec<Values>, Vec<Values>, Vec<R>) {
+        let zeros = || vec![[0.0; LEN]; self.keys.len()];
+        let (mut a, mut b) = (zeros(), zeros());
+        let all = a.iter_mut().zip(&mut b).enumerate().collect();
+        let found = each(all, |(i, (a, b))| of(i, a, b));
+        (a, b, found)
+    }
+
+    /// Whether anything is not zero in a tile or beside it.
+    pub fn is_any_near(&self, tile: usize, masks: &[Mask]) -> bool {
+        let known = self.neighbours[tile].iter().filter(|n| **n != ABSENT);
+        known.into_iter().any(|n| masks[*n as usize] != NONE)
+    }
+
+    /// Values of the rows of a tile and one knot beside them. Where there is no tile the values at its face go on, or it
+    /// says `absent`.
+    pub fn padded(&self, tile: usize, rows: &Rows, values: &[Values], absent: Option<f64>) -> Padded {
+        let mut out = [absent.unwrap_or(0.0); PADDED * PADDED * PADDED];
+        let neighbours = &self.neighbours[tile];
+        for x in rows.x.start..rows.x.end + 2 {
+            for y in rows.y.start..rows.y.end + 2 {
+                let row = &mut out[(x * PADDED + y) * PADDED..][..PADDED];
+                // The row itself, or the nearest one of a tile that there is.
+                let [inner_x, inner_y] = [x, y].map(|p| p.clamp(1, TILE));
+                let places = [[x, y], [inner_x, y], [x, inner_y], [inner_x, inner_y]];
+                let tried = if absent.is_some() { 1 } else { places.len() };
+                for [x, y] in &places[..tried] {
+                    let ((dx, sx), (dy, sy)) = (split(*x), split(*y));
+                    let [before, own, behind] = [0, 1, 2].map(|z| neighbours[(dx * 3 + dy) * 3 + z]);
+                    if own == ABSENT {
+                        continue;
+                    }
+                    let at = (sx * TILE + sy) * TILE;
+                    let of = |n: u32| &values[n as usize][at..at + TILE];
+                    row[1..=TILE].copy_from_slice(of(own));
+                    let beside = |n: u32, place: usize, face: f64| match n {
+                        ABSENT => absent.unwrap_or(face),
+                        n => of(n)[place],
+                    };
+                    row[0] = beside(before, TILE - 1, row[1]);
+                    row[PADDED - 1] = beside(behind, 0, row[TILE]);
+                    break;
+                }
+            }
+        }
+        out
+    }
+
+    /// Knots of a tile, or beside it by one on any axis, at which a mask is set: its rows grown by `reach` (1 or 2).
+    pub fn spread(&self, tile: usize, masks: &[Mask], reach: usize) -> Mask {
+        spread(reach, |n| match self.neighbours[tile][n] {
+            ABSENT => None,
+            n => Some(masks[n as usize]),
+        })
+    }
+
+    /// [`Self::spread`] into a tile that need not be one of these.
+    pub fn spread_to(&self, key: TileKey, masks: &[Mask], reach: usize) -> Mask {
+        spread(reach, |n| {
+            let step = [n / 9, n / 3 % 3, n % 3];
+            let key: TileKey = std::array::from_fn(|a| key[a] + step[a] as i32 - 1);
+            self.keys.binary_search(&key).ok().map(|n| masks[n])
+        })
+    }
+}
+
+/// Which of three tiles a padded place lies in, and where in it.
+fn split(padded: usize) -> (usize, usize) {
+    match padded {
+        0 => (0, TILE - 1),
+        PADDED.. => unreachable!("a padded tile is ten wide"),
+        p if p == PADDED - 1 => (2, 0),
+        p => (1, p - 1),
+    }
+}
+
+fn spread(reach: usize, masks: impl Fn(usize) -> Option<Mask>) -> Mask {
+    // Rows of bits, `reach` wider on every side.
+    let width = TILE + 2 * reach;
+    let mut rows = [[0u16; TILE + 4]; TILE + 4];
+    for n in 0..27 {
+        let Some(mask) = masks(n).filter(|m| *m != NONE) else {
+            continue;
+        };
+        let step = [n / 9, n / 3 % 3, n % 3];
+        // Where the tile's first knot lies in the wider one.
+        let start = step.map(|s| (s * TILE + reach) as i32 - TILE as i32);
+        for (x, word) in mask.iter().enumerate() {
+            let x = start[0] + x as i32;
+            if !(0..width as i32).contains(&x) || *word == 0 {
+                continue;
+            }
+            for (y, bits) in word.to_le_bytes().into_iter().enumerate() {
+                let y = start[1] + y as i32;
+                if (0..width as i32).contains(&y) {
+                    let bits = u32::from(bits) << 16 >> (16 - start[2]);
+                    rows[x as usize][y as usize] |= (bits & ((1 << width) - 1)) as u16;
+                }
+            }
+        }
+    }
+    for row in rows.iter_mut().flatten() {
+        *row = (0..=2 * reach).fold(0, |all, by| all | *row >> by);
+    }
+    std::array::from_fn(|x| {
+        let bytes = std::array::from_fn(|y| {
+            let near = rows[x..=x + 2 * reach]
+                .iter()
+                .flat_map(|rows| &rows[y..=y + 2 * reach]);
+            near.fold(0, |all, row| all | row) as u8
+        });
+        u64::from_le_bytes(bytes)
+    })
+}
+
+/// `weights[0]·v_{i-1} + weights[1]·v_i + weights[0]·v_{i+1}` on each axis.
+/// Of these rows; the others stay.
+pub(super) fn stencil(padded: &Padded, rows: &Rows, weights: [f64; 2], out: &mut Values) {
+    vectorized(
+        #[inline(always)]
+        || {
+            let [side, own] = weights;
+            const PLANE: usize = TILE * TILE;
+            let (xs, ys) = (rows.x.clone(), rows.y.clone());
+            let mut along_y = [0.0; PADDED * PLANE];
+            for x in xs.start..xs.end + 2 {
+                let mut along_z = [0.0; PADDED * TILE];
+                for y in ys.start..ys.end + 2 {
+                    let row = &padded[(x * PADDED + y) * PADDED..][..PADDED];
+                    let to = &mut along_z[y * TILE..][..TILE];
+                    for z in 0..TILE {
+                        to[z] = own * row[z + 1] + side * (row[z] + row[z + 2]);
+                    }
+                }
+                let to = &mut along_y[x * PLANE..][..PLANE];
+                for i in ys.start * TILE..ys.end * TILE {
+                    to[i] = own * along_z[i + TILE] + side * (along_z[i] + along_z[i + 2 * TILE]);
+                }
+            }
+            for i in xs.start * PLANE..xs.end * PLANE {
+                out[i] = own * along_y[i + PLANE] + side * (along_y[i] + along_y[i + 2 * PLANE]);
+            }
+        },
+    );
+}
+
+/// The knots `lo ..= hi` of a tile.
+pub(super) fn between(key: TileKey, lo: [i64; 3], hi: [i64; 3]) -> Mask {
+    let [xs, ys, zs] = [0, 1, 2].map(|a| {
+        let first = i64::from(key[a]) * TILE as i64;
+        let start = (lo[a] - first).clamp(0, TILE as i64);
+        let end = (hi[a] + 1 - first).clamp(start, TILE as i64);
+        start as usize..end as usize
+    });
+    let row = ((1u64 << zs.len()) - 1) << zs.start;
+    let plane = ys.fold(0, |plane, y| plane | row << (TILE * y));
+    std::array::from_fn(|x| if xs.contains(&x) { plane } else { 0 })
+}
+
+/// Bits of a mask, with their place `64x + 8y + z`.
+pub(super) fn places(mask: &Mask) -> impl Iterator<Item = usize> {
+    bspline::hierarchical::active_slots(mask)
+}
+
+/// Does work on `tiles` tiles where its parts can be shared at once: each call from outside the threads' pool waits for
+/// one of them to wake.
+pub(super) fn in_pool<R: Send>(tiles: usize, work: impl FnOnce() -> R + Send) -> R {
+    match tiles < SIDE_BY_SIDE {
+        true => work(),
+        false => rayon::scope(|_| work()),
+    }
+}
+
+/// What `of` gives for each, in order; side by side where there are many.
+fn each<I: Send, R: Send>(all: Vec<I>, of: impl Fn(I) -> R + Sync + Send) -> Vec<R> {
+    if all.len() < SIDE_BY_SIDE {
+        return all.into_iter().map(of).collect();
+    }
+    all.into_par_iter().with_min_len(4).map(of).collect()
+}

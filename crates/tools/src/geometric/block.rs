@@ -1,0 +1,68 @@
+use bspline::hierarchical::Lattice;
+use bspline::primitives::Cuboid;
+use bspline::{Field, HierarchicalSpline};
+use fitting::Control;
+use fitting::field::{Aim, FieldFitOptions, fit_field};
+use glam::{DAffine3, DVec3};
+
+use super::{GeometricError, TOLERANCE};
+
+/// Cells of level 0 along the longest side of the box at most: it is filled whole.
+const COARSEST: f64 = 48.0;
+
+/// Room about a block, over its longest edge: what is added to it has to lie within.
+const ROOM: f64 = 0.5;
+
+/// A block of clay to start from: a box about the origin with edges `size`, in knot intervals of `spacing`, both world lengths. Its
+/// field is the distance to its faces, positive inside, with the edges rounded by about a knot interval; the field's own box
+/// leaves half the longest edge about it free.
+///
+/// # Errors
+/// [`GeometricError::Shape`] if a length is not a positive number, or the block is less than two or more than 2²⁰ intervals
+/// wide; [`GeometricError::Fit`].
+pub fn block(
+    size: DVec3,
+    spacing: f64,
+    control: &mut Control,
+) -> Result<HierarchicalSpline<f32>, GeometricError> {
+    let wrong = |why: String| Err(GeometricError::Shape(why));
+    if !(size.is_finite() && size.min_element() > 0.0 && spacing.is_finite() && spacing > 0.0) {
+        return wrong(format!(
+            "a block of {size} at {spacing} makes no sense; give lengths above 0"
+        ));
+    }
+    let across = size / spacing;
+    if across.min_element() < 2.0 || across.max_element() > f64::from(1 << 20) {
+        return wrong(format!(
+            "a block of {size} is {} to {} intervals of {spacing} wide; choose from 2 to 1048576",
+            across.min_element(),
+            across.max_element(),
+        ));
+    }
+    let room = ROOM * size.max_element();
+    let outer = size + 2.0 * room;
+    let finest = (outer.max_element() / spacing / COARSEST).log2().ceil().max(0.0) as usize;
+    let step = spacing * (1u64 << finest) as f64;
+    let cells = (outer / step).ceil().max(DVec3::ONE);
+    let solid = Cuboid::new(DVec3::ZERO, 0.5 * size).map_err(|e| GeometricError::Shape(e.to_string()))?;
+    let lattice = Lattice {
+        world_from_lattice: DAffine3::from_scale_rotation_translation(
+            DVec3::splat(step),
+            glam::DQuat::IDENTITY,
+            -0.5 * step * cells,
+        ),
+        cells: cells.to_array().map(|n| n as u32),
+    };
+    let coarse = HierarchicalSpline::schoenberg(lattice, 1.0, |p| solid.value(p))
+        .map_err(|e| GeometricError::Shape(e.to_string()))?;
+    let options = FieldFitOptions {
+        aim: Aim::Surface {
+            iso: 0.0,
+            tolerance: TOLERANCE * spacing,
+        },
+        finest,
+        look: false,
+    };
+    let (field, _, _) = fit_field(&solid, &coarse, &lattice.world_box(), &options, control)?;
+    Ok(field)
+}

@@ -1,0 +1,149 @@
+//! Solids that carve a field or are added to it.
+//!
+//! The tool and the field become one by CSG \[Hua04 eqs. 3, 4\], `max(f, g)` to add and `min(f, 2c − g)` to carve, and the result
+//! is written back into the coefficients that it touches by [`fit_field`]. A distance `d` of the tool counts as `c + d·|∇f|`, so
+//! that depths and blends are lengths on any field.
+
+mod block;
+mod shape;
+
+use std::sync::Arc;
+
+use bspline::csg::Rounding;
+use bspline::hierarchical::MAX_LEVELS;
+use bspline::{Csg, Field, HierarchicalSpline, Real};
+use fitting::field::{Aim, FieldFitOptions, FieldFitReport, fit_field};
+use fitting::{Control, FitError};
+use serde::{Deserialize, Serialize};
+
+pub use block::block;
+pub use shape::Shape;
+
+use crate::number::{NonNegative, Point, Positive};
+
+/// Tolerance over the finest knot interval where none is asked for.
+const TOLERANCE: f64 = 0.02;
+
+/// Knot intervals of the finest level that a tool's box reaches beyond the tool and its blend: the supports of what changes.
+const MARGIN: f64 = 4.0;
+
+/// What a geometric tool does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Operation {
+    /// Takes the tool out of the solid.
+    Carve,
+    /// Adds the tool to the solid.
+    Add,
+}
+
+/// A geometric tool and its way.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Geometric {
+    /// The solid.
+    pub shape: Shape,
+    /// Where its centre goes, in the world of the object: one place or more. A sphere sweeps all between them; others act
+    /// at each place.
+    pub along: Vec<Point>,
+    /// Width over which the crease is rounded, a world length; 0 leaves it as sharp as the field can be.
+    #[serde(default)]
+    pub blend: NonNegative,
+    /// Distance from the true surface that may stay off the creases, a world length; a fiftieth of the finest knot interval if
+    /// missing.
+    pub tolerance: Option<Positive>,
+    /// Levels finer than the field has that may be added.
+    #[serde(default = "one")]
+    pub finer: u8,
+}
+
+fn one() -> u8 {
+    1
+}
+
+/// Why a geometric tool cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum GeometricError {
+    /// A value of the tool makes no solid.
+    #[error("{0}")]
+    Shape(String),
+    /// The tool lies beside the field.
+    #[error(
+        "the tool reaches from {tool:?}, and the field from {field:?}; move the tool, or choose another object"
+    )]
+    Outside {
+        /// Corners of the tool's box.
+        tool: [[f64; 3]; 2],
+        /// Corners of the field's box.
+        field: [[f64; 3]; 2],
+    },
+    /// The result cannot be written back.
+    #[error(transparent)]
+    Fit(#[from] FitError),
+}
+
+impl Geometric {
+    /// What the tool leaves of a field whose surface lies at `iso`, and how close it is.
+    ///
+    /// Beyond the tool's box, which ends a few knot intervals beside the tool and its blend, no coefficient changes.
+    ///
+    /// # Errors
+    /// Any [`GeometricError`].
+    pub fn apply<T: Real>(
+        &self,
+        operation: Operation,
+        field: &HierarchicalSpline<T>,
+        iso: f64,
+        control: &mut Control,
+    ) -> Result<(HierarchicalSpline<T>, FieldFitReport), GeometricError> {
+        let wrong = |e: &dyn std::fmt::Display| GeometricError::Shape(e.to_string());
+        let places: Vec<_> = self.along.iter().map(|p| p.0).collect();
+        let (solids, reach) = self.shape.solids(&places).map_err(GeometricError::Shape)?;
+        let finest = (field.level_count() - 1 + usize::from(self.finer)).min(MAX_LEVELS - 1);
+        let spacing = field.lattice().spacing(finest);
+        let coarse = field.finest_spacing();
+        let margin = self.blend.0 + MARGIN * coarse;
+        let whole = field.lattice().world_box();
+        let own = bspline::Aabb::new(reach.min - margin, reach.max + margin);
+        if own.max.cmplt(whole.min).any() || own.min.cmpgt(whole.max).any() {
+            let corners = |b: &bspline::Aabb| [b.min.to_array(), b.max.to_array()];
+            return Err(GeometricError::Outside {
+                tool: corners(&reach),
+                field: corners(&whole),
+            });
+        }
+        let within = bspline::Aabb::new(own.min.max(whole.min), own.max.min(whole.max));
+        let slope = field.slope();
+        let solid: Arc<dyn Field> = Arc::new(field.clone());
+        let tools: Result<Vec<Arc<dyn Field>>, _> = solids
+            .into_iter()
+            .map(|tool| Csg::sum(vec![(slope, tool)], iso).map(|tool| Arc::new(tool) as Arc<dyn Field>))
+            .collect();
+        let tools = tools.map_err(|e| wrong(&e))?;
+        let rounding = Rounding::Bounded {
+            range: self.blend.0 * slope,
+        };
+        let target: Arc<dyn Field> = match (operation, self.blend.0 > 0.0) {
+            (Operation::Carve, false) => Arc::new(Csg::difference(solid, tools, iso).map_err(|e| wrong(&e))?),
+            (Operation::Carve, true) => {
+                Csg::smooth_difference(solid, tools, rounding, iso).map_err(|e| wrong(&e))?
+            }
+            (Operation::Add, is_smooth) => {
+                let all = [vec![solid], tools].concat();
+                match is_smooth {
+                    false => Arc::new(Csg::union(all).map_err(|e| wrong(&e))?),
+                    true => Csg::smooth_union(all, rounding, iso).map_err(|e| wrong(&e))?,
+                }
+            }
+        };
+        let options = FieldFitOptions {
+            aim: Aim::Surface {
+                iso,
+                tolerance: self.tolerance.map_or(TOLERANCE * spacing.min_element(), |t| t.0),
+            },
+            finest,
+            look: true,
+        };
+        let (field, _, report) = fit_field(&*target, field, &within, &options, control)?;
+        Ok((field, report))
+    }
+}

@@ -1,0 +1,282 @@
+//! Geometric tools: volumes, what stays, and what is refused.
+
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use bspline::hierarchical::{HierarchicalSpline, Lattice};
+use bspline::polygonize::{PolygonizeOptions, check_mesh, polygonize};
+use bspline::{Aabb, Field, Frame};
+use fitting::Control;
+use glam::{DAffine3, DVec3};
+use tools::geometric::{Geometric, GeometricError, Operation, block as block_of};
+use tools::session::Session;
+
+/// Cells of the block's box, half a world length each.
+const CELLS: u32 = 48;
+
+/// What lies below `z = 12` in a box of 24³, with a slope that is not 1: exact in splines.
+fn block() -> HierarchicalSpline<f32> {
+    let lattice = Lattice {
+        world_from_lattice: DAffine3::from_scale(DVec3::splat(0.5)),
+        cells: [CELLS; 3],
+    };
+    HierarchicalSpline::schoenberg(lattice, SLOPE, |p| SLOPE * (12.0 - p.z) + ISO).unwrap()
+}
+
+const SLOPE: f64 = 40.0;
+const ISO: f64 = 300.0;
+
+fn tool(text: &str) -> Geometric {
+    let script = format!("[[stroke]]\ncarve = {{ {text} }}");
+    let session: Session = toml::from_str(&script).unwrap_or_else(|e| panic!("{e}"));
+    session.stroke[0].carve.clone().unwrap()
+}
+
+fn apply(field: &HierarchicalSpline<f32>, operation: Operation, text: &str) -> HierarchicalSpline<f32> {
+    let done = tool(text).apply(operation, field, ISO, &mut Control::default());
+    let (field, report) = done.unwrap();
+    assert_eq!(report.left.unwrap().wrong_signs, 0, "{text}");
+    field
+}
+
+/// Volume of the solid.
+fn volume(field: &dyn Field) -> f64 {
+    let frame = Frame {
+        world_from_grid: DAffine3::from_scale(DVec3::splat(0.125)),
+        cells: [4 * CELLS; 3],
+    };
+    let options = PolygonizeOptions {
+        iso: ISO,
+        ..Default::default()
+    };
+    let (mesh, _) = polygonize(field, &frame, &options).unwrap();
+    let check = check_mesh(&mesh);
+    assert!(check.is_closed_manifold());
+    check.volume
+}
+
+/// Both ways, half of a tool whose centre is on the block's face is taken or put.
+#[test]
+fn tools_take_and_put_their_volume() {
+    let block = block();
+    let before = volume(&block);
+    for (text, whole) in [
+        ("shape = { sphere = { radius = 4.0 } }", 4.0 / 3.0 * PI * 64.0),
+        ("shape = { box = { size = [6.0, 7.0, 8.0] } }", 336.0),
+        (
+            "shape = { cylinder = { axis = [0, 0, 2], radius = 3.0, height = 8.0 } }",
+            72.0 * PI,
+        ),
+        (
+            "shape = { capsule = { axis = [1, 0, 0], radius = 3.0, height = 6.0 } }",
+            (54.0 + 36.0) * PI,
+        ),
+        (
+            "shape = { torus = { axis = [0, 0, 1], major = 6.0, minor = 2.0 } }",
+            2.0 * PI * PI * 24.0,
+        ),
+    ] {
+        let text = format!("{text}, along = [[12.0, 12.0, 12.0]], finer = 2");
+        for (operation, sign) in [(Operation::Carve, -1.0), (Operation::Add, 1.0)] {
+            let changed = sign * (volume(&apply(&block, operation, &text)) - before);
+            assert!(
+                (changed / (0.5 * whole) - 1.0).abs() < 0.005,
+                "{operation:?} {text}: {changed} of {}",
+                0.5 * whole
+            );
+        }
+    }
+}
+
+/// Cubes, plates and rods of few and many intervals: their own volume, faces where they belong, room about them.
+#[test]
+fn a_block_is_as_large_as_asked() {
+    for (size, spacing) in [
+        ([10.0, 6.0, 4.0], 0.2),
+        ([1.0, 1.0, 1.0], 0.25),
+        ([40.0, 2.0, 2.0], 0.5),
+        ([3e3, 3e3, 200.0], 50.0),
+        ([2e-6, 1e-6, 1e-6], 1e-7),
+    ] {
+        let size = DVec3::from_array(size);
+        let made = block_of(size, spacing, &mut Control::default()).unwrap();
+        let within = made.lattice().world_box();
+        assert!(within.max.cmpge(0.9 * size).all() && within.min.cmple(-0.9 * size).all());
+        // The middles of the faces.
+        for axis in 0..3 {
+            for side in [-0.5, 0.5] {
+                let mut face = DVec3::ZERO;
+                face[axis] = side * size[axis];
+                let off = made.value(face).abs();
+                assert!(off <= 0.05 * spacing, "{size}: face {face} is off by {off}");
+            }
+        }
+        let frame = Frame::over(&within, (within.size() / spacing * 4.0).as_uvec3().to_array());
+        let (mesh, _) = polygonize(&made, &frame, &PolygonizeOptions::default()).unwrap();
+        let check = check_mesh(&mesh);
+        assert!(check.is_closed_manifold());
+        // Edges are rounded by about an interval.
+        let edges = 4.0 * (size.x + size.y + size.z) * spacing * spacing;
+        let (found, whole) = (check.volume, size.element_product());
+        assert!(
+            (found - whole).abs() < 0.2 * edges + 1e-3 * whole,
+            "{size}: {found} of {whole}"
+        );
+    }
+    for (size, spacing) in [
+        (DVec3::ONE, 0.6),
+        (DVec3::ONE, f64::NAN),
+        (DVec3::ZERO, 0.1),
+        (DVec3::ONE, 1e-9),
+    ] {
+        let refused = block_of(size, spacing, &mut Control::default());
+        assert!(matches!(refused, Err(GeometricError::Shape(_))));
+    }
+}
+
+/// A sweep has no gaps and takes the same at any spacing of its poses.
+#[test]
+fn a_swept_sphere_takes_a_capsule_at_any_spacing_of_poses() {
+    let block = block();
+    let before = volume(&block);
+    let whole = PI * 4.0 * 10.0 + 4.0 / 3.0 * PI * 8.0;
+    for count in [2, 3, 11, 60] {
+        let places: Vec<String> = (0..count)
+            .map(|i| {
+                format!(
+                    "[{}, 12.0, 12.0]",
+                    7.0 + 10.0 * f64::from(i) / f64::from(count - 1)
+                )
+            })
+            .collect();
+        let text = format!(
+            "shape = {{ sphere = {{ radius = 2.0 }} }}, along = [{}], finer = 2",
+            places.join(", ")
+        );
+        let taken = before - volume(&apply(&block, Operation::Carve, &text));
+        assert!(
+            (taken / (0.5 * whole) - 1.0).abs() < 0.005,
+            "{count} poses: {taken}"
+        );
+    }
+}
+
+/// Strokes at random: beyond the tool, its blend and a few knot intervals nothing changes, to the bit; any number of
+/// threads gives the same.
+#[test]
+fn no_coefficient_changes_beyond_the_tool() {
+    let block = block();
+    let mut draw = 1u64;
+    let mut random = |low: f64, high: f64| {
+        draw = draw
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        low + (high - low) * (draw >> 40) as f64 / (1u64 << 24) as f64
+    };
+    for _ in 0..20 {
+        let (radius, blend) = (random(0.6, 3.0), random(0.0, 1.0));
+        let places = [0, 1].map(|_| [random(4.0, 20.0), random(4.0, 20.0), random(9.0, 15.0)]);
+        let text =
+            format!("shape = {{ sphere = {{ radius = {radius} }} }}, along = {places:?}, blend = {blend}");
+        let operation = if random(0.0, 1.0) < 0.5 {
+            Operation::Carve
+        } else {
+            Operation::Add
+        };
+        let changed = apply(&block, operation, &text);
+        let reach = radius + blend + 4.0;
+        let [a, b] = places.map(DVec3::from_array);
+        let allowed = Aabb::new(a.min(b) - reach, a.max(b) + reach);
+        for found in changed.changed_boxes(&block, &block.lattice().world_box()) {
+            // Bricks change whole.
+            let brick = 8.0 * 0.5;
+            assert!(
+                found.min.cmpge(allowed.min - brick).all() && found.max.cmple(allowed.max + brick).all(),
+                "{text}: {found:?} beyond {allowed:?}"
+            );
+        }
+        let difference = block.difference(&changed).unwrap();
+        for brick in &difference.bricks {
+            let spacing = 0.5 / f64::from(1u32 << brick.level);
+            for slot in 0..512 {
+                let value = |side: &Option<Arc<bspline::hierarchical::Corrections<f32>>>| {
+                    side.as_ref().and_then(|c| c.get(slot))
+                };
+                if value(&brick.old) != value(&brick.new) {
+                    let at = [slot / 64, slot / 8 % 8, slot % 8];
+                    let knot = std::array::from_fn(|a| f64::from(8 * brick.key.0[a] + at[a] as u32) - 1.0);
+                    let at = DVec3::from_array(knot) * spacing;
+                    let is_within = at.cmpge(allowed.min).all() && at.cmple(allowed.max).all();
+                    assert!(is_within, "{text}: the function at {at} changed");
+                }
+            }
+        }
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(7).build().unwrap();
+        let again = pool.install(|| apply(&block, operation, &text));
+        assert_eq!(again.sha256(), changed.sha256());
+    }
+}
+
+#[test]
+fn a_blend_rounds_the_crease_within_its_width() {
+    let block = block();
+    let at = "along = [[12.0, 12.0, 12.0]], finer = 2";
+    let sharp = apply(
+        &block,
+        Operation::Add,
+        &format!("shape = {{ sphere = {{ radius = 4.0 }} }}, {at}"),
+    );
+    let smooth = apply(
+        &block,
+        Operation::Add,
+        &format!("shape = {{ sphere = {{ radius = 4.0 }} }}, blend = 2.0, {at}"),
+    );
+    // The fillet adds; far from the crease both have the same surface.
+    assert!(volume(&smooth) > volume(&sharp) + 1.0);
+    let top = DVec3::new(12.0, 12.0, 16.0);
+    let beside = DVec3::new(12.0, 19.0, 12.0);
+    for p in [top, beside] {
+        let off = |f: &HierarchicalSpline<f32>| (f.value(p) - ISO).abs() / SLOPE;
+        assert!(
+            off(&sharp) < 0.02 && off(&smooth) < 0.02,
+            "{p}: {} {}",
+            off(&sharp),
+            off(&smooth)
+        );
+    }
+    let in_the_corner = DVec3::new(12.0, 16.2, 12.2);
+    assert!(smooth.value(in_the_corner) > ISO && sharp.value(in_the_corner) < ISO);
+}
+
+#[test]
+fn tools_that_make_no_sense_are_refused() {
+    let block = block();
+    let refused = |text: &str| {
+        tool(text)
+            .apply(Operation::Carve, &block, ISO, &mut Control::default())
+            .unwrap_err()
+    };
+    let error = refused("shape = { sphere = { radius = 1.0 } }, along = []");
+    assert!(matches!(error, GeometricError::Shape(_)), "{error}");
+    let error = refused(
+        "shape = { cylinder = { axis = [0, 0, 0], radius = 1.0, height = 1.0 } }, along = [[9, 9, 9]]",
+    );
+    assert!(error.to_string().contains("no direction"), "{error}");
+    let error =
+        refused("shape = { torus = { axis = [0, 0, 1], major = 1.0, minor = 2.0 } }, along = [[9, 9, 9]]");
+    assert!(error.to_string().contains("less than"), "{error}");
+    let error = refused("shape = { sphere = { radius = 1.0 } }, along = [[99, 99, 99]]");
+    assert!(matches!(error, GeometricError::Outside { .. }), "{error}");
+    for text in [
+        "shape = { sphere = { radius = -1.0 } }, along = [[9, 9, 9]]",
+        "shape = { sphere = { radius = nan } }, along = [[9, 9, 9]]",
+        "shape = { sphere = { radius = 1.0 } }, along = [[9, inf, 9]]",
+        "shape = { cube = { size = 1.0 } }, along = [[9, 9, 9]]",
+        "shape = { sphere = { radius = 1.0 } }, along = [[9, 9, 9]], blend = -1.0",
+        "shape = { sphere = { radius = 1.0 } }, along = [[9, 9, 9]], colour = 1",
+    ] {
+        let script = format!("\n[[stroke]]\ncarve = {{ {text} }}");
+        let error = toml::from_str::<Session>(&script).unwrap_err().to_string();
+        assert!(error.contains("line 3"), "{error}");
+    }
+}
