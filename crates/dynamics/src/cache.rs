@@ -3,9 +3,10 @@
 use bspline::Real;
 
 use crate::lattice::SampleBox;
-use crate::response::StaticSolver;
 use crate::solve::StepSolver;
 use crate::springs::StepMatrix;
+use crate::statics::StaticSolver;
+use crate::version::{Prepared, Version};
 
 /// Solvers and matrices of a patch.
 #[derive(Clone, Debug)]
@@ -30,27 +31,6 @@ pub(crate) struct Cache<T> {
     pub limit: Option<(Version, f64)>,
     /// Of static problems, painted and of reference; no bit depends on whether they are there.
     pub statics: [Option<Box<StaticSolver>>; 2],
-}
-
-/// What a matrix depends on, counted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Version {
-    /// Matter and constraints that were set.
-    pub changes: u64,
-    /// Matter that was painted since.
-    pub paints: u64,
-}
-
-/// Key of the matrix that the solver was made for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Prepared {
-    pub version: Version,
-    pub damping: f64,
-    pub stiffness: f64,
-    /// Of the matrix.
-    pub unit: f64,
-    /// Residual of the first solve with it.
-    pub residual: f64,
 }
 
 impl<T: Real> Cache<T> {

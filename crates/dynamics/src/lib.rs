@@ -51,5 +51,7 @@ pub mod snapshot;
 pub mod solve;
 pub mod sparse;
 pub mod springs;
+mod statics;
 pub mod study;
 mod units;
+mod version;

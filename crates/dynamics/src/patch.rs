@@ -5,7 +5,7 @@ use std::sync::Arc;
 use bspline::Real;
 use serde::{Deserialize, Serialize};
 
-use crate::cache::{Cache, Version};
+use crate::cache::Cache;
 use crate::constraints::Held;
 use crate::lattice::{Lattice, OnBox, SampleBox, TensorWorkspace};
 use crate::matter::{Matter, Quantity, ScaledMatter};
@@ -14,6 +14,7 @@ use crate::solve::{SolverOptions, StepSolver};
 use crate::sparse::Mask;
 use crate::springs::{Law, Neighbours, Plasticity, SpringNetwork, SpringWeights, StepMatrix, Weights};
 use crate::units::largest;
+use crate::version::Version;
 
 /// Energies of a state.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

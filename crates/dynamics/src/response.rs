@@ -2,7 +2,6 @@
 
 use bspline::Real;
 
-use crate::cache::Version;
 use crate::integrators::Integrator;
 use crate::lattice::{Lattice, OnBox, Rim, SampleBox};
 use crate::matter::{Matter, Quantity};
@@ -10,6 +9,8 @@ use crate::patch::{Patch, PatchError, finite};
 use crate::solve::{SolveReport, SolverOptions, StepSolver, VCycleOptions};
 use crate::sparse::Mask;
 use crate::springs::{Law, SpringWeights, StepMatrix, Weights};
+pub use crate::statics::Against;
+use crate::statics::StaticSolver;
 use crate::units::{binary_unit, largest};
 
 /// Residual at which static solves stop. Their errors are smooth and may be some hundred times as large.
@@ -37,33 +38,6 @@ impl<T: Real> Response<T> {
         let terms = places.zip(kernel.values);
         terms.map(|(i, j)| j.as_f64() * self.d[i].as_f64()).sum()
     }
-}
-
-/// Against which springs a static force works.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Against {
-    /// The matter as it is, constraints included; of the 4-D law the tangent of the present state.
-    Painted,
-    /// Linear springs of the same stiffness everywhere and no constraints: what a tool scales its force by, so that painted
-    /// matter shows.
-    Reference {
-        /// Stiffness per volume.
-        stiffness: f64,
-        /// Ground stiffness per volume.
-        ground: f64,
-    },
-}
-
-/// Solver of static problems, in double precision.
-#[derive(Clone, Debug)]
-pub(crate) struct StaticSolver {
-    against: Against,
-    /// Of the matter it is for.
-    version: Version,
-    matrix: StepMatrix<f64>,
-    /// Of the matrix, `σ²` included.
-    unit: f64,
-    solver: StepSolver<f64>,
 }
 
 impl<T: Real> Patch<T> {

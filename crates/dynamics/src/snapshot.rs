@@ -3,14 +3,14 @@
 use bspline::{KnotVector, Real};
 use serde::{Deserialize, Serialize};
 
-use crate::cache::{Prepared, Version};
 use crate::constraints::{Constraint, Held};
-use crate::lattice::{Axis, Lattice, LatticeError, Rim};
+use crate::lattice::{Axis, Lattice, LatticeError, Rim, SampleBox};
 use crate::matter::Matter;
 use crate::patch::{Patch, PatchError, State, finite};
 use crate::solve::{SolverHistory, SolverOptions};
 use crate::sparse::MaskRecord;
 use crate::springs::{Law, Neighbours, Plasticity, Rest, SpringWeights, StepMatrix, Weights};
+use crate::version::{Prepared, Version};
 
 /// All of a patch that later bits depend on: state, matter, and of the solvers what they were made for. Factors are not in
 /// it; they come out the same when they are made again.
@@ -34,8 +34,8 @@ pub struct PatchSnapshot<T> {
     mask: Option<MaskRecord>,
     /// Damping, stiffness, unit and residual of [`Prepared`], as bits: some formats know no infinity.
     prepared: Option<[u64; 4]>,
-    /// Whether there was paint since.
-    painted: bool,
+    /// Where there was paint since.
+    painted: Option<SampleBox>,
     solver: Option<SolverHistory<T>>,
     /// Bits of the damping in the matrix of explicit steps.
     mass_prepared: Option<u64>,
@@ -121,7 +121,7 @@ impl<T: Real> Patch<T> {
             constraints: self.constraints().to_vec(),
             mask: self.mask().map(MaskRecord::of),
             prepared: prepared.map(bits),
-            painted: prepared.is_some_and(|p| p.version != now),
+            painted: prepared.and_then(|p| (p.version != now).then_some(cache.painted_on)),
             solver,
             mass_prepared: mass_matrix.map(|m| m.1.to_bits()),
             mass_solver: cache.mass_solver.as_ref().and_then(|s| s.history()),
@@ -214,12 +214,15 @@ impl<T: Real> Patch<T> {
                 self.fill_matrix(damping, stiffness, unit);
                 self.cache.solver.prepare(&self.cache.matrix)?;
             }
-            // Where is not written down: what follows paint costs its box, but comes out the same if that is larger.
-            let paints = if s.painted {
-                self.cache.painted_on = self.lattice().all_samples();
-                u64::MAX
-            } else {
-                now.paints
+            let paints = match s.painted {
+                Some(at) if !at.fits(self.lattice().sample_dims()) => {
+                    return Err(damaged("paint beside the samples"));
+                }
+                Some(at) => {
+                    self.cache.painted_on = at;
+                    u64::MAX
+                }
+                None => now.paints,
             };
             self.cache.prepared = Some(Prepared {
                 version: Version { paints, ..now },

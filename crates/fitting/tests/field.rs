@@ -1,12 +1,17 @@
 //! Fields written back into a box of another.
 
+use std::path::Path;
 use std::sync::Arc;
 
-use bspline::hierarchical::{Lattice, LevelEdit};
+use bspline::hierarchical::{BRICK, Lattice, LevelEdit};
 use bspline::primitives::{Gyroid, Sphere, Torus};
-use bspline::{Aabb, Csg, Field, HierarchicalSpline};
+use bspline::{Aabb, Csg, Field, HierarchicalSpline, Interval, Jet};
 use fitting::field::{Aim, FieldFitOptions, FieldFitReport, fit_field};
+use fitting::phantoms::{SplitMix64, head};
+use fitting::points::{OrientedPoints, PointOptions, fit_points};
+use fitting::volume::{VolumeOptions, VolumeView, fit_volume};
 use fitting::{Cancel, Control, FitError};
+use formats::{ReadLimits, points};
 use glam::{DAffine3, DMat3, DVec3};
 
 /// A box of 20 by 20 by 20 world units, its lattice turned by a right angle and of other spacings on each axis.
@@ -199,6 +204,274 @@ fn densities_are_met_at_every_point() {
         }
         assert!(worst < 1.5 * tolerance, "{worst} of {tolerance}, {report:?}");
     }
+}
+
+/// The scan in the repository, fitted; and the diagonal of its points.
+fn bunny() -> (HierarchicalSpline<f32>, f64) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data/bunny.obj.gz");
+    let cloud = points::read(&path, &ReadLimits::default()).unwrap();
+    let oriented = OrientedPoints {
+        positions: &cloud.positions,
+        normals: cloud.normals.as_deref().unwrap(),
+        certainty: None,
+    };
+    let (field, _) = fit_points(&oriented, &PointOptions::default(), &mut Control::default()).unwrap();
+    let (min, max) = cloud
+        .positions
+        .iter()
+        .fold((cloud.positions[0], cloud.positions[0]), |(lo, hi), p| {
+            (lo.min(*p), hi.max(*p))
+        });
+    (field, (max - min).length())
+}
+
+/// `p` moved onto the surface of `field`, if Newton steps get there.
+fn on_surface(field: &dyn Field, mut p: DVec3) -> Option<DVec3> {
+    for _ in 0..12 {
+        let (value, gradient) = field.value_gradient(p);
+        let step = gradient * (value / gradient.length_squared().max(1e-12));
+        p -= step;
+        if step.length() < 1e-9 {
+            return Some(p);
+        }
+    }
+    None
+}
+
+fn random_in(random: &mut SplitMix64, b: &Aabb) -> DVec3 {
+    b.min + b.size() * random.uniform3()
+}
+
+fn is_inside(b: &Aabb, p: DVec3) -> bool {
+    p.cmpge(b.min).all() && p.cmple(b.max).all()
+}
+
+/// Asserts what a fit owes a target within `b`: the tolerance within three finest `interval`s of the surface but near
+/// its crease, whose distance `crease` gives; there the surface rounded by one interval at most; the right sign elsewhere.
+fn assert_follows(
+    field: &dyn Field,
+    target: &dyn Field,
+    b: &Aabb,
+    (tolerance, interval): (f64, f64),
+    crease: impl Fn(DVec3) -> f64,
+) {
+    let mut random = SplitMix64::new(7);
+    let mut counted = 0;
+    for _ in 0..20_000 {
+        let p = random_in(&mut random, b);
+        let (t, gradient) = target.value_gradient(p);
+        let (f, height) = (field.value(p), t.abs() / gradient.length());
+        if height > tolerance + interval {
+            assert_eq!(f > 0.0, t > 0.0, "the sign at {p}, {height} from the surface");
+        }
+        if height < 3.0 * interval && crease(p) > 3.0 * interval {
+            let off = (f - t).abs() / gradient.length();
+            assert!(
+                off < tolerance,
+                "{off} for {tolerance} at {p}, {height} from the surface"
+            );
+            counted += 1;
+        }
+        let there = on_surface(field, p).filter(|q| is_inside(b, *q));
+        if let Some((t, gradient)) = there.map(|q| target.value_gradient(q)) {
+            let rounded = t.abs() / gradient.length();
+            assert!(
+                rounded < interval,
+                "rounded by {rounded}, the interval is {interval}"
+            );
+        }
+    }
+    assert!(counted > 1000, "{counted} points");
+}
+
+/// Asserts that outside of `b` and one support, rounded out to whole bricks, all bits are equal, and elsewhere outside
+/// nearly so.
+fn assert_same_beside(
+    field: &HierarchicalSpline<f32>,
+    before: &HierarchicalSpline<f32>,
+    b: &Aabb,
+    finest: usize,
+) {
+    let largest = before.bounds(&before.lattice().world_box());
+    let allowed = 8.0 * f64::from(f32::EPSILON) * largest.hi.abs().max(largest.lo.abs());
+    let interval = before.lattice().spacing(finest);
+    let reach = 2.0 * interval;
+    let support = Aabb::new(b.min - reach, b.max + reach);
+    // Where a new brick moves evaluation to a finer level: of the first level that may have changed.
+    let bricks = Aabb::new(
+        support.min - BRICK as f64 * 8.0 * interval,
+        support.max + BRICK as f64 * 8.0 * interval,
+    );
+    let mut random = SplitMix64::new(3);
+    for _ in 0..20_000 {
+        let p = random_in(&mut random, &before.lattice().world_box());
+        if is_inside(&support, p) {
+            continue;
+        }
+        let (old, new) = (before.value(p), field.value(p));
+        assert!((old - new).abs() <= allowed, "{old} became {new} at {p}");
+        if !is_inside(&bricks, p) {
+            assert_eq!(old.to_bits(), new.to_bits(), "at {p}");
+        }
+    }
+}
+
+#[test]
+fn a_ball_is_carved_from_a_scan() {
+    let (bunny, diagonal) = bunny();
+    let shared = Arc::new(bunny.clone());
+    let finest = bunny.level_count() + 1;
+    let interval = bunny.lattice().spacing(finest).max_element();
+    let (radius, tolerance) = (0.05 * diagonal, 1e-4 * diagonal);
+    let mut random = SplitMix64::new(5);
+    let mut places = 0;
+    while places < 3 {
+        let start = random_in(&mut random, &bunny.lattice().world_box());
+        let Some(middle) = on_surface(&bunny, start).filter(|p| is_inside(&bunny.lattice().world_box(), *p))
+        else {
+            continue;
+        };
+        places += 1;
+        let tool = sphere(middle, radius);
+        let target = Csg::difference(shared.clone(), vec![tool.clone()], 0.0).unwrap();
+        // Off the tool, what is deep inside the scan goes on changing: three intervals count, and the functions of the
+        // finest levels have to fit between them and the faces.
+        let reach = radius + 10.0 * interval;
+        let within = Aabb::new(middle - reach, middle + reach);
+        let (field, report) = fitted(&target, &bunny, &within, &surface(tolerance, finest));
+        let sheet = |p: DVec3| {
+            let ((f, of_f), (g, of_g)) = (bunny.value_gradient(p), tool.value_gradient(p));
+            (f + g).abs() / (of_f + of_g).length().max(1e-9)
+        };
+        assert_follows(&field, &target, &within, (tolerance, interval), sheet);
+        assert_same_beside(&field, &bunny, &within, finest);
+        assert!(report.functions > 5000, "{report:?}");
+    }
+}
+
+#[test]
+fn a_surface_that_is_gone_takes_its_functions_along() {
+    // Waves that only fine functions can follow.
+    let waves = Arc::new(Gyroid::new(DVec3::ZERO, 0.53, 0.0).unwrap());
+    let ball = Csg::sum(vec![(1.0, sphere(DVec3::ZERO, 7.0)), (0.3, waves)], 0.0).unwrap();
+    let (plain, _) = fitted(&ball, &empty(), &whole(), &surface(0.05, 2));
+    let here = Aabb::new(DVec3::new(4.0, -2.0, -2.0), DVec3::new(9.0, 4.0, 4.0));
+    let (onto, _) = fitted(&ball, &plain, &here, &surface(0.005, 5));
+    let onto = Arc::new(onto);
+    let tool = sphere(DVec3::new(6.5, 1.0, 1.0), 3.0);
+    let reach = DVec3::splat(4.0);
+    let within = Aabb::new(
+        DVec3::new(6.5, 1.0, 1.0) - reach,
+        DVec3::new(6.5, 1.0, 1.0) + reach,
+    );
+    for target in [
+        Csg::difference(onto.clone(), vec![tool.clone()], 0.0).unwrap(),
+        Csg::union(vec![onto.clone(), tool.clone()]).unwrap(),
+    ] {
+        let (field, report) = fitted(&target, &onto, &within, &surface(0.01, 4));
+        assert!(report.taken_out > 500, "{report:?}");
+        let sheet = |p: DVec3| {
+            let ((f, of_f), (g, of_g)) = (onto.value_gradient(p), tool.value_gradient(p));
+            let g = if target.value(p) == g { -1.0 } else { 1.0 } * g;
+            ((f - g).abs().min((f + g).abs())) / (of_f.length() + of_g.length())
+        };
+        let interval = lattice().spacing(4).max_element();
+        assert_follows(&field, &target, &within, (0.01, interval), sheet);
+    }
+}
+
+/// A field pushed along `by` about a place, as a hand that moves clay does.
+struct Pushed {
+    field: Arc<dyn Field>,
+    at: DVec3,
+    by: DVec3,
+    width: f64,
+}
+
+impl Field for Pushed {
+    fn value(&self, p: DVec3) -> f64 {
+        let share = libm::exp(-(p - self.at).length_squared() / (self.width * self.width));
+        self.field.value(p - self.by * share)
+    }
+
+    fn value_gradient(&self, p: DVec3) -> (f64, DVec3) {
+        let step = 1e-5;
+        let slope = |axis: DVec3| (self.value(p + axis * step) - self.value(p - axis * step)) / (2.0 * step);
+        (
+            self.value(p),
+            DVec3::new(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z)),
+        )
+    }
+
+    fn jet(&self, _: DVec3) -> Jet {
+        unreachable!("a fit asks for values")
+    }
+
+    fn bounds(&self, _: &Aabb) -> Interval {
+        Interval::EVERYTHING
+    }
+}
+
+#[test]
+fn a_push_is_written_into_a_scan() {
+    let (bunny, diagonal) = bunny();
+    let middle = on_surface(&bunny, bunny.lattice().world_box().center() + DVec3::X).unwrap();
+    let width = 0.05 * diagonal;
+    let target = Pushed {
+        field: Arc::new(bunny.clone()),
+        at: middle,
+        by: DVec3::new(0.3, 0.2, -0.1) * width,
+        width,
+    };
+    let finest = bunny.level_count();
+    let interval = bunny.lattice().spacing(finest).max_element();
+    let reach = 4.0 * width;
+    let within = Aabb::new(middle - reach, middle + reach);
+    let tolerance = 2e-4 * diagonal;
+    let (field, report) = fitted(&target, &bunny, &within, &surface(tolerance, finest));
+    assert_eq!(report.left.unwrap().wrong_signs, 0);
+    assert_follows(&field, &target, &within, (tolerance, interval), |_| f64::INFINITY);
+    assert_same_beside(&field, &bunny, &within, finest);
+}
+
+#[test]
+fn densities_are_met_at_every_voxel_off_the_crease() {
+    let dims = [40, 44, 36];
+    let view = VolumeView {
+        dims,
+        values: &head(dims, 0.0, 1),
+        world_from_voxel: DAffine3::from_scale(DVec3::new(4.0, 4.0, 5.0)),
+    };
+    let (onto, _): (HierarchicalSpline<f32>, _) =
+        fit_volume(&view, &VolumeOptions::default(), &mut Control::default()).unwrap();
+    // A ball of metal, 40 mm wide, and what is about it: densities fall by 100 a millimetre.
+    let middle = DVec3::new(78.0, 90.0, 92.0);
+    let metal = Csg::sum(vec![(100.0, sphere(middle, 20.0))], 1000.0).unwrap();
+    let (onto, metal) = (Arc::new(onto), Arc::new(metal));
+    let target = Csg::union(vec![onto.clone(), metal.clone()]).unwrap();
+    let within = Aabb::new(middle - 50.0, middle + 50.0);
+    let finest = onto.level_count();
+    let options = FieldFitOptions {
+        aim: Aim::Density { tolerance: 20.0 },
+        finest,
+        look: true,
+    };
+    let (field, report) = fitted(&target, &onto, &within, &options);
+    let interval = onto.lattice().spacing(finest).max_element();
+    let mut counted = 0;
+    for i in 0..dims.iter().product() {
+        let voxel = [i % dims[0], i / dims[0] % dims[1], i / dims[0] / dims[1]].map(|k: usize| k as f64);
+        let p = view.world_from_voxel.transform_point3(DVec3::from_array(voxel));
+        let ((f, of_f), (g, of_g)) = (onto.value_gradient(p), metal.value_gradient(p));
+        let is_off_crease = (f - g).abs() > 3.0 * interval * (of_f - of_g).length();
+        // The metal has a crease of its own in the middle.
+        if is_inside(&within, p) && is_off_crease && p.distance(middle) > 3.0 * interval {
+            let off = (field.value(p) - target.value(p)).abs();
+            assert!(off < 20.0, "{off} at {p}, {report:?}");
+            counted += usize::from(g > f);
+        }
+    }
+    assert!(counted > 200, "{counted} voxels of metal");
 }
 
 #[test]

@@ -7,14 +7,12 @@ use std::time::Instant;
 
 use bspline::hierarchical::{BlockEdit, BrickKey, Change, DenseCorrections, Lattice, LevelEdit};
 use bspline::polygonize::{BlockMesh, PolygonizeError, PolygonizeOptions};
-use bspline::primitives::Sphere;
-use bspline::{Aabb, Csg, Field, Frame, HierarchicalSpline};
-use fitting::Control;
-use fitting::field::{Aim, FieldFitOptions, fit_field};
+use bspline::{Aabb, Field, Frame, HierarchicalSpline};
 use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 use serde_json::{Map, Value};
 
+use super::fields::{self, Tool};
 use super::{Chart, Series};
 
 /// Cells of level 0 on an axis of the box.
@@ -67,14 +65,14 @@ pub fn edit_costs(
     Ok(all)
 }
 
-struct Ball {
-    field: HierarchicalSpline<f32>,
-    level: usize,
+pub(super) struct Ball {
+    pub field: HierarchicalSpline<f32>,
+    pub level: usize,
 }
 
 impl Ball {
     /// Distance to a ball on level 0; small waves near its surface on `depth` finer levels.
-    fn new(depth: u32) -> Self {
+    pub fn new(depth: u32) -> Self {
         let lattice = Lattice {
             world_from_lattice: DAffine3::IDENTITY,
             cells: [CELLS; 3],
@@ -103,7 +101,7 @@ impl Ball {
     }
 
     /// Where a stroke along the surface is after `i` steps of one finest interval each.
-    fn stroke(&self, i: usize) -> DVec3 {
+    pub fn stroke(&self, i: usize) -> DVec3 {
         let turn = 0.4 + i as f64 * self.cell() / (RADIUS * f64::from(CELLS));
         let (u, v) = (DVec3::new(0.8, 0.0, 0.6), DVec3::new(0.36, 0.8, -0.48));
         on_ball(libm::cos(turn) * u + libm::sin(turn) * v)
@@ -118,7 +116,7 @@ impl Ball {
     }
 
     /// Width of a cell of the finest level.
-    fn cell(&self) -> f64 {
+    pub fn cell(&self) -> f64 {
         1.0 / f64::from(1u32 << self.level)
     }
 }
@@ -156,7 +154,7 @@ fn brick(level: u32, key: BrickKey) -> Option<DenseCorrections<f32>> {
 }
 
 /// Median of `count` runs, microseconds; `run` is told its number and returns what it takes to drop, which is not timed.
-fn median<R>(count: usize, mut run: impl FnMut(usize) -> R) -> f64 {
+pub(super) fn median<R>(count: usize, mut run: impl FnMut(usize) -> R) -> f64 {
     let times = (0..count).map(|i| {
         let start = Instant::now();
         let kept = black_box(run(i));
@@ -252,27 +250,17 @@ fn remeshed(ball: &Ball) -> Result<f64, PolygonizeError> {
     Ok(middle(times))
 }
 
-/// Milliseconds to carve a ball `across` finest cells wide, and to write the result back: rows of \[Hua04\] Table 1.
+/// Milliseconds to carve a ball `across` finest cells wide, and to write the result back.
 fn carved(ball: &Ball, across: f64) -> f64 {
     let field: Arc<dyn Field> = Arc::new(ball.field.clone());
-    let radius = 0.5 * across * ball.cell();
-    let options = FieldFitOptions {
-        aim: Aim::Surface {
-            iso: 0.0,
-            tolerance: 0.05 * ball.cell(),
-        },
+    let tool = |i: usize| Tool {
+        middle: ball.stroke(i),
+        radius: 0.5 * across * ball.cell(),
+        beside: 0.0,
+        tolerance: 0.05 * ball.cell(),
         finest: ball.level,
-        look: false,
     };
-    let time = median(15, |i| {
-        let middle = ball.stroke(i);
-        let tool = Sphere::new(middle, radius).expect("a ball of some size");
-        let target = Csg::difference(field.clone(), vec![Arc::new(tool)], 0.0).expect("finite");
-        let within = Aabb::new(middle - radius, middle + radius);
-        fit_field(&target, &ball.field, &within, &options, &mut Control::default())
-            .expect("a tool beside nothing else")
-    });
-    time / 1e3
+    median(15, |i| fields::carved((&ball.field, &field), &tool(i))) / 1e3
 }
 
 /// What it costs to lay out the bricks round a tool, and to ask them.

@@ -2,6 +2,7 @@
 
 mod dynamics;
 mod edits;
+mod fields;
 mod fit;
 mod hard;
 mod masks;
@@ -13,6 +14,7 @@ mod plot;
 
 pub use dynamics::{DynamicsError, Extent, Line, Run, cost, sampling, sweep};
 pub use edits::edit_costs;
+pub use fields::field_fit_costs;
 pub use fit::{Configuration, Input, Measurement, sweeps};
 pub use hard::Scene;
 pub use masks::mask_costs;

@@ -17,7 +17,7 @@ use super::progress::Bar;
 use super::quantity::between;
 use super::source::{SAMPLES, Source, scratch};
 use super::staged::{StagedFiles, publish};
-use super::{chart_dynamics, chart_edits, chart_masks, chart_mesh, chart_orient};
+use super::{chart_dynamics, chart_edits, chart_fields, chart_masks, chart_mesh, chart_orient};
 use crate::charts::{Chart, Configuration, Input, Measurement, Scene, noise, outliers, sweeps};
 
 /// Arguments of `isoclay charts`.
@@ -41,6 +41,8 @@ enum Subject {
     Mesh(chart_mesh::Args),
     /// Time of edits, and of what follows from them, against the size of the field
     Edits(chart_edits::Args),
+    /// Time of writing a tool's work back into a field, against the size of its box
+    Fields(chart_fields::Args),
     /// Noise against the resolution chosen and the error, and outliers against the error with and without --robust
     Hard(HardArgs),
 }
@@ -90,6 +92,7 @@ impl Args {
             Subject::Dynamics(a) => a.json,
             Subject::Masks(a) => a.json,
             Subject::Edits(a) => a.json,
+            Subject::Fields(a) => a.json,
             Subject::Orient(_) | Subject::Mesh(_) | Subject::Hard(_) => false,
         }
     }
@@ -105,6 +108,7 @@ pub fn run(args: &Args) -> Outcome {
         Subject::Masks(args) => chart_masks::run(args, &cancel),
         Subject::Mesh(args) => chart_mesh::run(args, &cancel),
         Subject::Edits(args) => chart_edits::run(args, &cancel),
+        Subject::Fields(args) => chart_fields::run(args, &cancel),
         Subject::Hard(args) => hard(args, &cancel),
     }
 }

@@ -7,8 +7,9 @@
 //! contradict them, and conjugate gradients run in the null space of the rest.
 
 mod constraint;
+mod held;
 mod hold;
 mod independent;
 
 pub use constraint::{Constraint, ConstraintError, Hold, On, curve};
-pub(crate) use hold::Held;
+pub(crate) use held::Held;

@@ -148,7 +148,7 @@ impl<T: Real> Patch<T> {
         let work = Work::on(coefficients, samples, self.network.springs().len());
         let count: usize = coefficients.iter().product();
         let options = self.cache.solver.options();
-        let method = self.method(self.is_even(), count, coefficients == samples);
+        let method = options.method(self.is_even(), count, coefficients == samples);
         let factor = count <= options.background_limit;
         // A factor beside the steps takes the place of the cycle.
         let solving = match method {
@@ -189,18 +189,6 @@ impl<T: Real> Patch<T> {
         self.mask.is_none() && self.lumped.mass.is_constant() && self.lumped.damping.is_constant()
     }
 
-    /// The method that a matrix takes on so many coefficients.
-    fn method(&self, uniform: bool, coefficients: usize, square: bool) -> Method {
-        let few = coefficients <= self.cache.solver.options().direct_limit;
-        match (uniform, square, few) {
-            (true, ..) => Method::FastDiagonalization,
-            (_, true, true) => Method::SampleDirect,
-            (_, true, false) => Method::SampleMultigrid,
-            (_, false, true) => Method::Direct,
-            (_, false, false) => Method::VCycle,
-        }
-    }
-
     /// What [`Integrator::Auto`] takes for a step of `dt` seconds: explicit sub-steps within their bound where they cost
     /// fewer operations than one implicit step, which is then no more accurate. Costs the
     /// [bound](Self::explicit_limit), once after each change of the matter.
@@ -218,7 +206,8 @@ impl<T: Real> Patch<T> {
         let work = Work::new(self.lattice(), self.network.springs().len());
         let solve = |uniform: bool, rough: f64| {
             let lattice = self.lattice();
-            let method = self.method(uniform, lattice.coefficient_count(), lattice.is_square());
+            let options = self.cache.solver.options();
+            let method = options.method(uniform, lattice.coefficient_count(), lattice.is_square());
             let iterations = match method {
                 Method::VCycle | Method::SampleMultigrid => rough,
                 _ => 1.0,

@@ -1,11 +1,11 @@
 use bspline::Real;
 
-use crate::cache::Prepared;
 use crate::lattice::SampleBox;
 use crate::patch::{Patch, PatchError};
 use crate::solve::{ITERATED, Method, SolveReport};
 use crate::springs::{Law, Weights};
 use crate::units::binary_unit;
+use crate::version::Prepared;
 
 /// Beyond this ratio of step sizes a factor is not tried again: four in `Δt²` costs about eight iterations.
 const STALE: f64 = 4.0;

@@ -4,9 +4,10 @@ use bspline::Real;
 use serde::{Deserialize, Serialize};
 
 use super::background::Work;
+use super::painted::Painted;
 use super::renewal::{Renewal, Stage};
 use super::report::SolveError;
-use super::step_solver::{Painted, StepSolver};
+use super::step_solver::StepSolver;
 use crate::springs::{SpringWeights, StepMatrix, Weights};
 
 /// All of a solver that is neither its lattice nor made from the matrix at hand: the matrix that it was prepared for, how

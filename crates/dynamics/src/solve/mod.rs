@@ -3,6 +3,7 @@
 mod background;
 mod band_cholesky;
 mod border;
+mod chebyshev;
 mod dot;
 mod fast_diagonalization;
 mod galerkin;
@@ -10,12 +11,14 @@ mod history;
 mod lanczos;
 mod mean;
 mod orthonormal;
+mod painted;
 mod pcg;
 mod renewal;
 mod report;
 mod sample_multigrid;
 mod schwarz;
 mod step_solver;
+mod systems;
 mod v_cycle;
 
 pub use band_cholesky::{BandCholesky, NotPositive};

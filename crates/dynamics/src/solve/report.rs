@@ -40,6 +40,18 @@ impl Default for SolverOptions {
 }
 
 impl SolverOptions {
+    /// The method for so many free coefficients, `square` with as many samples; a V-cycle may give way to a factor that is made
+    /// beside the steps.
+    pub(crate) fn method(&self, uniform: bool, coefficients: usize, square: bool) -> Method {
+        match (uniform, square) {
+            (true, _) => Method::FastDiagonalization,
+            (_, true) if coefficients <= self.sample_direct_limit() => Method::SampleDirect,
+            (_, true) => Method::SampleMultigrid,
+            (_, false) if coefficients <= self.direct_limit => Method::Direct,
+            (_, false) => Method::VCycle,
+        }
+    }
+
     /// Free coefficients up to which the matrix of a lattice with as many samples is factorized.
     pub fn sample_direct_limit(&self) -> usize {
         4 * self.direct_limit

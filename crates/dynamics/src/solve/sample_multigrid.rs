@@ -5,6 +5,7 @@ use bspline::Real;
 use bspline::vectorized;
 
 use super::band_cholesky::{BandCholesky, NotPositive};
+use super::chebyshev::Chebyshev;
 use super::pcg::Preconditioner;
 use crate::lattice::{Banded, TensorProduct, TensorWorkspace};
 use crate::springs::StepMatrix;
@@ -271,25 +272,15 @@ impl<T: Real> Level<T> {
     fn smooth(&mut self, finest: Option<&StepMatrix<T>>, from_zero: bool) {
         let (high, low) = (self.bound, self.bound / 8.0);
         let (theta, delta) = ((high + low) / 2.0, (high - low) / 2.0);
-        let sigma = theta / delta;
-        let mut rho = 1.0 / sigma;
         if from_zero {
             self.x.fill(T::zero());
         }
-        for step in 0..DEGREE {
+        for (step, (keep, take)) in Chebyshev::new(theta, delta).take(DEGREE).enumerate() {
             if step == 0 && from_zero {
                 self.r.copy_from_slice(&self.b);
             } else {
                 self.residual(finest);
             }
-            let (keep, take) = if step == 0 {
-                (0.0, 1.0 / theta)
-            } else {
-                let next = 1.0 / (2.0 * sigma - rho);
-                let out = (next * rho, 2.0 * next / delta);
-                rho = next;
-                out
-            };
             let (keep, take) = (T::from_f64(keep), T::from_f64(take));
             let terms = self.r.iter().zip(&self.inverse_diagonal);
             if step == 0 {

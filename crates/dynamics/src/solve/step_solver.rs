@@ -4,19 +4,16 @@ use std::sync::Arc;
 
 use bspline::Real;
 
-use super::background::Background;
-use super::band_cholesky::{BandCholesky, NotPositive};
+use super::band_cholesky::NotPositive;
 use super::border::Border;
-use super::dot::dot;
 use super::fast_diagonalization::FastDiagonalization;
-use super::galerkin::Galerkin;
-use super::pcg::{CoefficientSystem, ConjugateGradients, PcgReport, Preconditioner, System, add_scaled};
+use super::painted::{Dynamic, Painted, active, fill_band};
+use super::pcg::{CoefficientSystem, ConjugateGradients, PcgReport};
 use super::renewal::{Renewal, Renewed};
 use super::report::{ITERATED, Method, SolveError, SolveReport, SolverOptions};
-use super::sample_multigrid::SampleMultigrid;
-use super::v_cycle::VCycle;
+use super::systems::{SampleSystem, Sampled};
 use crate::lattice::{Lattice, SampleBox, TensorProduct, TensorWorkspace};
-use crate::sparse::{Mask, MaskedSolver, MaskedWay, Projected};
+use crate::sparse::{Mask, MaskedWay, Projected};
 use crate::springs::StepMatrix;
 use crate::units::{binary_unit, largest};
 
@@ -74,29 +71,6 @@ pub struct StepSolver<T> {
     workspace: TensorWorkspace<T>,
 }
 
-/// Made when the first painted matrix comes.
-#[derive(Clone, Debug)]
-pub(super) enum Painted<T> {
-    None,
-    Direct(Box<(Galerkin, BandCholesky<T>)>),
-    Background(Box<Background<T>>),
-    VCycle(Box<VCycle<T>>),
-    SampleDirect(BandCholesky<T>),
-    SampleMultigrid(Box<SampleMultigrid<T>>),
-    Masked(Box<MaskedSolver<T>>),
-}
-
-impl<T: Real> Painted<T> {
-    /// The factor on the coefficients, if there is one, and what assembles it.
-    pub(super) fn factor(&mut self) -> Option<(&mut Galerkin, &mut BandCholesky<T>)> {
-        match self {
-            Self::Direct(direct) => Some((&mut direct.0, &mut direct.1)),
-            Self::Background(background) => Some(background.factor()),
-            _ => None,
-        }
-    }
-}
-
 /// `A⁻¹` in double precision.
 #[derive(Clone, Debug)]
 struct SampleInverse {
@@ -104,22 +78,6 @@ struct SampleInverse {
     d: Vec<f64>,
     p: Vec<f64>,
     workspace: TensorWorkspace<f64>,
-}
-
-/// `S` on the samples.
-struct SampleSystem<'a, T, P> {
-    matrix: &'a StepMatrix<T>,
-    preconditioner: &'a mut P,
-}
-
-impl<T: Real, P: Preconditioner<T>> System<T> for SampleSystem<'_, T, P> {
-    fn apply(&mut self, p: &[T], q: &mut [T]) -> f64 {
-        self.matrix.apply(p, q);
-        dot(p, q)
-    }
-    fn precondition(&mut self, r: &[T], z: &mut [T]) {
-        self.preconditioner.apply(self.matrix, r, z);
-    }
 }
 
 impl<T: Real> StepSolver<T> {
@@ -192,7 +150,7 @@ impl<T: Real> StepSolver<T> {
             return Ok(());
         }
         if matches!(self.painted, Painted::None) {
-            self.painted = self.make_painted();
+            self.painted = Painted::new(&self.lattice, &self.steps, &self.options, self.mask.as_ref());
         }
         if self.painted_for.as_ref() != Some(s) {
             self.painted_for = None;
@@ -367,45 +325,6 @@ impl<T: Real> StepSolver<T> {
     pub(crate) fn hold(&self, list: &mut [T]) {
         if let Some(mask) = &self.mask {
             mask.hold(list);
-        }
-    }
-
-    fn make_painted(&self) -> Painted<T> {
-        if let Some(mask) = &self.mask {
-            return Painted::Masked(Box::new(MaskedSolver::new(
-                &self.lattice,
-                mask.clone(),
-                &self.steps,
-                self.options.masked,
-                self.options.v_cycle,
-            )));
-        }
-        let [_, my, mz] = self.lattice.sample_dims();
-        let (n, m) = (self.lattice.coefficient_count(), self.lattice.sample_count());
-        let few = n
-            <= if self.inverse.is_some() {
-                self.options.sample_direct_limit()
-            } else {
-                self.options.direct_limit
-            };
-        match (self.inverse.is_some(), few) {
-            (true, true) => Painted::SampleDirect(BandCholesky::new(m, ((my + 1) * mz + 1).min(m - 1))),
-            (true, false) => {
-                Painted::SampleMultigrid(Box::new(SampleMultigrid::new(self.lattice.sample_dims())))
-            }
-            (false, true) => {
-                let galerkin = Galerkin::new(&self.lattice, &self.steps);
-                let factor = BandCholesky::new(n, galerkin.band());
-                Painted::Direct(Box::new((galerkin, factor)))
-            }
-            (false, false) if n <= self.options.background_limit => Painted::Background(Box::new(
-                Background::new(&self.lattice, &self.steps, self.options.v_cycle),
-            )),
-            (false, false) => Painted::VCycle(Box::new(VCycle::new(
-                &self.lattice,
-                &self.steps,
-                self.options.v_cycle,
-            ))),
         }
     }
 
@@ -594,65 +513,5 @@ impl<T: Real> StepSolver<T> {
                 report
             }
         }
-    }
-}
-
-/// Sums the solution on the samples from what the iteration samples anyway.
-struct Sampled<'a, 'b, T, P> {
-    system: CoefficientSystem<'a, T, P>,
-    dx: &'b mut [T],
-}
-
-impl<T: Real, P: Preconditioner<T>> System<T> for Sampled<'_, '_, T, P> {
-    fn apply(&mut self, p: &[T], q: &mut [T]) -> f64 {
-        self.system.apply(p, q)
-    }
-    fn precondition(&mut self, r: &[T], z: &mut [T]) {
-        self.system.precondition(r, z);
-    }
-    fn moved(&mut self, alpha: T) {
-        add_scaled(self.dx, alpha, &self.system.samples[0]);
-    }
-}
-
-/// What the matrix was prepared with.
-fn active<'a, T: Real>(
-    method: Method,
-    painted: &'a mut Painted<T>,
-    diagonalization: &'a mut FastDiagonalization<T>,
-) -> &'a mut dyn Preconditioner<T> {
-    match (method, painted) {
-        (_, Painted::Masked(masked)) => &mut **masked,
-        (Method::Direct, Painted::Direct(direct)) => &mut direct.1,
-        (Method::Direct | Method::VCycle, Painted::Background(background)) => &mut **background,
-        (Method::VCycle, Painted::VCycle(cycle)) => &mut **cycle,
-        (Method::SampleDirect, Painted::SampleDirect(factor)) => factor,
-        (Method::SampleMultigrid, Painted::SampleMultigrid(multigrid)) => &mut **multigrid,
-        _ => diagonalization,
-    }
-}
-
-/// A preconditioner behind a pointer.
-struct Dynamic<'a, T>(&'a mut dyn Preconditioner<T>);
-
-impl<T> Preconditioner<T> for Dynamic<'_, T> {
-    fn apply(&mut self, s: &StepMatrix<T>, r: &[T], z: &mut [T]) {
-        self.0.apply(s, r, z);
-    }
-}
-
-/// Writes `S` itself into a band.
-fn fill_band<T: Real>(s: &StepMatrix<T>, into: &mut BandCholesky<T>) {
-    into.clear();
-    let [mx, my, mz] = s.dims();
-    let mut diagonal: Vec<f64> = (0..mx * my * mz).map(|i| s.mass.at(i).as_f64()).collect();
-    s.for_each_spring(|i, j, w, _| {
-        let (i, j) = (i.min(j), i.max(j));
-        diagonal[i] += w.as_f64();
-        diagonal[j] += w.as_f64();
-        into.set(j, i, -w.as_f64());
-    });
-    for (i, d) in diagonal.into_iter().enumerate() {
-        into.set(i, i, d);
     }
 }

@@ -4,6 +4,7 @@ use bspline::Real;
 use serde::{Deserialize, Serialize};
 
 use super::band_cholesky::{BandCholesky, NotPositive};
+use super::chebyshev::Chebyshev;
 use super::fast_diagonalization::FastDiagonalization;
 use super::galerkin::Galerkin;
 use super::lanczos::Lanczos;
@@ -365,18 +366,8 @@ impl<T: Real> VCycle<T> {
             blocks: schwarz.as_mut().filter(|_| blocks),
         };
         let (theta, delta) = (largest * (1.0 + LOWER) / 2.0, largest * (1.0 - LOWER) / 2.0);
-        let sigma = theta / delta;
-        let mut rho = 1.0 / sigma;
-        for step in 0..degree {
+        for (step, (keep, take)) in Chebyshev::new(theta, delta).take(degree).enumerate() {
             smoother.apply(s, r, z);
-            let (keep, take) = if step == 0 {
-                (0.0, 1.0 / theta)
-            } else {
-                let next = 1.0 / (2.0 * sigma - rho);
-                let out = (next * rho, 2.0 * next / delta);
-                rho = next;
-                out
-            };
             let (keep, take) = (T::from_f64(keep), T::from_f64(take));
             if step == 0 {
                 for (d, z) in d.iter_mut().zip(z.iter()) {

@@ -2,11 +2,13 @@
 
 mod law;
 mod neighbours;
+mod network;
 mod plasticity;
 mod stencil;
 
-pub(crate) use law::EnergyChange;
-pub use law::{Law, Rest, SpringNetwork, SpringReport};
+pub use law::Law;
 pub use neighbours::{Direction, Neighbours};
+pub(crate) use network::EnergyChange;
+pub use network::{Rest, SpringNetwork, SpringReport};
 pub use plasticity::Plasticity;
 pub use stencil::{SpringWeights, StepMatrix, Weights};

@@ -2,7 +2,8 @@ use bspline::Real;
 use serde::{Deserialize, Serialize};
 
 use super::Law;
-use super::law::{SpringNetwork, length, rows_of};
+use super::law::length;
+use super::network::{SpringNetwork, rows_of};
 use crate::patch::{Patch, PatchError, finite};
 
 /// Whether springs keep their rest lengths.

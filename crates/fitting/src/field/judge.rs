@@ -8,8 +8,9 @@ use super::tiles::{Mask, NONE, Rows, TILE, TileKey, Tiles, Values, places};
 
 /// Cells of a level on each side of the surface in which its distance counts.
 const NEAR: f64 = 3.0;
-/// Cells of a level on each side of the surface in which the next level looks: half of [`NEAR`], its own band, and what
-/// lies between the surface and a knot beside it.
+/// Those in which a rest makes functions take part, with those one knot further: all that reach where [`NEAR`] counts.
+const TAKEN: f64 = NEAR + 1.0;
+/// Those in which the next level looks: half of what it takes, and what lies between the surface and a knot beside it.
 const OPEN: f64 = 2.5;
 
 /// The aim on one level, in units in which its knots are one apart.
@@ -70,7 +71,7 @@ impl Judge {
             Aim::Density { tolerance } => mask(judged, |i| rests[i].abs() > tolerance),
             Aim::Surface { iso, tolerance } => {
                 let slopes = self.slopes_squared(tiles, tile, judged, target);
-                let (tolerance, near) = (tolerance * tolerance, (NEAR * self.cell).powi(2));
+                let (tolerance, near) = (tolerance * tolerance, (TAKEN * self.cell).powi(2));
                 let rounding = self.rounding * self.rounding;
                 mask(judged, |i| {
                     let (t, r, s) = (target[tile][i], rests[i], slopes[i]);
@@ -129,7 +130,7 @@ impl Judge {
     fn slopes_squared(&self, tiles: &Tiles, tile: usize, asked: &Mask, target: &[Values]) -> Values {
         const WIDE: usize = TILE + 2;
         let rows = Rows::of(asked);
-        let padded = tiles.padded(tile, &rows, target, f64::NAN);
+        let padded = tiles.padded(tile, &rows, target, Some(f64::NAN));
         let m = self.metric;
         let (xx, yy, zz) = (m.x_axis.x, m.y_axis.y, m.z_axis.z);
         let (xy, xz, yz) = (2.0 * m.x_axis.y, 2.0 * m.x_axis.z, 2.0 * m.y_axis.z);

@@ -10,7 +10,7 @@ use super::FieldFitOptions;
 use super::judge::{Judge, Left, between_knots, children};
 use super::region::Region;
 use super::sample::sample;
-use super::tiles::{Mask, NONE, Rows, TILE, TileKey, Tiles, Values, between, only, places, stencil};
+use super::tiles::{Mask, NONE, Rows, TILE, TileKey, Tiles, Values, between, places, stencil};
 use crate::FitError;
 
 /// Side and middle of the cubic B-spline at the knots.
@@ -147,28 +147,32 @@ impl<T: Real> LevelFit<'_, T> {
     }
 
     /// The quasi-interpolant of the rest, and of what that leaves at the knots, in the functions that take part.
+    ///
+    /// Only the sum is cut off where functions do not take part: where all that reach a point do, it is interpolated as
+    /// if there were no cut.
     fn coefficients(&self, tiles: &Tiles, rest: &[Values], takes_part: &[Mask]) -> Vec<Values> {
         let (first, last) = self.region.sampled();
-        let quasi = |rest: &[Values], i: usize, out: &mut Values| {
-            if takes_part[i] != NONE {
-                let rows = Rows::of(&takes_part[i]);
-                stencil(&tiles.padded(i, &rows, rest, 0.0), &rows, QUASI, out);
-                only(&takes_part[i], out);
-            }
+        let convolved = |i: usize, values: &[Values], weights: [f64; 2], out: &mut Values| {
+            let rows = Rows::of(&between(tiles.keys[i], first, last));
+            stencil(&tiles.padded(i, &rows, values, None), &rows, weights, out);
         };
-        let mut coefficients = tiles.fill(|i, out| quasi(rest, i, out));
+        let once = tiles.fill(|i, out| {
+            if tiles.is_any_near(i, takes_part) {
+                convolved(i, rest, QUASI, out);
+            }
+        });
         let left = tiles.fill(|i, out| {
             if tiles.is_any_near(i, takes_part) {
-                let rows = Rows::of(&between(tiles.keys[i], first, last));
-                stencil(&tiles.padded(i, &rows, &coefficients, 0.0), &rows, SAMPLES, out);
+                convolved(i, &once, SAMPLES, out);
                 out.iter_mut().zip(&rest[i]).for_each(|(o, r)| *o = r - *o);
             }
         });
-        let more = tiles.fill(|i, out| quasi(&left, i, out));
-        for (all, more) in coefficients.iter_mut().flatten().zip(more.iter().flatten()) {
-            *all += more;
-        }
-        coefficients
+        tiles.fill(|i, out| {
+            if takes_part[i] != NONE {
+                convolved(i, &left, QUASI, out);
+                out.iter_mut().zip(&once[i]).for_each(|(o, first)| *o += first);
+            }
+        })
     }
 
     /// Coefficients of the functions that take part, brick by brick.

@@ -8,6 +8,7 @@
 
 mod judge;
 mod level;
+mod prune;
 mod region;
 mod sample;
 mod tiles;
@@ -19,6 +20,7 @@ use bspline::hierarchical::{BrickDiff, EditError, MAX_LEVELS};
 use bspline::{Aabb, Field, HierarchicalSpline, Real};
 pub use judge::Left;
 use level::LevelFit;
+use prune::dead_functions;
 use region::Region;
 use tiles::in_pool;
 
@@ -59,6 +61,8 @@ pub struct FieldFitReport {
     pub levels: Vec<usize>,
     /// Functions that took part, over all levels.
     pub functions: usize,
+    /// Functions of the old surface that were taken out, as the new one is far from them.
+    pub taken_out: usize,
     /// Points at which target and field were compared.
     pub samples: u64,
     /// What the look at the end found, if there was one.
@@ -117,6 +121,12 @@ pub fn fit_field<T: Real>(
             field = field.added(&round.edits).map_err(not_added)?;
         }
         open = round.open;
+    }
+    if let Aim::Surface { iso, .. } = options.aim {
+        let dead = dead_functions(onto, &field, iso, first, |level| region(level, false));
+        let before = field.coefficient_count();
+        field = field.edited_blocks(&dead).map_err(not_added)?;
+        report.taken_out = before - field.coefficient_count();
     }
     if options.look {
         let fit = LevelFit {

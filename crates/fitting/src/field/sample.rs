@@ -6,7 +6,7 @@ use super::region::Region;
 use super::tiles::{TILE, TileKey, Values};
 
 /// Target and rest (`target - field`) at the knots of a tile; gives the number of points asked for. Knots that are not
-/// sampled get the target NaN and the rest 0.
+/// sampled get the target NaN.
 pub(super) fn sample(
     [target, field]: [&dyn Field; 2],
     region: &Region,
@@ -57,6 +57,17 @@ pub(super) fn sample(
                 targets[to] = t;
                 rests[to] = t - f;
             }
+        }
+    }
+    // Beside what is sampled the rest goes on as it is.
+    if (0..3).any(|a| start[a] > first[a] || end[a] < first[a] + TILE as i64 - 1) {
+        for i in 0..rests.len() {
+            let at = [i / TILE / TILE, i / TILE % TILE, i % TILE];
+            let [x, y, z] = std::array::from_fn(|a| {
+                let knot = first[a] + at[a] as i64;
+                (knot.clamp(start[a], end[a]) - first[a]) as usize
+            });
+            rests[i] = rests[(x * TILE + y) * TILE + z];
         }
     }
     len as u64

@@ -109,28 +109,34 @@ impl Tiles {
         known.into_iter().any(|n| masks[*n as usize] != NONE)
     }
 
-    /// Values of the rows of a tile and one knot beside them; `absent` where there is no tile, and in other rows.
-    pub fn padded(&self, tile: usize, rows: &Rows, values: &[Values], absent: f64) -> Padded {
-        let mut out = [absent; PADDED * PADDED * PADDED];
-        let around = |dx: usize, dy: usize| &self.neighbours[tile][(dx * 3 + dy) * 3..][..3];
+    /// Values of the rows of a tile and one knot beside them. Where there is no tile the values at its face go on, or it
+    /// says `absent`.
+    pub fn padded(&self, tile: usize, rows: &Rows, values: &[Values], absent: Option<f64>) -> Padded {
+        let mut out = [absent.unwrap_or(0.0); PADDED * PADDED * PADDED];
+        let neighbours = &self.neighbours[tile];
         for x in rows.x.start..rows.x.end + 2 {
-            let (dx, sx) = split(x);
             for y in rows.y.start..rows.y.end + 2 {
-                let (dy, sy) = split(y);
                 let row = &mut out[(x * PADDED + y) * PADDED..][..PADDED];
-                let at = (sx * TILE + sy) * TILE;
-                let of = |n: u32| &values[n as usize][at..at + TILE];
-                let &[before, own, behind] = around(dx, dy) else {
-                    unreachable!("three tiles a column")
-                };
-                if own != ABSENT {
+                // The row itself, or the nearest one of a tile that there is.
+                let [inner_x, inner_y] = [x, y].map(|p| p.clamp(1, TILE));
+                let places = [[x, y], [inner_x, y], [x, inner_y], [inner_x, inner_y]];
+                let tried = if absent.is_some() { 1 } else { places.len() };
+                for [x, y] in &places[..tried] {
+                    let ((dx, sx), (dy, sy)) = (split(*x), split(*y));
+                    let [before, own, behind] = [0, 1, 2].map(|z| neighbours[(dx * 3 + dy) * 3 + z]);
+                    if own == ABSENT {
+                        continue;
+                    }
+                    let at = (sx * TILE + sy) * TILE;
+                    let of = |n: u32| &values[n as usize][at..at + TILE];
                     row[1..=TILE].copy_from_slice(of(own));
-                }
-                if before != ABSENT {
-                    row[0] = of(before)[TILE - 1];
-                }
-                if behind != ABSENT {
-                    row[PADDED - 1] = of(behind)[0];
+                    let beside = |n: u32, place: usize, face: f64| match n {
+                        ABSENT => absent.unwrap_or(face),
+                        n => of(n)[place],
+                    };
+                    row[0] = beside(before, TILE - 1, row[1]);
+                    row[PADDED - 1] = beside(behind, 0, row[TILE]);
+                    break;
                 }
             }
         }
@@ -233,15 +239,6 @@ pub(super) fn stencil(padded: &Padded, rows: &Rows, weights: [f64; 2], out: &mut
             }
         },
     );
-}
-
-/// Sets what a mask leaves out to 0.
-pub(super) fn only(mask: &Mask, values: &mut Values) {
-    for (word, plane) in mask.iter().zip(values.chunks_exact_mut(TILE * TILE)) {
-        for (bit, value) in plane.iter_mut().enumerate() {
-            *value = if word >> bit & 1 == 1 { *value } else { 0.0 };
-        }
-    }
 }
 
 /// The knots `lo ..= hi` of a tile.
