@@ -66,3 +66,31 @@ fn lines_have_all_figures_and_show_what_the_default_gains_over_plain_iterations(
         assert!(svg.starts_with("<svg") && svg.contains("<circle"), "{name}");
     }
 }
+
+#[test]
+fn masks_are_solved_by_every_way_and_best_by_the_default() {
+    let bench = Bench::new();
+    let run = bench.run("charts masks --quick --json -o charts");
+    assert_eq!(run.code, 0, "{}", run.stderr);
+    let lines = run.stdout.lines().map(|l| serde_json::from_str(l).unwrap());
+    let lines: Vec<Value> = lines.collect();
+    // Four masks, four ways.
+    assert_eq!(lines.len(), 16);
+    for line in &lines {
+        let cycle = line["way"] == "tensor V-cycle of the box";
+        let bound = if cycle { 1e-2 } else { 1e-5 };
+        assert!(
+            number(line, "increment_error") < bound && number(line, "step_ms") > 0.0,
+            "{line}"
+        );
+        assert!(
+            line["converged"] == true && number(line, "moving") > 100.0,
+            "{line}"
+        );
+    }
+    assert_eq!(lines.iter().filter(|l| l["default"] == true).count(), 4);
+    for name in ["error", "step", "setup"] {
+        let svg = std::fs::read_to_string(bench.path(&format!("charts/masks-{name}.svg"))).unwrap();
+        assert!(svg.starts_with("<svg") && svg.contains("<circle"), "{name}");
+    }
+}

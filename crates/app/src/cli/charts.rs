@@ -17,7 +17,7 @@ use super::progress::Bar;
 use super::quantity::between;
 use super::source::{SAMPLES, Source, scratch};
 use super::staged::{StagedFiles, publish};
-use super::{chart_dynamics, chart_edits, chart_fields, chart_mesh, chart_orient};
+use super::{chart_dynamics, chart_edits, chart_fields, chart_masks, chart_mesh, chart_orient};
 use crate::charts::{Chart, Configuration, Input, Measurement, Scene, noise, outliers, sweeps};
 
 /// Arguments of `isoclay charts`.
@@ -35,6 +35,8 @@ enum Subject {
     Orient(chart_orient::Args),
     /// Error of a step's increment against its time, over solvers, laws, schemes and steps; sampling; cost by size
     Dynamics(chart_dynamics::Args),
+    /// Error and time of steps of regions that are no box, over the ways to solve them, sizes and masks
+    Masks(chart_masks::Args),
     /// Distance of meshes from the surface of their field against triangles and time
     Mesh(chart_mesh::Args),
     /// Time of edits, and of what follows from them, against the size of the field
@@ -88,6 +90,7 @@ impl Args {
         match &self.subject {
             Subject::Fit(a) => a.json,
             Subject::Dynamics(a) => a.json,
+            Subject::Masks(a) => a.json,
             Subject::Edits(a) => a.json,
             Subject::Fields(a) => a.json,
             Subject::Orient(_) | Subject::Mesh(_) | Subject::Hard(_) => false,
@@ -102,6 +105,7 @@ pub fn run(args: &Args) -> Outcome {
         Subject::Fit(args) => fits(args, &cancel),
         Subject::Orient(args) => chart_orient::run(args, &cancel),
         Subject::Dynamics(args) => chart_dynamics::run(args, &cancel),
+        Subject::Masks(args) => chart_masks::run(args, &cancel),
         Subject::Mesh(args) => chart_mesh::run(args, &cancel),
         Subject::Edits(args) => chart_edits::run(args, &cancel),
         Subject::Fields(args) => chart_fields::run(args, &cancel),

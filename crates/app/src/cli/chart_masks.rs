@@ -1,0 +1,54 @@
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+use fitting::{Cancel, FitError};
+
+use super::cost::cpu_seconds;
+use super::failure::{Failure, OrFail, Outcome};
+use super::progress::Bar;
+use super::staged::{StagedFiles, publish};
+use crate::charts::{Chart, mask_costs};
+
+/// Arguments of `isoclay charts masks`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Directory for the charts masks-NAME.svg; made if missing
+    #[arg(short, long, value_name = "DIR", default_value = "docs/charts")]
+    output: PathBuf,
+    /// The smallest box only: takes seconds
+    #[arg(long)]
+    quick: bool,
+    /// Print one JSON object for each way, size and mask
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Measures the ways to step what is left of a box, and draws them.
+pub fn run(args: &Args, cancel: &Cancel) -> Outcome {
+    let mut staged = StagedFiles::new("-o", &args.output)?;
+    let bar = Bar::new();
+    let mut closed = None;
+    let costs = mask_costs(args.quick, cpu_seconds, |cost, fraction| {
+        bar.show("measuring", fraction);
+        if args.json {
+            let text = serde_json::to_string(cost).expect("a struct of plain fields is always JSON");
+            if let Err(e) = writeln!(io::stdout().lock(), "{text}") {
+                closed.get_or_insert(e);
+            }
+        }
+        !cancel.is_cancelled()
+    });
+    bar.clear();
+    if cancel.is_cancelled() {
+        return Err(FitError::Cancelled.into());
+    }
+    let costs = costs.map_err(Failure::limit)?;
+    if let Some(e) = closed {
+        return Err(e).or_limit();
+    }
+    for (name, chart) in Chart::of_masks(&costs) {
+        let svg = chart.svg().map_err(Failure::limit)?;
+        staged.write_text(&format!("masks-{name}.svg"), &svg)?;
+    }
+    publish(staged, args.json)
+}
