@@ -59,6 +59,12 @@ struct Work {
     sample: Arc<Sample>,
 }
 
+fn sampled(judge: &Judge, level: usize, key: BlockKey, scratch: &mut Scratch) -> Arc<Sample> {
+    let mut sample = Sample::default();
+    sample.fill(judge, level, key, scratch);
+    Arc::new(sample)
+}
+
 fn both(a: Cells, b: Cells) -> Cells {
     std::array::from_fn(|x| a[x] & b[x])
 }
@@ -166,9 +172,7 @@ impl Octree {
             .par_iter()
             .with_min_len(2)
             .map_init(Scratch::default, |scratch, &place| {
-                let mut sample = Sample::default();
-                sample.fill(judge, place.0, self.block(place).key, scratch);
-                Arc::new(sample)
+                sampled(judge, place.0, self.block(place).key, scratch)
             })
             .collect();
         found.sampled += samples.len();
@@ -216,9 +220,7 @@ impl Octree {
                 .with_min_len(2)
                 .for_each_init(Scratch::default, |scratch, w| {
                     if w.is_new {
-                        let mut sample = Sample::default();
-                        sample.fill(judge, level, w.key, scratch);
-                        w.sample = Arc::new(sample);
+                        w.sample = sampled(judge, level, w.key, scratch);
                     } else if !w.boxes.is_empty() {
                         let (nodes, stale) = changed.within(grids, level, w.key, &w.boxes);
                         Arc::make_mut(&mut w.sample).refill(judge, level, w.key, nodes, stale, scratch);
