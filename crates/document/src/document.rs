@@ -4,15 +4,15 @@ use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use formats::ReadLimits;
-use formats::field::{decode, encode};
-use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use crate::entry::{EditCounts, EditHead, EditInfo, Kind, MoveHead, ObjectHead, SnapshotHead, hex};
-use crate::error::{damaged, fault};
+use crate::entry::{EditCounts, EditHead, EditInfo, Kind, MoveHead, SnapshotHead, hex};
+use crate::error::damaged;
 use crate::journal::{Journal, Parts, Record, Tail};
-use crate::{Change, DocumentError, Object, State};
+use crate::layout::Layout;
+use crate::records::{followed, json, read_text, snapshot};
+use crate::{Change, DocumentError, State};
 
 /// How a document is kept.
 #[derive(Clone, Copy, Debug)]
@@ -67,17 +67,6 @@ pub struct Lost {
     pub is_torn: bool,
     /// What was met.
     pub why: String,
-}
-
-/// What the journal's records make.
-#[derive(Clone, Debug, Default)]
-struct Layout {
-    /// Edits, the oldest first.
-    edits: Vec<Record>,
-    /// How many of them are done.
-    done: usize,
-    /// Snapshots, and how many edits each has in it.
-    snapshots: Vec<(usize, Record)>,
 }
 
 impl Document {
@@ -403,185 +392,6 @@ impl Document {
 
 /// Bytes of edits that need no snapshot, however small the objects are.
 const SHORT: u64 = 1 << 20;
-
-impl Layout {
-    /// What records make, as far as they can be understood: the first one that cannot is cut off with all behind it.
-    fn read(
-        journal: &mut Journal,
-        records: &[Record],
-    ) -> Result<(Self, Option<DocumentError>), DocumentError> {
-        let (mut layout, mut trouble) = (Self::default(), None);
-        for record in records {
-            match record.kind {
-                Kind::Snapshot => layout.snapshots.push((layout.done, *record)),
-                Kind::Edit => {
-                    layout.forget_after(layout.done);
-                    layout.edits.push(*record);
-                    layout.done += 1;
-                }
-                Kind::Move => match read_text::<MoveHead>(journal, record) {
-                    Ok(head) => layout.done = (head.done as usize).min(layout.edits.len()),
-                    Err(error) => {
-                        journal.cut(record);
-                        trouble = Some(error);
-                        break;
-                    }
-                },
-            }
-        }
-        match layout.snapshots.first() {
-            Some((0, _)) => Ok((layout, trouble)),
-            _ => Err(damaged(journal.path(), "it does not begin with its objects")),
-        }
-    }
-
-    /// Drops edits from a number on, and the snapshots that have them in them.
-    fn forget_after(&mut self, count: usize) {
-        self.edits.truncate(count);
-        self.snapshots.retain(|(at, _)| *at <= count);
-        self.done = self.done.min(count);
-    }
-
-    /// The state that all done edits make, or the last one on the way to it that can be reached: how many edits are in it,
-    /// and what was in the way.
-    fn reach(
-        &self,
-        journal: &mut Journal,
-        limits: &ReadLimits,
-    ) -> Result<(State, usize, Option<DocumentError>), DocumentError> {
-        let mut best: Option<(State, usize)> = None;
-        let mut trouble = None;
-        for (at, record) in self.snapshots.iter().rev().filter(|(at, _)| *at <= self.done) {
-            let mut state = match restored(journal, record, limits) {
-                Ok(state) => state,
-                Err(error) => {
-                    trouble.get_or_insert(error);
-                    continue;
-                }
-            };
-            let mut reached = *at;
-            for edit in &self.edits[*at..self.done] {
-                match followed(journal, edit, &state, true, limits) {
-                    Ok(next) => (state, reached) = (next, reached + 1),
-                    Err(error) => {
-                        trouble.get_or_insert(error);
-                        break;
-                    }
-                }
-            }
-            if best.as_ref().is_none_or(|(_, most)| reached > *most) {
-                best = Some((state, reached));
-            }
-            if reached == self.done {
-                break;
-            }
-        }
-        let nothing = || damaged(journal.path(), "it does not begin with its objects");
-        match best {
-            Some((state, reached)) => Ok((state, reached, trouble)),
-            None => Err(trouble.unwrap_or_else(nothing)),
-        }
-    }
-}
-
-/// All objects as a record.
-fn snapshot(path: &Path, state: &State, forgotten: u64) -> Result<Parts, DocumentError> {
-    let mut bulk = Vec::new();
-    let mut objects = Vec::new();
-    for (name, object) in state.objects() {
-        let bytes = encode(&object.field, &object.meta).map_err(|f| fault(path, f))?;
-        objects.push(ObjectHead::new(name, object, bytes.len() as u64));
-        bulk.extend(bytes);
-    }
-    let sha256 = hex(state.sha256());
-    Ok(Parts {
-        text: json(&SnapshotHead {
-            forgotten,
-            objects,
-            sha256,
-        }),
-        bulk,
-    })
-}
-
-/// The objects of a snapshot.
-fn restored(journal: &mut Journal, record: &Record, limits: &ReadLimits) -> Result<State, DocumentError> {
-    let parts = journal.read(record)?;
-    let path = journal.path();
-    let head: SnapshotHead = from_json(path, &parts.text)?;
-    let (mut state, mut rest) = (State::new(), &parts.bulk[..]);
-    for ObjectHead {
-        name,
-        properties,
-        bytes,
-    } in head.objects
-    {
-        let count = usize::try_from(bytes).ok().filter(|&n| n <= rest.len());
-        let (own, others) =
-            rest.split_at(count.ok_or_else(|| damaged(path, "a snapshot is shorter than it says"))?);
-        rest = others;
-        let loaded = decode(own, limits).map_err(|f| fault(path, f))?;
-        let mut object = Object::new(&loaded.field, loaded.meta).map_err(|e| damaged(path, e.to_string()))?;
-        object.properties = properties;
-        state.set(&name, Some(object));
-    }
-    checked(path, state, &head.sha256)
-}
-
-/// The state that an edit leads to from another, forth or back.
-fn followed(
-    journal: &mut Journal,
-    edit: &Record,
-    from: &State,
-    forth: bool,
-    limits: &ReadLimits,
-) -> Result<State, DocumentError> {
-    let parts = journal.read(edit)?;
-    let path = journal.path();
-    let head: EditHead = from_json(path, &parts.text)?;
-    let mut rest = &parts.bulk[..];
-    let changes = head
-        .changes
-        .iter()
-        .map(|change| Change::read(change, &mut rest, from, limits, path));
-    let mut changes: Vec<Change> = changes.collect::<Result<_, _>>()?;
-    if !forth {
-        changes = changes.iter().rev().map(Change::reversed).collect();
-    }
-    let mut state = from.clone();
-    for change in &changes {
-        change.apply(&mut state).map_err(|why| damaged(path, why))?;
-    }
-    match forth {
-        true => checked(path, state, &head.info.sha256),
-        false => Ok(state),
-    }
-}
-
-/// A state that is what it says it is.
-fn checked(path: &Path, state: State, sha256: &str) -> Result<State, DocumentError> {
-    state.check_all().map_err(|e| damaged(path, e.to_string()))?;
-    match hex(state.sha256()) == sha256 {
-        true => Ok(state),
-        false => Err(damaged(
-            path,
-            "a state does not have the hash that was stored with it",
-        )),
-    }
-}
-
-fn json(head: &impl Serialize) -> Vec<u8> {
-    serde_json::to_vec(head).expect("heads are plain values with text for keys")
-}
-
-fn from_json<T: DeserializeOwned>(path: &Path, text: &[u8]) -> Result<T, DocumentError> {
-    serde_json::from_slice(text).map_err(|e| damaged(path, format!("a record cannot be understood ({e})")))
-}
-
-fn read_text<T: DeserializeOwned>(journal: &mut Journal, record: &Record) -> Result<T, DocumentError> {
-    let text = journal.text(record)?;
-    from_json(journal.path(), &text)
-}
 
 /// A name for the copy of a damaged document that no file has.
 fn free_name(path: &Path) -> PathBuf {

@@ -13,7 +13,9 @@ mod document;
 mod entry;
 mod error;
 mod journal;
+mod layout;
 mod object;
+mod records;
 mod state;
 
 pub use change::Change;
