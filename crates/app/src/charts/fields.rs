@@ -11,7 +11,7 @@ use fitting::field::{Aim, FieldFitOptions, FieldFitReport, fit_field};
 use glam::{DAffine3, DVec3};
 use serde_json::{Value, json};
 
-use super::edits::{Ball, median};
+use super::ball::{Ball, median};
 use super::{Chart, Series};
 
 /// Finest levels of the balls on whose surface tools work.

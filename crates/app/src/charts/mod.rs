@@ -1,5 +1,6 @@
 //! Speed against accuracy: sweeps over the options, and their charts.
 
+mod ball;
 mod dynamics;
 mod edits;
 mod fields;
