@@ -4,10 +4,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use bspline::hierarchical::BrickDiff;
-use formats::ReadLimits;
-use formats::field::{decode, decode_difference, encode, encode_difference};
+use formats::field::{decode_difference, encode, encode_difference};
 use serde::{Deserialize, Serialize};
 
+use crate::bulk::Bulk;
 use crate::error::{damaged, fault};
 use crate::{DocumentError, Object, Properties, State};
 
@@ -186,27 +186,7 @@ impl Change {
     }
 
     /// Reads one of the changes that lead from or to `beside`, a state that has the lattices of its objects.
-    pub(crate) fn read(
-        head: &ChangeHead,
-        rest: &mut &[u8],
-        beside: &State,
-        limits: &ReadLimits,
-        path: &Path,
-    ) -> Result<Self, DocumentError> {
-        let mut take = |count: u64| {
-            let count = usize::try_from(count).ok().filter(|&n| n <= rest.len());
-            let (own, others) =
-                rest.split_at(count.ok_or_else(|| damaged(path, "a change is shorter than it says"))?);
-            *rest = others;
-            Ok::<_, DocumentError>(own)
-        };
-        let object_of = |bytes: &[u8], properties: &Properties| {
-            let loaded = decode(bytes, limits).map_err(|f| fault(path, f))?;
-            let mut object =
-                Object::new(&loaded.field, loaded.meta).map_err(|e| damaged(path, e.to_string()))?;
-            object.properties = properties.clone();
-            Ok::<_, DocumentError>(object)
-        };
+    pub(crate) fn read(head: &ChangeHead, bulk: &mut Bulk, beside: &State) -> Result<Self, DocumentError> {
         Ok(match head {
             ChangeHead::Added {
                 object,
@@ -214,7 +194,7 @@ impl Change {
                 bytes,
             } => Self::Added {
                 object: object.clone(),
-                new: object_of(take(*bytes)?, properties)?,
+                new: bulk.object(*bytes, properties)?,
             },
             ChangeHead::Removed {
                 object,
@@ -222,15 +202,14 @@ impl Change {
                 bytes,
             } => Self::Removed {
                 object: object.clone(),
-                old: object_of(take(*bytes)?, properties)?,
+                old: bulk.object(*bytes, properties)?,
             },
             ChangeHead::Field { object, bytes } => {
-                let lattice = *beside
+                let known = beside
                     .object(object)
-                    .map_err(|e| damaged(path, e.to_string()))?
-                    .field
-                    .lattice();
-                let diff = decode_difference(take(*bytes)?, &lattice, limits).map_err(|f| fault(path, f))?;
+                    .map_err(|e| damaged(bulk.path, e.to_string()))?;
+                let diff = decode_difference(bulk.take(*bytes)?, known.field.lattice(), bulk.limits)
+                    .map_err(|f| fault(bulk.path, f))?;
                 Self::Field {
                     object: object.clone(),
                     diff,

@@ -8,6 +8,7 @@
 //! A [`State`] is a value: cheap to copy, and copies share all that is equal. An edit makes a new one;
 //! [`Document::commit`] finds out what differs.
 
+mod bulk;
 mod change;
 mod document;
 mod entry;

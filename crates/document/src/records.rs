@@ -3,14 +3,15 @@
 use std::path::Path;
 
 use formats::ReadLimits;
-use formats::field::{decode, encode};
+use formats::field::encode;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
+use crate::bulk::Bulk;
 use crate::entry::{EditHead, ObjectHead, SnapshotHead, hex};
 use crate::error::{damaged, fault};
 use crate::journal::{Journal, Parts, Record};
-use crate::{Change, DocumentError, Object, State};
+use crate::{Change, DocumentError, State};
 
 /// All objects as a record.
 pub(crate) fn snapshot(path: &Path, state: &State, forgotten: u64) -> Result<Parts, DocumentError> {
@@ -41,21 +42,14 @@ pub(crate) fn restored(
     let parts = journal.read(record)?;
     let path = journal.path();
     let head: SnapshotHead = from_json(path, &parts.text)?;
-    let (mut state, mut rest) = (State::new(), &parts.bulk[..]);
-    for ObjectHead {
-        name,
-        properties,
-        bytes,
-    } in head.objects
-    {
-        let count = usize::try_from(bytes).ok().filter(|&n| n <= rest.len());
-        let (own, others) =
-            rest.split_at(count.ok_or_else(|| damaged(path, "a snapshot is shorter than it says"))?);
-        rest = others;
-        let loaded = decode(own, limits).map_err(|f| fault(path, f))?;
-        let mut object = Object::new(&loaded.field, loaded.meta).map_err(|e| damaged(path, e.to_string()))?;
-        object.properties = properties;
-        state.set(&name, Some(object));
+    let mut bulk = Bulk {
+        rest: &parts.bulk,
+        path,
+        limits,
+    };
+    let mut state = State::new();
+    for object in head.objects {
+        state.set(&object.name, Some(bulk.object(object.bytes, &object.properties)?));
     }
     checked(path, state, &head.sha256)
 }
@@ -71,11 +65,15 @@ pub(crate) fn followed(
     let parts = journal.read(edit)?;
     let path = journal.path();
     let head: EditHead = from_json(path, &parts.text)?;
-    let mut rest = &parts.bulk[..];
+    let mut bulk = Bulk {
+        rest: &parts.bulk,
+        path,
+        limits,
+    };
     let changes = head
         .changes
         .iter()
-        .map(|change| Change::read(change, &mut rest, from, limits, path));
+        .map(|change| Change::read(change, &mut bulk, from));
     let mut changes: Vec<Change> = changes.collect::<Result<_, _>>()?;
     if !forth {
         changes = changes.iter().rev().map(Change::reversed).collect();

@@ -1,0 +1,38 @@
+use std::path::Path;
+
+use formats::ReadLimits;
+use formats::field::decode;
+
+use crate::error::{damaged, fault};
+use crate::{DocumentError, Object, Properties};
+
+/// The second part of a record, read from its start in pieces that the first part tells the lengths of.
+pub(crate) struct Bulk<'a> {
+    pub rest: &'a [u8],
+    /// For messages.
+    pub path: &'a Path,
+    pub limits: &'a ReadLimits,
+}
+
+impl<'a> Bulk<'a> {
+    /// The next so many bytes.
+    pub fn take(&mut self, count: u64) -> Result<&'a [u8], DocumentError> {
+        let own = usize::try_from(count)
+            .ok()
+            .and_then(|n| self.rest.split_at_checked(n));
+        let (own, rest) = own.ok_or_else(|| damaged(self.path, "a record is shorter than it says"))?;
+        self.rest = rest;
+        Ok(own)
+    }
+
+    /// The object whose field takes so many bytes.
+    pub fn object(&mut self, count: u64, properties: &Properties) -> Result<Object, DocumentError> {
+        let loaded = decode(self.take(count)?, self.limits).map_err(|f| fault(self.path, f))?;
+        let object =
+            Object::new(&loaded.field, loaded.meta).map_err(|e| damaged(self.path, e.to_string()))?;
+        Ok(Object {
+            properties: properties.clone(),
+            ..object
+        })
+    }
+}
