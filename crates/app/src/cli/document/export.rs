@@ -30,7 +30,7 @@ pub struct Args {
     #[arg(long, value_name = "SCAN")]
     like: Option<PathBuf>,
     /// Density of what was carved [default: air, -1000 HU; where the unit is not known, what 1 % of the voxels are below]
-    #[arg(long, value_name = "DENSITY", value_parser = finite, allow_hyphen_values = true, requires = "like")]
+    #[arg(long, value_name = "DENSITY", value_parser = finite, allow_negative_numbers = true, requires = "like")]
     fill: Option<f64>,
     /// DICOM: the series to write, by its number or its identifier, where there are several
     #[arg(long, value_name = "NUMBER|UID", requires = "like")]
@@ -68,7 +68,7 @@ pub fn run(args: &Args) -> Outcome {
 /// Writes the scan that an object was fitted to, with the object's edits.
 fn scan_with_edits(args: &Args, scan: &Path, cost: &Cost) -> Outcome {
     let mut notes = Vec::new();
-    let source = Source::open(scan, None, SAMPLES, &interrupt::cancel())?;
+    let source = Source::open(scan, None, SAMPLES, &interrupt::cancel())?.under("--like");
     let mut document = open(&args.document, &mut notes)?;
     let name = chosen(document.state(), args.object.as_deref())?.to_string();
     let choice = VolumeChoice::whole(args.series.clone(), args.volume);

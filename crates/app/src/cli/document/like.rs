@@ -52,7 +52,7 @@ impl Like<'_> {
         match input {
             Input::Volume(volume) => self.volume(&fitted, &now, &volume, &identity, output),
             Input::Cloud(_) | Input::Mesh(_) => Err(Failure::usage(format!(
-                "--like {}: only volumes are written back; mesh the object, or export its field",
+                "{}: only volumes are written back; mesh the object, or export its field",
                 self.source.name()
             ))),
         }
