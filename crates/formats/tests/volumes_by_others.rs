@@ -250,7 +250,7 @@ fn revised_volumes_keep_every_byte_but_those_of_the_voxels_changed() {
         assert_eq!(old.len(), new.len(), "{name}");
         let differ: Vec<usize> = (0..old.len()).filter(|i| old[*i] != new[*i]).collect();
         let first = old.len() - before.values.len() * size;
-        let is_touched = |byte: usize| byte >= first && (byte - first) / size % 5 == 0;
+        let is_touched = |byte: usize| byte >= first && ((byte - first) / size).is_multiple_of(5);
         assert!(differ.iter().all(|byte| is_touched(*byte)), "{name}");
         seen += 1;
     }

@@ -73,7 +73,7 @@ pub const ROWS: &[Row] = &[
     ("new", "--box", "new.isoclay --spacing 1 --box *0", "above zero"),
     ("new", "--spacing", "new.isoclay --box 1 --spacing *-1", "above zero"),
     ("new", "--iso", "new.isoclay field.iclay --iso *nan", "finite"),
-    ("new", "--iso", "new.isoclay field.iclay --iso *1e9", "another --iso"),
+    ("new", "--iso", "new.isoclay field.iclay --iso *99", "another --iso"),
     ("new", "--unit", "new.isoclay --box 9 --spacing 1 --unit *inch", "mm, cm or m"),
     ("sculpt history undo redo replay export", "document", "*nowhere.isoclay @script @out", "check the path"),
     ("sculpt history undo redo replay export", "document", "*field.iclay @script @out", "document of this program"),
