@@ -3,6 +3,7 @@
 
 pub mod geometric;
 pub mod number;
+pub mod paint;
 pub mod scene;
 pub mod session;
 pub mod tool;

@@ -9,7 +9,7 @@ use glam::DVec3;
 use super::error::{SimulateError, wrong};
 use super::place::Samples;
 use super::script::{Amount, Material, Paint, Scene, Substance};
-use crate::number::Point;
+use crate::paint::distance;
 
 /// Matter and scale of rest lengths.
 #[derive(Clone, Debug, PartialEq)]
@@ -119,21 +119,4 @@ pub fn plasticity<T: Real>(scene: &Scene, samples: &Samples) -> Result<Plasticit
         rate,
         weights: samples.positions.iter().map(weight).collect(),
     })
-}
-
-/// From a place to a point or a polyline.
-fn distance(p: DVec3, along: &[Point]) -> f64 {
-    let points = along.iter().map(|p| p.0);
-    let to_segment = |(a, b): (DVec3, DVec3)| {
-        let ab = b - a;
-        let t = if ab == DVec3::ZERO {
-            0.0
-        } else {
-            ((p - a).dot(ab) / ab.length_squared()).clamp(0.0, 1.0)
-        };
-        p.distance(a + t * ab)
-    };
-    let ends = points.clone().map(|a| p.distance(a));
-    let segments = points.clone().zip(points.skip(1)).map(to_segment);
-    ends.chain(segments).fold(f64::INFINITY, f64::min)
 }
