@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::geometric::Geometric;
+use crate::paint::Paint;
 use crate::tool::Tool;
 
 /// What a session file says.
@@ -26,6 +27,9 @@ pub struct Stroke {
     /// Adds a solid.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub add: Option<Geometric>,
+    /// Paints matter or touch.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub paint: Option<Paint>,
 }
 
 impl Stroke {
@@ -37,6 +41,7 @@ impl Stroke {
         let all = [
             self.carve.as_ref().map(Tool::Carve),
             self.add.as_ref().map(Tool::Add),
+            self.paint.as_ref().map(Tool::Paint),
         ];
         let given: Vec<_> = all.into_iter().flatten().collect();
         match given[..] {

@@ -5,6 +5,7 @@ use fitting::field::FieldFitReport;
 use fitting::{Control, FitError};
 
 use crate::geometric::{Geometric, GeometricError, Operation};
+use crate::paint::{Layers, Paint, PaintError};
 
 /// What a tool works on. Cheap to copy.
 #[derive(Clone, Debug)]
@@ -13,6 +14,8 @@ pub struct Canvas {
     pub field: HierarchicalSpline<f32>,
     /// Density of its surface.
     pub iso: f64,
+    /// What is painted on it.
+    pub layers: Layers,
 }
 
 /// A tool with all that it is told.
@@ -22,6 +25,8 @@ pub enum Tool<'a> {
     Carve(&'a Geometric),
     /// Adds a solid.
     Add(&'a Geometric),
+    /// Paints matter or touch.
+    Paint(&'a Paint),
 }
 
 /// Why a tool cannot be used.
@@ -30,6 +35,9 @@ pub enum ToolError {
     /// A geometric tool cannot.
     #[error(transparent)]
     Geometric(#[from] GeometricError),
+    /// Paint cannot be laid on.
+    #[error(transparent)]
+    Paint(#[from] PaintError),
 }
 
 impl ToolError {
@@ -41,13 +49,14 @@ impl ToolError {
 
 impl Tool<'_> {
     /// Names of all tools, as sessions write them.
-    pub const NAMES: [&'static str; 2] = ["carve", "add"];
+    pub const NAMES: [&'static str; 3] = ["carve", "add", "paint"];
 
     /// Its name, as sessions write it.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Carve(_) => "carve",
             Self::Add(_) => "add",
+            Self::Paint(_) => "paint",
         }
     }
 
@@ -57,6 +66,13 @@ impl Tool<'_> {
     /// Any [`ToolError`].
     pub fn apply(&self, canvas: Canvas, control: &mut Control) -> Result<(Canvas, Vec<String>), ToolError> {
         let (field, report) = match self {
+            Self::Paint(paint) => {
+                let everywhere = canvas.field.lattice().world_box();
+                let layer = paint.apply(&canvas.field, &canvas.layers, &everywhere)?;
+                let mut canvas = canvas;
+                canvas.layers.insert(paint.layer, layer);
+                return Ok((canvas, Vec::new()));
+            }
             Self::Carve(tool) => tool.apply(Operation::Carve, &canvas.field, canvas.iso, control)?,
             Self::Add(tool) => tool.apply(Operation::Add, &canvas.field, canvas.iso, control)?,
         };

@@ -15,6 +15,9 @@ const SPARE: usize = 64;
 #[derive(Clone, Debug)]
 pub struct Layer {
     tree: HierarchicalSpline<f32>,
+    /// Level of the tree that holds the numbers.
+    depth: usize,
+    /// Level of the object's lattice that has the same nodes.
     level: usize,
 }
 
@@ -29,14 +32,17 @@ pub enum LayerError {
     Foreign,
 }
 
+/// Levels that a layer's tree has above those of `lattice`, so that an empty one costs nothing.
+fn coarser(lattice: &Lattice, level: usize) -> usize {
+    let longest = lattice.cells.into_iter().max().unwrap_or(1);
+    let enough = (0..MAX_LEVELS).find(|n| longest.div_ceil(1 << n) <= COARSEST);
+    enough.unwrap_or(MAX_LEVELS).min(MAX_LEVELS - 1 - level)
+}
+
 impl Layer {
     /// Nothing painted over the box of `lattice`; nodes are as far apart as the knots of its `level`.
     pub fn empty(lattice: &Lattice, level: usize) -> Self {
-        let mut coarser = 0;
-        let longest = lattice.cells.into_iter().max().unwrap_or(1);
-        while longest.div_ceil(1 << coarser) > COARSEST && level + coarser + 1 < MAX_LEVELS {
-            coarser += 1;
-        }
+        let coarser = coarser(lattice, level);
         let step = DMat3::from_diagonal(DVec3::splat((1u64 << coarser) as f64));
         let coarse = Lattice {
             world_from_lattice: lattice.world_from_lattice * DAffine3::from_mat3(step),
@@ -45,7 +51,8 @@ impl Layer {
         let tree = HierarchicalSpline::from_corrections(coarse, 1.0, Vec::new());
         Self {
             tree,
-            level: level + coarser,
+            depth: level + coarser,
+            level,
         }
     }
 
@@ -63,14 +70,14 @@ impl Layer {
         let elsewhere = counts
             .iter()
             .enumerate()
-            .any(|(level, n)| level != self.level && *n > 0);
+            .any(|(level, n)| level != self.depth && *n > 0);
         if tree.lattice() != self.tree.lattice() || elsewhere {
             return Err(LayerError::Foreign);
         }
         Ok(Self { tree, ..*self })
     }
 
-    /// Level of the tree that holds the numbers.
+    /// Level of the object's lattice whose knots are as far apart as the nodes.
     pub fn level(&self) -> usize {
         self.level
     }
@@ -178,7 +185,7 @@ impl Layer {
                         shape[2] += 1;
                     }
                     (_, Some(new)) => edits.push(BlockEdit {
-                        level: self.level,
+                        level: self.depth,
                         // The function whose peak is at the node.
                         first: [x + 1, y + 1, z + 1],
                         shape: [1; 3],
@@ -197,19 +204,19 @@ impl Layer {
     fn block(&self, first: [u32; 3], count: [usize; 3]) -> Vec<f32> {
         let numbers = self
             .tree
-            .level_coefficients(self.level, first.map(|n| n + 1), count);
+            .level_coefficients(self.depth, first.map(|n| n + 1), count);
         numbers.expect("nodes lie in the lattice")
     }
 
     fn world_from_node(&self) -> DAffine3 {
-        let step = DMat3::from_diagonal(DVec3::splat(0.5f64.powi(self.level as i32)));
+        let step = DMat3::from_diagonal(DVec3::splat(0.5f64.powi(self.depth as i32)));
         self.tree.lattice().world_from_lattice * DAffine3::from_mat3(step)
     }
 
     /// First and last node of a world box.
     fn nodes(&self, b: &Aabb) -> [[u32; 3]; 2] {
         let b = b.transformed(&self.world_from_node().inverse());
-        let last = DVec3::from_array(self.tree.lattice().cells_at(self.level).map(f64::from));
+        let last = DVec3::from_array(self.tree.lattice().cells_at(self.depth).map(f64::from));
         // What lies on a node but for rounding is meant to be on it.
         let slack = 1e-9 * last.max_element();
         let node = |p: DVec3| p.clamp(DVec3::ZERO, last).to_array().map(|v| v as u32);
@@ -219,7 +226,7 @@ impl Layer {
     /// The cell of a place, and where in it the place lies.
     fn cell(&self, p: DVec3) -> ([u32; 3], [f64; 3]) {
         let p = self.world_from_node().inverse().transform_point3(p).to_array();
-        let cells = self.tree.lattice().cells_at(self.level);
+        let cells = self.tree.lattice().cells_at(self.depth);
         let at: [f64; 3] = std::array::from_fn(|a| p[a].clamp(0.0, f64::from(cells[a])));
         let cell: [u32; 3] = std::array::from_fn(|a| (at[a] as u32).min(cells[a] - 1));
         (cell, std::array::from_fn(|a| at[a] - f64::from(cell[a])))

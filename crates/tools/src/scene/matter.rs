@@ -9,7 +9,7 @@ use glam::DVec3;
 use super::error::{SimulateError, wrong};
 use super::place::Samples;
 use super::script::{Amount, Material, Paint, Scene, Substance};
-use crate::paint::distance;
+use crate::paint::{self, Layers, distance};
 
 /// Matter and scale of rest lengths.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,6 +56,28 @@ impl Clay {
             },
             rest_scale: on("rest-scale", &material.rest_scale, 1.0, true)?,
         })
+    }
+
+    /// Multiplies the material by what is painted on the object.
+    pub fn scale_by(&mut self, layers: &Layers, samples: &Samples) {
+        for (substance, quantity) in [
+            (paint::Substance::Stiffness, &mut self.matter.stiffness),
+            (paint::Substance::Mass, &mut self.matter.mass),
+            (paint::Substance::Damping, &mut self.matter.damping),
+            (paint::Substance::RestLength, &mut self.rest_scale),
+        ] {
+            let Some(factors) = paint::values(layers, substance, &samples.positions) else {
+                continue;
+            };
+            // Where a region meets no paint its matter stays uniform, and its solver fast.
+            if factors.iter().any(|f| *f != 1.0) {
+                let values = quantity.paint(samples.positions.len());
+                values
+                    .iter_mut()
+                    .zip(factors)
+                    .for_each(|(value, factor)| *value *= factor);
+            }
+        }
     }
 
     /// Lays paint on. Between the edge and where it is full the value changes linearly.
