@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::geometric::{Geometric, Operation};
+use crate::geometric::Geometric;
+use crate::tool::Tool;
 
 /// What a session file says.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -32,12 +33,39 @@ impl Stroke {
     ///
     /// # Errors
     /// A sentence, if there is none or more than one.
-    pub fn tool(&self) -> Result<(Operation, &Geometric), String> {
-        match (&self.carve, &self.add) {
-            (Some(tool), None) => Ok((Operation::Carve, tool)),
-            (None, Some(tool)) => Ok((Operation::Add, tool)),
-            (None, None) => Err("no tool is given; write carve or add".into()),
-            (Some(_), Some(_)) => Err("carve and add are given; write a stroke for each".into()),
+    pub fn tool(&self) -> Result<Tool<'_>, String> {
+        let all = [
+            self.carve.as_ref().map(Tool::Carve),
+            self.add.as_ref().map(Tool::Add),
+        ];
+        let given: Vec<_> = all.into_iter().flatten().collect();
+        match given[..] {
+            [one] => Ok(one),
+            [] => Err(format!(
+                "no tool is given; write one of {}",
+                Tool::NAMES.join(", ")
+            )),
+            [one, other, ..] => Err(format!(
+                "{} and {} are given; write a stroke for each",
+                one.name(),
+                other.name()
+            )),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stroke_has_one_tool() {
+        let ball = "along = [[0, 0, 0]]\nshape.sphere.radius = 1\n";
+        let told = |text: &str| toml::from_str::<Stroke>(text).unwrap().tool().map(|t| t.name());
+        assert_eq!(told(&format!("[carve]\n{ball}")).unwrap(), "carve");
+        let none = told("object = \"a\"").unwrap_err();
+        assert!(Tool::NAMES.iter().all(|name| none.contains(name)), "{none}");
+        let two = told(&format!("[carve]\n{ball}[add]\n{ball}")).unwrap_err();
+        assert!(two.contains("carve and add"), "{two}");
     }
 }

@@ -59,13 +59,13 @@ fn a_document_is_edited_undone_done_again_and_replayed() {
         assert_eq!(fields(&replayed), fields(&both));
     }
     let history = bench.run("history clay.isoclay");
-    assert!(history.stdout.contains("out.toml on ball") && history.stdout.contains("in.toml on ball"));
+    assert!(history.stdout.contains("on ball (out.toml)") && history.stdout.contains("on ball (in.toml)"));
     bench.json("undo clay.isoclay");
     assert!(
         bench
             .run("history clay.isoclay")
             .stdout
-            .contains("in.toml on ball  (undone)")
+            .contains("scene on ball (in.toml)  (undone)")
     );
     let exported = bench.json("export clay.isoclay -o now.iclay");
     assert_eq!(exported["field_sha256"].as_str().unwrap(), fields(&out));
@@ -178,7 +178,7 @@ add = { shape = { torus = { axis = [0, 1, 0], major = 0.6, minor = 0.1 } }, alon
     let run = bench.run("sculpt clay.isoclay --script half.toml");
     assert_eq!(run.code, 3);
     assert!(
-        run.stderr.contains("stroke 2") && run.stderr.contains("carve or add"),
+        run.stderr.contains("stroke 2") && run.stderr.contains("one of carve, add"),
         "{}",
         run.stderr
     );

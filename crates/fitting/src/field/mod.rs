@@ -121,7 +121,7 @@ pub fn fit_field_where<T: Real>(
     let mut open = Vec::new();
     for level in first..=options.finest {
         let done = (level - first) as f64 / (options.finest + 2 - first) as f64;
-        control.step("field", done)?;
+        control.step("writing back", done)?;
         let fit = LevelFit {
             target,
             field: &field,

@@ -1,7 +1,7 @@
 use std::path::PathBuf;
 
 use document::{Document, Object, State};
-use fitting::{Cancel, Control, FitReport};
+use fitting::{Cancel, FitReport};
 use formats::Unit;
 use formats::field::{AnyField, FieldMeta, SourceKind};
 use glam::DVec3;
@@ -78,12 +78,7 @@ pub fn run(args: &Args) -> Outcome {
     if let (Some(OneOrThree(size)), Some(spacing)) = (args.block, args.spacing) {
         let cancel = interrupt::cancel();
         let bar = Bar::new();
-        let shown = bar.clone();
-        let mut control = Control {
-            cancel,
-            on_progress: Box::new(move |p| shown.show("shaping", p.fraction)),
-            ..Control::default()
-        };
+        let mut control = bar.control(&cancel);
         let size = DVec3::from_array(size.map(|s| s.0));
         let field = block(size, spacing, &mut control).map_err(|e| Failure::usage(format!("--box: {e}")))?;
         bar.clear();

@@ -1,0 +1,152 @@
+//! What was asked for: enough to do it, and to do it again.
+
+use bspline::HierarchicalSpline;
+use fitting::{Control, FitError};
+use serde::{Deserialize, Serialize};
+use tools::scene::{Scene, SimulateError, Simulation};
+use tools::session::{Session, Stroke};
+use tools::tool::{Canvas, ToolError};
+
+use crate::{DocumentError, State};
+
+/// What makes an edit. The journal keeps it beside the difference that it made.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "tool", rename_all = "lowercase", deny_unknown_fields)]
+pub enum Command {
+    /// A scene, as it was written.
+    Scene {
+        /// What it moves.
+        object: String,
+        /// Its text, TOML.
+        script: String,
+    },
+    /// One stroke of a session.
+    Stroke {
+        /// What it works on.
+        object: String,
+        /// The stroke.
+        stroke: Box<Stroke>,
+    },
+}
+
+/// Why a command cannot be done. The state is as it was.
+#[derive(Debug, thiserror::Error)]
+pub enum CommandError {
+    /// A script says what nobody understands.
+    #[error("{0}")]
+    Script(String),
+    /// There is no such object, or what comes out cannot be one.
+    #[error(transparent)]
+    Document(#[from] DocumentError),
+    /// The object has no surface for a tool to work on.
+    #[error("object {0:?} names no surface; fit it with an iso-value")]
+    NoSurface(String),
+    /// A tool cannot be used.
+    #[error(transparent)]
+    Tool(#[from] ToolError),
+    /// A scene cannot be played.
+    #[error(transparent)]
+    Scene(#[from] SimulateError),
+    /// The user said stop.
+    #[error(transparent)]
+    Cancelled(FitError),
+}
+
+impl Command {
+    /// What a script asks for, in its order: a scene is one command, of a session every stroke is one. `object` names the
+    /// object where a script names none.
+    ///
+    /// # Errors
+    /// [`CommandError::Script`] with the line, and what `object` says.
+    pub fn of_script<E: From<CommandError>>(
+        text: &str,
+        object: impl Fn(Option<&str>) -> Result<String, E>,
+    ) -> Result<Vec<Self>, E> {
+        let table: toml::Table = parsed(text)?;
+        if !table.contains_key("stroke") {
+            let _: Scene = parsed(text)?;
+            let script = text.to_string();
+            return Ok(vec![Self::Scene {
+                object: object(None)?,
+                script,
+            }]);
+        }
+        let session: Session = parsed(text)?;
+        let strokes = session.stroke.into_iter().enumerate();
+        let commands = strokes.map(|(n, stroke)| {
+            let wrong = |why| CommandError::Script(format!("stroke {}: {why}", n + 1));
+            stroke.tool().map_err(wrong)?;
+            Ok(Self::Stroke {
+                object: object(stroke.object.as_deref())?,
+                stroke: Box::new(stroke),
+            })
+        });
+        commands.collect()
+    }
+
+    /// What it does, in a few words.
+    pub fn title(&self) -> String {
+        match self {
+            Self::Scene { object, .. } => format!("scene on {object}"),
+            Self::Stroke { object, stroke } => {
+                let name = stroke.tool().map_or("stroke", |tool| tool.name());
+                format!("{name} on {object}")
+            }
+        }
+    }
+
+    /// Does it, and says in sentences what is left to say.
+    ///
+    /// # Errors
+    /// Any [`CommandError`].
+    pub fn apply(&self, state: &State, control: &mut Control) -> Result<(State, Vec<String>), CommandError> {
+        let (Self::Scene { object: name, .. } | Self::Stroke { object: name, .. }) = self;
+        let mut object = state.object(name)?.clone();
+        let mut notes = Vec::new();
+        match self {
+            Self::Scene { script, .. } => {
+                let scene: Scene = parsed(script)?;
+                let iso = scene.iso.map(|i| i.0).or(object.meta.iso);
+                object.field = played(&scene, object.field, iso, control)?;
+            }
+            Self::Stroke { stroke, .. } => {
+                let tool = stroke.tool().map_err(CommandError::Script)?;
+                let iso = object
+                    .meta
+                    .iso
+                    .ok_or_else(|| CommandError::NoSurface(name.clone()))?;
+                let field = object.field;
+                let (canvas, told) =
+                    tool.apply(Canvas { field, iso }, control)
+                        .map_err(|e| match e.is_cancelled() {
+                            true => CommandError::Cancelled(FitError::Cancelled),
+                            false => e.into(),
+                        })?;
+                object.field = canvas.field;
+                notes = told;
+            }
+        }
+        Ok((state.with(name, object)?, notes))
+    }
+}
+
+fn parsed<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, CommandError> {
+    toml::from_str(text).map_err(|e| CommandError::Script(e.to_string().trim_end().into()))
+}
+
+/// What a scene leaves of a field.
+fn played(
+    scene: &Scene,
+    field: HierarchicalSpline<f32>,
+    iso: Option<f64>,
+    control: &mut Control,
+) -> Result<HierarchicalSpline<f32>, CommandError> {
+    let mut simulation = Simulation::new(scene, field, iso)?;
+    while !simulation.is_over() {
+        control
+            .step("simulating", simulation.progress())
+            .map_err(CommandError::Cancelled)?;
+        simulation.step()?;
+    }
+    Ok(simulation.baked()?)
+}
