@@ -2,10 +2,11 @@
 
 use bspline::HierarchicalSpline;
 use fitting::{Control, FitError};
+use glam::DAffine3;
 use serde::{Deserialize, Serialize};
 use tools::scene::{Scene, SimulateError, Simulation};
 use tools::session::{Session, Stroke};
-use tools::tool::{Canvas, ToolError};
+use tools::tool::{Canvas, Others, ToolError};
 
 use crate::{DocumentError, State};
 
@@ -110,14 +111,15 @@ impl Command {
                 object.field = played(&scene, object.field, iso, control)?;
             }
             Self::Stroke { stroke, .. } => {
-                let tool = stroke.tool().map_err(CommandError::Script)?;
                 let iso = object
                     .meta
                     .iso
                     .ok_or_else(|| CommandError::NoSurface(name.clone()))?;
+                let others = others(state, name)?;
                 let field = object.field;
                 let (canvas, told) =
-                    tool.apply(Canvas { field, iso }, control)
+                    stroke
+                        .apply(Canvas { field, iso, others }, control)
                         .map_err(|e| match e.is_cancelled() {
                             true => CommandError::Cancelled(FitError::Cancelled),
                             false => e.into(),
@@ -128,6 +130,24 @@ impl Command {
         }
         Ok((state.with(name, object)?, notes))
     }
+}
+
+/// All objects that have a surface, as they lie to the one of a name.
+fn others(state: &State, name: &str) -> Result<Others, CommandError> {
+    let own = state.placement(name)?.inverse();
+    let mut others = Others::default();
+    for (other, object) in state.objects() {
+        if let Some(iso) = object.meta.iso {
+            // Of the object itself no rounding.
+            let map = match other == name {
+                true => DAffine3::IDENTITY,
+                false => own * state.placement(other)?,
+            };
+            let put = others.put(other, &object.field, iso, map);
+            put.map_err(|e| CommandError::Script(format!("object {other:?} cannot be used: {e}")))?;
+        }
+    }
+    Ok(others)
 }
 
 fn parsed<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, CommandError> {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use bspline::{Aabb, Field, Interval, Jet};
+use bspline::{Aabb, Field, Frame, Interval, Jet};
 use glam::{DMat3, DVec3};
 
 use crate::fade::{STEEPEST, fade};
@@ -60,37 +60,34 @@ impl Field for Faded {
 }
 
 /// `f + w·(g - f)`: `f` to the bit where `w` is 0, `g` where it is 1.
-#[derive(Clone)]
-pub struct Mixed<F, G, W> {
+#[derive(Clone, Copy)]
+pub struct Mixed<'a> {
     /// `f`.
-    pub from: F,
+    pub from: &'a dyn Field,
     /// `g`.
-    pub to: G,
+    pub to: &'a dyn Field,
     /// `w`, between 0 and 1.
-    pub weight: W,
+    pub weight: &'a dyn Field,
 }
 
-impl<F: AsRef<dyn Field> + Sync + Send, G: AsRef<dyn Field> + Sync + Send, W: Field> Field for Mixed<F, G, W> {
+impl Field for Mixed<'_> {
     fn value(&self, p: DVec3) -> f64 {
         match self.weight.value(p) {
-            0.0 => self.from.as_ref().value(p),
-            1.0 => self.to.as_ref().value(p),
-            w => {
-                let f = self.from.as_ref().value(p);
-                f + w * (self.to.as_ref().value(p) - f)
-            }
+            0.0 => self.from.value(p),
+            1.0 => self.to.value(p),
+            w => mixed(w, self.from.value(p), self.to.value(p)),
         }
     }
 
     fn value_gradient(&self, p: DVec3) -> (f64, DVec3) {
         let (w, dw) = self.weight.value_gradient(p);
-        let (f, df) = self.from.as_ref().value_gradient(p);
-        let (g, dg) = self.to.as_ref().value_gradient(p);
+        let (f, df) = self.from.value_gradient(p);
+        let (g, dg) = self.to.value_gradient(p);
         (mixed(w, f, g), df + w * (dg - df) + (g - f) * dw)
     }
 
     fn jet(&self, p: DVec3) -> Jet {
-        let (w, f, g) = (self.weight.jet(p), self.from.as_ref().jet(p), self.to.as_ref().jet(p));
+        let (w, f, g) = (self.weight.jet(p), self.from.jet(p), self.to.jet(p));
         let (by, slope) = (g.value - f.value, g.gradient - f.gradient);
         Jet {
             value: mixed(w.value, f.value, g.value),
@@ -105,14 +102,36 @@ impl<F: AsRef<dyn Field> + Sync + Send, G: AsRef<dyn Field> + Sync + Send, W: Fi
 
     fn bounds(&self, b: &Aabb) -> Interval {
         let w = self.weight.bounds(b);
-        let f = self.from.as_ref().bounds(b);
+        let f = self.from.bounds(b);
         if w.hi == 0.0 {
             return f;
         }
-        let g = self.to.as_ref().bounds(b);
+        let g = self.to.bounds(b);
         let hull = f.hull(g);
         hull.widened(4.0 * f64::EPSILON * hull.lo.abs().max(hull.hi.abs()))
             .intersection(f + w * (g - f))
+    }
+
+    fn frame_values(&self, frame: &Frame, lo: [i64; 3], count: [usize; 3], out: &mut [f64]) {
+        if count.contains(&0) {
+            return;
+        }
+        let last = std::array::from_fn(|a| lo[a] + count[a] as i64 - 1);
+        let w = self.weight.frame_bounds(frame, lo, last);
+        match (w.lo, w.hi) {
+            (_, 0.0) => self.from.frame_values(frame, lo, count, out),
+            (1.0, _) => self.to.frame_values(frame, lo, count, out),
+            _ => {
+                let mut others = [(); 2].map(|()| vec![0.0; out.len()]);
+                let [to, weight] = &mut others;
+                self.from.frame_values(frame, lo, count, out);
+                self.to.frame_values(frame, lo, count, to);
+                self.weight.frame_values(frame, lo, count, weight);
+                for ((f, g), w) in out.iter_mut().zip(to).zip(weight) {
+                    *f = mixed(*w, *f, *g);
+                }
+            }
+        }
     }
 }
 

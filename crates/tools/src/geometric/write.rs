@@ -4,7 +4,6 @@ use bspline::hierarchical::MAX_LEVELS;
 use bspline::{Aabb, Field, Frame, HierarchicalSpline, Real};
 use fitting::Control;
 use fitting::field::{Aim, FieldFitOptions, FieldFitReport, fit_field_where};
-use serde::{Deserialize, Serialize};
 
 use super::GeometricError;
 use crate::limits::Limits;
@@ -20,14 +19,12 @@ pub(super) const MARGIN: f64 = 4.0;
 const FACE: u32 = 256;
 
 /// How closely the result of a tool is followed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Fineness {
     /// Distance from the true surface that may stay off the creases, a world length; a fiftieth of the finest knot interval
     /// if missing.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<Positive>,
     /// Levels finer than the field has that may be added; 1 if missing.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub finer: Option<u8>,
 }
 
@@ -39,13 +36,13 @@ impl Fineness {
 }
 
 /// A field, and what bounds a change of it.
-pub(super) struct Canvas<'a, T> {
+pub(super) struct Writer<'a, T> {
     pub field: &'a HierarchicalSpline<T>,
     pub iso: f64,
     pub limits: &'a Limits,
 }
 
-impl<T: Real> Canvas<'_, T> {
+impl<T: Real> Writer<'_, T> {
     /// The box in which a tool that acts in `reach` changes the field.
     ///
     /// # Errors
@@ -101,6 +98,8 @@ impl<T: Real> Canvas<'_, T> {
         let lattice = self.field.lattice();
         let local = within.transformed(self.field.lattice_from_world());
         let extent = lattice.extent();
+        let step = 1.0 / (1u64 << (self.field.level_count() - 1)) as f64;
+        let rim = self.field.finest_spacing() * self.field.slope();
         for axis in 0..3 {
             for (face, is_reached) in [
                 (0.0, local.min[axis] <= 0.0),
@@ -111,7 +110,7 @@ impl<T: Real> Canvas<'_, T> {
                 }
                 let mut part = Aabb::new(local.min.max(glam::DVec3::ZERO), local.max.min(extent));
                 (part.min[axis], part.max[axis]) = (face, face);
-                let steps = (part.size() / self.field.level_spacing()).ceil();
+                let steps = (part.size() / step).ceil();
                 let cells = steps.to_array().map(|n| (n as u32).clamp(1, FACE));
                 let mut frame = Frame::over(&part, cells);
                 frame.world_from_grid = lattice.world_from_lattice * frame.world_from_grid;
@@ -120,7 +119,8 @@ impl<T: Real> Canvas<'_, T> {
                 let [now, then] = &mut values;
                 target.frame_values(&frame, [0; 3], count, now);
                 self.field.frame_values(&frame, [0; 3], count, then);
-                let leaves = |(now, then): (&f64, &f64)| *now > self.iso && *then <= self.iso;
+                // Where the solid has been cut off before, its rim may move.
+                let leaves = |(now, then): (&f64, &f64)| *now > self.iso + rim && *then < self.iso - rim;
                 if let Some(n) = now.iter().zip(then.iter()).position(leaves) {
                     let at = [n / count[2] / count[1], n / count[2] % count[1], n % count[2]];
                     return Err(GeometricError::Leaves {

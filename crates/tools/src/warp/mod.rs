@@ -10,6 +10,7 @@ mod zone;
 use bspline::Aabb;
 use glam::{DMat3, DVec3};
 
+use crate::fade::STEEPEST;
 use step::{Step, rotation};
 use zone::Zone;
 
@@ -33,6 +34,12 @@ pub struct Warp {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{0}")]
 pub struct WarpError(String);
+
+impl WarpError {
+    pub(crate) fn new(why: impl Into<String>) -> Self {
+        Self(why.into())
+    }
+}
 
 impl Warp {
     /// Takes what lies within `rigid` of the hand along as it moves from place to place, and what lies within `radius` in part.
@@ -92,7 +99,7 @@ impl Warp {
         }
         check_turn(angle, length)?;
         let farthest = (within.min - at).abs().max((within.max - at).abs()).length();
-        let steps = count_of(STEEPEST_TURN * angle.abs() * farthest / length)?;
+        let steps = count_of(STEEPEST * angle.abs() * farthest / length)?;
         let step = |i: usize| {
             // The plane between what rests and what turns follows by half.
             let share = (i as f64 + 0.5) / steps as f64;
@@ -128,20 +135,17 @@ impl Warp {
         Self::turned(at, normal, angle, length, zone)
     }
 
-    /// Twists a ball by `angle` about an axis through its middle: the whole angle within `rigid`, nothing beyond `radius`.
+    /// Twists a ball about an axis through its middle: by `angle` in the middle, not at all from `radius` on.
     ///
     /// # Errors
-    /// [`WarpError`] for an axis without direction, an angle of 0 or beyond a hundred turns, a radius that is not above `rigid`.
-    pub fn swirl(at: DVec3, axis: DVec3, angle: f64, rigid: f64, radius: f64) -> Result<Self, WarpError> {
-        if rigid.is_nan() || rigid < 0.0 {
-            return Err(WarpError(format!("rigid is {rigid}; write 0 or more")));
-        }
+    /// [`WarpError`] for an axis without direction, an angle of 0 or beyond a hundred turns, a radius that is not above 0.
+    pub fn swirl(at: DVec3, axis: DVec3, angle: f64, radius: f64) -> Result<Self, WarpError> {
         let zone = Zone::Ball {
             center: at,
-            inner: rigid,
+            inner: 0.0,
             outer: radius,
         };
-        Self::turned(at, unit("axis", axis)?, angle, radius - rigid, zone)
+        Self::turned(at, unit("axis", axis)?, angle, radius, zone)
     }
 
     /// Turns under which no point changes its share fold nothing, so one step is enough.
@@ -225,9 +229,6 @@ impl Warp {
     }
 }
 
-/// Of a half zone, with its width as the unit.
-const STEEPEST_TURN: f64 = crate::fade::STEEPEST;
-
 fn count_of(stretch: f64) -> Result<usize, WarpError> {
     let count = (stretch / STRETCH).ceil().max(1.0);
     match count <= MOST_STEPS {
@@ -242,7 +243,12 @@ fn too_long() -> WarpError {
 
 fn unit(name: &str, v: DVec3) -> Result<DVec3, WarpError> {
     let direction = v.try_normalize();
-    direction.ok_or_else(|| WarpError(format!("{name} {:?} gives no direction; write one that is not zero", v.to_array())))
+    direction.ok_or_else(|| {
+        WarpError(format!(
+            "{name} {:?} gives no direction; write one that is not zero",
+            v.to_array()
+        ))
+    })
 }
 
 fn check_turn(angle: f64, length: f64) -> Result<(), WarpError> {

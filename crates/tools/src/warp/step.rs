@@ -114,9 +114,8 @@ impl Step {
         }
         // y - kδ + sin α (e×u) + (1 - cos α) e×(e×u), u = y - c.
         let (sine, versine) = turn_ranges(Interval::point(-self.angle) * k);
-        let u: [Interval; 3] = std::array::from_fn(|a| {
-            Interval::new(b.min[a], b.max[a]) - Interval::point(self.pivot[a])
-        });
+        let u: [Interval; 3] =
+            std::array::from_fn(|a| Interval::new(b.min[a], b.max[a]) - Interval::point(self.pivot[a]));
         let once = cross(self.axis, u);
         let twice = cross(self.axis, once);
         let moved: [Interval; 3] = std::array::from_fn(|a| {
@@ -153,18 +152,17 @@ fn cross(a: DVec3, u: [Interval; 3]) -> [Interval; 3] {
     })
 }
 
-/// `sin` and `1 - cos` over angles.
+/// `sin` and `1 - cos` over angles: neither changes faster than the angle.
 fn turn_ranges(angle: Interval) -> (Interval, Interval) {
-    use std::f64::consts::{FRAC_PI_2, PI};
-    let sine = match angle.lo >= -FRAC_PI_2 && angle.hi <= FRAC_PI_2 {
-        true => Interval::new(libm::sin(angle.lo), libm::sin(angle.hi)),
-        false => Interval::new(-1.0, 1.0),
+    let middle = 0.5 * (angle.lo + angle.hi);
+    let reach = 0.5 * angle.width() + 1e-14 * (1.0 + middle.abs());
+    let about = |value: f64, lo: f64, hi: f64| {
+        Interval::point(value)
+            .widened(reach)
+            .intersection(Interval::new(lo, hi))
     };
-    let most = angle.lo.abs().max(angle.hi.abs());
-    let least = if angle.contains(0.0) { 0.0 } else { angle.lo.abs().min(angle.hi.abs()) };
-    let versine = match most <= PI {
-        true => Interval::new(1.0 - libm::cos(least), 1.0 - libm::cos(most)),
-        false => Interval::new(0.0, 2.0),
-    };
-    (sine.widened(1e-15), versine.widened(1e-15))
+    (
+        about(libm::sin(middle), -1.0, 1.0),
+        about(1.0 - libm::cos(middle), 0.0, 2.0),
+    )
 }

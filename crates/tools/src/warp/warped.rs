@@ -40,6 +40,7 @@ impl Field for Warped {
         back.fold(jet, |jet, (step, place)| step.pulled_back(*place, &jet))
     }
 
+    /// Step by step in boxes along the axes: wide for motions of many steps, and narrow only for narrow boxes.
     fn bounds(&self, b: &Aabb) -> Interval {
         self.field.bounds(&self.warp.back_box(b))
     }

@@ -9,17 +9,9 @@ pub(super) enum Zone {
     /// 1 within `inner` of a point, 0 beyond `outer`.
     Ball { center: DVec3, inner: f64, outer: f64 },
     /// 0 behind a plane through `start`, 1 from `width` before it on.
-    Half {
-        start: DVec3,
-        normal: DVec3,
-        width: f64,
-    },
+    Half { start: DVec3, normal: DVec3, width: f64 },
     /// 1 in a box, 0 from `width` beside it on.
-    Box {
-        center: DVec3,
-        half: DVec3,
-        width: f64,
-    },
+    Box { center: DVec3, half: DVec3, width: f64 },
 }
 
 impl Zone {
@@ -83,9 +75,8 @@ impl Zone {
                     [v, first / width * away[a].signum(), second / (width * width)]
                 });
                 let product = |order: [usize; 3]| (0..3).map(|a| axes[a][order[a]]).product::<f64>();
-                let order = |i: usize, j: usize| {
-                    std::array::from_fn(|a| usize::from(a == i) + usize::from(a == j))
-                };
+                let order =
+                    |i: usize, j: usize| std::array::from_fn(|a| usize::from(a == i) + usize::from(a == j));
                 let gradient = DVec3::from_array([0, 1, 2].map(|i| product(order(i, 3))));
                 let column = |i| DVec3::from_array([0, 1, 2].map(|j| product(order(i, j))));
                 (

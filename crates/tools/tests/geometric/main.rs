@@ -1,5 +1,8 @@
 //! Geometric tools: volumes, what stays, and what is refused.
 
+mod limits;
+mod moves;
+
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -9,7 +12,8 @@ use bspline::{Aabb, Field, Frame};
 use fitting::Control;
 use glam::{DAffine3, DVec3};
 use tools::geometric::{Geometric, GeometricError, Operation, block as block_of};
-use tools::session::Session;
+use tools::limits::Limits;
+use tools::session::{Session, Stroke};
 
 /// Cells of the block's box, half a world length each.
 const CELLS: u32 = 48;
@@ -26,14 +30,28 @@ fn block() -> HierarchicalSpline<f32> {
 const SLOPE: f64 = 40.0;
 const ISO: f64 = 300.0;
 
+/// A stroke as a session writes it.
+fn stroke(text: &str) -> Stroke {
+    toml::from_str(text).unwrap_or_else(|e| panic!("{text}: {e}"))
+}
+
+/// Numbers at random between two bounds, the same for the same seed.
+fn random(seed: u64) -> impl FnMut(f64, f64) -> f64 {
+    let mut state = seed.wrapping_mul(2).wrapping_add(1);
+    move |low, high| {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        low + (high - low) * (state >> 40) as f64 / (1u64 << 24) as f64
+    }
+}
+
 fn tool(text: &str) -> Geometric {
-    let script = format!("[[stroke]]\ncarve = {{ {text} }}");
-    let session: Session = toml::from_str(&script).unwrap_or_else(|e| panic!("{e}"));
-    session.stroke[0].carve.clone().unwrap()
+    stroke(&format!("carve = {{ {text} }}")).carve.unwrap()
 }
 
 fn apply(field: &HierarchicalSpline<f32>, operation: Operation, text: &str) -> HierarchicalSpline<f32> {
-    let done = tool(text).apply(operation, field, ISO, &mut Control::default());
+    let done = tool(text).apply(operation, field, ISO, &Limits::default(), &mut Control::default());
     let (field, report) = done.unwrap();
     assert_eq!(report.left.unwrap().wrong_signs, 0, "{text}");
     field
@@ -166,13 +184,7 @@ fn a_swept_sphere_takes_a_capsule_at_any_spacing_of_poses() {
 #[test]
 fn no_coefficient_changes_beyond_the_tool() {
     let block = block();
-    let mut draw = 1u64;
-    let mut random = |low: f64, high: f64| {
-        draw = draw
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        low + (high - low) * (draw >> 40) as f64 / (1u64 << 24) as f64
-    };
+    let mut random = random(0);
     for _ in 0..20 {
         let (radius, blend) = (random(0.6, 3.0), random(0.0, 1.0));
         let places = [0, 1].map(|_| [random(4.0, 20.0), random(4.0, 20.0), random(9.0, 15.0)]);
@@ -253,7 +265,13 @@ fn tools_that_make_no_sense_are_refused() {
     let block = block();
     let refused = |text: &str| {
         tool(text)
-            .apply(Operation::Carve, &block, ISO, &mut Control::default())
+            .apply(
+                Operation::Carve,
+                &block,
+                ISO,
+                &Limits::default(),
+                &mut Control::default(),
+            )
             .unwrap_err()
     };
     let error = refused("shape = { sphere = { radius = 1.0 } }, along = []");
