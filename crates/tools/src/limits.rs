@@ -80,11 +80,7 @@ impl Limits {
     ///
     /// # Errors
     /// A sentence.
-    pub fn new(
-        region: Option<&Region>,
-        mask: Option<&Mask>,
-        others: &Others,
-    ) -> Result<Self, String> {
+    pub fn new(region: Option<&Region>, mask: Option<&Mask>, others: &Others) -> Result<Self, String> {
         let region = region.map(Region::solid).transpose()?;
         let Some(mask) = mask else {
             return Ok(Self {

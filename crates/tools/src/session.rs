@@ -71,9 +71,8 @@ impl Stroke {
     /// Any [`ToolError`].
     pub fn apply(&self, canvas: Canvas, control: &mut Control) -> Result<(Canvas, Vec<String>), ToolError> {
         let tool = self.tool().map_err(ToolError::Stroke)?;
-        let other = |name: &str| Err(format!("there is no object {name:?}"));
-        let limits =
-            Limits::new(self.within.as_ref(), self.mask.as_ref(), other).map_err(ToolError::Stroke)?;
+        let limits = Limits::new(self.within.as_ref(), self.mask.as_ref(), &canvas.others);
+        let limits = limits.map_err(ToolError::Stroke)?;
         tool.apply(canvas, &limits, control)
     }
 }
