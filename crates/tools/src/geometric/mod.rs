@@ -7,6 +7,7 @@
 mod block;
 mod motion;
 mod shape;
+mod swept;
 mod write;
 
 use std::sync::Arc;
@@ -15,11 +16,13 @@ use bspline::csg::Rounding;
 use bspline::{Csg, Field, HierarchicalSpline, Real};
 use fitting::field::FieldFitReport;
 use fitting::{Control, FitError};
+use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
 pub use block::block;
 pub use motion::{Motion, Move, reflection};
 pub use shape::Shape;
+use swept::Pose;
 use write::{Fineness, TOLERANCE, Writer};
 
 use crate::limits::Limits;
@@ -41,9 +44,15 @@ pub enum Operation {
 pub struct Geometric {
     /// The solid.
     pub shape: Shape,
-    /// Where its centre goes, in the world of the object: one place or more. A sphere sweeps all between them; others act
-    /// at each place.
+    /// Where its centre goes, in the world of the object: one place or more. It sweeps all between them.
     pub along: Vec<Point>,
+    /// How it is turned at each place: the axis of the turn, as long as its angle in degrees. As it is if missing; one for
+    /// all, or one a place.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub turn: Vec<Point>,
+    /// Whether it acts at each place alone and sweeps nothing between.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub each: bool,
     /// Width over which the crease is rounded, a world length; 0 leaves it as sharp as the field can be.
     #[serde(default)]
     pub blend: NonNegative,
@@ -99,6 +108,33 @@ impl GeometricError {
 }
 
 impl Geometric {
+    fn poses(&self) -> Result<Vec<Pose>, String> {
+        let (places, turns) = (self.along.len(), self.turn.len());
+        if turns > 1 && turns != places {
+            return Err(format!(
+                "there are {places} places and {turns} turns; write one turn for all, or one for each place"
+            ));
+        }
+        let turn = |n: usize| {
+            let turn = self
+                .turn
+                .get(n)
+                .or(self.turn.first())
+                .map_or(DVec3::ZERO, |t| t.0);
+            let angle = turn.length().to_radians();
+            let axis = turn.normalize_or_zero();
+            let (sine, cosine) = (libm::sin(0.5 * angle), libm::cos(0.5 * angle));
+            DQuat::from_xyzw(axis.x * sine, axis.y * sine, axis.z * sine, cosine)
+        };
+        let places = self.along.iter().enumerate();
+        Ok(places
+            .map(|(n, at)| Pose {
+                at: at.0,
+                turn: turn(n),
+            })
+            .collect())
+    }
+
     /// What the tool leaves of a field whose surface lies at `iso`, and how close it is.
     ///
     /// Beyond the tool's box, which ends a few knot intervals beside the tool and its blend, no coefficient changes.
@@ -113,8 +149,9 @@ impl Geometric {
         limits: &Limits,
         control: &mut Control,
     ) -> Result<(HierarchicalSpline<T>, FieldFitReport), GeometricError> {
-        let places: Vec<_> = self.along.iter().map(|p| p.0).collect();
-        let (solids, mut reach) = self.shape.solids(&places).map_err(GeometricError::Shape)?;
+        let poses = self.poses().map_err(GeometricError::Shape)?;
+        let solids = self.shape.solids(&poses, self.each);
+        let (solids, mut reach) = solids.map_err(GeometricError::Shape)?;
         reach.min -= self.blend.0;
         reach.max += self.blend.0;
         let writer = Writer { field, iso, limits };

@@ -11,7 +11,8 @@ use bspline::Aabb;
 use glam::{DMat3, DVec3};
 
 use crate::fade::STEEPEST;
-use step::{Step, rotation};
+use step::Step;
+pub(crate) use step::rotation;
 use zone::Zone;
 
 pub use warped::Warped;

@@ -132,7 +132,7 @@ impl Step {
 }
 
 /// Turns by `angle` about the unit vector `axis` (Rodrigues).
-pub(super) fn rotation(axis: DVec3, angle: f64) -> DMat3 {
+pub fn rotation(axis: DVec3, angle: f64) -> DMat3 {
     if angle == 0.0 {
         return DMat3::IDENTITY;
     }

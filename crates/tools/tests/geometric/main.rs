@@ -152,31 +152,85 @@ fn a_block_is_as_large_as_asked() {
     }
 }
 
-/// A sweep has no gaps and takes the same at any spacing of its poses.
+/// A sweep has no gaps and takes the same at any spacing of its poses. All go through the face of the block, so half counts.
 #[test]
-fn a_swept_sphere_takes_a_capsule_at_any_spacing_of_poses() {
+fn swept_tools_take_the_same_at_any_spacing_of_poses() {
     let block = block();
     let before = volume(&block);
-    let whole = PI * 4.0 * 10.0 + 4.0 / 3.0 * PI * 8.0;
-    for count in [2, 3, 11, 60] {
+    let along = |from: [f64; 2], to: [f64; 2], count: usize| {
+        let at = |i: usize, a: usize| from[a] + (to[a] - from[a]) * i as f64 / (count - 1) as f64;
         let places: Vec<String> = (0..count)
-            .map(|i| {
-                format!(
-                    "[{}, 12.0, 12.0]",
-                    7.0 + 10.0 * f64::from(i) / f64::from(count - 1)
-                )
-            })
+            .map(|i| format!("[{}, {}, 12.0]", at(i, 0), at(i, 1)))
             .collect();
-        let text = format!(
-            "shape = {{ sphere = {{ radius = 2.0 }} }}, along = [{}], finer = 2",
-            places.join(", ")
-        );
-        let taken = before - volume(&apply(&block, Operation::Carve, &text));
-        assert!(
-            (taken / (0.5 * whole) - 1.0).abs() < 0.005,
-            "{count} poses: {taken}"
-        );
+        format!("along = [{}]", places.join(", "))
+    };
+    let turned = |count: usize| {
+        let turns: Vec<String> = (0..count)
+            .map(|i| format!("[0, 0, {}]", 90.0 * i as f64 / (count - 1) as f64))
+            .collect();
+        format!("turn = [{}]", turns.join(", "))
+    };
+    let diagonal = |count| along([7.0, 8.0], [15.0, 14.0], count);
+    for (shape, way, whole) in [
+        (
+            "sphere = { radius = 2.0 }",
+            &|n| along([7.0, 12.0], [17.0, 12.0], n) as String,
+            PI * 4.0 * 10.0 + 4.0 / 3.0 * PI * 8.0,
+        ),
+        // Its own volume, and what its faces run through.
+        (
+            "box = { size = [4.0, 3.0, 5.0] }",
+            &diagonal,
+            60.0 + 8.0 * 15.0 + 6.0 * 20.0,
+        ),
+        (
+            "cylinder = { axis = [0, 0, 1], radius = 2.0, height = 4.0 }",
+            &diagonal,
+            16.0 * PI + 10.0 * 16.0,
+        ),
+        (
+            "capsule = { axis = [0, 0, 1], radius = 2.0, height = 4.0 }",
+            &diagonal,
+            16.0 * PI + 32.0 / 3.0 * PI + 10.0 * (16.0 + 4.0 * PI),
+        ),
+        // Half of it lies in what the other half runs through.
+        (
+            "torus = { axis = [3, 4, 0], major = 4.0, minor = 1.5 }",
+            &|n| along([9.0, 10.0], [12.0, 14.0], n),
+            2.0 * PI * 4.0 * (PI * 2.25 + 5.0 * 3.0),
+        ),
+        (
+            "box = { size = [9.0, 2.0, 4.0] }",
+            &|n| format!("{}, {}", along([12.0, 12.0], [12.0, 12.0], n), turned(n)),
+            4.0 * swept_rectangle(4.5, 1.0),
+        ),
+    ] as [(&str, &dyn Fn(usize) -> String, f64); 6]
+    {
+        for count in [2, 5] {
+            let text = format!("shape = {{ {shape} }}, {}, finer = 2", way(count));
+            let taken = before - volume(&apply(&block, Operation::Carve, &text));
+            let off = taken / (0.5 * whole) - 1.0;
+            assert!(off.abs() < 0.005, "{shape}, {count} poses: {taken}, off by {off}");
+        }
     }
+}
+
+/// Area that a rectangle of these half edges runs through when it turns by a right angle about its middle.
+fn swept_rectangle(a: f64, b: f64) -> f64 {
+    let (side, angles) = (800, 400);
+    let reach = (a * a + b * b).sqrt();
+    let cell = 2.0 * reach / f64::from(side);
+    let is_hit = |x: f64, y: f64| {
+        (0..=angles).any(|n| {
+            let (sine, cosine) = (0.5 * PI * f64::from(n) / f64::from(angles)).sin_cos();
+            (cosine * x + sine * y).abs() <= a && (cosine * y - sine * x).abs() <= b
+        })
+    };
+    let at = |i: i32| (f64::from(i) + 0.5) * cell - reach;
+    let hits = (0..side * side)
+        .filter(|n| is_hit(at(n / side), at(n % side)))
+        .count();
+    hits as f64 * cell * cell
 }
 
 /// Strokes at random: beyond the tool, its blend and a few knot intervals nothing changes, to the bit; any number of
@@ -285,6 +339,10 @@ fn tools_that_make_no_sense_are_refused() {
     assert!(error.to_string().contains("less than"), "{error}");
     let error = refused("shape = { sphere = { radius = 1.0 } }, along = [[99, 99, 99]]");
     assert!(matches!(error, GeometricError::Outside { .. }), "{error}");
+    let error = refused(
+        "shape = { box = { size = [1, 1, 1] } }, along = [[9, 9, 9], [9, 9, 8], [9, 8, 8]], turn = [[0, 0, 9], [0, 0, 0]]",
+    );
+    assert!(error.to_string().contains("3 places and 2 turns"), "{error}");
     for text in [
         "shape = { sphere = { radius = -1.0 } }, along = [[9, 9, 9]]",
         "shape = { sphere = { radius = nan } }, along = [[9, 9, 9]]",
