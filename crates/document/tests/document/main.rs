@@ -1,6 +1,7 @@
 //! Documents: edits, undo, and files that crashes and faults have cut.
 
 mod common;
+mod revision;
 
 use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader, Seek, SeekFrom, Write};
