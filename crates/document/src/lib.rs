@@ -15,6 +15,7 @@ mod document;
 mod entry;
 mod error;
 mod journal;
+mod layers;
 mod layout;
 mod object;
 mod records;

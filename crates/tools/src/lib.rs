@@ -6,6 +6,7 @@ pub mod geometric;
 pub mod limits;
 pub mod mix;
 pub mod number;
+pub mod paint;
 pub mod scene;
 pub mod session;
 pub mod tool;

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::geometric::{Geometric, Move};
 use crate::limits::{Limits, Mask, Region};
+use crate::paint::Paint;
 use crate::tool::{Canvas, Tool, ToolError};
 
 /// What a session file says.
@@ -37,6 +38,9 @@ pub struct Stroke {
     /// What may change.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mask: Option<Mask>,
+    /// Paints matter or touch.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub paint: Option<Paint>,
 }
 
 impl Stroke {
@@ -49,6 +53,7 @@ impl Stroke {
             self.carve.as_ref().map(Tool::Carve),
             self.add.as_ref().map(Tool::Add),
             self.motion.as_ref().map(Tool::Move),
+            self.paint.as_ref().map(Tool::Paint),
         ];
         let given: Vec<_> = all.into_iter().flatten().collect();
         match given[..] {

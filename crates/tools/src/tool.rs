@@ -11,6 +11,7 @@ use glam::DAffine3;
 
 use crate::geometric::{Geometric, GeometricError, Move, Operation};
 use crate::limits::Limits;
+use crate::paint::{Layer, Layers, Paint, PaintError};
 
 /// What a tool works on. Cheap to copy.
 #[derive(Clone, Debug)]
@@ -19,6 +20,8 @@ pub struct Canvas {
     pub field: HierarchicalSpline<f32>,
     /// Density of its surface.
     pub iso: f64,
+    /// What is painted on it.
+    pub layers: Layers,
     /// Objects that a tool may name.
     pub others: Others,
 }
@@ -84,6 +87,8 @@ pub enum Tool<'a> {
     Add(&'a Geometric),
     /// Carries along.
     Move(&'a Move),
+    /// Paints matter or touch.
+    Paint(&'a Paint),
 }
 
 /// Why a tool cannot be used.
@@ -95,6 +100,9 @@ pub enum ToolError {
     /// The stroke names no tool, or several, or limits that make no sense.
     #[error("{0}")]
     Stroke(String),
+    /// Paint cannot be laid on.
+    #[error(transparent)]
+    Paint(#[from] PaintError),
 }
 
 impl ToolError {
@@ -106,7 +114,7 @@ impl ToolError {
 
 impl Tool<'_> {
     /// Names of all tools, as sessions write them.
-    pub const NAMES: [&'static str; 3] = ["carve", "add", "move"];
+    pub const NAMES: [&'static str; 4] = ["carve", "add", "move", "paint"];
 
     /// Its name, as sessions write it.
     pub fn name(&self) -> &'static str {
@@ -114,6 +122,7 @@ impl Tool<'_> {
             Self::Carve(_) => "carve",
             Self::Add(_) => "add",
             Self::Move(_) => "move",
+            Self::Paint(_) => "paint",
         }
     }
 
@@ -132,9 +141,26 @@ impl Tool<'_> {
             Self::Carve(tool) => tool.apply(Operation::Carve, old, *iso, limits, control)?,
             Self::Add(tool) => tool.apply(Operation::Add, old, *iso, limits, control)?,
             Self::Move(tool) => tool.apply(old, *iso, limits, control)?,
+            Self::Paint(paint) => {
+                let layer = painted(paint, &canvas, limits)?;
+                let mut canvas = canvas;
+                canvas.layers.insert(paint.layer, layer);
+                return Ok((canvas, Vec::new()));
+            }
         };
         Ok((Canvas { field, ..canvas }, thin_parts(&report)))
     }
+}
+
+/// A layer with paint laid on, as far as the limits allow.
+fn painted(paint: &Paint, canvas: &Canvas, limits: &Limits) -> Result<Layer, ToolError> {
+    let field = &canvas.field;
+    let whole = limits.cut(&field.lattice().world_box());
+    let layer = paint.apply(field, &canvas.layers, &whole)?;
+    let before = canvas.layers.get(&paint.layer).cloned();
+    let before = before.unwrap_or_else(|| Layer::empty(field.lattice(), field.level_count() - 1));
+    let kept = limits.kept(before.tree(), layer.tree());
+    Ok(layer.with_tree(kept).expect("some of the nodes painted"))
 }
 
 /// Says what was too thin for the field.

@@ -40,6 +40,7 @@ fn no_tool_changes_what_is_masked_out() {
             let canvas = Canvas {
                 field: field.clone(),
                 iso: ISO,
+                layers: Default::default(),
                 others: Others::default(),
             };
             let (changed, _) = stroke(&text)
@@ -94,6 +95,7 @@ fn a_soft_mask_fades() {
     let canvas = Canvas {
         field: field.clone(),
         iso: ISO,
+        layers: Default::default(),
         others: Others::default(),
     };
     let (changed, _) = stroke(&format!("{limit}\n{tool}"))
@@ -125,6 +127,7 @@ fn limits_that_make_no_sense_are_refused() {
         let canvas = Canvas {
             field: block(),
             iso: ISO,
+            layers: Default::default(),
             others: Others::default(),
         };
         let error = stroke(&format!("{limit}\n{tool}"))
