@@ -16,8 +16,9 @@ use rayon::prelude::*;
 use rustc_hash::FxHashSet;
 
 use super::residual::newton_foot;
-use super::samples::{BASE_DEPTH, Samples};
+use super::samples::Samples;
 use super::still::{FARTHEST, StillCell, may_lead_to_peak, to_maximum};
+use crate::level::BASE_DEPTH;
 
 /// Steps to an extremum.
 const STEPS: usize = 12;
