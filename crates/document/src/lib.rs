@@ -6,23 +6,28 @@
 //! `docs/document.md` has the format.
 //!
 //! A [`State`] is a value: cheap to copy, and copies share all that is equal. An edit makes a new one;
-//! [`Document::commit`] finds out what differs.
+//! [`Document::commit`] finds out what differs. A [`Command`] is what was asked for; the journal keeps it beside the edit.
 
 mod bulk;
 mod change;
+mod command;
 mod document;
 mod entry;
 mod error;
 mod journal;
+mod layers;
 mod layout;
 mod object;
 mod records;
+mod revision;
 mod state;
 
 pub use change::Change;
+pub use command::{Command, CommandError};
 pub use document::{Document, Lost, Opened, Options};
 pub use entry::{EditCounts, EditInfo};
 pub use error::DocumentError;
 pub use journal::is_document;
 pub use object::{Object, Properties};
+pub use revision::{VolumeRevision, revise_volume};
 pub use state::State;

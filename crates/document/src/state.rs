@@ -1,5 +1,6 @@
 use std::collections::BTreeMap;
 
+use glam::DAffine3;
 use sha2::{Digest, Sha256};
 
 use crate::{DocumentError, Object};
@@ -33,6 +34,20 @@ impl State {
             name: name.into(),
             known: self.objects.keys().cloned().collect(),
         })
+    }
+
+    /// Map from an object's own world to that which all objects without a parent share.
+    ///
+    /// # Errors
+    /// [`DocumentError::NoObject`].
+    pub fn placement(&self, name: &str) -> Result<DAffine3, DocumentError> {
+        let mut properties = &self.object(name)?.properties;
+        let mut map = properties.parent_from_object();
+        while let Some(parent) = &properties.parent {
+            properties = &self.object(parent)?.properties;
+            map = properties.parent_from_object() * map;
+        }
+        Ok(map)
     }
 
     /// With an object put in, in place of one that had the name.

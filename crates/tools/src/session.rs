@@ -1,8 +1,12 @@
 //! Sessions: what is to be done to a document, stroke after stroke.
 
+use fitting::Control;
 use serde::{Deserialize, Serialize};
 
-use crate::geometric::{Geometric, Operation};
+use crate::geometric::{Geometric, Move};
+use crate::limits::{Limits, Mask, Region};
+use crate::paint::Paint;
+use crate::tool::{Canvas, Tool, ToolError};
 
 /// What a session file says.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -25,6 +29,18 @@ pub struct Stroke {
     /// Adds a solid.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub add: Option<Geometric>,
+    /// Carries along.
+    #[serde(default, rename = "move", skip_serializing_if = "Option::is_none")]
+    pub motion: Option<Move>,
+    /// A box that it leaves nothing outside of changed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub within: Option<Region>,
+    /// What may change.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mask: Option<Mask>,
+    /// Paints matter or touch.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub paint: Option<Paint>,
 }
 
 impl Stroke {
@@ -32,12 +48,52 @@ impl Stroke {
     ///
     /// # Errors
     /// A sentence, if there is none or more than one.
-    pub fn tool(&self) -> Result<(Operation, &Geometric), String> {
-        match (&self.carve, &self.add) {
-            (Some(tool), None) => Ok((Operation::Carve, tool)),
-            (None, Some(tool)) => Ok((Operation::Add, tool)),
-            (None, None) => Err("no tool is given; write carve or add".into()),
-            (Some(_), Some(_)) => Err("carve and add are given; write a stroke for each".into()),
+    pub fn tool(&self) -> Result<Tool<'_>, String> {
+        let all = [
+            self.carve.as_ref().map(Tool::Carve),
+            self.add.as_ref().map(Tool::Add),
+            self.motion.as_ref().map(Tool::Move),
+            self.paint.as_ref().map(Tool::Paint),
+        ];
+        let given: Vec<_> = all.into_iter().flatten().collect();
+        match given[..] {
+            [one] => Ok(one),
+            [] => Err(format!(
+                "no tool is given; write one of {}",
+                Tool::NAMES.join(", ")
+            )),
+            [one, other, ..] => Err(format!(
+                "{} and {} are given; write a stroke for each",
+                one.name(),
+                other.name()
+            )),
         }
+    }
+
+    /// What the stroke leaves of a canvas, and what is left to say of it, in sentences.
+    ///
+    /// # Errors
+    /// Any [`ToolError`].
+    pub fn apply(&self, canvas: Canvas, control: &mut Control) -> Result<(Canvas, Vec<String>), ToolError> {
+        let tool = self.tool().map_err(ToolError::Stroke)?;
+        let limits = Limits::new(self.within.as_ref(), self.mask.as_ref(), &canvas.others);
+        let limits = limits.map_err(ToolError::Stroke)?;
+        tool.apply(canvas, &limits, control)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stroke_has_one_tool() {
+        let ball = "along = [[0, 0, 0]]\nshape.sphere.radius = 1\n";
+        let told = |text: &str| toml::from_str::<Stroke>(text).unwrap().tool().map(|t| t.name());
+        assert_eq!(told(&format!("[carve]\n{ball}")).unwrap(), "carve");
+        let none = told("object = \"a\"").unwrap_err();
+        assert!(Tool::NAMES.iter().all(|name| none.contains(name)), "{none}");
+        let two = told(&format!("[carve]\n{ball}[add]\n{ball}")).unwrap_err();
+        assert!(two.contains("carve and add"), "{two}");
     }
 }

@@ -154,14 +154,12 @@ pub fn run(args: &Args) -> Outcome {
     bar.show("reading", 0.0);
     let input = input::read(&source, args.shape, &args.volume, args.choice.unit, args.memory)?;
     interrupt::check(&cancel)?;
-    let shown = bar.clone();
     let mut control = Control {
-        on_progress: Box::new(move |p| shown.show(p.stage, p.fraction)),
-        cancel,
         memory_limit: args
             .memory
             .or_else(ceiling::limit)
             .map(|m| m.0.saturating_sub(ceiling::PROGRAM + input.bytes())),
+        ..bar.control(&cancel)
     };
     let fitted = fit(&input, &args.choice, &mut control)
         .map_err(|f| if f.code() == 3 { f.about(source.name()) } else { f })?;

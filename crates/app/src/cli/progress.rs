@@ -1,5 +1,6 @@
 use std::io::IsTerminal;
 
+use fitting::{Cancel, Control};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 /// A bar on stderr with the stage, the share done and the time left; silent where stderr is no terminal.
@@ -28,6 +29,16 @@ impl Bar {
         self.0.set_message(stage);
         self.0
             .set_position((fraction.clamp(0.0, 1.0) * STEPS as f64) as u64);
+    }
+
+    /// Shows what work under this control has done, and lets a flag stop it.
+    pub fn control(&self, cancel: &Cancel) -> Control {
+        let shown = self.clone();
+        Control {
+            cancel: cancel.clone(),
+            on_progress: Box::new(move |p| shown.show(p.stage, p.fraction)),
+            ..Control::default()
+        }
     }
 
     /// Takes the bar off the screen.

@@ -2,6 +2,7 @@
 
 pub mod export;
 pub mod history;
+mod like;
 pub mod new;
 pub mod replay;
 pub mod sculpt;
@@ -10,7 +11,7 @@ pub mod undo;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use document::{Document, DocumentError, Object, Options, State};
+use document::{CommandError, Document, DocumentError, Object, Options, State};
 use formats::Fault;
 use formats::field::FieldMeta;
 use serde::Serialize;
@@ -63,6 +64,16 @@ fn failure(error: DocumentError) -> Failure {
         },
         DocumentError::InUse(_) => Failure::limit(error),
         _ => Failure::usage(error),
+    }
+}
+
+impl From<CommandError> for Failure {
+    fn from(error: CommandError) -> Self {
+        match error {
+            CommandError::Document(error) => failure(error),
+            CommandError::Cancelled(error) => error.into(),
+            error => Self::input(error),
+        }
     }
 }
 

@@ -1,7 +1,8 @@
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use super::sculpt::Command;
+use document::Command;
+
 use super::{Told, failure, open};
 use crate::cli::failure::{Failure, Outcome};
 use crate::cli::progress::Bar;
@@ -32,13 +33,16 @@ pub fn run(args: &Args) -> Outcome {
     let counts = document.counts().map_err(failure)?;
     let mut state = document.first_state().map_err(failure)?;
     let bar = Bar::new();
+    let mut control = bar.control(&cancel);
     for (n, edit) in history.iter().enumerate().take(counts.done) {
         let number = counts.forgotten + n as u64 + 1;
         let about = |f: Failure| f.about(format!("edit {number} ({})", edit.title));
         let value = document.command(n).map_err(failure)?;
         let command: Command = serde_json::from_value(value)
             .map_err(|e| about(Failure::input(format!("cannot be done again ({e})"))))?;
-        state = command.run(&state, &cancel, &bar, &mut notes).map_err(about)?;
+        let (next, told) = command.apply(&state, &mut control).map_err(|e| about(e.into()))?;
+        state = next;
+        notes.extend(told.into_iter().map(|note| format!("edit {number}: {note}")));
         let found = hex(&state.sha256());
         if found != edit.sha256 {
             bar.clear();
