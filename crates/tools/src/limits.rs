@@ -50,6 +50,8 @@ pub struct Limits {
     region: Option<(Aabb, Cuboid)>,
     mask: Option<Arc<dyn Field>>,
     weight: Option<Faded>,
+    /// Level that the object is shaped to.
+    detail: Option<usize>,
 }
 
 impl Region {
@@ -109,7 +111,21 @@ impl Limits {
             region,
             mask: Some(named),
             weight,
+            detail: None,
         })
+    }
+
+    /// With the level of the field that the object is shaped to.
+    pub fn at_detail(self, level: usize) -> Self {
+        Self {
+            detail: Some(level),
+            ..self
+        }
+    }
+
+    /// Level of the field that the object is shaped to, if it is told.
+    pub fn detail(&self) -> Option<usize> {
+        self.detail
     }
 
     /// Whether all is free.

@@ -77,7 +77,7 @@ impl Stroke {
     pub fn apply(&self, canvas: Canvas, control: &mut Control) -> Result<(Canvas, Vec<String>), ToolError> {
         let tool = self.tool().map_err(ToolError::Stroke)?;
         let limits = Limits::new(self.within.as_ref(), self.mask.as_ref(), &canvas.others);
-        let limits = limits.map_err(ToolError::Stroke)?;
+        let limits = limits.map_err(ToolError::Stroke)?.at_detail(canvas.detail);
         tool.apply(canvas, &limits, control)
     }
 }

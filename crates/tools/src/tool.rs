@@ -20,6 +20,8 @@ pub struct Canvas {
     pub field: HierarchicalSpline<f32>,
     /// Density of its surface.
     pub iso: f64,
+    /// Level of the field that the object is shaped to.
+    pub detail: usize,
     /// What is painted on it.
     pub layers: Layers,
     /// Objects that a tool may name.
@@ -156,9 +158,9 @@ impl Tool<'_> {
 fn painted(paint: &Paint, canvas: &Canvas, limits: &Limits) -> Result<Layer, ToolError> {
     let field = &canvas.field;
     let whole = limits.cut(&field.lattice().world_box());
-    let layer = paint.apply(field, &canvas.layers, &whole)?;
+    let layer = paint.apply(field, &canvas.layers, canvas.detail, &whole)?;
     let before = canvas.layers.get(&paint.layer).cloned();
-    let before = before.unwrap_or_else(|| Layer::empty(field.lattice(), field.level_count() - 1));
+    let before = before.unwrap_or_else(|| Layer::empty(field.lattice(), canvas.detail));
     let kept = limits.kept(before.tree(), layer.tree());
     Ok(layer.with_tree(kept).expect("some of the nodes painted"))
 }

@@ -59,13 +59,9 @@ pub struct Geometric {
     /// Distance from the true surface that may stay off the creases, a world length; a fiftieth of the finest knot interval if
     /// missing.
     pub tolerance: Option<Positive>,
-    /// Levels finer than the field has that may be added.
-    #[serde(default = "one")]
-    pub finer: u8,
-}
-
-fn one() -> u8 {
-    1
+    /// Levels finer than the object's detail that may be added; if missing one, and as many more as show the thinnest part.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub finer: Option<u8>,
 }
 
 /// Why a geometric tool cannot be used.
@@ -183,7 +179,8 @@ impl Geometric {
         };
         let fineness = Fineness {
             tolerance: self.tolerance,
-            finer: Some(self.finer),
+            finer: self.finer,
+            feature: Some(self.shape.feature()),
         };
         writer.written(&*target, &within, &fineness, control)
     }

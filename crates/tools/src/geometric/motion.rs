@@ -109,6 +109,7 @@ impl Move {
         let fineness = Fineness {
             tolerance: self.tolerance,
             finer: self.finer,
+            feature: None,
         };
         if let Motion::Mirror { at, normal, blend } = &self.motion {
             return mirrored(&writer, at.0, normal.0, *blend, &fineness, control);
@@ -172,7 +173,7 @@ fn mirrored<T: Real>(
     let map = reflection(at, normal)?;
     let field = writer.field;
     let other = Csg::affine(Arc::new(field.clone()), map).map_err(GeometricError::shape)?;
-    let width = blend.map_or(2.0 * field.finest_spacing(), |b| b.0);
+    let width = blend.map_or(2.0 * writer.spacing(), |b| b.0);
     let behind = HalfSpace::new(at, normal).map_err(GeometricError::shape)?;
     let weight = Faded::new(Arc::new(behind), -0.5 * width, 0.5 * width);
     let mixed = Mixed {

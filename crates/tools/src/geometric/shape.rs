@@ -55,6 +55,16 @@ pub enum Shape {
 pub(super) type Solids = (Vec<Arc<dyn Field>>, Aabb);
 
 impl Shape {
+    /// Radius of the smallest ball that touches opposite sides of it.
+    pub(super) fn feature(&self) -> f64 {
+        match self {
+            Self::Sphere { radius } | Self::Capsule { radius, .. } => radius.0,
+            Self::Box { size } => 0.5 * size.iter().fold(f64::INFINITY, |least, edge| least.min(edge.0)),
+            Self::Cylinder { radius, height, .. } => radius.0.min(0.5 * height.0),
+            Self::Torus { minor, .. } => minor.0,
+        }
+    }
+
     /// The tool on its way from pose to pose, or at each of them alone.
     pub(super) fn solids(&self, poses: &[Pose], is_each: bool) -> Result<Solids, String> {
         let (solid, size) = self.solid().map_err(|e| e.to_string())?;

@@ -1,6 +1,6 @@
 //! How the result of a tool becomes coefficients.
 
-use bspline::hierarchical::MAX_LEVELS;
+use bspline::hierarchical::{Lattice, MAX_LEVELS};
 use bspline::{Aabb, Field, Frame, HierarchicalSpline, Real};
 use fitting::Control;
 use fitting::field::{Aim, FieldFitOptions, FieldFitReport, fit_field_where};
@@ -24,14 +24,31 @@ pub struct Fineness {
     /// Distance from the true surface that may stay off the creases, a world length; a fiftieth of the finest knot interval
     /// if missing.
     pub tolerance: Option<Positive>,
-    /// Levels finer than the field has that may be added; 1 if missing.
+    /// Levels finer than the object's detail that may be added. If missing one, and as many more as the feature asks for.
     pub finer: Option<u8>,
+    /// Smallest length that the tool shapes, if it has one.
+    pub feature: Option<f64>,
 }
 
+/// Knot intervals across a feature that show it.
+const ACROSS: f64 = 3.0;
+
+/// Levels that are added for a feature, at most.
+const MOST_FINER: usize = 5;
+
 impl Fineness {
-    fn finest<T: Real>(&self, field: &HierarchicalSpline<T>) -> usize {
-        let finer = usize::from(self.finer.unwrap_or(1));
-        (field.level_count() - 1 + finer).min(MAX_LEVELS - 1)
+    /// The finest level that a tool may use on an object of so much detail.
+    fn finest(&self, lattice: &Lattice, detail: usize) -> usize {
+        let shows = |feature: f64| {
+            let spacing = |finer: usize| lattice.spacing(detail + finer).min_element();
+            (1..MOST_FINER).find(|finer| ACROSS * spacing(*finer) <= feature)
+        };
+        let finer = match (self.finer, self.feature) {
+            (Some(finer), _) => usize::from(finer),
+            (None, Some(feature)) => shows(feature).unwrap_or(MOST_FINER),
+            (None, None) => 1,
+        };
+        (detail + finer).min(MAX_LEVELS - 1)
     }
 }
 
@@ -43,12 +60,23 @@ pub(super) struct Writer<'a, T> {
 }
 
 impl<T: Real> Writer<'_, T> {
+    /// Level that the object is shaped to. Places where tools went finer do not count: else every stroke would be finer than the
+    /// one before.
+    fn detail(&self) -> usize {
+        self.limits.detail().unwrap_or(self.field.level_count() - 1)
+    }
+
+    /// Least distance of its knots.
+    pub fn spacing(&self) -> f64 {
+        self.field.lattice().spacing(self.detail()).min_element()
+    }
+
     /// The box in which a tool that acts in `reach` changes the field.
     ///
     /// # Errors
     /// [`GeometricError::Outside`] if it lies beside the field, or beside what the limits leave.
     pub fn within(&self, reach: &Aabb) -> Result<Aabb, GeometricError> {
-        let margin = MARGIN * self.field.finest_spacing();
+        let margin = MARGIN * self.spacing();
         let whole = self.limits.cut(&self.field.lattice().world_box());
         let own = Aabb {
             min: reach.min - margin,
@@ -75,7 +103,7 @@ impl<T: Real> Writer<'_, T> {
         fineness: &Fineness,
         control: &mut Control,
     ) -> Result<(HierarchicalSpline<T>, FieldFitReport), GeometricError> {
-        let finest = fineness.finest(self.field);
+        let finest = fineness.finest(self.field.lattice(), self.detail());
         let spacing = self.field.lattice().spacing(finest).min_element();
         let mixed = self.limits.mixed(self.field, target);
         let target: &dyn Field = mixed.as_ref().map_or(target, |mixed| mixed);
@@ -98,8 +126,8 @@ impl<T: Real> Writer<'_, T> {
         let lattice = self.field.lattice();
         let local = within.transformed(self.field.lattice_from_world());
         let extent = lattice.extent();
-        let step = 1.0 / (1u64 << (self.field.level_count() - 1)) as f64;
-        let rim = self.field.finest_spacing() * self.field.slope();
+        let step = 1.0 / (1u64 << self.detail()) as f64;
+        let rim = self.spacing() * self.field.slope();
         for axis in 0..3 {
             for (face, is_reached) in [
                 (0.0, local.min[axis] <= 0.0),

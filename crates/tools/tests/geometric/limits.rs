@@ -38,6 +38,7 @@ fn no_tool_changes_what_is_masked_out() {
         for (n, limit) in limits.iter().enumerate() {
             let text = format!("{limit}\n{tool}");
             let canvas = Canvas {
+                detail: 0,
                 field: field.clone(),
                 iso: ISO,
                 layers: Default::default(),
@@ -93,6 +94,7 @@ fn a_soft_mask_fades() {
     let limit = "mask = { boxes = [{ min = [6, 2, 2], max = [22, 22, 22] }], soft = 8.0 }";
     let tool = "add = { shape = { box = { size = [18.0, 8.0, 2.0] } }, along = [[12, 12, 12.5]], finer = 2 }";
     let canvas = Canvas {
+        detail: 0,
         field: field.clone(),
         iso: ISO,
         layers: Default::default(),
@@ -125,6 +127,7 @@ fn limits_that_make_no_sense_are_refused() {
         ("mask = { object = \"none\" }", "none"),
     ] {
         let canvas = Canvas {
+            detail: 0,
             field: block(),
             iso: ISO,
             layers: Default::default(),
