@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::force::{Chisel, Drill, Pull};
 use crate::geometric::Geometric;
 use crate::tool::Tool;
 
@@ -26,6 +27,21 @@ pub struct Stroke {
     /// Adds a solid.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub add: Option<Geometric>,
+    /// Brings the surface elsewhere.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pull: Option<Pull>,
+    /// Cuts a groove.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub chisel: Option<Chisel>,
+    /// Lays a ridge.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub squirt: Option<Chisel>,
+    /// Makes a hole or a cut.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drill: Option<Drill>,
+    /// Makes a bridge or a seam.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub join: Option<Drill>,
 }
 
 impl Stroke {
@@ -37,6 +53,11 @@ impl Stroke {
         let all = [
             self.carve.as_ref().map(Tool::Carve),
             self.add.as_ref().map(Tool::Add),
+            self.pull.as_ref().map(Tool::Pull),
+            self.chisel.as_ref().map(Tool::Chisel),
+            self.squirt.as_ref().map(Tool::Squirt),
+            self.drill.as_ref().map(Tool::Drill),
+            self.join.as_ref().map(Tool::Join),
         ];
         let given: Vec<_> = all.into_iter().flatten().collect();
         match given[..] {

@@ -4,6 +4,7 @@ use bspline::HierarchicalSpline;
 use fitting::field::FieldFitReport;
 use fitting::{Control, FitError};
 
+use crate::force::{Chisel, Drill, ForceError, ForceReport, Pull};
 use crate::geometric::{Geometric, GeometricError, Operation};
 
 /// What a tool works on. Cheap to copy.
@@ -22,6 +23,16 @@ pub enum Tool<'a> {
     Carve(&'a Geometric),
     /// Adds a solid.
     Add(&'a Geometric),
+    /// Brings the surface elsewhere.
+    Pull(&'a Pull),
+    /// Cuts a groove.
+    Chisel(&'a Chisel),
+    /// Lays a ridge.
+    Squirt(&'a Chisel),
+    /// Makes a hole or a cut.
+    Drill(&'a Drill),
+    /// Makes a bridge or a seam.
+    Join(&'a Drill),
 }
 
 /// Why a tool cannot be used.
@@ -30,24 +41,35 @@ pub enum ToolError {
     /// A geometric tool cannot.
     #[error(transparent)]
     Geometric(#[from] GeometricError),
+    /// A force tool cannot.
+    #[error(transparent)]
+    Force(#[from] ForceError),
 }
 
 impl ToolError {
     /// Whether the user said stop.
     pub fn is_cancelled(&self) -> bool {
-        matches!(self, Self::Geometric(GeometricError::Fit(FitError::Cancelled)))
+        match self {
+            Self::Geometric(e) => matches!(e, GeometricError::Fit(FitError::Cancelled)),
+            Self::Force(e) => e.is_cancelled(),
+        }
     }
 }
 
 impl Tool<'_> {
     /// Names of all tools, as sessions write them.
-    pub const NAMES: [&'static str; 2] = ["carve", "add"];
+    pub const NAMES: [&'static str; 7] = ["carve", "add", "pull", "chisel", "squirt", "drill", "join"];
 
     /// Its name, as sessions write it.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Carve(_) => "carve",
             Self::Add(_) => "add",
+            Self::Pull(_) => "pull",
+            Self::Chisel(_) => "chisel",
+            Self::Squirt(_) => "squirt",
+            Self::Drill(_) => "drill",
+            Self::Join(_) => "join",
         }
     }
 
@@ -56,11 +78,24 @@ impl Tool<'_> {
     /// # Errors
     /// Any [`ToolError`].
     pub fn apply(&self, canvas: Canvas, control: &mut Control) -> Result<(Canvas, Vec<String>), ToolError> {
-        let (field, report) = match self {
-            Self::Carve(tool) => tool.apply(Operation::Carve, &canvas.field, canvas.iso, control)?,
-            Self::Add(tool) => tool.apply(Operation::Add, &canvas.field, canvas.iso, control)?,
+        let Canvas { field: old, iso } = &canvas;
+        let stroke = match self {
+            Self::Carve(tool) => Err(tool.apply(Operation::Carve, old, *iso, control)?),
+            Self::Add(tool) => Err(tool.apply(Operation::Add, old, *iso, control)?),
+            Self::Pull(tool) => Ok(tool.begin(old, *iso)?),
+            Self::Chisel(tool) => Ok(tool.begin(old, *iso, false)?),
+            Self::Squirt(tool) => Ok(tool.begin(old, *iso, true)?),
+            Self::Drill(tool) => Ok(tool.begin(old, *iso, false)?),
+            Self::Join(tool) => Ok(tool.begin(old, *iso, true)?),
         };
-        Ok((Canvas { field, ..canvas }, thin_parts(&report)))
+        let (field, told) = match stroke {
+            Err((field, report)) => (field, thin_parts(&report)),
+            Ok(stroke) => {
+                let (field, report) = stroke.finish(control)?;
+                (field, late_paths(&report))
+            }
+        };
+        Ok((Canvas { field, ..canvas }, told))
     }
 }
 
@@ -71,6 +106,20 @@ fn thin_parts(report: &FieldFitReport) -> Vec<String> {
         format!(
             "{} of {} points have the wrong sign: parts thinner than a knot interval; allow more levels (finer)",
             left.wrong_signs, report.samples,
+        )
+    });
+    told.into_iter().collect()
+}
+
+/// Says what did not arrive.
+fn late_paths(report: &ForceReport) -> Vec<String> {
+    let off = |share: f64| (share - 1.0).abs() > 0.02;
+    let told = (off(report.arrival.least) || off(report.arrival.most)).then(|| {
+        format!(
+            "after {} steps the surface is at {:.1} to {:.1} % of its way; what is near holds it, or the rim of the field",
+            report.steps,
+            100.0 * report.arrival.least,
+            100.0 * report.arrival.most,
         )
     });
     told.into_iter().collect()
