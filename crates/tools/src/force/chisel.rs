@@ -2,7 +2,7 @@ use bspline::{HierarchicalSpline, Real};
 use serde::{Deserialize, Serialize};
 
 use super::path::Path;
-use super::stroke::ForceStroke;
+use super::stroke::{Extent, ForceStroke};
 use super::target::Target;
 use super::{ForceError, How, track};
 use crate::number::{Point, Positive};
@@ -45,6 +45,6 @@ impl Chisel {
         };
         let places = track::along(field, iso, &points, self.radius.0)?;
         let targets: Result<Vec<_>, ForceError> = places.iter().map(target).collect();
-        ForceStroke::new(field, iso, targets?, self.radius.0, &self.how)
+        ForceStroke::new(field, iso, targets?, Extent::Track, self.radius.0, &self.how)
     }
 }

@@ -27,7 +27,7 @@ pub use drill::Drill;
 pub use filter::Filter;
 pub use path::{Path, first_crossing, nearest_surface};
 pub use pull::Pull;
-pub use stroke::{Arrival, ForceReport, ForceStroke, Told};
+pub use stroke::{Arrival, Extent, ForceReport, ForceStroke, Told};
 pub use target::Target;
 
 use dynamics::patch::PatchError;

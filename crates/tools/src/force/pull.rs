@@ -2,7 +2,7 @@ use bspline::{HierarchicalSpline, Real};
 use serde::{Deserialize, Serialize};
 
 use super::path::Path;
-use super::stroke::ForceStroke;
+use super::stroke::{Extent, ForceStroke};
 use super::target::Target;
 use super::{ForceError, How, track};
 use crate::number::{Finite, Point, Positive};
@@ -65,7 +65,8 @@ impl Pull {
                 ..Target::single(path, true)
             })
         };
+        let extent = if self.disc.is_some() { Extent::Area } else { Extent::Curve };
         let targets: Result<Vec<_>, _> = places.iter().map(target).collect();
-        ForceStroke::new(field, iso, targets?, radius, &self.how)
+        ForceStroke::new(field, iso, targets?, extent, radius, &self.how)
     }
 }

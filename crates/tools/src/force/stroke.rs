@@ -1,5 +1,6 @@
 use bspline::{Field, HierarchicalSpline, Real};
 use dynamics::integrators::Integrator;
+use dynamics::lattice::OnBox;
 use dynamics::matter::{Matter, Quantity};
 use dynamics::region::{Cells, Region, RegionOptions};
 use dynamics::response::Against;
@@ -18,16 +19,13 @@ const SPACINGS_PER_RADIUS: f64 = 1.5;
 const SAMPLES_PER_CELL: f64 = 4.0 / 3.0;
 /// Radii of a region beside the paths.
 const ROOM: f64 = 4.0;
-/// Radii that have to be left of it before it is cut anew.
-const LEAST_ROOM: f64 = 3.0;
 /// Knot intervals that the rim takes from a region.
 const RIM: f64 = 0.58;
 /// Radii of track behind a tool on which its paths go on acting.
 const TRAIL: f64 = 6.0;
-/// Radii of track up to which all paths act at once.
-const AT_ONCE: f64 = 12.0;
-/// Steps that a path takes from where its goal stands still to its end.
-const SETTLING: f64 = 10.0;
+/// Radii of track that a tool goes on at once. Each time the shape so far becomes the one at rest: what is left behind
+/// would else spring back by what its springs have not yet followed.
+const STAGE: f64 = 6.0;
 /// Radii that the goal of the longest path advances in a step.
 const ADVANCE: f64 = 0.3;
 /// Share of what is missing by which rest lengths follow in a step of clay, as an exponent: `λΔt`.
@@ -39,17 +37,41 @@ const MASS: f64 = 0.1;
 const DAMPING: f64 = 1.0;
 /// Softness of paths that have to arrive, over their own stiffness.
 const SOFT: [f64; 2] = [0.01, 0.003];
-/// Solves of a step beside the first: of few paths, of a curve, of an area.
-const SOLVES: [usize; 2] = [3, 5];
-/// Share of its length that a path that has arrived may be off.
+/// Share of its length that a path that has arrived may be off; after some steps with goals that stand still more is
+/// allowed, between neighbours it may not become less.
 const ARRIVED: f64 = 0.002;
-/// Steps with goals that stand still after which a stroke ends in any case.
+const ARRIVED_LATE: f64 = 0.01;
+const LATE: usize = 8;
+/// Share that an elastic path at rest moves in a step.
+const AT_REST: f64 = 1e-5;
+/// Steps with goals that stand still after which the next stage begins in any case.
 const PATIENCE: usize = 60;
 /// Of the integrals: over the value, and of the mean over the fall of the density in a radius.
 const EXACT: Tolerance = Tolerance {
     relative: 1e-4,
     mean: 1e-5,
 };
+
+/// What the paths of a tool are together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extent {
+    /// A point or a curve: all paths act at once.
+    Curve,
+    /// An area, which takes more solves a step.
+    Area,
+    /// A track that the tool walks along: those of the last six radii, and of the six before, act at a time.
+    Track,
+}
+
+impl Extent {
+    /// Solves of a step beside the first.
+    fn solves(self) -> usize {
+        match self {
+            Self::Curve | Self::Track => 3,
+            Self::Area => 5,
+        }
+    }
+}
 
 /// How far the paths of a stroke have come, as shares of their lengths.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -104,8 +126,9 @@ struct Acting {
     index: usize,
     /// Total force.
     force: f64,
-    /// Arc length of the surface on it, where there is one.
+    /// Arc length of the surface on it, where there is one, now and before the step.
     crossing: Option<f64>,
+    before: Option<f64>,
     /// Steps that it has acted.
     age: usize,
     /// What moves it by itself, a unit of force on all paths by their weights.
@@ -137,20 +160,20 @@ pub struct ForceStroke<T> {
     acting: Vec<Acting>,
     /// Targets that have begun.
     begun: usize,
-    /// Way of the tool along its track, and what it goes on in a step.
+    extent: Extent,
+    /// Where the tool is on its track.
     gone: f64,
-    pace: f64,
-    track: f64,
     longest: f64,
-    /// Steps with all goals at the ends.
+    /// Steps of the stage with all goals at the ends.
     settled: usize,
     scales: bool,
+    /// Forces of the last step.
+    load: Load<T>,
     report: ForceReport,
 }
 
 impl<T: Real> ForceStroke<T> {
-    /// Begins to work on a field whose surface lies at `iso`. Of targets that begin along a track longer than twelve radii
-    /// those of the last six act.
+    /// Begins to work on a field whose surface lies at `iso`.
     ///
     /// # Errors
     /// Any [`ForceError`].
@@ -158,6 +181,7 @@ impl<T: Real> ForceStroke<T> {
         field: &HierarchicalSpline<T>,
         iso: f64,
         targets: Vec<Target>,
+        extent: Extent,
         radius: f64,
         how: &How,
     ) -> Result<Self, ForceError> {
@@ -169,12 +193,6 @@ impl<T: Real> ForceStroke<T> {
         }
         let shape = Shape::new(&how.filter).map_err(ForceError::Tool)?;
         let longest = targets.iter().map(|t| t.path.length()).fold(0.0, f64::max);
-        let track = targets.iter().map(|t| t.begins).fold(0.0, f64::max);
-        let steps = (longest / (ADVANCE * radius)).ceil() + SETTLING;
-        let pace = match track <= AT_ONCE * radius {
-            true => f64::INFINITY,
-            false => TRAIL * radius / steps,
-        };
         let level = level(field, radius)?;
         let matter = matter(field, radius);
         let gain = how.gain.map_or(
@@ -184,7 +202,13 @@ impl<T: Real> ForceStroke<T> {
             },
             |g| g.0,
         );
-        let first: Vec<&Target> = targets.iter().filter(|t| t.begins <= pace).collect();
+        // Elastic springs may not follow at all.
+        let extent = match (extent, how.solid) {
+            (Extent::Track, Solid::Elastic) => Extent::Curve,
+            (extent, _) => extent,
+        };
+        let gone = if extent == Extent::Track { STAGE * radius } else { f64::INFINITY };
+        let first: Vec<&Target> = targets.iter().filter(|t| t.begins <= gone).collect();
         let cells = about(field, level, &first, radius)?;
         let region = Region::new(field, cells, matter, &RegionOptions::of(field, level))?;
         let samples = region.patch().lattice().sample_count();
@@ -200,12 +224,12 @@ impl<T: Real> ForceStroke<T> {
             gain,
             acting: Vec::new(),
             begun: 0,
-            gone: 0.0,
-            pace,
-            track,
+            extent,
+            gone,
             longest,
             settled: 0,
             scales: false,
+            load: Load::of(std::iter::empty()),
             report: ForceReport {
                 paths: targets.len(),
                 steps: 0,
@@ -236,28 +260,42 @@ impl<T: Real> ForceStroke<T> {
         Functions::of(&self.field, &self.region).value(&self.region.patch().state().p, p)
     }
 
+    /// Forces on the samples that the last step ended with.
+    pub fn load(&self) -> OnBox<'_, T> {
+        self.load.on_box()
+    }
+
     /// Share of the work that is done, about.
     pub fn progress(&self) -> f64 {
-        let way = if self.track > 0.0 { (self.gone / self.track).min(1.0) } else { 1.0 };
-        let settled = self.settled as f64 / PATIENCE as f64;
-        (0.7 * way + 0.3 * settled).clamp(0.0, 1.0)
+        let stage = (self.settled as f64 / LATE as f64).min(0.9);
+        (self.begun as f64 - (1.0 - stage) * self.acting.len() as f64).max(0.0) / self.targets.len() as f64
     }
 
     /// Whether all paths have arrived, or have had their time.
     pub fn is_over(&self) -> bool {
-        if self.begun < self.targets.len() || self.settled == 0 {
-            return false;
+        self.begun == self.targets.len() && self.is_stage_over()
+    }
+
+    fn is_stage_over(&self) -> bool {
+        if self.settled == 0 {
+            return self.acting.is_empty() && self.report.steps > 0;
         }
-        let there = self.acting.iter().all(|a| match a.crossing {
-            None => true,
-            Some(crossing) => {
-                let target = &self.targets[a.index];
-                let length = self.share() * target.path.length();
-                let ahead = (crossing - length) / length;
-                ahead.abs() <= ARRIVED || (target.ends_early && ahead > 0.0)
+        let off = if self.settled < LATE { ARRIVED } else { ARRIVED_LATE };
+        let is_there = |a: &Acting| {
+            let Some(crossing) = a.crossing else { return true };
+            let target = &self.targets[a.index];
+            let length = target.path.length();
+            let ahead = (crossing - length) / length;
+            if target.ends_early && ahead > 0.0 {
+                return true;
             }
-        });
-        (there && self.settled > 1) || self.settled >= PATIENCE
+            match (self.how.solid, a.before) {
+                (Solid::Clay, _) => ahead.abs() <= off,
+                (Solid::Elastic, Some(before)) => (crossing - before).abs() <= AT_REST * length,
+                (Solid::Elastic, None) => false,
+            }
+        };
+        self.settled >= PATIENCE || (self.settled > 1 && self.acting.iter().all(is_there))
     }
 
     /// Share of its path to which a surface is brought.
@@ -321,7 +359,7 @@ impl<T: Real> ForceStroke<T> {
             .zip(&soft)
             .map(|(&i, soft)| self.acting[i].stiffness / self.targets[self.acting[i].index].weight + soft)
             .collect();
-        let most = SOLVES[usize::from(self.is_area())];
+        let most = self.extent.solves();
         let region = &mut self.region;
         let solved = system::solve(&right, &soft, &diagonal, most, 1e-4, |z| {
             let of = live.iter().zip(z).map(|(&i, z)| (&bearing(i).spread, *z));
@@ -335,6 +373,7 @@ impl<T: Real> ForceStroke<T> {
         for (&i, force) in live.iter().zip(&solved.forces) {
             self.acting[i].force += force;
         }
+        self.load = Load::of(pairs(&bearings, self.acting.iter().map(|a| a.force)));
         self.move_on(&solved.parts, dt)?;
         if self.how.solid == Solid::Clay {
             let patch = self.region.patch_mut();
@@ -397,65 +436,43 @@ impl<T: Real> ForceStroke<T> {
         })
     }
 
-    /// Lets the tool go on along its track, paths begin and end, and the region follow.
+    /// Lets the tool go on along its track where it is done so far: its shape becomes the one at rest, the oldest paths end
+    /// and the next begin.
     fn advance(&mut self) -> Result<(), ForceError> {
-        self.report.steps += 1;
-        if self.report.steps > 1 {
-            self.gone = (self.gone + self.pace).min(self.track);
-        }
-        let reached = if self.pace.is_finite() { self.gone } else { f64::INFINITY };
-        let before = self.acting.len();
-        if self.pace.is_finite() {
+        if self.report.steps > 0 && self.begun < self.targets.len() && self.is_stage_over() {
+            self.field = self.region.release_clay(&self.field)?;
             let oldest = self.gone - TRAIL * self.radius;
+            self.gone += STAGE * self.radius;
             let targets = &self.targets;
             self.acting.retain(|a| targets[a.index].begins >= oldest);
+            let next = targets[self.begun..].iter().take_while(|t| t.begins <= self.gone);
+            let paths: Vec<&Target> = self.acting.iter().map(|a| &targets[a.index]).chain(next).collect();
+            let cells = about(&self.field, self.region.cells().level, &paths, self.radius)?;
+            let options = RegionOptions::of(&self.field, cells.level);
+            self.region = Region::new(&self.field, cells, matter(&self.field, self.radius), &options)?;
+            // What they had to hold is at rest now.
+            self.acting.iter_mut().for_each(|a| a.force = 0.0);
+            self.settled = 0;
+            self.scales = true;
+            self.report.cuts += 1;
+            self.report.samples = self.report.samples.max(self.region.patch().lattice().sample_count());
         }
-        self.scales = before != self.acting.len();
+        self.report.steps += 1;
         let step = self.look();
-        while let Some(target) = self.targets.get(self.begun).filter(|t| t.begins <= reached) {
+        while let Some(target) = self.targets.get(self.begun).filter(|t| t.begins <= self.gone) {
             let value = |p| self.value(p);
             let crossing = target.crossing(&value, self.iso, self.radius, step);
             self.acting.push(Acting {
                 index: self.begun,
                 force: 0.0,
                 crossing,
+                before: None,
                 age: 0,
                 stiffness: 0.0,
             });
             self.begun += 1;
             self.scales = true;
         }
-        self.follow()
-    }
-
-    /// Cuts the region anew where the paths come near its rim.
-    fn follow(&mut self) -> Result<(), ForceError> {
-        if !self.pace.is_finite() {
-            return Ok(());
-        }
-        let acting: Vec<&Target> = self.acting.iter().map(|a| &self.targets[a.index]).collect();
-        let cells = *self.region.cells();
-        let least = bounds(&self.field, &acting);
-        let half = LEAST_ROOM * self.radius;
-        let is_inside = |a: usize| {
-            let spacing = self.field.lattice().spacing(cells.level)[a];
-            let scale = (1u64 << cells.level) as f64;
-            let room = half / spacing;
-            let limit = f64::from(self.field.lattice().cells_at(cells.level)[a]);
-            let (low, high) = (least[0][a] * scale - room, least[1][a] * scale + room);
-            let (first, end) = (f64::from(cells.first[a]), f64::from(cells.first[a] + cells.count[a]));
-            (first <= low || first == 0.0) && (end >= high || end == limit)
-        };
-        if (0..3).all(is_inside) {
-            return Ok(());
-        }
-        let cells = about(&self.field, cells.level, &acting, self.radius)?;
-        let matter = matter(&self.field, self.radius);
-        let (field, region) = self.region.moved(&self.field, cells, matter)?;
-        (self.field, self.region) = (field, region);
-        self.scales = true;
-        self.report.cuts += 1;
-        self.report.samples = self.report.samples.max(self.region.patch().lattice().sample_count());
         Ok(())
     }
 
@@ -470,9 +487,7 @@ impl<T: Real> ForceStroke<T> {
             part * share * self.targets[a.index].path.length()
         });
         let goals = goals.collect();
-        if all && self.begun == self.targets.len() && (self.gone >= self.track || !self.pace.is_finite()) {
-            self.settled += 1;
-        }
+        self.settled += usize::from(all);
         goals
     }
 
@@ -570,11 +585,6 @@ impl<T: Real> ForceStroke<T> {
         }
     }
 
-    /// Whether the tool is wider than a curve.
-    fn is_area(&self) -> bool {
-        self.track == 0.0 && self.targets.len() > 1
-    }
-
     /// Looks where the surface is now.
     fn told(&mut self, solves: usize, residual: f64) -> Told {
         let functions = Functions::of(&self.field, &self.region);
@@ -584,6 +594,7 @@ impl<T: Real> ForceStroke<T> {
         let (mut least, mut most, mut force) = (f64::INFINITY, f64::NEG_INFINITY, 0.0);
         for acting in &mut self.acting {
             let target = &self.targets[acting.index];
+            acting.before = acting.crossing;
             acting.crossing = target.crossing(&value, self.iso, self.radius, step);
             force += acting.force;
             let share = acting.crossing.map_or(1.0, |s| s / target.path.length());
