@@ -69,6 +69,13 @@ impl Path {
         from + share * (to - from)
     }
 
+    /// Arc lengths of the points between the ends at which it turns by more than an angle of this cosine.
+    pub fn corners(&self, cosine: f64) -> impl Iterator<Item = f64> {
+        let ways: Vec<DVec3> = self.points.windows(2).map(|w| (w[1] - w[0]).normalize()).collect();
+        let turns = (1..ways.len()).filter(move |i| ways[*i].dot(ways[i - 1]) < cosine);
+        turns.map(|i| self.lengths[i])
+    }
+
     /// Unit vector of the way at an arc length.
     pub fn direction(&self, s: f64) -> DVec3 {
         let end = self.lengths.partition_point(|l| *l <= s).clamp(1, self.points.len() - 1);

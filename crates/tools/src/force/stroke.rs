@@ -21,8 +21,8 @@ const SAMPLES_PER_CELL: f64 = 4.0 / 3.0;
 const ROOM: f64 = 4.0;
 /// Knot intervals that the rim takes from a region.
 const RIM: f64 = 0.58;
-/// Radii of track behind a tool on which its paths go on acting.
-const TRAIL: f64 = 6.0;
+/// Radii about the paths of a stage in which those of earlier ones go on acting.
+const TRAIL: f64 = 5.0;
 /// Radii of track that a tool goes on at once. Each time the shape so far becomes the one at rest: what is left behind
 /// would else spring back by what its springs have not yet followed.
 const STAGE: f64 = 6.0;
@@ -59,7 +59,7 @@ pub enum Extent {
     Curve,
     /// An area, which takes more solves a step.
     Area,
-    /// A track that the tool walks along: those of the last six radii, and of the six before, act at a time.
+    /// A track that the tool walks along, in order: those of six radii act at a time, with those near them from before.
     Track,
 }
 
@@ -135,6 +135,19 @@ struct Acting {
     stiffness: f64,
 }
 
+impl Acting {
+    fn new(index: usize, age: usize) -> Self {
+        Self {
+            index,
+            age,
+            force: 0.0,
+            crossing: None,
+            before: None,
+            stiffness: 0.0,
+        }
+    }
+}
+
 /// What a path asks of a step.
 struct Bearing {
     spread: Spread,
@@ -190,6 +203,13 @@ impl<T: Real> ForceStroke<T> {
         }
         for target in &targets {
             track::within(field, target.path.at(target.path.length()))?;
+        }
+        let whole = field.lattice().extent() * field.lattice().spacing(0);
+        if radius > 0.5 * whole.max_element() {
+            return Err(ForceError::tool(format!(
+                "a radius of {radius} is wider than the field, {:?}; use a smaller one",
+                whole.to_array()
+            )));
         }
         let shape = Shape::new(&how.filter).map_err(ForceError::Tool)?;
         let longest = targets.iter().map(|t| t.path.length()).fold(0.0, f64::max);
@@ -280,7 +300,8 @@ impl<T: Real> ForceStroke<T> {
         if self.settled == 0 {
             return self.acting.is_empty() && self.report.steps > 0;
         }
-        let off = if self.settled < LATE { ARRIVED } else { ARRIVED_LATE };
+        let is_late = self.settled >= LATE && self.acting.len() > 1;
+        let off = if is_late { ARRIVED_LATE } else { ARRIVED };
         let is_there = |a: &Acting| {
             let Some(crossing) = a.crossing else { return true };
             let target = &self.targets[a.index];
@@ -441,37 +462,32 @@ impl<T: Real> ForceStroke<T> {
     fn advance(&mut self) -> Result<(), ForceError> {
         if self.report.steps > 0 && self.begun < self.targets.len() && self.is_stage_over() {
             self.field = self.region.release_clay(&self.field)?;
-            let oldest = self.gone - TRAIL * self.radius;
             self.gone += STAGE * self.radius;
             let targets = &self.targets;
-            self.acting.retain(|a| targets[a.index].begins >= oldest);
-            let next = targets[self.begun..].iter().take_while(|t| t.begins <= self.gone);
+            let next = targets[self.begun..].partition_point(|t| t.begins <= self.gone);
+            let next = &targets[self.begun..][..next];
+            let far = (TRAIL * self.radius).powi(2);
+            let is_near = |t: &Target| next.iter().any(|n| n.path.at(0.0).distance_squared(t.path.at(0.0)) <= far);
+            let kept = (0..self.begun).filter(|i| is_near(&targets[*i]));
+            // What they had to hold is at rest now.
+            self.acting = kept.map(|i| Acting::new(i, usize::MAX / 2)).collect();
             let paths: Vec<&Target> = self.acting.iter().map(|a| &targets[a.index]).chain(next).collect();
             let cells = about(&self.field, self.region.cells().level, &paths, self.radius)?;
             let options = RegionOptions::of(&self.field, cells.level);
             self.region = Region::new(&self.field, cells, matter(&self.field, self.radius), &options)?;
-            // What they had to hold is at rest now.
-            self.acting.iter_mut().for_each(|a| a.force = 0.0);
             self.settled = 0;
-            self.scales = true;
             self.report.cuts += 1;
             self.report.samples = self.report.samples.max(self.region.patch().lattice().sample_count());
         }
         self.report.steps += 1;
-        let step = self.look();
-        while let Some(target) = self.targets.get(self.begun).filter(|t| t.begins <= self.gone) {
-            let value = |p| self.value(p);
-            let crossing = target.crossing(&value, self.iso, self.radius, step);
-            self.acting.push(Acting {
-                index: self.begun,
-                force: 0.0,
-                crossing,
-                before: None,
-                age: 0,
-                stiffness: 0.0,
-            });
+        self.scales = false;
+        while self.targets.get(self.begun).is_some_and(|t| t.begins <= self.gone) {
+            self.acting.push(Acting::new(self.begun, 0));
             self.begun += 1;
             self.scales = true;
+        }
+        if self.scales {
+            self.look_up();
         }
         Ok(())
     }
@@ -538,7 +554,6 @@ impl<T: Real> ForceStroke<T> {
 
     /// How far each path goes by a unit of force on all, by their weights.
     fn scale(&mut self, bearings: &[Option<Bearing>], dt: f64) -> Result<(), ForceError> {
-        self.scales = false;
         let targets = &self.targets;
         let weights = self.acting.iter().map(|a| targets[a.index].weight);
         let load = Load::<T>::of(pairs(bearings, weights));
@@ -586,16 +601,24 @@ impl<T: Real> ForceStroke<T> {
     }
 
     /// Looks where the surface is now.
-    fn told(&mut self, solves: usize, residual: f64) -> Told {
+    fn look_up(&mut self) {
         let functions = Functions::of(&self.field, &self.region);
         let p = &self.region.patch().state().p;
         let value = |at: DVec3| functions.value(p, at);
         let step = self.look();
-        let (mut least, mut most, mut force) = (f64::INFINITY, f64::NEG_INFINITY, 0.0);
         for acting in &mut self.acting {
             let target = &self.targets[acting.index];
             acting.before = acting.crossing;
             acting.crossing = target.crossing(&value, self.iso, self.radius, step);
+        }
+    }
+
+    /// What the step did.
+    fn told(&mut self, solves: usize, residual: f64) -> Told {
+        self.look_up();
+        let (mut least, mut most, mut force) = (f64::INFINITY, f64::NEG_INFINITY, 0.0);
+        for acting in &self.acting {
+            let target = &self.targets[acting.index];
             force += acting.force;
             let share = acting.crossing.map_or(1.0, |s| s / target.path.length());
             (least, most) = (least.min(share), most.max(share));

@@ -10,6 +10,8 @@ pub const DENSITY: f64 = 2.0;
 const NEAR: f64 = 4.0;
 /// Radii that a free end of a curve, or the rim of an area, stands for beside its share.
 const OPEN: f64 = 0.5;
+/// Cosine of the turn from which on a curve has a corner.
+const CORNER: f64 = 0.9;
 /// Most paths of a tool.
 const MOST: f64 = 20_000.0;
 
@@ -77,14 +79,20 @@ pub fn along<T: Real>(
         return Ok(vec![place(first, 1.0, 0.0)?]);
     }
     let path = Path::through(points.iter().copied())?;
-    let count = (DENSITY * path.length() / radius).ceil();
-    few(count)?;
-    let width = path.length() / count;
-    (0..=count as usize)
+    // Corners get places of their own.
+    let ends: Vec<f64> = path.corners(CORNER).collect();
+    let mut stops = vec![0.0];
+    for (from, to) in std::iter::once(0.0).chain(ends.iter().copied()).zip(ends.iter().copied().chain([path.length()])) {
+        let count = (DENSITY * (to - from) / radius).ceil();
+        few(stops.len() as f64 + count)?;
+        stops.extend((1..=count as usize).map(|i| from + (to - from) * i as f64 / count));
+    }
+    let last = stops.len() - 1;
+    (0..=last)
         .map(|i| {
-            let is_end = i == 0 || i == count as usize;
-            let weight = if is_end { 0.5 * width + OPEN * radius } else { width };
-            place(path.at(i as f64 * width), weight, i as f64 * width)
+            let width = 0.5 * (stops[(i + 1).min(last)] - stops[i.saturating_sub(1)]);
+            let open = if i == 0 || i == last { OPEN * radius } else { 0.0 };
+            place(path.at(stops[i]), width + open, stops[i])
         })
         .collect()
 }
