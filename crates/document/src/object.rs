@@ -6,6 +6,7 @@ use formats::field::FieldMeta;
 use glam::{DAffine3, DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
+use tools::paint::Layers;
 
 /// A solid of a document. Cheap to copy.
 #[derive(Clone, Debug)]
@@ -14,6 +15,8 @@ pub struct Object {
     pub field: HierarchicalSpline<f32>,
     /// What came with the field: unit, iso value, report of the fit.
     pub meta: Arc<FieldMeta>,
+    /// What is painted on it; layers on which nothing is painted are missing.
+    pub layers: Layers,
     /// What a user may set without a change of the field.
     pub properties: Properties,
 }
@@ -66,11 +69,12 @@ impl Object {
         Ok(Self {
             field: field.to_single()?,
             meta: Arc::new(meta),
+            layers: Layers::new(),
             properties: Properties::default(),
         })
     }
 
-    /// Names field and properties; what came with the field does not enter.
+    /// Names field, properties and layers; what came with the field does not enter.
     pub(crate) fn hash_into(&self, hash: &mut Sha256) {
         hash.update(self.field.sha256());
         for value in self.properties.placement.as_flattened() {
@@ -79,5 +83,9 @@ impl Object {
         let parent = self.properties.parent.as_deref().unwrap_or_default();
         hash.update((parent.len() as u64).to_le_bytes());
         hash.update(parent);
+        for (substance, layer) in self.layers.iter().filter(|(_, layer)| !layer.is_empty()) {
+            hash.update(substance.name());
+            hash.update(layer.tree().sha256());
+        }
     }
 }

@@ -36,14 +36,12 @@
 //!
 //! What it cannot do yet: use more than one thread.
 
-mod cache;
 pub mod constraints;
 pub mod integrators;
 pub mod lattice;
 pub mod matter;
 pub mod paint;
 pub mod patch;
-mod patch_error;
 pub mod region;
 pub mod response;
 mod rest;
@@ -52,6 +50,6 @@ pub mod solve;
 pub mod sparse;
 pub mod springs;
 mod statics;
+#[cfg(feature = "study")]
 pub mod study;
 mod units;
-mod version;

@@ -48,19 +48,19 @@ impl<T: Real> Patch<T> {
         }
         let values = Quantity::PerSample(paint.values.to_vec());
         values.check(substance.name(), paint.at.len(), substance != Substance::Mass)?;
-        let samples = self.base.len();
+        let samples = self.motion.base.len();
         let quantity = match substance {
-            Substance::Stiffness => &mut self.matter.stiffness,
-            Substance::Mass => &mut self.matter.mass,
-            Substance::Damping => &mut self.matter.damping,
-            Substance::Ground => &mut self.matter.ground,
+            Substance::Stiffness => &mut self.material.matter.stiffness,
+            Substance::Mass => &mut self.material.matter.mass,
+            Substance::Damping => &mut self.material.matter.damping,
+            Substance::Ground => &mut self.material.matter.ground,
         };
         let was_constant = matches!(quantity, Quantity::Constant(_));
         let list = quantity.paint(samples);
         let before = paint.at.crop(list, dims);
         paint.at.paste(list, dims, paint.values);
         // Under a mask samples outside follow those inside.
-        let local = !self.own_springs && self.mask.is_none();
+        let local = !self.material.own_springs && self.material.mask.is_none();
         let done = if substance == Substance::Stiffness && !was_constant && local {
             self.stiffen(paint)
         } else {
@@ -68,15 +68,15 @@ impl<T: Real> Patch<T> {
         };
         if let Err(e) = done {
             let undone = match substance {
-                Substance::Stiffness => &mut self.matter.stiffness,
-                Substance::Mass => &mut self.matter.mass,
-                Substance::Damping => &mut self.matter.damping,
-                Substance::Ground => &mut self.matter.ground,
+                Substance::Stiffness => &mut self.material.matter.stiffness,
+                Substance::Mass => &mut self.material.matter.mass,
+                Substance::Damping => &mut self.material.matter.damping,
+                Substance::Ground => &mut self.material.matter.ground,
             };
             paint.at.paste(undone.paint(samples), dims, &before);
             return Err(e.into());
         }
-        self.cache.paints += 1;
+        self.material.paints += 1;
         // A spring counts where it starts, which may be a sample before the box.
         self.cache.painted_on = self.cache.painted_on.joined(paint.at.grown(1, dims));
         Ok(())
@@ -85,11 +85,11 @@ impl<T: Real> Patch<T> {
     /// Of all matter.
     fn lump_again(&mut self) -> Result<(), MatterError> {
         let (lumped, springs) = self
-            .masked_matter(&self.matter)
-            .in_units(self.cache.solver.lattice(), self.neighbours)?;
-        self.lumped = lumped;
-        self.network.paint(&springs);
-        self.own_springs = false;
+            .masked_matter(&self.material.matter)
+            .in_units(self.cache.solver.lattice(), self.material.neighbours)?;
+        self.material.lumped = lumped;
+        self.material.network.paint(&springs);
+        self.material.own_springs = false;
         Ok(())
     }
 
@@ -99,12 +99,13 @@ impl<T: Real> Patch<T> {
         let dims = lattice.sample_dims();
         let near = paint.at.grown(1, dims);
         let changed: Vec<Vec<(usize, f64)>> = self
+            .material
             .neighbours
             .directions()
             .into_iter()
             .enumerate()
             .map(|(n, direction)| {
-                let weight = self.matter.spring_weight(lattice, n, direction);
+                let weight = self.material.matter.spring_weight(lattice, n, direction);
                 near.indices(dims).map(|i| (i, weight(i))).collect()
             })
             .collect();
@@ -121,7 +122,7 @@ impl<T: Real> Patch<T> {
                 },
             });
         }
-        self.network.paint_on(&changed);
+        self.material.network.paint_on(&changed);
         Ok(())
     }
 }

@@ -93,24 +93,27 @@ impl<T: Real> Patch<T> {
             solve,
         };
         if integrator == Integrator::Paper {
-            return Ok(response(&self.work, first));
+            return Ok(response(&self.cache.work, first));
         }
         // With e = H⁻¹·2c²J the second stage, less c²K̃e = 2c²J - (M̃ + cD̃)e, has (1 + β)(2M̃ + cD̃)e - c²J to solve.
-        let e = response(&self.work, first);
+        let e = response(&self.cache.work, first);
         let beta = (1.0 - gamma).powi(2) / (gamma * (2.0 - gamma));
         let unit = self.matrix_unit(a, b);
         self.forces(Some(b / unit));
         self.write_impulse(load, dims, -b / unit);
-        let factors = [2.0 * self.lumped.mass.unit, a * self.lumped.damping.unit];
+        let factors = [
+            2.0 * self.material.lumped.mass.unit,
+            a * self.material.lumped.damping.unit,
+        ];
         let [of_mass, of_damping] = factors.map(|f| (1.0 + beta) * f / unit);
-        for (i, g) in self.work.g.iter_mut().enumerate() {
-            let inertia =
-                of_mass * self.lumped.mass.at(i).as_f64() + of_damping * self.lumped.damping.at(i).as_f64();
+        for (i, g) in self.cache.work.g.iter_mut().enumerate() {
+            let inertia = of_mass * self.material.lumped.mass.at(i).as_f64()
+                + of_damping * self.material.lumped.damping.at(i).as_f64();
             *g = T::from_f64(g.as_f64() + inertia * e.d[i].as_f64());
         }
         self.aim(0.0, 0.0, 0.0);
         let second = self.solve_step_to(a, b, Some(RESPONSE))?;
-        let mut whole = response(&self.work, first.and(second));
+        let mut whole = response(&self.cache.work, first.and(second));
         let add = |to: &mut [T], from: &[T]| to.iter_mut().zip(from).for_each(|(a, b)| *a += *b);
         add(&mut whole.p, &e.p);
         add(&mut whole.d, &e.d);
@@ -118,12 +121,12 @@ impl<T: Real> Patch<T> {
     }
 
     fn write_impulse(&mut self, load: &OnBox<T>, dims: [usize; 3], factor: f64) {
-        self.work.g.fill(T::zero());
+        self.cache.work.g.fill(T::zero());
         for (i, j) in load.at.indices(dims).zip(load.values) {
-            self.work.g[i] = T::from_f64(factor * j.as_f64());
+            self.cache.work.g[i] = T::from_f64(factor * j.as_f64());
         }
-        if let Some(mask) = &self.mask {
-            mask.cut(&mut self.work.g);
+        if let Some(mask) = &self.material.mask {
+            mask.cut(&mut self.cache.work.g);
         }
     }
 
@@ -152,10 +155,10 @@ impl<T: Real> Patch<T> {
             self.check_load(load)?;
         }
         let mut s = self.static_solver(against)?;
-        let mask = self.mask.clone();
+        let mask = self.material.mask.clone();
         let (dims, count) = (self.lattice().sample_dims(), self.lattice().coefficient_count());
-        let mut g = vec![0.0; self.base.len()];
-        let (mut x, mut dx) = (vec![0.0; count], vec![0.0; self.base.len()]);
+        let mut g = vec![0.0; self.motion.base.len()];
+        let (mut x, mut dx) = (vec![0.0; count], vec![0.0; self.motion.base.len()]);
         let column = |load: &OnBox<T>| {
             // The unit keeps what is solved for in range; the result is asked for in that of T.
             let size = binary_unit(largest(load.values));
@@ -190,12 +193,12 @@ impl<T: Real> Patch<T> {
         let version = self.version();
         let kept = self.cache.statics[slot].take();
         // A tangent is of the state, which has no version.
-        let moves = slot == 0 && matches!(self.network.law(), Law::FourD { .. });
+        let moves = slot == 0 && matches!(self.material.network.law(), Law::FourD { .. });
         let kept = match kept {
             Some(s) if s.against == against && (s.version == version || slot == 1) && !moves => return Ok(s),
             kept => kept,
         };
-        let sigma2 = self.network.law().scale().powi(2);
+        let sigma2 = self.material.network.law().scale().powi(2);
         let (ground, springs) = match against {
             Against::Painted => (self.exact_ground(), self.present_springs()),
             Against::Reference { stiffness, ground } => {
@@ -206,16 +209,16 @@ impl<T: Real> Patch<T> {
                 };
                 let lumped = self
                     .masked_matter(&matter)
-                    .lumped::<f64>(&self.lattice().in_double(), self.neighbours)?;
+                    .lumped::<f64>(&self.lattice().in_double(), self.material.neighbours)?;
                 (lumped.ground, lumped.springs)
             }
         };
-        let held = self.held.as_deref().filter(|_| slot == 0);
+        let held = self.material.held.as_deref().filter(|_| slot == 0);
         let stiffest = springs.iter().fold(0.0_f64, |m, s| m.max(s.weights.range().1));
         let anchored = ground.range().1 > 0.0 || held.is_some();
         let fixed = self.lattice().axes().iter().any(|a| a.rim() == Rim::Fixed);
         let floats = |m: &Mask| m.parts().iter().any(|p| p.floats);
-        let fixed = match &self.mask {
+        let fixed = match &self.material.mask {
             Some(mask) => !floats(mask),
             None => fixed,
         };
@@ -262,22 +265,24 @@ impl<T: Real> Patch<T> {
             },
             ..own
         };
-        let steps = self.neighbours.directions().into_iter().map(|d| d.step);
+        let steps = self.material.neighbours.directions().into_iter().map(|d| d.step);
         let mut solver = StepSolver::new(self.lattice().in_double(), &steps.collect::<Vec<_>>(), options);
-        solver.set_mask(self.mask.clone());
+        solver.set_mask(self.material.mask.clone());
         solver
     }
 
     pub(crate) fn exact_ground(&self) -> Weights<f64> {
-        let ground = &self.lumped.ground;
+        let ground = &self.material.lumped.ground;
         ground.weights.scaled(ground.unit)
     }
 
     /// Springs of the linear law, tangents of the 4-D one, without `σ²`.
     pub(crate) fn present_springs(&self) -> Vec<SpringWeights<f64>> {
         let mut springs = self.exact_springs();
-        if let Law::FourD { .. } = self.network.law() {
-            self.network.scale_by_tangent(&self.state.d, &mut springs);
+        if let Law::FourD { .. } = self.material.network.law() {
+            self.material
+                .network
+                .scale_by_tangent(&self.motion.state.d, &mut springs);
         }
         springs
     }
@@ -296,7 +301,7 @@ impl<T: Real> Patch<T> {
             if weight <= 0.0 || weight.is_nan() {
                 continue;
             }
-            for s in self.network.springs() {
+            for s in self.material.network.springs() {
                 let step = s.direction.step;
                 let end = |a: usize| ijk[a].checked_add_signed(step[a]).is_some_and(|e| e < dims[a]);
                 if !(0..3).all(end) {
@@ -305,7 +310,7 @@ impl<T: Real> Patch<T> {
                 let axis = step.iter().position(|&s| s != 0).unwrap_or(0);
                 let share = s.direction.share * volume / (h[axis] * h[axis]);
                 let weight = weight * s.direction.share;
-                sum += weight * self.network.stiffness_unit() * s.weights.at(i).as_f64() / share;
+                sum += weight * self.material.network.stiffness_unit() * s.weights.at(i).as_f64() / share;
                 all += weight;
             }
         }

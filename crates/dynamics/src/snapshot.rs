@@ -7,10 +7,10 @@ use crate::constraints::{Constraint, Held};
 use crate::lattice::{Axis, Lattice, LatticeError, Rim, SampleBox};
 use crate::matter::Matter;
 use crate::patch::{Patch, PatchError, State, finite};
+use crate::patch::{Prepared, Version};
 use crate::solve::{SolverHistory, SolverOptions};
 use crate::sparse::MaskRecord;
 use crate::springs::{Law, Neighbours, Plasticity, Rest, SpringWeights, StepMatrix, Weights};
-use crate::version::{Prepared, Version};
 
 /// All of a patch that later bits depend on: state, matter, and of the solvers what they were made for. Factors are not in
 /// it; they come out the same when they are made again.
@@ -97,7 +97,7 @@ impl<T: Real> Patch<T> {
     /// All that later bits depend on. Looking changes nothing.
     pub fn snapshot(&self) -> PatchSnapshot<T> {
         let (now, cache) = (self.version(), &self.cache);
-        let springs = self.own_springs.then(|| self.exact_springs());
+        let springs = self.material.own_springs.then(|| self.exact_springs());
         let solver = cache.solver.history();
         // Constant material is prepared for anew after paint.
         let lags = |p: &Prepared| p.version.changes == now.changes && solver.is_some();
@@ -107,17 +107,17 @@ impl<T: Real> Patch<T> {
         PatchSnapshot {
             precision: T::NAME.to_owned(),
             axes: self.lattice().axes().each_ref().map(AxisRecord::of),
-            law: self.network.law(),
-            neighbours: self.neighbours,
+            law: self.material.network.law(),
+            neighbours: self.material.neighbours,
             options: cache.solver.options(),
-            matter: self.matter.clone(),
+            matter: self.material.matter.clone(),
             springs: springs.map(|all| all.into_iter().map(|s| s.weights).collect()),
-            rest: self.network.rest().clone(),
-            plasticity: self.plasticity.clone(),
-            state: self.state.clone(),
-            base: self.base.clone(),
-            anchor: self.anchor.clone(),
-            external: self.external.clone(),
+            rest: self.material.network.rest().clone(),
+            plasticity: self.material.plasticity.clone(),
+            state: self.motion.state.clone(),
+            base: self.motion.base.clone(),
+            anchor: self.motion.anchor.clone(),
+            external: self.motion.external.clone(),
             constraints: self.constraints().to_vec(),
             mask: self.mask().map(MaskRecord::of),
             prepared: prepared.map(bits),
@@ -169,7 +169,7 @@ impl<T: Real> Patch<T> {
         for (list, needed) in sizes.into_iter().chain([(&s.anchor, m), (&s.external, m)]) {
             finite("number", list, needed)?;
         }
-        let directions = patch.network.rest().differences.len();
+        let directions = patch.material.network.rest().differences.len();
         if s.rest.differences.len() != directions {
             return Err(damaged("rest lengths of another number of directions"));
         }
@@ -179,17 +179,17 @@ impl<T: Real> Patch<T> {
         if let Weights::Each(scale) = &s.rest.scale {
             finite("rest scale", scale, m)?;
         }
-        *patch.network.rest_mut() = s.rest.clone();
+        *patch.material.network.rest_mut() = s.rest.clone();
         patch.set_plasticity(s.plasticity.clone())?;
-        patch.state = s.state.clone();
-        patch.anchor.copy_from_slice(&s.anchor);
+        patch.motion.state = s.state.clone();
+        patch.motion.anchor.copy_from_slice(&s.anchor);
         patch.write_force(|external| external.copy_from_slice(&s.external));
         if !s.constraints.is_empty() {
             let sigma2 = s.law.scale().powi(2);
-            let mask = patch.mask.as_deref();
-            let held = Held::new(&s.constraints, patch.lattice(), &patch.base, sigma2, mask)?;
+            let mask = patch.material.mask.as_deref();
+            let held = Held::new(&s.constraints, patch.lattice(), &patch.motion.base, sigma2, mask)?;
             patch.cache.solver.set_border(Some(held.border(true)));
-            patch.held = Some(Box::new(held));
+            patch.material.held = Some(Box::new(held));
         }
         patch.resume(s)?;
         Ok(patch)
@@ -238,7 +238,7 @@ impl<T: Real> Patch<T> {
         let damping = s.mass_prepared.map(f64::from_bits);
         let matrix = self.mass_matrix(damping.unwrap_or(0.0));
         let mut solver = self.mass_solver();
-        if let (Some(held), Some(_)) = (&self.held, damping) {
+        if let (Some(held), Some(_)) = (&self.material.held, damping) {
             solver.set_border(Some(held.border(false)));
         }
         match &s.mass_solver {
@@ -255,8 +255,8 @@ impl<T: Real> Patch<T> {
 
     /// Stiffness of the springs, as it was given.
     pub(crate) fn exact_springs(&self) -> Vec<SpringWeights<f64>> {
-        let unit = self.network.stiffness_unit();
-        let springs = self.network.springs().iter().map(|s| SpringWeights {
+        let unit = self.material.network.stiffness_unit();
+        let springs = self.material.network.springs().iter().map(|s| SpringWeights {
             direction: s.direction,
             weights: s.weights.scaled(if unit > 0.0 { unit } else { 1.0 }),
         });

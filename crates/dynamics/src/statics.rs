@@ -1,8 +1,8 @@
 //! Solvers of static problems, which a patch keeps.
 
+use crate::patch::Version;
 use crate::solve::StepSolver;
 use crate::springs::StepMatrix;
-use crate::version::Version;
 
 /// Against which springs a static force works.
 #[derive(Clone, Copy, Debug, PartialEq)]

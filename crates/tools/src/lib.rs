@@ -4,6 +4,7 @@
 pub mod force;
 pub mod geometric;
 pub mod number;
+pub mod paint;
 pub mod scene;
 pub mod session;
 pub mod tool;

@@ -2,8 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::force::{Chisel, Drill, Pull};
+use crate::force::{Chisel, Drill, ForceTool, Pull};
 use crate::geometric::Geometric;
+use crate::paint::Paint;
 use crate::tool::Tool;
 
 /// What a session file says.
@@ -42,6 +43,9 @@ pub struct Stroke {
     /// Makes a bridge or a seam.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub join: Option<Drill>,
+    /// Paints matter or touch.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub paint: Option<Paint>,
 }
 
 impl Stroke {
@@ -53,11 +57,18 @@ impl Stroke {
         let all = [
             self.carve.as_ref().map(Tool::Carve),
             self.add.as_ref().map(Tool::Add),
-            self.pull.as_ref().map(Tool::Pull),
-            self.chisel.as_ref().map(Tool::Chisel),
-            self.squirt.as_ref().map(Tool::Squirt),
-            self.drill.as_ref().map(Tool::Drill),
-            self.join.as_ref().map(Tool::Join),
+            self.pull.as_ref().map(|tool| Tool::Force(ForceTool::Pull(tool))),
+            self.chisel
+                .as_ref()
+                .map(|tool| Tool::Force(ForceTool::Chisel(tool))),
+            self.squirt
+                .as_ref()
+                .map(|tool| Tool::Force(ForceTool::Squirt(tool))),
+            self.drill
+                .as_ref()
+                .map(|tool| Tool::Force(ForceTool::Drill(tool))),
+            self.join.as_ref().map(|tool| Tool::Force(ForceTool::Join(tool))),
+            self.paint.as_ref().map(Tool::Paint),
         ];
         let given: Vec<_> = all.into_iter().flatten().collect();
         match given[..] {

@@ -4,8 +4,9 @@ use bspline::HierarchicalSpline;
 use fitting::field::FieldFitReport;
 use fitting::{Control, FitError};
 
-use crate::force::{Chisel, Drill, ForceError, ForceReport, Pull};
+use crate::force::{ForceError, ForceTool};
 use crate::geometric::{Geometric, GeometricError, Operation};
+use crate::paint::{Layers, Paint, PaintError};
 
 /// What a tool works on. Cheap to copy.
 #[derive(Clone, Debug)]
@@ -14,6 +15,8 @@ pub struct Canvas {
     pub field: HierarchicalSpline<f32>,
     /// Density of its surface.
     pub iso: f64,
+    /// What is painted on it.
+    pub layers: Layers,
 }
 
 /// A tool with all that it is told.
@@ -23,16 +26,10 @@ pub enum Tool<'a> {
     Carve(&'a Geometric),
     /// Adds a solid.
     Add(&'a Geometric),
-    /// Brings the surface elsewhere.
-    Pull(&'a Pull),
-    /// Cuts a groove.
-    Chisel(&'a Chisel),
-    /// Lays a ridge.
-    Squirt(&'a Chisel),
-    /// Makes a hole or a cut.
-    Drill(&'a Drill),
-    /// Makes a bridge or a seam.
-    Join(&'a Drill),
+    /// Pushes or pulls.
+    Force(ForceTool<'a>),
+    /// Paints matter or touch.
+    Paint(&'a Paint),
 }
 
 /// Why a tool cannot be used.
@@ -44,6 +41,9 @@ pub enum ToolError {
     /// A force tool cannot.
     #[error(transparent)]
     Force(#[from] ForceError),
+    /// Paint cannot be laid on.
+    #[error(transparent)]
+    Paint(#[from] PaintError),
 }
 
 impl ToolError {
@@ -52,24 +52,25 @@ impl ToolError {
         match self {
             Self::Geometric(e) => matches!(e, GeometricError::Fit(FitError::Cancelled)),
             Self::Force(e) => e.is_cancelled(),
+            Self::Paint(_) => false,
         }
     }
 }
 
 impl Tool<'_> {
     /// Names of all tools, as sessions write them.
-    pub const NAMES: [&'static str; 7] = ["carve", "add", "pull", "chisel", "squirt", "drill", "join"];
+    pub const NAMES: [&'static str; 8] = {
+        let [pull, chisel, squirt, drill, join] = ForceTool::NAMES;
+        ["carve", "add", pull, chisel, squirt, drill, join, "paint"]
+    };
 
     /// Its name, as sessions write it.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Carve(_) => "carve",
             Self::Add(_) => "add",
-            Self::Pull(_) => "pull",
-            Self::Chisel(_) => "chisel",
-            Self::Squirt(_) => "squirt",
-            Self::Drill(_) => "drill",
-            Self::Join(_) => "join",
+            Self::Force(tool) => tool.name(),
+            Self::Paint(_) => "paint",
         }
     }
 
@@ -78,24 +79,22 @@ impl Tool<'_> {
     /// # Errors
     /// Any [`ToolError`].
     pub fn apply(&self, canvas: Canvas, control: &mut Control) -> Result<(Canvas, Vec<String>), ToolError> {
-        let Canvas { field: old, iso } = &canvas;
-        let stroke = match self {
-            Self::Carve(tool) => Err(tool.apply(Operation::Carve, old, *iso, control)?),
-            Self::Add(tool) => Err(tool.apply(Operation::Add, old, *iso, control)?),
-            Self::Pull(tool) => Ok(tool.begin(old, *iso)?),
-            Self::Chisel(tool) => Ok(tool.begin(old, *iso, false)?),
-            Self::Squirt(tool) => Ok(tool.begin(old, *iso, true)?),
-            Self::Drill(tool) => Ok(tool.begin(old, *iso, false)?),
-            Self::Join(tool) => Ok(tool.begin(old, *iso, true)?),
-        };
-        let (field, told) = match stroke {
-            Err((field, report)) => (field, thin_parts(&report)),
-            Ok(stroke) => {
-                let (field, report) = stroke.finish(control)?;
-                (field, late_paths(&report))
+        let (field, report) = match self {
+            Self::Paint(paint) => {
+                let everywhere = canvas.field.lattice().world_box();
+                let layer = paint.apply(&canvas.field, &canvas.layers, &everywhere)?;
+                let mut canvas = canvas;
+                canvas.layers.insert(paint.layer, layer);
+                return Ok((canvas, Vec::new()));
             }
+            Self::Force(tool) => {
+                let (field, told) = tool.apply(&canvas.field, canvas.iso, control)?;
+                return Ok((Canvas { field, ..canvas }, told));
+            }
+            Self::Carve(tool) => tool.apply(Operation::Carve, &canvas.field, canvas.iso, control)?,
+            Self::Add(tool) => tool.apply(Operation::Add, &canvas.field, canvas.iso, control)?,
         };
-        Ok((Canvas { field, ..canvas }, told))
+        Ok((Canvas { field, ..canvas }, thin_parts(&report)))
     }
 }
 
@@ -106,20 +105,6 @@ fn thin_parts(report: &FieldFitReport) -> Vec<String> {
         format!(
             "{} of {} points have the wrong sign: parts thinner than a knot interval; allow more levels (finer)",
             left.wrong_signs, report.samples,
-        )
-    });
-    told.into_iter().collect()
-}
-
-/// Says what did not arrive.
-fn late_paths(report: &ForceReport) -> Vec<String> {
-    let off = |share: f64| (share - 1.0).abs() > 0.02;
-    let told = (off(report.arrival.least) || off(report.arrival.most)).then(|| {
-        format!(
-            "after {} steps the surface is at {:.1} to {:.1} % of its way; what is near holds it, or the rim of the field",
-            report.steps,
-            100.0 * report.arrival.least,
-            100.0 * report.arrival.most,
         )
     });
     told.into_iter().collect()

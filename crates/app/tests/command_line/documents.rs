@@ -216,3 +216,40 @@ fn a_block_is_made_from_nothing_and_shaped() {
     }
     assert!(!bench.path("a.isoclay").exists());
 }
+
+#[test]
+fn a_scan_comes_back_with_the_edits_of_its_object() {
+    let bench = Bench::new();
+    bench.json("phantom head -o head.nii --size 32");
+    bench.json("fit head.nii -o head.iclay");
+    bench.json("new clay.isoclay head.iclay");
+    bench.json("export clay.isoclay --like head.nii -o same.nii");
+    let bytes = |name: &str| std::fs::read(bench.path(name)).unwrap();
+    assert_eq!(bytes("same.nii"), bytes("head.nii"));
+    let corners = bench.json("info head.iclay")["box"].clone();
+    let corner = |n: usize, axis: usize| corners[n][axis].as_f64().unwrap();
+    let [x, y, z] = [0, 1, 2].map(|axis| (corner(0, axis) + corner(1, axis)) / 2.0);
+    let r = 0.2 * (corner(1, 0) - corner(0, 0));
+    bench.write(
+        "carve.toml",
+        format!(
+            "[[stroke]]\ncarve = {{ shape = {{ sphere = {{ radius = {r} }} }}, along = [[{x}, {y}, {z}]] }}\n"
+        ),
+    );
+    bench.json("sculpt clay.isoclay --script carve.toml");
+    let told = bench.run("export clay.isoclay --like head.nii -o carved.nii --fill -7");
+    assert!(told.stdout.contains("density -7"), "{}", told.stdout);
+    let (old, new) = (bytes("head.nii"), bytes("carved.nii"));
+    assert_eq!(old.len(), new.len());
+    assert_eq!(old[..352], new[..352]);
+    assert_ne!(old, new);
+    bench.json("undo clay.isoclay");
+    bench.json("export clay.isoclay --like head.nii -o back.nii.gz");
+    bench.json("export clay.isoclay --like head.nii -o back.nii");
+    assert_eq!(bytes("back.nii"), old);
+    bench.json("phantom head -o other.nii --size 32 --seed 2 --noise 1%");
+    let run = bench.run("export clay.isoclay --like other.nii -o out.nii");
+    assert_eq!(run.code, 2);
+    assert!(run.stderr.contains("other samples"), "{}", run.stderr);
+    assert!(!bench.path("out.nii").exists());
+}

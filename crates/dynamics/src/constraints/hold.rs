@@ -17,13 +17,13 @@ impl<T: Real> Patch<T> {
     /// # Errors
     /// [`PatchError::Constraint`]; the old constraints then stay.
     pub fn set_constraints(&mut self, constraints: &[Constraint]) -> Result<(), PatchError> {
-        if let Some(held) = &mut self.held
-            && held.aim_at(constraints, &self.base)?
+        if let Some(held) = &mut self.material.held
+            && held.aim_at(constraints, &self.motion.base)?
         {
             self.meet_constraints();
             return Ok(());
         }
-        let sigma2 = self.network.law().scale().powi(2);
+        let sigma2 = self.material.network.law().scale().powi(2);
         let (coefficients, limit) = (
             self.lattice().coefficient_count(),
             self.cache.solver.options().sample_direct_limit(),
@@ -37,39 +37,43 @@ impl<T: Real> Patch<T> {
             list => Some(Box::new(Held::new(
                 list,
                 self.cache.solver.lattice(),
-                &self.base,
+                &self.motion.base,
                 sigma2,
-                self.mask.as_deref(),
+                self.material.mask.as_deref(),
             )?)),
         };
         self.cache
             .solver
             .set_border(held.as_ref().map(|h| h.border(true)));
-        self.held = held;
+        self.material.held = held;
         if let Some(solver) = &mut self.cache.mass_solver {
             solver.set_border(None);
         }
         self.cache.mass_matrix = None;
-        self.cache.changes += 1;
+        self.material.changes += 1;
         self.meet_constraints();
         Ok(())
     }
 
     /// The constraints.
     pub fn constraints(&self) -> &[Constraint] {
-        self.held.as_ref().map_or(&[], |h| &h.constraints)
+        self.material.held.as_ref().map_or(&[], |h| &h.constraints)
     }
 
     /// What is missing to the density of each constraint.
     pub fn constraint_gaps(&self) -> impl Iterator<Item = f64> + '_ {
-        let rows = self.held.iter().flat_map(|h| &h.rows);
-        rows.map(|r| r.target - r.value(&self.state.p))
+        let rows = self.material.held.iter().flat_map(|h| &h.rows);
+        rows.map(|r| r.target - r.value(&self.motion.state.p))
     }
 
     /// Constraint springs on the coefficients: rows with `σ²k`.
     pub(crate) fn constraint_springs(&self) -> Vec<(&[(usize, f64)], f64)> {
-        let sigma2 = self.network.law().scale().powi(2);
-        let rows = self.held.iter().flat_map(|h| h.constraints.iter().zip(&h.rows));
+        let sigma2 = self.material.network.law().scale().powi(2);
+        let rows = self
+            .material
+            .held
+            .iter()
+            .flat_map(|h| h.constraints.iter().zip(&h.rows));
         let springs = rows.filter_map(|(c, row)| match c.hold {
             Hold::Spring(k) => Some((&row.terms[..], sigma2 * k)),
             Hold::Hard => None,
@@ -79,7 +83,7 @@ impl<T: Real> Patch<T> {
 
     /// Energy of the constraint springs.
     pub(crate) fn constraint_energy(&self) -> f64 {
-        let sigma2 = self.network.law().scale().powi(2);
+        let sigma2 = self.material.network.law().scale().powi(2);
         let springs = self.constraints().iter().zip(self.constraint_gaps());
         let energies = springs.map(|(c, gap)| match c.hold {
             Hold::Spring(k) => 0.5 * sigma2 * k * gap * gap,
@@ -90,7 +94,7 @@ impl<T: Real> Patch<T> {
 
     /// Brings the state onto the hard constraints, and its velocity into their null space.
     pub(crate) fn meet_constraints(&mut self) {
-        let Some(mut held) = self.held.take() else {
+        let Some(mut held) = self.material.held.take() else {
             return;
         };
         if !held.hard.c.is_empty() {
@@ -106,7 +110,7 @@ impl<T: Real> Patch<T> {
                 for ((now, then), p) in moved
                     .iter()
                     .zip(&before)
-                    .zip([&mut self.state.p, &mut self.state.v])
+                    .zip([&mut self.motion.state.p, &mut self.motion.state.v])
                 {
                     let moved = now.iter().zip(then);
                     let moved: Vec<f64> = moved.map(|(a, b)| (*a - *b).as_f64()).collect();
@@ -116,32 +120,32 @@ impl<T: Real> Patch<T> {
                     }
                 }
             } else {
-                self.state.p.copy_from_slice(&moved[0]);
-                self.state.v.copy_from_slice(&moved[1]);
+                self.motion.state.p.copy_from_slice(&moved[0]);
+                self.motion.state.v.copy_from_slice(&moved[1]);
             }
             self.sample_state();
         }
-        self.held = Some(held);
+        self.material.held = Some(held);
     }
 
     /// Reads displacement and velocity of the unknowns.
     fn displace(&self, held: &mut Held<T>) {
         let [u, v] = &mut held.moved;
         if self.lattice().is_square() {
-            for ((u, d), base) in u.iter_mut().zip(&self.state.d).zip(&self.base) {
+            for ((u, d), base) in u.iter_mut().zip(&self.motion.state.d).zip(&self.motion.base) {
                 *u = *d - *base;
             }
-            v.copy_from_slice(&self.state.w);
+            v.copy_from_slice(&self.motion.state.w);
         } else {
-            u.copy_from_slice(&self.state.p);
-            v.copy_from_slice(&self.state.v);
+            u.copy_from_slice(&self.motion.state.p);
+            v.copy_from_slice(&self.motion.state.v);
         }
     }
 
     /// Completes forces on the unknowns, multiples of `unit`, by those of the constraints: what the springs pull with, and
     /// what the hard ones bear.
     pub(crate) fn balance(&mut self, unit: f64, forces: &mut [T]) {
-        let Some(mut held) = self.held.take() else {
+        let Some(mut held) = self.material.held.take() else {
             return;
         };
         self.displace(&mut held);
@@ -153,13 +157,17 @@ impl<T: Real> Patch<T> {
             }
         }
         held.hard.rows.close(forces, |_| 0.0);
-        self.held = Some(held);
+        self.material.held = Some(held);
     }
 
     /// What constraint springs gain when the coefficients have grown by `moved(i)` since the state `p`.
     pub(crate) fn constraint_energy_change(&self, p: &[T], moved: impl Fn(usize) -> f64) -> f64 {
-        let sigma2 = self.network.law().scale().powi(2);
-        let rows = self.held.iter().flat_map(|h| h.constraints.iter().zip(&h.rows));
+        let sigma2 = self.material.network.law().scale().powi(2);
+        let rows = self
+            .material
+            .held
+            .iter()
+            .flat_map(|h| h.constraints.iter().zip(&h.rows));
         let gains = rows.map(|(c, row)| match c.hold {
             Hold::Spring(k) => {
                 let closed: f64 = row.terms.iter().map(|(i, w)| w * moved(*i)).sum();
@@ -173,7 +181,7 @@ impl<T: Real> Patch<T> {
     /// Sets what the constraints do in the next solve: springs push with `force` times their force, and the hard ones
     /// want `position` times what is missing less `rate` times their velocity.
     pub(crate) fn aim(&mut self, force: f64, position: f64, rate: f64) {
-        let Some(mut held) = self.held.take() else {
+        let Some(mut held) = self.material.held.take() else {
             return;
         };
         self.displace(&mut held);
@@ -187,12 +195,12 @@ impl<T: Real> Patch<T> {
             let missing = hard.c[h] - hard.rows.times(h, u);
             *gap = position * missing - rate * hard.rows.times(h, v);
         }
-        self.held = Some(held);
+        self.material.held = Some(held);
     }
 
     /// Hands the constraints to the solver of implicit steps; `stiffness` is that of the springs in its matrix.
     pub(crate) fn aim_implicit(&mut self, stiffness: f64) {
-        if let (Some(held), Some(border)) = (&self.held, self.cache.solver.border_mut()) {
+        if let (Some(held), Some(border)) = (&self.material.held, self.cache.solver.border_mut()) {
             border.set_weights(held.springs.iter().map(|(_, k)| stiffness * k));
             held.aim(border);
         }

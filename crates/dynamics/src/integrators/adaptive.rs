@@ -131,30 +131,34 @@ impl<T: Real> Patch<T> {
     /// What the energy grew by over the last step of TR-BDF2, from the increments. The difference of the energies before
     /// and after would hold the rounding of the densities, which may stretch the springs by more than the step does.
     fn energy_change(&mut self) -> EnergyChange {
-        let work = &mut self.work;
+        let work = &mut self.cache.work;
         work.moved.clear();
         let both = work.first_dx.iter().zip(&work.dx);
         work.moved.extend(both.map(|(a, b)| a.as_f64() + b.as_f64()));
-        let work = &self.work;
+        let work = &self.cache.work;
         let (before, moved) = (&work.before, &work.moved);
-        let mut sum = self.network.energy_change(&before.d, moved);
+        let mut sum = self.material.network.energy_change(&before.d, moved);
         let (mut kinetic, mut swing) = (0.0, 0.0);
-        for (i, (now, then)) in self.state.w.iter().zip(&before.w).enumerate() {
-            let (m, now, then) = (self.lumped.mass.at(i).as_f64(), now.as_f64(), then.as_f64());
+        for (i, (now, then)) in self.motion.state.w.iter().zip(&before.w).enumerate() {
+            let (m, now, then) = (
+                self.material.lumped.mass.at(i).as_f64(),
+                now.as_f64(),
+                then.as_f64(),
+            );
             kinetic += m * (now - then) * (now + then);
             swing += m * now.abs() * (now.abs() + then.abs());
         }
-        sum.energy += 0.5 * self.lumped.mass.unit * kinetic;
-        sum.rounding += T::UNIT_ROUND_OFF * self.lumped.mass.unit * swing;
-        let ground = &self.lumped.ground;
+        sum.energy += 0.5 * self.material.lumped.mass.unit * kinetic;
+        sum.rounding += T::UNIT_ROUND_OFF * self.material.lumped.mass.unit * swing;
+        let ground = &self.material.lumped.ground;
         if ground.unit > 0.0 {
             let (mut held, mut size) = (0.0, 0.0);
             for (i, (d, moved)) in before.d.iter().zip(moved).enumerate() {
-                let (g, d, base) = (ground.at(i).as_f64(), d.as_f64(), self.anchor[i].as_f64());
+                let (g, d, base) = (ground.at(i).as_f64(), d.as_f64(), self.motion.anchor[i].as_f64());
                 held += g * moved * (0.5 * moved + (d - base));
                 size += g * moved.abs() * (d.abs() + base.abs());
             }
-            let unit = self.network.law().scale().powi(2) * ground.unit;
+            let unit = self.material.network.law().scale().powi(2) * ground.unit;
             sum.energy += unit * held;
             sum.rounding += T::UNIT_ROUND_OFF * unit * size;
         }
@@ -167,16 +171,16 @@ impl<T: Real> Patch<T> {
 
     /// `ΔdᵀDΔd/Δt`, what damping takes at least from the last step to here.
     fn least_dissipation(&self, dt: f64) -> f64 {
-        let terms = self.work.moved.iter().enumerate();
+        let terms = self.cache.work.moved.iter().enumerate();
         let sum: f64 = terms
-            .map(|(i, change)| self.lumped.damping.value(i) * change * change)
+            .map(|(i, change)| self.material.lumped.damping.value(i) * change * change)
             .sum();
         sum / dt
     }
 
     /// Largest mean acceleration of a density over the last step.
     fn acceleration(&self, dt: f64) -> f64 {
-        let rates = self.state.w.iter().zip(&self.work.before.w);
+        let rates = self.motion.state.w.iter().zip(&self.cache.work.before.w);
         rates
             .map(|(now, then)| (*now - *then).as_f64().abs() / dt)
             .fold(0.0, f64::max)

@@ -145,7 +145,7 @@ impl<T: Real> Patch<T> {
 
     /// What they would cost on a part of this patch.
     pub(crate) fn operations_on(&self, coefficients: [usize; 3], samples: [usize; 3]) -> Operations {
-        let work = Work::on(coefficients, samples, self.network.springs().len());
+        let work = Work::on(coefficients, samples, self.material.network.springs().len());
         let count: usize = coefficients.iter().product();
         let options = self.cache.solver.options();
         let method = options.method(self.is_even(), count, coefficients == samples);
@@ -159,7 +159,7 @@ impl<T: Real> Patch<T> {
             Method::VCycle | Method::SampleMultigrid => ITERATED,
             _ => 1.0,
         };
-        let law = self.network.law();
+        let law = self.material.network.law();
         Operations {
             solve: work.solve(law, solving, iterations),
             preparation: work.preparation(method, factor),
@@ -176,17 +176,19 @@ impl<T: Real> Patch<T> {
 
     /// Whether the matrix of a step is the same everywhere.
     fn is_even(&self) -> bool {
-        let springs = self.network.springs();
+        let springs = self.material.network.springs();
         let constant = |w: &Weights<T>| matches!(w, Weights::Constant(_));
         self.has_even_mass()
-            && self.lumped.ground.is_constant()
+            && self.material.lumped.ground.is_constant()
             && springs.len() == 3
             && springs.iter().all(|s| constant(&s.weights))
-            && matches!(self.network.law(), Law::Linear { .. })
+            && matches!(self.material.network.law(), Law::Linear { .. })
     }
 
     fn has_even_mass(&self) -> bool {
-        self.mask.is_none() && self.lumped.mass.is_constant() && self.lumped.damping.is_constant()
+        self.material.mask.is_none()
+            && self.material.lumped.mass.is_constant()
+            && self.material.lumped.damping.is_constant()
     }
 
     /// What [`Integrator::Auto`] takes for a step of `dt` seconds: explicit sub-steps within their bound where they cost
@@ -202,8 +204,8 @@ impl<T: Real> Patch<T> {
             return Err(PatchError::TimeStep { dt });
         }
         let parts = self.explicit_parts(dt)?;
-        let law = self.network.law();
-        let work = Work::new(self.lattice(), self.network.springs().len());
+        let law = self.material.network.law();
+        let work = Work::new(self.lattice(), self.material.network.springs().len());
         let solve = |uniform: bool, rough: f64| {
             let lattice = self.lattice();
             let options = self.cache.solver.options();
@@ -214,7 +216,7 @@ impl<T: Real> Patch<T> {
             };
             work.solve(law, method, iterations)
         };
-        let kicks = if self.lumped.damping.unit == 0.0 {
+        let kicks = if self.material.lumped.damping.unit == 0.0 {
             parts + 1.0
         } else {
             2.0 * parts

@@ -77,23 +77,35 @@ pub(crate) fn largest_frequency<T: Real>(
 impl<T: Real> Patch<T> {
     /// The power of two in whose units `M + aD` is written.
     fn mass_unit(&self, damping: f64) -> f64 {
-        binary_unit(self.lumped.mass.unit.max(damping * self.lumped.damping.unit))
+        binary_unit(
+            self.material
+                .lumped
+                .mass
+                .unit
+                .max(damping * self.material.lumped.damping.unit),
+        )
     }
 
     /// The matrix `M + aD`, in its unit.
     pub(crate) fn mass_matrix(&self, damping: f64) -> StepMatrix<T> {
-        let springs = self.network.springs().iter().take(3).map(|s| SpringWeights {
-            direction: s.direction,
-            weights: Weights::Constant(T::zero()),
-        });
-        let (m, c) = (&self.lumped.mass, &self.lumped.damping);
+        let springs = self
+            .material
+            .network
+            .springs()
+            .iter()
+            .take(3)
+            .map(|s| SpringWeights {
+                direction: s.direction,
+                weights: Weights::Constant(T::zero()),
+            });
+        let (m, c) = (&self.material.lumped.mass, &self.material.lumped.damping);
         let unit = self.mass_unit(damping);
         let factors = [m.unit / unit, damping * c.unit / unit].map(T::from_f64);
         let one = |i: usize| factors[0] * m.at(i) + factors[1] * c.at(i);
         let mass = if m.is_constant() && c.is_constant() {
             Weights::Constant(one(0))
         } else {
-            Weights::Each((0..self.base.len()).map(one).collect())
+            Weights::Each((0..self.motion.base.len()).map(one).collect())
         };
         StepMatrix::new(self.cache.matrix.dims(), mass, springs.collect())
     }
@@ -103,7 +115,7 @@ impl<T: Real> Patch<T> {
             let steps = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
             let own = &self.cache.solver;
             let mut solver = StepSolver::new(own.lattice().clone(), &steps, own.options());
-            solver.set_mask(self.mask.clone());
+            solver.set_mask(self.material.mask.clone());
             Box::new(solver)
         })
     }
@@ -121,18 +133,24 @@ impl<T: Real> Patch<T> {
             return Ok(limit);
         }
         let mass = self.mass_matrix(0.0);
-        let sigma2 = self.network.law().scale().powi(2);
-        let held = self.held.as_deref().map_or(&[][..], Held::springs);
+        let sigma2 = self.material.network.law().scale().powi(2);
+        let held = self.material.held.as_deref().map_or(&[][..], Held::springs);
         let stiffest = held.iter().fold(0.0_f64, |m, (_, k)| m.max(k / sigma2));
-        let ground = &self.lumped.ground;
-        let unit = binary_unit(self.network.stiffness_unit().max(ground.unit).max(stiffest));
+        let ground = &self.material.lumped.ground;
+        let unit = binary_unit(
+            self.material
+                .network
+                .stiffness_unit()
+                .max(ground.unit)
+                .max(stiffest),
+        );
         if unit == 0.0 {
             self.cache.limit = Some((now, f64::INFINITY));
             return Ok(f64::INFINITY);
         }
-        let springs = self.network.springs().iter().map(|s| SpringWeights {
+        let springs = self.material.network.springs().iter().map(|s| SpringWeights {
             direction: s.direction,
-            weights: s.weights.scaled(self.network.stiffness_unit() / unit),
+            weights: s.weights.scaled(self.material.network.stiffness_unit() / unit),
         });
         let stiffness = StepMatrix::new(
             self.cache.matrix.dims(),
@@ -187,7 +205,7 @@ impl<T: Real> Patch<T> {
     pub(super) fn verlet_steps(&mut self, dt: f64, parts: usize) -> Result<Moved, PatchError> {
         let h = dt / parts as f64;
         self.check_explicit(h)?;
-        let merge = self.lumped.damping.unit == 0.0;
+        let merge = self.material.lumped.damping.unit == 0.0;
         let mut worst: Option<(SolveReport, usize)> = None;
         let mut kicked = |(report, clamped): (SolveReport, usize)| {
             let (before, most) = worst.unwrap_or((report, clamped));
@@ -213,17 +231,17 @@ impl<T: Real> Patch<T> {
 
     /// `p += Δt v`.
     fn drift(&mut self, dt: f64) {
-        let state = &mut self.state;
+        let state = &mut self.motion.state;
         let grown = |d: T, w: T| T::from_f64(d.as_f64() + dt * w.as_f64());
         for (p, v) in state.p.iter_mut().zip(&state.v) {
             *p = grown(*p, *v);
         }
         let mut done = 0.0;
-        for ((d, w), f) in state.d.iter_mut().zip(&state.w).zip(&self.external) {
+        for ((d, w), f) in state.d.iter_mut().zip(&state.w).zip(&self.motion.external) {
             *d = grown(*d, *w);
             done += w.as_f64() * f.as_f64();
         }
-        self.work.work += dt * done;
+        self.cache.work.work += dt * done;
     }
 
     /// `v += Δt (M̃ + aD̃)⁻¹ Aᵀ(f - Dw)`: the damping of the velocity after the kick with `a = Δt`, of the mean one with
@@ -231,18 +249,18 @@ impl<T: Real> Patch<T> {
     fn kick(&mut self, dt: f64, damping: f64) -> Result<(SolveReport, usize), PatchError> {
         let clamped = self.forces(None);
         let unit = self.mass_unit(damping);
-        let lost = dt * self.lumped.damping.unit / unit;
-        let pushed = dt * self.work.force_unit / unit;
-        for (i, g) in self.work.g.iter_mut().enumerate() {
-            let damped = lost * self.lumped.damping.at(i).as_f64() * self.state.w[i].as_f64();
-            *g = T::from_f64(pushed * self.work.force[i].as_f64() - damped);
+        let lost = dt * self.material.lumped.damping.unit / unit;
+        let pushed = dt * self.cache.work.force_unit / unit;
+        for (i, g) in self.cache.work.g.iter_mut().enumerate() {
+            let damped = lost * self.material.lumped.damping.at(i).as_f64() * self.motion.state.w[i].as_f64();
+            *g = T::from_f64(pushed * self.cache.work.force[i].as_f64() - damped);
         }
         let mut solver = self.mass_solver();
-        if let (Some(held), None) = (&self.held, solver.border_mut()) {
+        if let (Some(held), None) = (&self.material.held, solver.border_mut()) {
             solver.set_border(Some(held.border(false)));
             self.cache.mass_matrix = None;
         }
-        if let (Some(held), Some(border)) = (&self.held, solver.border_mut()) {
+        if let (Some(held), Some(border)) = (&self.material.held, solver.border_mut()) {
             held.aim(border);
         }
         let version = self.version();
@@ -259,12 +277,12 @@ impl<T: Real> Patch<T> {
                 (matrix, prepared)
             }
         };
-        let work = &mut self.work;
+        let work = &mut self.cache.work;
         let report = prepared.map(|()| solver.solve(&matrix, &work.g, &mut work.x, &mut work.dx));
         self.cache.mass_solver = Some(solver);
         let report = report?;
         self.cache.mass_matrix = Some((version, damping, matrix));
-        let state = &mut self.state;
+        let state = &mut self.motion.state;
         for (v, x) in state.v.iter_mut().zip(&work.x) {
             *v += *x;
         }

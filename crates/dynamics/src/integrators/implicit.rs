@@ -1,11 +1,11 @@
 use bspline::Real;
 
 use crate::lattice::SampleBox;
+use crate::patch::Prepared;
 use crate::patch::{Patch, PatchError};
 use crate::solve::{ITERATED, Method, SolveReport};
 use crate::springs::{Law, Weights};
 use crate::units::binary_unit;
-use crate::version::Prepared;
 
 /// Beyond this ratio of step sizes a factor is not tried again: four in `Δt²` costs about eight iterations.
 const STALE: f64 = 4.0;
@@ -20,30 +20,31 @@ impl<T: Real> Patch<T> {
     /// `work.force_unit`. With them, of the 4-D law, the tangent `tangent·σ²kτ`. Returns the number of springs with a
     /// negative tangent.
     pub(crate) fn forces(&mut self, tangent: Option<f64>) -> usize {
-        let d = &self.state.d;
-        let sigma2 = self.network.law().scale().powi(2);
-        let ground = &self.lumped.ground;
+        let d = &self.motion.state.d;
+        let sigma2 = self.material.network.law().scale().powi(2);
+        let ground = &self.material.lumped.ground;
         let unit = binary_unit(
-            self.external_size
-                .max(self.network.force_unit())
+            self.motion
+                .external_size
+                .max(self.material.network.force_unit())
                 .max(sigma2 * ground.unit),
         );
         let unit = if unit > 0.0 { unit } else { 1.0 };
-        self.work.force_unit = unit;
-        let force = &mut self.work.force;
+        self.cache.work.force_unit = unit;
+        let force = &mut self.cache.work.force;
         let inverse = 1.0 / unit;
-        for (f, e) in force.iter_mut().zip(&self.external) {
+        for (f, e) in force.iter_mut().zip(&self.motion.external) {
             *f = T::from_f64(e.as_f64() * inverse);
         }
-        let tangent = match self.network.law() {
+        let tangent = match self.material.network.law() {
             Law::FourD { .. } => tangent.map(|t| (t, &mut self.cache.matrix.springs[..])),
             Law::Linear { .. } => None,
         };
-        let clamped = self.network.add_forces_in(unit, d, force, tangent);
+        let clamped = self.material.network.add_forces_in(unit, d, force, tangent);
         if ground.unit > 0.0 {
             let factor = T::from_f64(sigma2 * ground.unit * inverse);
             for (i, f) in force.iter_mut().enumerate() {
-                *f -= factor * ground.at(i) * (d[i] - self.anchor[i]);
+                *f -= factor * ground.at(i) * (d[i] - self.motion.anchor[i]);
             }
         }
         clamped
@@ -55,12 +56,16 @@ impl<T: Real> Patch<T> {
         if let Some(p) = self.cache.prepared.filter(|p| self.is_near(p, stiffness)) {
             return p.unit;
         }
-        let sigma2 = self.network.law().scale().powi(2);
-        let springs = self.network.stiffness_unit().max(self.lumped.ground.unit);
+        let sigma2 = self.material.network.law().scale().powi(2);
+        let springs = self
+            .material
+            .network
+            .stiffness_unit()
+            .max(self.material.lumped.ground.unit);
         let of_springs = stiffness * sigma2 * springs;
         binary_unit(
-            (self.lumped.mass.unit)
-                .max(damping * self.lumped.damping.unit)
+            (self.material.lumped.mass.unit)
+                .max(damping * self.material.lumped.damping.unit)
                 .max(of_springs),
         )
     }
@@ -85,7 +90,10 @@ impl<T: Real> Patch<T> {
         stiffness: f64,
         residual: Option<f64>,
     ) -> Result<SolveReport, PatchError> {
-        let (version, four_d) = (self.version(), matches!(self.network.law(), Law::FourD { .. }));
+        let (version, four_d) = (
+            self.version(),
+            matches!(self.material.network.law(), Law::FourD { .. }),
+        );
         let unit = self.matrix_unit(damping, stiffness);
         let same = self
             .cache
@@ -125,7 +133,7 @@ impl<T: Real> Patch<T> {
                 Some(residual) => Some(residual.min(usual)),
                 None => (painted && !fresh).then_some(ITERATED),
             };
-            let work = &mut self.work;
+            let work = &mut self.cache.work;
             let report =
                 self.cache
                     .solver
@@ -159,8 +167,8 @@ impl<T: Real> Patch<T> {
 
     /// Writes `M + aD + bG` and, of the linear law, `bσ²k` into the matrix, as multiples of `unit`.
     pub(crate) fn fill_matrix(&mut self, damping: f64, stiffness: f64, unit: f64) {
-        let scale = stiffness * self.network.law().scale().powi(2);
-        let lumped = &self.lumped;
+        let scale = stiffness * self.material.network.law().scale().powi(2);
+        let lumped = &self.material.lumped;
         let parts = [
             (&lumped.mass, 1.0),
             (&lumped.damping, damping),
@@ -172,12 +180,23 @@ impl<T: Real> Patch<T> {
             let [m, d, g] = parts.each_ref().map(|(w, factor)| *factor * w.at(i));
             m + d + g
         };
-        write(&mut self.cache.matrix.mass, constant, self.base.len(), diagonal);
-        if let Law::Linear { .. } = self.network.law() {
-            let b = T::from_f64(scale * self.network.stiffness_unit() / unit);
-            for (to, from) in self.cache.matrix.springs.iter_mut().zip(self.network.springs()) {
+        write(
+            &mut self.cache.matrix.mass,
+            constant,
+            self.motion.base.len(),
+            diagonal,
+        );
+        if let Law::Linear { .. } = self.material.network.law() {
+            let b = T::from_f64(scale * self.material.network.stiffness_unit() / unit);
+            for (to, from) in self
+                .cache
+                .matrix
+                .springs
+                .iter_mut()
+                .zip(self.material.network.springs())
+            {
                 let constant = matches!(from.weights, Weights::Constant(_));
-                write(&mut to.weights, constant, self.base.len(), |i| {
+                write(&mut to.weights, constant, self.motion.base.len(), |i| {
                     b * from.weights.at(i)
                 });
             }
@@ -191,17 +210,17 @@ impl<T: Real> Patch<T> {
         let (a, b) = (0.5 * dt, dt * dt);
         let unit = self.matrix_unit(a, b);
         let clamped = self.forces(Some(b / unit));
-        let work = &mut self.work;
-        let (mass, damping) = (&self.lumped.mass, &self.lumped.damping);
+        let work = &mut self.cache.work;
+        let (mass, damping) = (&self.material.lumped.mass, &self.material.lumped.damping);
         let (kept, lost) = (dt * mass.unit / unit, a * dt * damping.unit / unit);
         let pushed = b * work.force_unit / unit;
         for (i, g) in work.g.iter_mut().enumerate() {
             let momentum = kept * mass.at(i).as_f64() - lost * damping.at(i).as_f64();
-            *g = T::from_f64(momentum * self.state.w[i].as_f64() + pushed * work.force[i].as_f64());
+            *g = T::from_f64(momentum * self.motion.state.w[i].as_f64() + pushed * work.force[i].as_f64());
         }
         self.aim(b / unit, 1.0, 0.0);
         let report = self.solve_step(a, b)?;
-        let (work, state) = (&self.work, &mut self.state);
+        let (work, state) = (&self.cache.work, &mut self.motion.state);
         let rate = |x: T| T::from_f64(x.as_f64() / dt);
         for (v, x) in state.v.iter_mut().zip(&work.x) {
             *v = rate(*x);
@@ -215,12 +234,12 @@ impl<T: Real> Patch<T> {
 
     /// `p += x`, `d += dx`.
     fn advance(&mut self) {
-        let (work, state) = (&mut self.work, &mut self.state);
+        let (work, state) = (&mut self.cache.work, &mut self.motion.state);
         for (p, x) in state.p.iter_mut().zip(&work.x) {
             *p += *x;
         }
         let mut done = 0.0;
-        for ((d, dx), f) in state.d.iter_mut().zip(&work.dx).zip(&self.external) {
+        for ((d, dx), f) in state.d.iter_mut().zip(&work.dx).zip(&self.motion.external) {
             *d += *dx;
             done += dx.as_f64() * f.as_f64();
         }
@@ -237,18 +256,19 @@ impl<T: Real> Patch<T> {
         let beta = (1.0 - gamma).powi(2) / (gamma * (2.0 - gamma));
         let c = 0.5 * gamma * dt;
         let unit = self.matrix_unit(c, c * c);
-        let of_mass = self.lumped.mass.unit / unit;
+        let of_mass = self.material.lumped.mass.unit / unit;
         let clamped = self.forces(Some(c * c / unit));
-        let work = &mut self.work;
+        let work = &mut self.cache.work;
         let of_force = c * c * work.force_unit / unit;
         for (i, g) in work.g.iter_mut().enumerate() {
-            let momentum = of_mass * self.lumped.mass.at(i).as_f64() * self.state.w[i].as_f64();
+            let momentum =
+                of_mass * self.material.lumped.mass.at(i).as_f64() * self.motion.state.w[i].as_f64();
             *g = T::from_f64(2.0 * (c * momentum + of_force * work.force[i].as_f64()));
         }
         self.aim(2.0 * c * c / unit, 1.0, 0.0);
         let first = self.solve_step(c, c * c)?;
         let rate = |x: T, v: T| T::from_f64(x.as_f64() / c - v.as_f64());
-        let (work, state) = (&mut self.work, &mut self.state);
+        let (work, state) = (&mut self.cache.work, &mut self.motion.state);
         for (v, x) in state.v.iter_mut().zip(&work.x) {
             *v = rate(*x, *v);
         }
@@ -256,19 +276,19 @@ impl<T: Real> Patch<T> {
             *w = rate(*dx, *w);
         }
         self.advance();
-        std::mem::swap(&mut self.work.first_x, &mut self.work.x);
-        std::mem::swap(&mut self.work.first_dx, &mut self.work.dx);
+        std::mem::swap(&mut self.cache.work.first_x, &mut self.cache.work.x);
+        std::mem::swap(&mut self.cache.work.first_dx, &mut self.cache.work.dx);
         // The factor may have been renewed, in another unit.
         let unit = self.matrix_unit(c, c * c);
-        let of_mass = self.lumped.mass.unit / unit;
-        let of_damping = c * self.lumped.damping.unit / unit;
+        let of_mass = self.material.lumped.mass.unit / unit;
+        let of_damping = c * self.material.lumped.damping.unit / unit;
         let clamped = clamped.max(self.forces(Some(c * c / unit)));
-        let work = &mut self.work;
+        let work = &mut self.cache.work;
         let of_force = c * c * work.force_unit / unit;
         for (i, g) in work.g.iter_mut().enumerate() {
-            let m = of_mass * self.lumped.mass.at(i).as_f64();
-            let damping = of_damping * self.lumped.damping.at(i).as_f64();
-            let velocity = (1.0 + beta) * self.state.w[i].as_f64() - beta * work.before.w[i].as_f64();
+            let m = of_mass * self.material.lumped.mass.at(i).as_f64();
+            let damping = of_damping * self.material.lumped.damping.at(i).as_f64();
+            let velocity = (1.0 + beta) * self.motion.state.w[i].as_f64() - beta * work.before.w[i].as_f64();
             let first = beta * work.first_dx[i].as_f64();
             *g = T::from_f64(c * (m * velocity) + (m + damping) * first + of_force * work.force[i].as_f64());
         }
@@ -288,7 +308,7 @@ impl<T: Real> Patch<T> {
             w - (3.0 * w + 1.0) / 3.0,
             gamma / 2.0 - gamma / 6.0,
         ];
-        let (work, state) = (&self.work, &mut self.state);
+        let (work, state) = (&self.cache.work, &mut self.motion.state);
         let rate = |x: T, first: T| T::from_f64((x.as_f64() - beta * first.as_f64()) / c);
         for ((v, x), first) in state.v.iter_mut().zip(&work.x).zip(&work.first_x) {
             *v = rate(*x, *first);
@@ -302,7 +322,7 @@ impl<T: Real> Patch<T> {
             *v = after;
         }
         self.advance();
-        (error / self.base.len() as f64).sqrt()
+        (error / self.motion.base.len() as f64).sqrt()
     }
 }
 

@@ -8,6 +8,7 @@ mod implicit;
 
 pub use adaptive::{AdaptiveOptions, AdaptiveReport};
 pub use auto::Choice;
+#[cfg(feature = "study")]
 pub(crate) use explicit::largest_frequency;
 
 use bspline::Real;
@@ -83,8 +84,8 @@ impl<T: Real> Patch<T> {
         if !(dt.is_finite() && dt > 0.0) {
             return Err(PatchError::TimeStep { dt });
         }
-        self.work.before.copy_from(&self.state);
-        self.work.work = 0.0;
+        self.cache.work.before.copy_from(&self.motion.state);
+        self.cache.work.work = 0.0;
         let (integrator, substeps) = match integrator {
             Integrator::Auto => {
                 let choice = self.choose(dt)?;
@@ -109,13 +110,13 @@ impl<T: Real> Patch<T> {
             substeps,
             solve,
             clamped,
-            work: self.work.work,
+            work: self.cache.work.work,
             error,
         })
     }
 
     /// Back to the state before the step.
     fn take_back(&mut self) {
-        self.state.copy_from(&self.work.before);
+        self.motion.state.copy_from(&self.cache.work.before);
     }
 }

@@ -36,6 +36,7 @@ mod sleep;
 mod snapshot;
 mod tensor;
 mod watch;
+mod window;
 
 pub use cells::{Cells, MAX_EDGE, MAX_SIZE, MIN_CELLS};
 pub use change::{Change, Viewer};
@@ -330,7 +331,7 @@ impl<T: Real> Region<T> {
     /// Lets an elastic solid go: force := 0, and it swings back to its rest. What it was cut from is, to the bit, the shape
     /// that it returns to.
     pub fn release_elastic(&mut self) {
-        let none = vec![T::zero(); self.patch.external.len()];
+        let none = vec![T::zero(); self.patch.motion.external.len()];
         self.set_force(&none).expect("zeros, one per sample, are forces");
         self.wake();
     }

@@ -168,7 +168,7 @@ impl<T: Real> Region<T> {
         let options = RegionOptions {
             samples_per_cell: self.samples_per_cell,
             law: self.patch.springs().law(),
-            neighbours: self.patch.neighbours,
+            neighbours: self.patch.material.neighbours,
             solver: self.patch.solver_options(),
             sleep: self.thresholds,
         };
@@ -183,13 +183,18 @@ impl<T: Real> Region<T> {
         let carried = Carried::new(self, new);
         let (old, patch) = (&self.patch, &mut new.patch);
         let dims = patch.lattice().coefficient_dims();
-        for (i, v) in patch.state.v.iter_mut().enumerate() {
+        for (i, v) in patch.motion.state.v.iter_mut().enumerate() {
             let at = [i / dims[2] / dims[1], i / dims[2] % dims[1], i % dims[2]];
             let at: [u32; 3] = std::array::from_fn(|a| new.cells.first[a] + at[a] as u32);
             *v = self.velocity_of(at);
         }
         patch.sample_velocities();
-        for (n, differences) in old.springs().stretches(&old.state.d).into_iter().enumerate() {
+        for (n, differences) in old
+            .springs()
+            .stretches(&old.motion.state.d)
+            .into_iter()
+            .enumerate()
+        {
             let step = old.springs().springs()[n].direction.step;
             let mut stretch = carried.read(&differences, step, 0.0);
             let axis = step.iter().position(|&s| s != 0).expect("a spring has a length");
@@ -197,25 +202,32 @@ impl<T: Real> Region<T> {
             let units = old.springs().length_unit() / patch.springs().length_unit();
             let factor = T::from_f64(longer * units);
             stretch.iter_mut().for_each(|s| *s = factor * *s);
-            patch.network.stretch(n, &patch.state.d, &stretch);
+            patch.material.network.stretch(n, &patch.motion.state.d, &stretch);
         }
         if let Weights::Each(scale) = &old.springs().rest().scale {
-            patch.network.rest_mut().scale = Weights::Each(carried.read(scale, [0; 3], 1.0));
+            patch.material.network.rest_mut().scale = Weights::Each(carried.read(scale, [0; 3], 1.0));
         } else {
-            patch.network.rest_mut().scale = old.springs().rest().scale.clone();
+            patch.material.network.rest_mut().scale = old.springs().rest().scale.clone();
         }
         let away: Vec<T> = old
+            .motion
             .state
             .d
             .iter()
-            .zip(&old.anchor)
+            .zip(&old.motion.anchor)
             .map(|(d, a)| *d - *a)
             .collect();
         let away = carried.read(&away, [0; 3], 0.0);
-        for ((anchor, d), away) in patch.anchor.iter_mut().zip(&patch.state.d).zip(away) {
+        for ((anchor, d), away) in patch
+            .motion
+            .anchor
+            .iter_mut()
+            .zip(&patch.motion.state.d)
+            .zip(away)
+        {
             *anchor = *d - away;
         }
-        patch.plasticity = match old.plasticity() {
+        patch.material.plasticity = match old.plasticity() {
             Plasticity::Kernel { rate, weights } => Plasticity::Kernel {
                 rate: *rate,
                 weights: carried.read(weights, [0; 3], 0.0),
@@ -234,6 +246,6 @@ impl<T: Real> Region<T> {
                 _ => return T::zero(),
             }
         }
-        self.patch.state.v[place]
+        self.patch.motion.state.v[place]
     }
 }

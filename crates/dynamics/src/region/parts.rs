@@ -5,8 +5,9 @@ use serde::{Deserialize, Serialize};
 
 use super::Region;
 use super::sleep::solves;
+use super::window::{Window, crop, paste};
 use crate::integrators::{Integrator, StepReport};
-use crate::lattice::{Axis, Lattice, LatticeError, Rim, SampleBox};
+use crate::lattice::{Axis, Lattice, LatticeError, Rim};
 use crate::matter::{Matter, Quantity};
 use crate::patch::{Patch, PatchError};
 use crate::springs::{Plasticity, Weights};
@@ -17,8 +18,6 @@ const LOOK: usize = 4;
 const MOST_MISSES: u32 = 3;
 /// Coefficients beyond those that move, on each side, of a part that is cut: twice as many each time that one was outgrown.
 const MARGIN: usize = 3;
-/// Of a part that is kept.
-const LEAST_MARGIN: usize = 2;
 const MOST_GROWTHS: u32 = 3;
 /// Share of the samples above which a part does not pay.
 const WORTH: f64 = 0.6;
@@ -89,64 +88,6 @@ impl Parts {
     }
 }
 
-/// A box of cells whose ends are samples.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) struct Window {
-    /// First free coefficient, which is also the first cell, and cells.
-    first: [usize; 3],
-    cells: [usize; 3],
-    first_sample: [usize; 3],
-    samples: [usize; 3],
-}
-
-impl Window {
-    fn coefficients(&self) -> [usize; 3] {
-        self.cells.map(|c| c - 3)
-    }
-
-    fn sample_count(&self) -> usize {
-        self.samples.iter().product()
-    }
-
-    /// Whether it holds the coefficients `low ..= high` of `all` on each axis, and a margin that ends where those do.
-    fn holds(&self, [low, high]: [[usize; 3]; 2], all: [usize; 3]) -> bool {
-        (0..3).all(|k| {
-            let end = self.first[k] + self.cells[k] - 3;
-            let before = low[k].saturating_sub(LEAST_MARGIN) >= self.first[k];
-            before && (high[k] + LEAST_MARGIN).min(all[k] - 1) < end
-        })
-    }
-
-    /// Whether it is one of `whole`, and `part` lies on it.
-    pub fn fits<T: Real>(&self, whole: &Lattice<T>, part: &Lattice<T>) -> bool {
-        let (n, m) = (whole.coefficient_dims(), whole.sample_dims());
-        let lies = |k: usize| {
-            let cells = self.first[k].checked_add(self.cells[k]);
-            let samples = self.first_sample[k].checked_add(self.samples[k]);
-            self.cells[k] > 3
-                && cells.is_some_and(|end| end <= n[k] + 3)
-                && samples.is_some_and(|end| end <= m[k])
-        };
-        (0..3).all(lies)
-            && part.coefficient_dims() == self.coefficients()
-            && part.sample_dims() == self.samples
-    }
-
-    /// Whether a sample lies in it.
-    fn has_sample(&self, at: [usize; 3]) -> bool {
-        (0..3).all(|k| (self.first_sample[k]..self.first_sample[k] + self.samples[k]).contains(&at[k]))
-    }
-}
-
-/// A box of a list, z fastest.
-fn crop<V: Copy>(from: &[V], dims: [usize; 3], first: [usize; 3], count: [usize; 3]) -> Vec<V> {
-    SampleBox { first, count }.crop(from, dims)
-}
-
-fn paste<V: Copy>(into: &mut [V], dims: [usize; 3], first: [usize; 3], count: [usize; 3], from: &[V]) {
-    SampleBox { first, count }.paste(into, dims, from);
-}
-
 fn greatest_common_divisor(a: usize, b: usize) -> usize {
     if b == 0 {
         a
@@ -209,7 +150,7 @@ impl<T: Real> Region<T> {
         part.earned += solves * (saved - taken);
         self.parts.savings += solves * (saved - taken);
         self.parts.operations += solves * taken;
-        let (w, state) = (part.window, &mut self.patch.state);
+        let (w, state) = (part.window, &mut self.patch.motion.state);
         let lattice = self.patch.cache.solver.lattice();
         let (n, m) = (lattice.coefficient_dims(), lattice.sample_dims());
         let from = part.patch.state();
@@ -219,7 +160,7 @@ impl<T: Real> Region<T> {
         paste(&mut state.w, m, w.first_sample, w.samples, &from.w);
         if *self.patch.plasticity() != Plasticity::Elastic {
             let rests = &part.patch.springs().rest().differences;
-            let into = &mut self.patch.network.rest_mut().differences;
+            let into = &mut self.patch.material.network.rest_mut().differences;
             for (into, from) in into.iter_mut().zip(rests) {
                 // Springs that start on the far faces may leave the part.
                 let count = w.samples.map(|m| m - 1);
@@ -246,12 +187,12 @@ impl<T: Real> Region<T> {
     pub(super) fn force_changed(&mut self, before: impl Iterator<Item = (usize, T)>) {
         let Some(part) = &mut self.part else { return };
         let m = self.patch.lattice().sample_dims();
-        let external = &self.patch.external;
+        let external = &self.patch.motion.external;
         let w = part.window;
         part.patch
             .write_force(|force| force.copy_from_slice(&crop(external, m, w.first_sample, w.samples)));
         let limit = self.thresholds.acceleration / self.patch.springs().law().scale();
-        let mass = &self.patch.lumped.mass;
+        let mass = &self.patch.material.lumped.mass;
         let wakes = |(i, then): (usize, T)| {
             let change = (external[i].as_f64() - then.as_f64()).abs();
             change > limit * mass.value(i) && !w.has_sample([i / m[2] / m[1], i / m[2] % m[1], i % m[2]])
@@ -323,10 +264,10 @@ impl<T: Real> Region<T> {
         self.drop_part();
         // What falls asleep stops.
         let n = self.patch.lattice().coefficient_dims();
-        let moving = crop(&self.patch.state.v, n, window.first, window.coefficients());
-        self.patch.state.v.fill(T::zero());
+        let moving = crop(&self.patch.motion.state.v, n, window.first, window.coefficients());
+        self.patch.motion.state.v.fill(T::zero());
         paste(
-            &mut self.patch.state.v,
+            &mut self.patch.motion.state.v,
             n,
             window.first,
             window.coefficients(),
@@ -348,7 +289,7 @@ impl<T: Real> Region<T> {
         let scale = self.patch.springs().law().scale();
         let limits = self.thresholds;
         let (mut low, mut high) = ([usize::MAX; 3], [0; 3]);
-        let speeds = self.patch.state.v.clone();
+        let speeds = self.patch.motion.state.v.clone();
         let accelerations = self.patch.unbalanced_each();
         for (i, (v, a)) in speeds.iter().zip(accelerations).enumerate() {
             let quiet = scale * v.as_f64().abs() <= limits.speed && scale * a <= limits.acceleration;
@@ -404,43 +345,43 @@ impl<T: Real> Region<T> {
             Quantity::Constant(v) => Quantity::Constant(*v),
             Quantity::PerSample(v) => Quantity::PerSample(crop(v, m, w.first_sample, w.samples)),
         };
-        let factors = whole.matter.spring_factors.as_ref();
+        let factors = whole.material.matter.spring_factors.as_ref();
         let matter = Matter {
-            stiffness: quantity(&whole.matter.stiffness),
-            mass: quantity(&whole.matter.mass),
-            damping: quantity(&whole.matter.damping),
-            ground: quantity(&whole.matter.ground),
+            stiffness: quantity(&whole.material.matter.stiffness),
+            mass: quantity(&whole.material.matter.mass),
+            damping: quantity(&whole.material.matter.damping),
+            ground: quantity(&whole.material.matter.ground),
             spring_factors: factors.map(|f| {
                 let all = f.iter().map(|f| crop(f, m, w.first_sample, w.samples));
                 all.collect()
             }),
         };
         let law = whole.springs().law();
-        let d = samples(&whole.state.d);
+        let d = samples(&whole.motion.state.d);
         let options = whole.cache.solver.options();
-        let mut part = Patch::new(lattice, matter, law, whole.neighbours, &d, options)?;
-        part.base = samples(&whole.base);
-        part.anchor = samples(&whole.anchor);
-        part.write_force(|force| force.copy_from_slice(&samples(&whole.external)));
+        let mut part = Patch::new(lattice, matter, law, whole.material.neighbours, &d, options)?;
+        part.motion.base = samples(&whole.motion.base);
+        part.motion.anchor = samples(&whole.motion.anchor);
+        part.write_force(|force| force.copy_from_slice(&samples(&whole.motion.external)));
         let n = whole.lattice().coefficient_dims();
-        part.state.p = crop(&whole.state.p, n, w.first, w.coefficients());
-        part.state.v = crop(&whole.state.v, n, w.first, w.coefficients());
-        part.state.w = samples(&whole.state.w);
+        part.motion.state.p = crop(&whole.motion.state.p, n, w.first, w.coefficients());
+        part.motion.state.v = crop(&whole.motion.state.v, n, w.first, w.coefficients());
+        part.motion.state.w = samples(&whole.motion.state.w);
         let mut springs = whole.exact_springs();
         for s in &mut springs {
             if let Weights::Each(k) = &mut s.weights {
                 *k = crop(k, m, w.first_sample, w.samples);
             }
         }
-        part.network.set_springs(&springs);
-        let rest = part.network.rest_mut();
+        part.material.network.set_springs(&springs);
+        let rest = part.material.network.rest_mut();
         let from = whole.springs().rest();
         rest.differences = from.differences.iter().map(|r| samples(r)).collect();
         rest.scale = match &from.scale {
             Weights::Constant(s) => Weights::Constant(*s),
             Weights::Each(s) => Weights::Each(samples(s)),
         };
-        part.plasticity = match whole.plasticity() {
+        part.material.plasticity = match whole.plasticity() {
             Plasticity::Kernel { rate, weights } => Plasticity::Kernel {
                 rate: *rate,
                 weights: samples(weights),

@@ -62,10 +62,10 @@ impl<T: Real> Region<T> {
     /// # Errors
     /// As [`crate::patch::Patch::set_force`]; the old forces then stay.
     pub fn set_force(&mut self, force: &[T]) -> Result<(), PatchError> {
-        if self.patch.external == force {
+        if self.patch.motion.external == force {
             return Ok(());
         }
-        let before = self.part.is_some().then(|| self.patch.external.clone());
+        let before = self.part.is_some().then(|| self.patch.motion.external.clone());
         self.patch.set_force(force)?;
         if let Some(before) = before {
             self.force_changed(before.into_iter().enumerate());
@@ -83,11 +83,14 @@ impl<T: Real> Region<T> {
     pub fn set_force_on(&mut self, force: OnBox<T>) -> Result<(), PatchError> {
         self.patch.check_load(&force)?;
         let dims = self.patch.lattice().sample_dims();
-        let boxes = [self.patch.pushed, force.at];
+        let boxes = [self.patch.motion.pushed, force.at];
         let places = boxes.into_iter().flat_map(|b| b.indices(dims));
-        let before: Vec<(usize, T)> = places.map(|i| (i, self.patch.external[i])).collect();
+        let before: Vec<(usize, T)> = places.map(|i| (i, self.patch.motion.external[i])).collect();
         self.patch.set_force_on(force)?;
-        if before.iter().all(|(i, then)| self.patch.external[*i] == *then) {
+        if before
+            .iter()
+            .all(|(i, then)| self.patch.motion.external[*i] == *then)
+        {
             return Ok(());
         }
         self.force_changed(before.into_iter());

@@ -5,7 +5,8 @@ use bspline::hierarchical::Lattice as FieldLattice;
 use glam::DAffine3;
 use serde::{Deserialize, Serialize};
 
-use super::parts::{Part, Parts, Window};
+use super::parts::{Part, Parts};
+use super::window::Window;
 use super::{Cells, MIN_CELLS, Region, RegionError, Thresholds, cells, perpendicular};
 use crate::patch::{Patch, PatchError, finite};
 use crate::snapshot::PatchSnapshot;

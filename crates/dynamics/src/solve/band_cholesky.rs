@@ -64,13 +64,8 @@ impl<T: Real> BandCholesky<T> {
     }
 
     /// Number of unknowns.
-    pub fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.n
-    }
-
-    /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
-        self.n == 0
     }
 
     /// Half-bandwidth.

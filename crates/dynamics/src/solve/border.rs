@@ -10,7 +10,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::dot::dot;
 use super::orthonormal::OrthonormalRows;
-use super::pcg::{PcgReport, System, add_scaled};
+use super::pcg::{ConjugateGradients, PcgReport, System, add_scaled};
 
 /// Share of the diagonal that is added to the small matrix of the border, from one try to the next, until it has a
 /// factor: in single precision its small eigenvalues drown.
@@ -35,7 +35,7 @@ pub(crate) struct Border<T> {
     /// `BY`, made symmetric.
     gram: DMatrix<f64>,
     factor: Option<Cholesky<f64, Dyn>>,
-    vectors: [Vec<T>; 5],
+    right: Vec<T>,
 }
 
 impl<T: Real> Border<T> {
@@ -50,7 +50,7 @@ impl<T: Real> Border<T> {
             y: vec![T::zero(); rows * n],
             gram: DMatrix::zeros(rows, rows),
             factor: None,
-            vectors: std::array::from_fn(|_| vec![T::zero(); n]),
+            right: vec![T::zero(); n],
             springs,
             hard,
         }
@@ -108,11 +108,11 @@ impl<T: Real> Border<T> {
 
     /// Makes `Y` for a new `P`.
     pub fn prepare(&mut self, mut precondition: impl FnMut(&[T], &mut [T])) {
-        let n = self.vectors[0].len();
+        let n = self.right.len();
         let mut y = std::mem::take(&mut self.y);
         for (row, y) in y.chunks_exact_mut(n).enumerate() {
             let soft = self.soft();
-            let [r, ..] = &mut self.vectors;
+            let r = &mut self.right;
             r.fill(T::zero());
             match row.checked_sub(soft) {
                 None => {
@@ -175,10 +175,10 @@ impl<T: Real> Border<T> {
         }
     }
 
-    /// Solves from `x` that fulfils the hard constraints, as [`ConjugateGradients`](super::ConjugateGradients) do; the
-    /// residual is that within their null space.
+    /// Solves from `x` that fulfils the hard constraints; the residual is that within their null space.
     pub fn solve(
         &mut self,
+        iteration: &mut ConjugateGradients<T>,
         system: &mut impl System<T>,
         b: &[T],
         x: &mut [T],
@@ -186,22 +186,7 @@ impl<T: Real> Border<T> {
         tolerance: f64,
     ) -> PcgReport {
         self.factorize();
-        let mut vectors = std::mem::take(&mut self.vectors);
-        let report = self.iterate(system, b, x, cap, tolerance, &mut vectors);
-        self.vectors = vectors;
-        report
-    }
-
-    fn iterate(
-        &self,
-        system: &mut impl System<T>,
-        b: &[T],
-        x: &mut [T],
-        cap: usize,
-        tolerance: f64,
-        [r, z, p, q, last]: &mut [Vec<T>; 5],
-    ) -> PcgReport {
-        let mut report = PcgReport::default();
+        let ConjugateGradients { r, q, .. } = iteration;
         r.copy_from_slice(b);
         for (row, impulse) in self.springs.iter().zip(&self.impulses) {
             for (i, w) in row {
@@ -226,39 +211,10 @@ impl<T: Real> Border<T> {
         let impulse = dot(r, r).sqrt();
         // What is left then is the rounding of forces that the constraints bear.
         if impulse <= 16.0 * T::UNIT_ROUND_OFF * size {
-            return report;
+            return PcgReport::default();
         }
-        report.residual = 1.0;
-        let mut before = 1.0;
-        while report.iterations < cap && report.residual > tolerance {
-            system.precondition(r, z);
-            let along = DVector::from_fn(self.rows(), |i, _| self.row_times(i, z));
-            self.add_border(z, along, -1.0);
-            self.project(z);
-            let rz = dot(r, z);
-            if report.iterations == 0 {
-                p.copy_from_slice(z);
-            } else {
-                // Polak and Ribière's form bears a preconditioner that is off by rounding, or one matrix late.
-                let beta = T::from_f64(((rz - dot(last, z)) / before).max(0.0));
-                for (p, z) in p.iter_mut().zip(z.iter()) {
-                    *p = *z + beta * *p;
-                }
-            }
-            before = rz;
-            let curvature = self.apply(system, p, q);
-            if !(curvature > 0.0 && rz > 0.0) {
-                report.negative_curvature = Some(curvature.min(rz));
-                break;
-            }
-            let alpha = T::from_f64(rz / curvature);
-            last.copy_from_slice(r);
-            add_scaled(x, alpha, p);
-            add_scaled(r, -alpha, q);
-            self.project(r);
-            report.iterations += 1;
-            report.residual = dot(r, r).sqrt() / impulse;
-        }
+        let mut bordered = Bordered { border: self, system };
+        let report = iteration.go_on(&mut bordered, x, impulse, cap, tolerance);
         self.hard.close(x, |h| self.gaps[h]);
         report
     }
@@ -272,6 +228,34 @@ impl<T: Real> Border<T> {
             }
         }
         curvature
+    }
+}
+
+/// A system with its border, in the null space of `Q`.
+struct Bordered<'a, T, S> {
+    border: &'a Border<T>,
+    system: &'a mut S,
+}
+
+impl<T: Real, S: System<T>> System<T> for Bordered<'_, T, S> {
+    fn apply(&mut self, p: &[T], q: &mut [T]) -> f64 {
+        self.border.apply(self.system, p, q)
+    }
+
+    fn precondition(&mut self, r: &[T], z: &mut [T]) {
+        let border = self.border;
+        self.system.precondition(r, z);
+        let along = DVector::from_fn(border.rows(), |i, _| border.row_times(i, z));
+        border.add_border(z, along, -1.0);
+        border.project(z);
+    }
+
+    fn project(&self, r: &mut [T]) {
+        self.border.project(r);
+    }
+
+    fn is_flexible(&self) -> bool {
+        true
     }
 }
 

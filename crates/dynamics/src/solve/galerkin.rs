@@ -342,6 +342,7 @@ impl Galerkin {
     }
 
     /// Writes `AᵀSA` into a band of the right size.
+    #[cfg(feature = "study")]
     pub fn assemble<T: Real>(&mut self, s: &StepMatrix<T>, into: &mut BandCholesky<T>) {
         for part in 0..=self.parts() {
             self.assemble_part(s, part, into);

@@ -14,6 +14,13 @@ pub trait System<T> {
     fn precondition(&mut self, r: &[T], z: &mut [T]);
     /// Told that the solution moved by `alpha` along the `p` that [`apply`](Self::apply) had last.
     fn moved(&mut self, _alpha: T) {}
+    /// Takes out of a residual what constraints bear.
+    fn project(&self, _r: &mut [T]) {}
+    /// Whether the preconditioner may be off by rounding, or of one matrix before: directions then take Polak and Ribière's
+    /// form, which bears that.
+    fn is_flexible(&self) -> bool {
+        false
+    }
 }
 
 /// An approximate inverse of `AᵀSA`, symmetric and positive definite.
@@ -23,9 +30,11 @@ pub trait Preconditioner<T> {
 }
 
 /// No preconditioner: `z = r`. What the source paper does.
+#[cfg(feature = "study")]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Unpreconditioned;
 
+#[cfg(feature = "study")]
 impl<T: Real> Preconditioner<T> for Unpreconditioned {
     fn apply(&mut self, _: &StepMatrix<T>, r: &[T], z: &mut [T]) {
         z.copy_from_slice(r);
@@ -81,10 +90,12 @@ pub(super) fn add_scaled<T: Real>(y: &mut [T], a: T, x: &[T]) {
 /// The vectors of the iteration.
 #[derive(Clone, Debug)]
 pub struct ConjugateGradients<T> {
-    r: Vec<T>,
+    pub(super) r: Vec<T>,
     z: Vec<T>,
     p: Vec<T>,
-    q: Vec<T>,
+    pub(super) q: Vec<T>,
+    /// The residual before, of flexible systems.
+    last: Vec<T>,
 }
 
 impl<T: Real> ConjugateGradients<T> {
@@ -96,6 +107,7 @@ impl<T: Real> ConjugateGradients<T> {
             z: zeros(),
             p: zeros(),
             q: zeros(),
+            last: Vec::new(),
         }
     }
 
@@ -109,15 +121,33 @@ impl<T: Real> ConjugateGradients<T> {
         cap: usize,
         tolerance: f64,
     ) -> PcgReport {
-        let Self { r, z, p, q } = self;
         x.fill(T::zero());
-        r.copy_from_slice(b);
+        self.r.copy_from_slice(b);
         let impulse = dot(b, b).sqrt();
-        let mut report = PcgReport::default();
         if impulse == 0.0 {
-            return report;
+            return PcgReport::default();
         }
-        report.residual = 1.0;
+        self.go_on(system, x, impulse, cap, tolerance)
+    }
+
+    /// The same from an `x` whose residual stands in `r`, until it falls below `tolerance` times `impulse`.
+    pub(super) fn go_on(
+        &mut self,
+        system: &mut impl System<T>,
+        x: &mut [T],
+        impulse: f64,
+        cap: usize,
+        tolerance: f64,
+    ) -> PcgReport {
+        let Self { r, z, p, q, last } = self;
+        let flexible = system.is_flexible();
+        if flexible {
+            last.resize(r.len(), T::zero());
+        }
+        let mut report = PcgReport {
+            residual: 1.0,
+            ..PcgReport::default()
+        };
         let mut before = 1.0;
         while report.iterations < cap && report.residual > tolerance {
             system.precondition(r, z);
@@ -125,7 +155,12 @@ impl<T: Real> ConjugateGradients<T> {
             if report.iterations == 0 {
                 p.copy_from_slice(z);
             } else {
-                let beta = T::from_f64(rz / before);
+                let beta = if flexible {
+                    ((rz - dot(last, z)) / before).max(0.0)
+                } else {
+                    rz / before
+                };
+                let beta = T::from_f64(beta);
                 for (p, z) in p.iter_mut().zip(z.iter()) {
                     *p = *z + beta * *p;
                 }
@@ -137,9 +172,13 @@ impl<T: Real> ConjugateGradients<T> {
                 break;
             }
             let alpha = T::from_f64(rz / curvature);
+            if flexible {
+                last.copy_from_slice(r);
+            }
             add_scaled(x, alpha, p);
             system.moved(alpha);
             add_scaled(r, -alpha, q);
+            system.project(r);
             report.iterations += 1;
             report.residual = dot(r, r).sqrt() / impulse;
         }

@@ -85,7 +85,6 @@ struct Level<T> {
 pub struct VCycle<T> {
     options: VCycleOptions,
     levels: Vec<Level<T>>,
-    coarsest: Lattice<T>,
     assembly: Galerkin,
     factor: BandCholesky<T>,
     /// By which share the diagonal of the factor was raised.
@@ -160,7 +159,6 @@ impl<T: Real> VCycle<T> {
             samples: [samples(), samples()],
             workspace: TensorWorkspace::new(),
             levels,
-            coarsest: here,
             assembly,
             factor,
             raised: 0.0,
@@ -168,27 +166,13 @@ impl<T: Real> VCycle<T> {
         }
     }
 
-    /// Number of levels, the factorized one included.
-    pub fn level_count(&self) -> usize {
-        self.levels.len() + 1
-    }
-
-    /// Coefficients of the factorized level.
-    pub fn coarsest_count(&self) -> usize {
-        self.coarsest.coefficient_count()
-    }
-
     /// The smoother of the finest level.
     ///
     /// # Panics
     /// If the finest level is factorized.
+    #[cfg(feature = "study")]
     pub fn smoother(&self) -> &FastDiagonalization<T> {
         &self.levels[0].smoother
-    }
-
-    /// Largest eigenvalue of the smoother times `H`, as estimated, of each level.
-    pub fn eigenvalues(&self) -> impl Iterator<Item = f64> + '_ {
-        self.levels.iter().map(|l| l.largest_eigenvalue)
     }
 
     /// Makes the preconditioner fit a matrix.

@@ -147,8 +147,8 @@ impl<T: Real> Patch<T> {
             stiffness = &stiffness + &pulled;
         }
         SparseForms {
-            mass: on_samples(&|i| self.lumped.mass.value(i)),
-            damping: on_samples(&|i| self.lumped.damping.value(i)),
+            mass: on_samples(&|i| self.material.lumped.mass.value(i)),
+            damping: on_samples(&|i| self.material.lumped.damping.value(i)),
             stiffness,
             sampling,
         }

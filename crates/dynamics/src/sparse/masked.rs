@@ -23,13 +23,13 @@ impl<T: Real> Patch<T> {
     /// # Errors
     /// [`PatchError::Mask`] for a mask of another lattice, [`PatchError::Matter`].
     pub fn with_mask(mut self, mask: Mask) -> Result<Self, PatchError> {
-        let needed = self.base.len();
+        let needed = self.motion.base.len();
         if mask.inside().len() != needed {
             let found = mask.inside().len();
             return Err(super::MaskError::Length { found, needed }.into());
         }
         self.put_mask(Arc::new(mask));
-        let matter = self.matter.clone();
+        let matter = self.material.matter.clone();
         self.set_matter(matter)?;
         Ok(self)
     }
@@ -40,13 +40,13 @@ impl<T: Real> Patch<T> {
         if let Some(solver) = &mut self.cache.mass_solver {
             solver.set_mask(Some(mask.clone()));
         }
-        self.mask = Some(mask);
-        self.cache.changes += 1;
+        self.material.mask = Some(mask);
+        self.material.changes += 1;
     }
 
     /// The mask, of a patch that is no box.
     pub fn mask(&self) -> Option<&Mask> {
-        self.mask.as_deref()
+        self.material.mask.as_deref()
     }
 
     /// How its steps are solved, of a patch with a mask.
@@ -56,7 +56,7 @@ impl<T: Real> Patch<T> {
 
     /// The mask if matter outside it is lighter.
     fn thinned(&self) -> Option<&Mask> {
-        self.mask.as_deref().filter(|m| m.rim() == Rim::Free)
+        self.material.mask.as_deref().filter(|m| m.rim() == Rim::Free)
     }
 
     /// What matter is under the mask: outside that of the nearest sample inside, but lighter.

@@ -39,29 +39,34 @@ impl<T: Real> Patch<T> {
             return Err(PatchError::Rate { rate: *rate });
         }
         if let Plasticity::Kernel { weights, .. } = &plasticity {
-            finite("weight", weights, self.base.len())?;
+            finite("weight", weights, self.motion.base.len())?;
             let outside = |w: &T| !(0.0..=1.0).contains(&w.as_f64());
             if let Some(index) = weights.iter().position(outside) {
                 let value = weights[index].as_f64();
                 return Err(PatchError::Weight { index, value });
             }
         }
-        self.plasticity = plasticity;
+        self.material.plasticity = plasticity;
         Ok(())
     }
 
     /// Whether springs keep their rest lengths.
     pub fn plasticity(&self) -> &Plasticity<T> {
-        &self.plasticity
+        &self.material.plasticity
     }
 
     /// Lets the rest lengths follow for `dt` seconds.
     pub(crate) fn flow(&mut self, dt: f64) {
-        match &self.plasticity {
+        match &self.material.plasticity {
             Plasticity::Elastic => (),
-            Plasticity::Clay { rate } => self.network.relax(&self.state.d, -libm::expm1(-rate * dt)),
+            Plasticity::Clay { rate } => self
+                .material
+                .network
+                .relax(&self.motion.state.d, -libm::expm1(-rate * dt)),
             Plasticity::Kernel { rate, weights } => {
-                self.network.relax_under(&self.state.d, weights, rate * dt);
+                self.material
+                    .network
+                    .relax_under(&self.motion.state.d, weights, rate * dt);
             }
         }
     }

@@ -5,9 +5,11 @@ use bspline::Real;
 use super::patterns::{Pattern, loads, random_masses, spring_weights, unit_random};
 use crate::integrators::largest_frequency;
 use crate::lattice::{Lattice, LatticeError, Rim, TensorWorkspace};
+use crate::solve::fast_diagonalization::FastDiagonalization;
+use crate::solve::pcg::{CoefficientSystem, Unpreconditioned};
 use crate::solve::{
-    BandCholesky, CoefficientSystem, ConjugateGradients, FastDiagonalization, Galerkin, PcgReport,
-    Preconditioner, SolveError, SolverOptions, StepSolver, Unpreconditioned, VCycle, VCycleOptions,
+    BandCholesky, ConjugateGradients, Galerkin, PcgReport, Preconditioner, SolveError, SolverOptions,
+    StepSolver, VCycle, VCycleOptions,
 };
 use crate::springs::{Neighbours, SpringWeights, StepMatrix, Weights};
 

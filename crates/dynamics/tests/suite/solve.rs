@@ -1,9 +1,9 @@
 //! Solvers of a step against dense double precision.
 
 use dynamics::lattice::{Lattice, Rim, TensorWorkspace};
-use dynamics::solve::{BandCholesky, Galerkin, Method, SolverOptions, StepSolver};
+use dynamics::solve::{Method, SolverOptions};
 use dynamics::springs::{Neighbours, SpringWeights, StepMatrix, Weights};
-use dynamics::study::{Pattern, spring_weights};
+use dynamics::study::{BandCholesky, Galerkin, Pattern, StepSolver, spring_weights};
 use nalgebra::DVector;
 
 use crate::common::dense;

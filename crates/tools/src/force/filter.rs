@@ -106,7 +106,10 @@ mod tests {
                 squares += w * way * way;
             }
             let variance = squares / sum;
-            assert!((variance - 1.0).abs().max_element() < 0.02, "{filter:?}: {variance}");
+            assert!(
+                (variance - 1.0).abs().max_element() < 0.02,
+                "{filter:?}: {variance}"
+            );
         }
     }
 }

@@ -20,6 +20,7 @@ mod spread;
 mod stroke;
 mod system;
 mod target;
+mod tool;
 mod track;
 
 pub use chisel::Chisel;
@@ -29,10 +30,11 @@ pub use path::{Path, first_crossing, nearest_surface};
 pub use pull::Pull;
 pub use stroke::{Arrival, Extent, ForceReport, ForceStroke, Told};
 pub use target::Target;
+pub use tool::ForceTool;
 
 use dynamics::patch::PatchError;
 use dynamics::region::RegionError;
-use fitting::{Control, FitError};
+use fitting::FitError;
 use serde::{Deserialize, Serialize};
 
 use crate::number::Positive;
@@ -120,24 +122,5 @@ impl ForceError {
     /// Whether the user said stop.
     pub fn is_cancelled(&self) -> bool {
         matches!(self, Self::Cancelled(_))
-    }
-}
-
-impl<T: bspline::Real> ForceStroke<T> {
-    /// Works until it is done, and lets go.
-    ///
-    /// # Errors
-    /// Any [`ForceError`].
-    pub fn finish(
-        mut self,
-        control: &mut Control,
-    ) -> Result<(bspline::HierarchicalSpline<T>, ForceReport), ForceError> {
-        while !self.is_over() {
-            control
-                .step("pulling", self.progress())
-                .map_err(ForceError::Cancelled)?;
-            self.step()?;
-        }
-        self.release()
     }
 }

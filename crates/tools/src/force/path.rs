@@ -34,7 +34,9 @@ impl Path {
             }
         }
         if kept.len() < 2 {
-            return Err(ForceError::tool("a path has no length; let it end beside its start"));
+            return Err(ForceError::tool(
+                "a path has no length; let it end beside its start",
+            ));
         }
         Ok(Self {
             points: kept,
@@ -63,7 +65,10 @@ impl Path {
 
     /// The place at an arc length from the start.
     pub fn at(&self, s: f64) -> DVec3 {
-        let end = self.lengths.partition_point(|l| *l <= s).clamp(1, self.points.len() - 1);
+        let end = self
+            .lengths
+            .partition_point(|l| *l <= s)
+            .clamp(1, self.points.len() - 1);
         let (from, to) = (self.points[end - 1], self.points[end]);
         let share = (s - self.lengths[end - 1]) / (self.lengths[end] - self.lengths[end - 1]);
         from + share * (to - from)
@@ -71,14 +76,21 @@ impl Path {
 
     /// Arc lengths of the points between the ends at which it turns by more than an angle of this cosine.
     pub fn corners(&self, cosine: f64) -> impl Iterator<Item = f64> {
-        let ways: Vec<DVec3> = self.points.windows(2).map(|w| (w[1] - w[0]).normalize()).collect();
+        let ways: Vec<DVec3> = self
+            .points
+            .windows(2)
+            .map(|w| (w[1] - w[0]).normalize())
+            .collect();
         let turns = (1..ways.len()).filter(move |i| ways[*i].dot(ways[i - 1]) < cosine);
         turns.map(|i| self.lengths[i])
     }
 
     /// Unit vector of the way at an arc length.
     pub fn direction(&self, s: f64) -> DVec3 {
-        let end = self.lengths.partition_point(|l| *l <= s).clamp(1, self.points.len() - 1);
+        let end = self
+            .lengths
+            .partition_point(|l| *l <= s)
+            .clamp(1, self.points.len() - 1);
         (self.points[end] - self.points[end - 1]).normalize()
     }
 }
@@ -150,7 +162,10 @@ fn root(mut f: impl FnMut(f64) -> f64, mut a: (f64, f64), mut b: (f64, f64)) -> 
 /// # Errors
 /// [`ForceError::Nowhere`] where there is none within `reach`.
 pub fn nearest_surface(field: &dyn Field, iso: f64, p: DVec3, reach: f64) -> Result<DVec3, ForceError> {
-    let nowhere = ForceError::Nowhere { at: p.to_array(), reach };
+    let nowhere = ForceError::Nowhere {
+        at: p.to_array(),
+        reach,
+    };
     let mut x = p;
     for _ in 0..64 {
         let (value, gradient) = field.value_gradient(x);

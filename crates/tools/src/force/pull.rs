@@ -38,7 +38,11 @@ impl Pull {
     ///
     /// # Errors
     /// Any [`ForceError`].
-    pub fn begin<T: Real>(&self, field: &HierarchicalSpline<T>, iso: f64) -> Result<ForceStroke<T>, ForceError> {
+    pub fn begin<T: Real>(
+        &self,
+        field: &HierarchicalSpline<T>,
+        iso: f64,
+    ) -> Result<ForceStroke<T>, ForceError> {
         let radius = self.radius.0;
         let points: Vec<_> = self.along.iter().map(|p| p.0).collect();
         let places = match (self.disc, &points[..]) {
@@ -65,7 +69,11 @@ impl Pull {
                 ..Target::single(path, true)
             })
         };
-        let extent = if self.disc.is_some() { Extent::Area } else { Extent::Curve };
+        let extent = if self.disc.is_some() {
+            Extent::Area
+        } else {
+            Extent::Curve
+        };
         let targets: Result<Vec<_>, _> = places.iter().map(target).collect();
         ForceStroke::new(field, iso, targets?, extent, radius, &self.how)
     }

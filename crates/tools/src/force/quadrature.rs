@@ -143,9 +143,21 @@ mod tests {
     #[test]
     fn polynomials_of_degree_22_are_exact_at_once() {
         for degree in 0..=22 {
-            let found = integrate(|x| x.powi(degree), 0.0, 2.0, Tolerance { relative: 1.0, mean: 0.0 });
+            let found = integrate(
+                |x| x.powi(degree),
+                0.0,
+                2.0,
+                Tolerance {
+                    relative: 1.0,
+                    mean: 0.0,
+                },
+            );
             let exact = 2f64.powi(degree + 1) / f64::from(degree + 1);
-            assert!((found.value / exact - 1.0).abs() < 1e-14, "{degree}: {}", found.value);
+            assert!(
+                (found.value / exact - 1.0).abs() < 1e-14,
+                "{degree}: {}",
+                found.value
+            );
             assert_eq!(found.nodes.len(), 15);
         }
     }

@@ -49,7 +49,11 @@ impl<'a, T: Real> Functions<'a, T> {
             first[a] = cell as i64 - 3;
             weights[a] = basis(local[a] - cell);
         }
-        let at = |a: usize, i: usize| usize::try_from(first[a] + i as i64).ok().filter(|n| *n < self.dims[a]);
+        let at = |a: usize, i: usize| {
+            usize::try_from(first[a] + i as i64)
+                .ok()
+                .filter(|n| *n < self.dims[a])
+        };
         for (i, wx) in weights[0].iter().enumerate() {
             let Some(x) = at(0, i) else { continue };
             for (j, wy) in weights[1].iter().enumerate() {

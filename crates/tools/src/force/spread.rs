@@ -64,16 +64,17 @@ impl Spread {
         for (p, weight, direction) in &places {
             let near = region.samples_near(*p, reach);
             let local = region.local(*p);
-            let way = |a: usize, i: usize| {
-                ((near.first[a] + i) as f64 * lattice.spacing()[a] - local[a]) / radius
-            };
+            let way =
+                |a: usize, i: usize| ((near.first[a] + i) as f64 * lattice.spacing()[a] - local[a]) / radius;
             let rows = |x: usize, y: usize| {
                 let [x, y] = [near.first[0] + x - at.first[0], near.first[1] + y - at.first[1]];
                 (x * ny + y) * nz + near.first[2] - at.first[2]
             };
             if let Shape::Gaussian = shape {
                 let one = |a: usize| -> Vec<f64> {
-                    (0..near.count[a]).map(|i| libm::exp(-0.5 * way(a, i).powi(2))).collect()
+                    (0..near.count[a])
+                        .map(|i| libm::exp(-0.5 * way(a, i).powi(2)))
+                        .collect()
                 };
                 let [gx, gy, gz] = [one(0), one(1), one(2)];
                 for (x, gx) in gx.iter().enumerate() {

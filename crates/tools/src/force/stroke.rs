@@ -227,12 +227,19 @@ impl<T: Real> ForceStroke<T> {
             (Extent::Track, Solid::Elastic) => Extent::Curve,
             (extent, _) => extent,
         };
-        let gone = if extent == Extent::Track { STAGE * radius } else { f64::INFINITY };
+        let gone = if extent == Extent::Track {
+            STAGE * radius
+        } else {
+            f64::INFINITY
+        };
         let first: Vec<&Target> = targets.iter().filter(|t| t.begins <= gone).collect();
         let cells = about(field, level, &first, radius)?;
         let region = Region::new(field, cells, matter, &RegionOptions::of(field, level))?;
         let samples = region.patch().lattice().sample_count();
-        let none = Arrival { least: 0.0, most: 0.0 };
+        let none = Arrival {
+            least: 0.0,
+            most: 0.0,
+        };
         Ok(Self {
             origin: field.clone(),
             field: field.clone(),
@@ -278,6 +285,11 @@ impl<T: Real> ForceStroke<T> {
     /// The value of the field as it is now.
     pub fn value(&self, p: DVec3) -> f64 {
         Functions::of(&self.field, &self.region).value(&self.region.patch().state().p, p)
+    }
+
+    /// Whether it springs back when it is let go.
+    pub fn is_elastic(&self) -> bool {
+        self.how.solid == Solid::Elastic
     }
 
     /// Forces on the samples that the last step ended with.
@@ -336,7 +348,11 @@ impl<T: Real> ForceStroke<T> {
 
     /// Length in which nothing of the surface is missed.
     fn look(&self) -> f64 {
-        let spacing = self.field.lattice().spacing(self.region.cells().level).min_element();
+        let spacing = self
+            .field
+            .lattice()
+            .spacing(self.region.cells().level)
+            .min_element();
         (0.5 * spacing).min(0.25 * self.radius)
     }
 
@@ -353,7 +369,11 @@ impl<T: Real> ForceStroke<T> {
             Solid::Elastic => (self.dt(), 1.0),
         };
         for (acting, bearing) in self.acting.iter_mut().zip(&bearings) {
-            acting.force = if bearing.is_some() { keep * acting.force } else { 0.0 };
+            acting.force = if bearing.is_some() {
+                keep * acting.force
+            } else {
+                0.0
+            };
         }
         let mut solves = 1;
         if self.scales {
@@ -367,7 +387,13 @@ impl<T: Real> ForceStroke<T> {
         let patch = self.region.patch_mut();
         patch.set_force_on(load.on_box())?;
         patch.step(Integrator::Paper, dt)?;
-        let moved: Vec<T> = patch.state().p.iter().zip(&before).map(|(now, then)| *now - *then).collect();
+        let moved: Vec<T> = patch
+            .state()
+            .p
+            .iter()
+            .zip(&before)
+            .map(|(now, then)| *now - *then)
+            .collect();
         let live: Vec<usize> = (0..bearings.len()).filter(|i| bearings[*i].is_some()).collect();
         let bearing = |i: usize| bearings[i].as_ref().expect("live paths have one");
         let right: Vec<f64> = live
@@ -410,7 +436,10 @@ impl<T: Real> ForceStroke<T> {
         let state = patch.state();
         let mut change = vec![0.0; state.p.len()];
         for (share, p) in parts {
-            change.iter_mut().zip(p).for_each(|(c, p)| *c += share * p.as_f64());
+            change
+                .iter_mut()
+                .zip(p)
+                .for_each(|(c, p)| *c += share * p.as_f64());
         }
         let add = |to: &[T], factor: f64| -> Vec<T> {
             let sums = to.iter().zip(&change);
@@ -467,21 +496,36 @@ impl<T: Real> ForceStroke<T> {
             let next = targets[self.begun..].partition_point(|t| t.begins <= self.gone);
             let next = &targets[self.begun..][..next];
             let far = (TRAIL * self.radius).powi(2);
-            let is_near = |t: &Target| next.iter().any(|n| n.path.at(0.0).distance_squared(t.path.at(0.0)) <= far);
+            let is_near = |t: &Target| {
+                next.iter()
+                    .any(|n| n.path.at(0.0).distance_squared(t.path.at(0.0)) <= far)
+            };
             let kept = (0..self.begun).filter(|i| is_near(&targets[*i]));
             // What they had to hold is at rest now.
             self.acting = kept.map(|i| Acting::new(i, usize::MAX / 2)).collect();
-            let paths: Vec<&Target> = self.acting.iter().map(|a| &targets[a.index]).chain(next).collect();
+            let paths: Vec<&Target> = self
+                .acting
+                .iter()
+                .map(|a| &targets[a.index])
+                .chain(next)
+                .collect();
             let cells = about(&self.field, self.region.cells().level, &paths, self.radius)?;
             let options = RegionOptions::of(&self.field, cells.level);
             self.region = Region::new(&self.field, cells, matter(&self.field, self.radius), &options)?;
             self.settled = 0;
             self.report.cuts += 1;
-            self.report.samples = self.report.samples.max(self.region.patch().lattice().sample_count());
+            self.report.samples = self
+                .report
+                .samples
+                .max(self.region.patch().lattice().sample_count());
         }
         self.report.steps += 1;
         self.scales = false;
-        while self.targets.get(self.begun).is_some_and(|t| t.begins <= self.gone) {
+        while self
+            .targets
+            .get(self.begun)
+            .is_some_and(|t| t.begins <= self.gone)
+        {
             self.acting.push(Acting::new(self.begun, 0));
             self.begun += 1;
             self.scales = true;
@@ -575,7 +619,11 @@ impl<T: Real> ForceStroke<T> {
         match self.how.rule {
             Rule::Arrive => {
                 let soft = SOFT[usize::from(self.how.solid == Solid::Elastic)];
-                Ok(self.acting.iter().map(|a| soft * a.stiffness / weight(a)).collect())
+                Ok(self
+                    .acting
+                    .iter()
+                    .map(|a| soft * a.stiffness / weight(a))
+                    .collect())
             }
             Rule::Raw(alpha) => {
                 let of = |b: &Option<Bearing>| b.as_ref().map_or(1.0, |b| b.span.to - b.span.from);
@@ -693,7 +741,10 @@ fn about<T: Real>(
     let [low, high] = bounds(field, targets);
     let spacing = field.lattice().spacing(0);
     let room = ROOM * radius + RIM * field.lattice().spacing(level).max_element();
-    let middle = field.lattice().world_from_lattice.transform_point3(0.5 * (low + high));
+    let middle = field
+        .lattice()
+        .world_from_lattice
+        .transform_point3(0.5 * (low + high));
     let half = 0.5 * (high - low) * spacing + room;
     Ok(Cells::around(field, level, middle, half)?.widened(field)?)
 }

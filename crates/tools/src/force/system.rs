@@ -102,7 +102,8 @@ mod tests {
     #[test]
     fn residuals_are_true_and_fall_to_rounding() {
         let n = 6;
-        let c = |i: usize, j: usize| 1.0 / (1.0 + (i as f64 - j as f64).abs()) + if i > j { 0.1 } else { 0.0 };
+        let c =
+            |i: usize, j: usize| 1.0 / (1.0 + (i as f64 - j as f64).abs()) + if i > j { 0.1 } else { 0.0 };
         let right: Vec<f64> = (0..n).map(|i| (i as f64 - 1.5).sin()).collect();
         let soft = [0.01; 6];
         let diagonal = [2.0, 2.2, 2.4, 2.4, 2.2, 2.0];

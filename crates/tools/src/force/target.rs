@@ -49,7 +49,13 @@ impl Target {
     }
 
     /// Arc length at which the surface is now; `None` where there is none along the path.
-    pub fn crossing(&self, value: &impl Fn(glam::DVec3) -> f64, iso: f64, radius: f64, step: f64) -> Option<f64> {
+    pub fn crossing(
+        &self,
+        value: &impl Fn(glam::DVec3) -> f64,
+        iso: f64,
+        radius: f64,
+        step: f64,
+    ) -> Option<f64> {
         let end = self.path.length() + BEYOND * radius;
         let behind = |s| self.behind(value, iso, s);
         first_crossing(behind, BEYOND * radius, end, step).filter(|s| *s < end)

@@ -82,7 +82,10 @@ pub fn along<T: Real>(
     // Corners get places of their own.
     let ends: Vec<f64> = path.corners(CORNER).collect();
     let mut stops = vec![0.0];
-    for (from, to) in std::iter::once(0.0).chain(ends.iter().copied()).zip(ends.iter().copied().chain([path.length()])) {
+    for (from, to) in std::iter::once(0.0)
+        .chain(ends.iter().copied())
+        .zip(ends.iter().copied().chain([path.length()]))
+    {
         let count = (DENSITY * (to - from) / radius).ceil();
         few(stops.len() as f64 + count)?;
         stops.extend((1..=count as usize).map(|i| from + (to - from) * i as f64 / count));

@@ -2,12 +2,12 @@
 
 use bspline::Real;
 use dynamics::lattice::TensorWorkspace;
-use dynamics::solve::{
-    CoefficientSystem, ConjugateGradients, Preconditioner, SolveError, StepSolver, Unpreconditioned, VCycle,
-    VCycleOptions,
-};
+use dynamics::solve::{SolveError, VCycleOptions};
 use dynamics::springs::StepMatrix;
-use dynamics::study::{Reference, Solver, StudyError};
+use dynamics::study::{
+    CoefficientSystem, ConjugateGradients, Preconditioner, Reference, Solver, StepSolver, StudyError,
+    Unpreconditioned, VCycle,
+};
 
 use super::{DynamicsError, median_seconds};
 

@@ -1,12 +1,13 @@
-//! What a patch keeps from step to step that is made from its state and matter: solvers, matrices, bounds.
+//! The room of the solvers: what a patch keeps from step to step that is made from its state and matter: solvers, matrices, bounds.
 
 use bspline::Real;
 
-use crate::lattice::SampleBox;
+use super::motion::State;
+use super::version::{Prepared, Version};
+use crate::lattice::{SampleBox, TensorWorkspace};
 use crate::solve::StepSolver;
 use crate::springs::StepMatrix;
 use crate::statics::StaticSolver;
-use crate::version::{Prepared, Version};
 
 /// Solvers and matrices of a patch.
 #[derive(Clone, Debug)]
@@ -21,30 +22,60 @@ pub(crate) struct Cache<T> {
     pub filled: Option<(Version, f64, f64, f64)>,
     /// What the solver was made for.
     pub prepared: Option<Prepared>,
-    /// Counts changes of matter and constraints.
-    pub changes: u64,
-    /// Counts paint, which what was made before may survive.
-    pub paints: u64,
     /// Where weights have changed by paint since the solver was made for them.
     pub painted_on: SampleBox,
     /// Bound of explicit steps with the version it is of.
     pub limit: Option<(Version, f64)>,
     /// Of static problems, painted and of reference; no bit depends on whether they are there.
     pub statics: [Option<Box<StaticSolver>>; 2],
+    pub work: Scratch<T>,
+    pub workspace: TensorWorkspace<T>,
+}
+
+/// Vectors of a step.
+#[derive(Clone, Debug)]
+pub(crate) struct Scratch<T> {
+    /// Impulse on the samples.
+    pub g: Vec<T>,
+    /// Forces on the samples, in `force_unit`.
+    pub force: Vec<T>,
+    pub force_unit: f64,
+    /// Work of the external forces since the step began.
+    pub work: f64,
+    /// What the densities moved over an adaptive step.
+    pub moved: Vec<f64>,
+    pub x: Vec<T>,
+    pub dx: Vec<T>,
+    pub first_x: Vec<T>,
+    pub first_dx: Vec<T>,
+    pub before: State<T>,
 }
 
 impl<T: Real> Cache<T> {
     /// Nothing made yet.
-    pub fn new(solver: StepSolver<T>, matrix: StepMatrix<T>) -> Self {
+    pub fn new(solver: StepSolver<T>, matrix: StepMatrix<T>, state: &State<T>) -> Self {
+        let (n, m) = (state.p.len(), state.d.len());
+        let zeros = |n: usize| vec![T::zero(); n];
         Self {
+            work: Scratch {
+                g: zeros(m),
+                force: zeros(m),
+                force_unit: 1.0,
+                work: 0.0,
+                moved: Vec::new(),
+                x: zeros(n),
+                dx: zeros(m),
+                first_x: zeros(n),
+                first_dx: zeros(m),
+                before: state.clone(),
+            },
+            workspace: TensorWorkspace::new(),
             solver,
             mass_solver: None,
             mass_matrix: None,
             matrix,
             filled: None,
             prepared: None,
-            changes: 0,
-            paints: 0,
             painted_on: SampleBox::default(),
             limit: None,
             statics: [None, None],

@@ -1,0 +1,217 @@
+//! One solve: from the impulses on the samples to the increments of coefficients and densities.
+
+use bspline::Real;
+
+use super::painted::{Dynamic, Painted, active};
+use super::pcg::{CoefficientSystem, PcgReport};
+use super::report::{ITERATED, Method, SolveReport};
+use super::step_solver::StepSolver;
+use super::systems::{SampleSystem, Sampled};
+use crate::lattice::{Lattice, TensorProduct, TensorWorkspace};
+use crate::sparse::Projected;
+use crate::springs::StepMatrix;
+use crate::units::{binary_unit, largest};
+
+/// Residual, in units of rounding of single precision, at which solves by a factor stop.
+const EXACT: f64 = 64.0;
+
+/// The same of fast diagonalization. On coefficients the residual is mostly that of combinations that hardly move a
+/// sample: one iteration leaves up to 2000 units of it in single precision, and increments of the samples that are wrong
+/// by a few units.
+const DIAGONALIZED: f64 = 4096.0;
+
+/// Most iterations of a solve that is asked for more than a step needs.
+const MOST_ITERATIONS: usize = 64;
+
+/// Impulses whose squares, and those of their residuals, are far from the ends of the range of single precision.
+const ORDINARY: std::ops::Range<f64> = 1e-6..1e12;
+
+/// `A⁻¹` in double precision.
+#[derive(Clone, Debug)]
+pub(super) struct SampleInverse {
+    product: TensorProduct<f64>,
+    d: Vec<f64>,
+    p: Vec<f64>,
+    workspace: TensorWorkspace<f64>,
+}
+
+impl SampleInverse {
+    pub fn new<T: Real>(lattice: &Lattice<T>) -> Self {
+        let m = lattice.sample_count();
+        Self {
+            product: lattice.inverse(),
+            d: vec![0.0; m],
+            p: vec![0.0; m],
+            workspace: TensorWorkspace::new(),
+        }
+    }
+
+    /// `x = A⁻¹ dx`.
+    fn apply<T: Real>(&mut self, dx: &[T], x: &mut [T]) {
+        for (d, dx) in self.d.iter_mut().zip(dx) {
+            *d = dx.as_f64();
+        }
+        self.product.apply(&self.d, &mut self.p, &mut self.workspace);
+        for (x, p) in x.iter_mut().zip(&self.p) {
+            *x = T::from_f64(*p);
+        }
+    }
+}
+
+impl<T: Real> StepSolver<T> {
+    /// The increment `x` of the coefficients and `dx = A x` of the densities under the impulses `g` on the samples, for
+    /// the matrix prepared last or one near it.
+    ///
+    /// # Panics
+    /// If a length is wrong.
+    pub fn solve(&mut self, s: &StepMatrix<T>, g: &[T], x: &mut [T], dx: &mut [T]) -> SolveReport {
+        self.solve_to(s, g, x, dx, None)
+    }
+
+    /// The same to a residual, if one is asked for; in more iterations than steps take if it is less than theirs.
+    pub(crate) fn solve_to(
+        &mut self,
+        s: &StepMatrix<T>,
+        g: &[T],
+        x: &mut [T],
+        dx: &mut [T],
+        asked: Option<f64>,
+    ) -> SolveReport {
+        let usual = self.tolerance();
+        let (tolerance, cap) = match asked {
+            Some(asked) if asked < usual => (asked, MOST_ITERATIONS.max(self.options.iterations)),
+            asked => (asked.unwrap_or(usual), self.options.iterations),
+        };
+        if self.inverse.is_some() {
+            self.b.copy_from_slice(g);
+        } else {
+            self.lattice.gather(g, &mut self.b, &mut self.workspace);
+            if let Some(mask) = &self.mask {
+                mask.hold(&mut self.b);
+            }
+        }
+        // Solved for an impulse of about one, whose squares no precision loses.
+        let unit = self.impulse_unit();
+        if unit != 1.0 {
+            for b in &mut self.b {
+                *b = T::from_f64(b.as_f64() / unit);
+            }
+            if let Some(border) = &mut self.border {
+                border.scale(1.0 / unit);
+            }
+        }
+        let solved_by = self.method;
+        let iteration = if let Some(inverse) = &mut self.inverse {
+            let preconditioner = active(self.method, &mut self.painted, &mut self.diagonalization);
+            let mut system = SampleSystem {
+                matrix: s,
+                preconditioner: &mut Dynamic(preconditioner),
+            };
+            let report = match &mut self.border {
+                Some(border) => border.solve(&mut self.iteration, &mut system, &self.b, dx, cap, tolerance),
+                None => self.iteration.solve(&mut system, &self.b, dx, cap, tolerance),
+            };
+            inverse.apply(dx, x);
+            report
+        } else {
+            let report = self.iterate(s, x, Some(dx), cap, tolerance);
+            if solved_by == Method::Direct {
+                self.keep_up(s, report.iterations);
+            } else if let (Painted::Background(background), Method::VCycle) = (&mut self.painted, solved_by) {
+                let matrix = self
+                    .painted_for
+                    .as_ref()
+                    .expect("prepared before the first solve");
+                background.advance(matrix);
+                self.settle_method();
+                if self.method != solved_by {
+                    self.renew_border();
+                }
+            }
+            report
+        };
+        if unit != 1.0 {
+            if let Some(border) = &mut self.border {
+                border.scale(unit);
+            }
+            for x in x.iter_mut().chain(dx) {
+                *x = T::from_f64(x.as_f64() * unit);
+            }
+        }
+        SolveReport {
+            method: solved_by,
+            iteration,
+        }
+    }
+
+    /// Residual at which steps stop.
+    pub(crate) fn tolerance(&self) -> f64 {
+        self.options.tolerance.unwrap_or(match self.method {
+            Method::VCycle | Method::SampleMultigrid => ITERATED,
+            Method::Direct if matches!(self.painted, Painted::Background(_)) => ITERATED,
+            // Double precision is for references: there coefficients that hardly move a sample count too.
+            _ if T::UNIT_ROUND_OFF < 1e-10 => 16.0 * T::UNIT_ROUND_OFF,
+            Method::FastDiagonalization => DIAGONALIZED * T::UNIT_ROUND_OFF,
+            _ => EXACT * T::UNIT_ROUND_OFF,
+        })
+    }
+
+    /// The power of two that the impulses are divided by; 1 where they are of ordinary size, which saves two passes and
+    /// changes no bit.
+    fn impulse_unit(&self) -> f64 {
+        let size = largest(&self.b).max(self.border.as_ref().map_or(0.0, |b| b.size()));
+        if size == 0.0 || ORDINARY.contains(&size) {
+            1.0
+        } else {
+            binary_unit(size)
+        }
+    }
+
+    /// The same without constraints for forces `b` on the coefficients, of lattices with fewer coefficients than samples.
+    pub(crate) fn solve_coefficients(&mut self, s: &StepMatrix<T>, b: &[T], x: &mut [T]) {
+        debug_assert!(self.inverse.is_none());
+        self.b.copy_from_slice(b);
+        if let Some(mask) = &self.mask {
+            mask.hold(&mut self.b);
+        }
+        self.iterate(s, x, None, self.options.iterations, 16.0 * T::UNIT_ROUND_OFF);
+    }
+
+    /// Solves for the right-hand side in `self.b`: with constraints if the samples are asked for too.
+    fn iterate(
+        &mut self,
+        s: &StepMatrix<T>,
+        x: &mut [T],
+        dx: Option<&mut [T]>,
+        cap: usize,
+        tolerance: f64,
+    ) -> PcgReport {
+        let preconditioner = active(self.method, &mut self.painted, &mut self.diagonalization);
+        let mask = self.mask.as_deref();
+        let system = CoefficientSystem {
+            lattice: &self.lattice,
+            matrix: s,
+            preconditioner: &mut Dynamic(preconditioner),
+            samples: &mut self.samples,
+            workspace: &mut self.workspace,
+        };
+        match (dx, &mut self.border) {
+            (None, _) => {
+                let mut system = Projected { system, mask };
+                self.iteration.solve(&mut system, &self.b, x, cap, tolerance)
+            }
+            (Some(dx), None) => {
+                dx.fill(T::zero());
+                let system = Sampled { system, dx };
+                let mut system = Projected { system, mask };
+                self.iteration.solve(&mut system, &self.b, x, cap, tolerance)
+            }
+            (Some(dx), Some(border)) => {
+                let mut system = Projected { system, mask };
+                let report = border.solve(&mut self.iteration, &mut system, &self.b, x, cap, tolerance);
+                self.lattice.sample(x, dx, &mut self.workspace);
+                report
+            }
+        }
+    }
+}
