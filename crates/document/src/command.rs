@@ -2,11 +2,12 @@
 
 use bspline::HierarchicalSpline;
 use fitting::{Control, FitError};
+use glam::DAffine3;
 use serde::{Deserialize, Serialize};
 use tools::paint::Layers;
 use tools::scene::{Scene, SimulateError, Simulation};
 use tools::session::{Session, Stroke};
-use tools::tool::{Canvas, ToolError};
+use tools::tool::{Canvas, Others, ToolError};
 
 use crate::{DocumentError, State};
 
@@ -111,26 +112,47 @@ impl Command {
                 (object.field, notes) = played(&scene, object.field, iso, &object.layers, control)?;
             }
             Self::Stroke { stroke, .. } => {
-                let tool = stroke.tool().map_err(CommandError::Script)?;
                 let iso = object
                     .meta
                     .iso
                     .ok_or_else(|| CommandError::NoSurface(name.clone()))?;
                 let canvas = Canvas {
+                    detail: object.detail(),
                     field: object.field,
                     iso,
                     layers: object.layers,
+                    others: others(state, name)?,
                 };
-                let (canvas, told) = tool.apply(canvas, control).map_err(|e| match e.is_cancelled() {
-                    true => CommandError::Cancelled(FitError::Cancelled),
-                    false => e.into(),
-                })?;
+                let (canvas, told) = stroke
+                    .apply(canvas, control)
+                    .map_err(|e| match e.is_cancelled() {
+                        true => CommandError::Cancelled(FitError::Cancelled),
+                        false => e.into(),
+                    })?;
                 (object.field, object.layers) = (canvas.field, canvas.layers);
                 notes = told;
             }
         }
         Ok((state.with(name, object)?, notes))
     }
+}
+
+/// All objects that have a surface, as they lie to the one of a name.
+fn others(state: &State, name: &str) -> Result<Others, CommandError> {
+    let own = state.placement(name)?.inverse();
+    let mut others = Others::default();
+    for (other, object) in state.objects() {
+        if let Some(iso) = object.meta.iso {
+            // Of the object itself no rounding.
+            let map = match other == name {
+                true => DAffine3::IDENTITY,
+                false => own * state.placement(other)?,
+            };
+            let put = others.put(other, &object.field, iso, map);
+            put.map_err(|e| CommandError::Script(format!("object {other:?} cannot be used: {e}")))?;
+        }
+    }
+    Ok(others)
 }
 
 fn parsed<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, CommandError> {

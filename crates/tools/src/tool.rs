@@ -1,12 +1,18 @@
 //! All tools behind one door: what they work on, and what they leave.
 
-use bspline::HierarchicalSpline;
+use std::collections::BTreeMap;
+use std::fmt;
+use std::sync::Arc;
+
+use bspline::{Csg, CsgError, Field, HierarchicalSpline};
 use fitting::field::FieldFitReport;
 use fitting::{Control, FitError};
+use glam::DAffine3;
 
 use crate::force::{ForceError, ForceTool};
-use crate::geometric::{Geometric, GeometricError, Operation};
-use crate::paint::{Layers, Paint, PaintError};
+use crate::geometric::{Geometric, GeometricError, Move, Operation};
+use crate::limits::Limits;
+use crate::paint::{Layer, Layers, Paint, PaintError};
 
 /// What a tool works on. Cheap to copy.
 #[derive(Clone, Debug)]
@@ -15,8 +21,64 @@ pub struct Canvas {
     pub field: HierarchicalSpline<f32>,
     /// Density of its surface.
     pub iso: f64,
+    /// Level of the field that the object is shaped to.
+    pub detail: usize,
     /// What is painted on it.
     pub layers: Layers,
+    /// Objects that a tool may name.
+    pub others: Others,
+}
+
+/// Objects by name, each about as the distance from its surface, positive inside, in the world of the canvas.
+#[derive(Clone, Default)]
+pub struct Others(BTreeMap<String, Arc<dyn Field>>);
+
+impl fmt::Debug for Others {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_set().entries(self.0.keys()).finish()
+    }
+}
+
+impl Others {
+    /// Puts an object in; `canvas_from_object` maps its world to that of the canvas.
+    ///
+    /// # Errors
+    /// [`CsgError`] for an iso-value that is not finite, or a map that flattens.
+    pub fn put(
+        &mut self,
+        name: &str,
+        field: &HierarchicalSpline<f32>,
+        iso: f64,
+        canvas_from_object: DAffine3,
+    ) -> Result<(), CsgError> {
+        let steep = 1.0 / field.slope();
+        let distance = Csg::sum(vec![(steep, Arc::new(field.clone()))], -iso * steep)?;
+        let placed: Arc<dyn Field> = match canvas_from_object == DAffine3::IDENTITY {
+            true => Arc::new(distance),
+            false => {
+                // A distance of the object, in lengths of the canvas.
+                let stretch = canvas_from_object.matrix3.determinant().abs().cbrt();
+                let placed = Arc::new(Csg::affine(Arc::new(distance), canvas_from_object)?);
+                Arc::new(Csg::sum(vec![(stretch, placed)], 0.0)?)
+            }
+        };
+        self.0.insert(name.into(), placed);
+        Ok(())
+    }
+
+    /// The object of a name.
+    ///
+    /// # Errors
+    /// A sentence.
+    pub fn get(&self, name: &str) -> Result<Arc<dyn Field>, String> {
+        self.0.get(name).cloned().ok_or_else(|| {
+            let known: Vec<_> = self.0.keys().map(String::as_str).collect();
+            match known.is_empty() {
+                true => format!("there is no object {name:?}, nor any other"),
+                false => format!("there is no object {name:?}; there are {}", known.join(", ")),
+            }
+        })
+    }
 }
 
 /// A tool with all that it is told.
@@ -28,6 +90,8 @@ pub enum Tool<'a> {
     Add(&'a Geometric),
     /// Pushes or pulls.
     Force(ForceTool<'a>),
+    /// Carries along.
+    Move(&'a Move),
     /// Paints matter or touch.
     Paint(&'a Paint),
 }
@@ -41,6 +105,9 @@ pub enum ToolError {
     /// A force tool cannot.
     #[error(transparent)]
     Force(#[from] ForceError),
+    /// The stroke names no tool, or several, or limits that make no sense.
+    #[error("{0}")]
+    Stroke(String),
     /// Paint cannot be laid on.
     #[error(transparent)]
     Paint(#[from] PaintError),
@@ -52,16 +119,16 @@ impl ToolError {
         match self {
             Self::Geometric(e) => matches!(e, GeometricError::Fit(FitError::Cancelled)),
             Self::Force(e) => e.is_cancelled(),
-            Self::Paint(_) => false,
+            Self::Stroke(_) | Self::Paint(_) => false,
         }
     }
 }
 
 impl Tool<'_> {
     /// Names of all tools, as sessions write them.
-    pub const NAMES: [&'static str; 8] = {
+    pub const NAMES: [&'static str; 9] = {
         let [pull, chisel, squirt, drill, join] = ForceTool::NAMES;
-        ["carve", "add", pull, chisel, squirt, drill, join, "paint"]
+        ["carve", "add", pull, chisel, squirt, drill, join, "move", "paint"]
     };
 
     /// Its name, as sessions write it.
@@ -70,32 +137,51 @@ impl Tool<'_> {
             Self::Carve(_) => "carve",
             Self::Add(_) => "add",
             Self::Force(tool) => tool.name(),
+            Self::Move(_) => "move",
             Self::Paint(_) => "paint",
         }
     }
 
-    /// What the tool leaves, and what is left to say of it, in sentences.
+    /// What the tool leaves within limits, and what is left to say of it, in sentences.
     ///
     /// # Errors
     /// Any [`ToolError`].
-    pub fn apply(&self, canvas: Canvas, control: &mut Control) -> Result<(Canvas, Vec<String>), ToolError> {
+    pub fn apply(
+        &self,
+        canvas: Canvas,
+        limits: &Limits,
+        control: &mut Control,
+    ) -> Result<(Canvas, Vec<String>), ToolError> {
+        let Canvas { field: old, iso, .. } = &canvas;
         let (field, report) = match self {
+            Self::Carve(tool) => tool.apply(Operation::Carve, old, *iso, limits, control)?,
+            Self::Add(tool) => tool.apply(Operation::Add, old, *iso, limits, control)?,
+            Self::Move(tool) => tool.apply(old, *iso, limits, control)?,
             Self::Paint(paint) => {
-                let everywhere = canvas.field.lattice().world_box();
-                let layer = paint.apply(&canvas.field, &canvas.layers, &everywhere)?;
+                let layer = painted(paint, &canvas, limits)?;
                 let mut canvas = canvas;
                 canvas.layers.insert(paint.layer, layer);
                 return Ok((canvas, Vec::new()));
             }
             Self::Force(tool) => {
-                let (field, told) = tool.apply(&canvas.field, canvas.iso, control)?;
+                let (field, told) = tool.apply(old, *iso, control)?;
+                let field = limits.kept(old, &field);
                 return Ok((Canvas { field, ..canvas }, told));
             }
-            Self::Carve(tool) => tool.apply(Operation::Carve, &canvas.field, canvas.iso, control)?,
-            Self::Add(tool) => tool.apply(Operation::Add, &canvas.field, canvas.iso, control)?,
         };
         Ok((Canvas { field, ..canvas }, thin_parts(&report)))
     }
+}
+
+/// A layer with paint laid on, as far as the limits allow.
+fn painted(paint: &Paint, canvas: &Canvas, limits: &Limits) -> Result<Layer, ToolError> {
+    let field = &canvas.field;
+    let whole = limits.cut(&field.lattice().world_box());
+    let layer = paint.apply(field, &canvas.layers, canvas.detail, &whole)?;
+    let before = canvas.layers.get(&paint.layer).cloned();
+    let before = before.unwrap_or_else(|| Layer::empty(field.lattice(), canvas.detail));
+    let kept = limits.kept(before.tree(), layer.tree());
+    Ok(layer.with_tree(kept).expect("some of the nodes painted"))
 }
 
 /// Says what was too thin for the field.

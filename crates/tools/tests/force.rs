@@ -334,10 +334,11 @@ fn topology(field: &HierarchicalSpline<f32>, script: &str) -> (u64, i64) {
         field: field.clone(),
         iso: ISO,
         layers: Default::default(),
+        others: Default::default(),
+        detail: 0,
     };
     for stroke in &session.stroke {
-        let tool = stroke.tool().unwrap();
-        let (after, notes) = tool
+        let (after, notes) = stroke
             .apply(canvas, &mut Control::default())
             .unwrap_or_else(|e| panic!("{e}"));
         println!("{notes:?}");
@@ -395,9 +396,11 @@ fn what_makes_no_sense_is_refused() {
                     field: field.clone(),
                     iso: ISO,
                     layers: Default::default(),
+                    others: Default::default(),
+                    detail: 0,
                 };
                 let stroke = &session.stroke[0];
-                let done = stroke.tool().unwrap().apply(canvas, &mut Control::default());
+                let done = stroke.apply(canvas, &mut Control::default());
                 done.map(|_| ()).expect_err(text).to_string()
             }
         };

@@ -9,6 +9,7 @@ use formats::Unit;
 use formats::volumes::{Orientation, Volume, VolumeHeader, VoxelType};
 use glam::{DAffine3, DMat3, DVec3};
 use tools::geometric::{Geometric, Operation};
+use tools::limits::Limits;
 
 use super::common::Draw;
 
@@ -72,7 +73,13 @@ fn sphere(centre: DVec3, radius: f64) -> Geometric {
 fn edited(operation: Operation, tool: &Geometric) -> (HierarchicalSpline<f32>, VolumeRevision) {
     let before = fitted();
     let (now, _) = tool
-        .apply(operation, &before, ISO, &mut Control::default())
+        .apply(
+            operation,
+            &before,
+            ISO,
+            &Limits::default(),
+            &mut Control::default(),
+        )
         .unwrap();
     let revision = revise_volume(&before, &now, &scan(), ISO, FILL).unwrap();
     (now, revision)

@@ -23,7 +23,7 @@ fn paint(text: &str) -> Paint {
 fn laid(text: &str, field: &HierarchicalSpline<f32>, layers: &Layers) -> Result<Layers, PaintError> {
     let paint = paint(text);
     let mut layers = layers.clone();
-    let layer = paint.apply(field, &layers, &everywhere())?;
+    let layer = paint.apply(field, &layers, 0, &everywhere())?;
     layers.insert(paint.layer, layer);
     Ok(layers)
 }
