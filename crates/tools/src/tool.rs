@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
-use bspline::{Csg, CsgError, Field, HierarchicalSpline};
+use bspline::{Aabb, Csg, CsgError, Field, HierarchicalSpline};
 use fitting::field::FieldFitReport;
 use fitting::{Control, FitError};
 use glam::DAffine3;
@@ -156,7 +156,16 @@ impl Tool<'_> {
         let (field, report) = match self {
             Self::Carve(tool) => tool.apply(Operation::Carve, old, *iso, limits, control)?,
             Self::Add(tool) => tool.apply(Operation::Add, old, *iso, limits, control)?,
-            Self::Move(tool) => tool.apply(old, *iso, limits, control)?,
+            Self::Move(tool) => {
+                let (field, report) = tool.apply(old, *iso, limits, control)?;
+                let layers = carried(tool, &canvas, limits)?;
+                let moved = Canvas {
+                    field,
+                    layers,
+                    ..canvas
+                };
+                return Ok((moved, thin_parts(&report)));
+            }
             Self::Paint(paint) => {
                 let layer = painted(paint, &canvas, limits)?;
                 let mut canvas = canvas;
@@ -171,6 +180,29 @@ impl Tool<'_> {
         };
         Ok((Canvas { field, ..canvas }, thin_parts(&report)))
     }
+}
+
+/// What is painted, carried along by a move as far as the limits allow.
+fn carried(tool: &Move, canvas: &Canvas, limits: &Limits) -> Result<Layers, ToolError> {
+    let whole = canvas.field.lattice().world_box();
+    let origin = tool.motion.origin(&whole)?;
+    let reach = origin.reach();
+    let within = limits.cut(&Aabb {
+        min: reach.min.max(whole.min),
+        max: reach.max.min(whole.max),
+    });
+    let painted = canvas.layers.iter().filter(|(_, layer)| !layer.is_empty());
+    let layers = painted.map(|(substance, layer)| {
+        let moved = layer
+            .carried(&within, |p| origin.back(p))
+            .map_err(PaintError::from)?;
+        let kept = limits.kept(layer.tree(), moved.tree());
+        Ok((
+            *substance,
+            layer.with_tree(kept).expect("nodes of the same level"),
+        ))
+    });
+    layers.collect()
 }
 
 /// A layer with paint laid on, as far as the limits allow.
