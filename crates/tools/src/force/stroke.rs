@@ -691,10 +691,10 @@ impl<T: Real> ForceStroke<T> {
 }
 
 /// Spreads of the paths that ask for something, with a factor each.
-fn pairs<'a>(
-    bearings: &'a [Option<Bearing>],
+fn pairs(
+    bearings: &[Option<Bearing>],
     factors: impl Iterator<Item = f64> + Clone,
-) -> impl Iterator<Item = (&'a Spread, f64)> + Clone {
+) -> impl Iterator<Item = (&Spread, f64)> + Clone {
     let both = bearings.iter().zip(factors);
     both.filter_map(|(b, f)| b.as_ref().map(|b| (&b.spread, f)))
 }
