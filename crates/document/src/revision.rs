@@ -34,7 +34,7 @@ pub struct VolumeRevision {
     pub carved: usize,
     /// Voxels that joined it.
     pub added: usize,
-    /// Those that were carved.
+    /// Those that were carved and filled.
     emptied: Vec<usize>,
 }
 
@@ -76,6 +76,13 @@ impl Journey {
                 false => p,
             }
         })
+    }
+}
+
+impl VolumeRevision {
+    /// Whether some voxels got the density of the fill.
+    pub fn is_filled(&self) -> bool {
+        !self.emptied.is_empty()
     }
 }
 
@@ -219,6 +226,8 @@ struct Matter {
     fill: f64,
     /// Density over which what was carved becomes the fill.
     ramp: f64,
+    /// Densities of the volume.
+    least: f64,
     largest: f64,
     /// A difference that is none.
     rounding: f64,
@@ -235,6 +244,7 @@ impl Matter {
             iso,
             fill,
             ramp: slope * steps.into_iter().fold(f64::INFINITY, f64::min),
+            least: least.into(),
             largest: largest.into(),
             rounding: ROUNDING * f64::from(least.abs().max(largest.abs())),
         }
@@ -246,7 +256,7 @@ impl Matter {
         let (was_in, is_in) = (fitted >= self.iso, now >= self.iso);
         told.carved += usize::from(was_in && !is_in);
         told.added += usize::from(is_in && !was_in);
-        now + residual
+        (now + residual).clamp(self.least, self.largest)
     }
 
     /// The new density of a voxel, if it has one.

@@ -141,7 +141,7 @@ fn sentences(
         human_count(revision.carved),
         human_count(revision.added),
     )];
-    if revision.carved > 0 {
+    if revision.is_filled() {
         notes.push(format!(
             "what was carved has density {} (--fill)",
             human_number(fill)
