@@ -24,11 +24,15 @@ const TURNED: f64 = 0.5;
 /// Steps along the gradient, at most.
 const STEPS: usize = 30;
 
-/// Distance from the nearest point, in spacings of the scan, at which surface is bare.
-const BARE: f64 = 0.8;
+/// Gap of a scan, in its spacings, from which on surface is bare: one in 300 000 gaps of points thrown at random is wider.
+const GAP: f64 = 2.0;
 
-/// Points whose nearest neighbours tell the spacing of the scan.
+/// Least distance of a new point from all others, in spacings of the scan.
+const APART: f64 = 0.8;
+
+/// Points whose neighbours tell the spacing of the scan, and how many of these.
 const PROBES: usize = 128;
+const NEIGHBOURS: usize = 6;
 
 /// Most cells of the grid on which bare surface is looked for, along one axis.
 const MOST_CELLS: f64 = 4096.0;
@@ -65,7 +69,7 @@ pub fn revise_cloud(
         .map(|p| fate(fitted, now, *p, journey, least, spacing))
         .collect();
     let mut changes = CloudChanges::default();
-    let mut cover = Cover::new(BARE * spacing);
+    let mut cover = Cover::new(GAP * spacing);
     for (row, (point, fate)) in points.iter().zip(&fates).enumerate() {
         match fate {
             Fate::Stays => cover.put(*point, row),
@@ -101,18 +105,28 @@ pub fn revise_cloud(
         ..PolygonizeOptions::default()
     };
     let (mesh, _) = polygonize(now, &frame, &options)?;
-    for vertex in mesh.positions {
-        // Caps of the mesh at the faces of its box are no surface.
-        let (value, gradient) = now.value_gradient(vertex);
-        let is_surface = (value - iso).abs() < 0.1 * spacing * fitted.slope();
-        let is_new = (value - fitted.value(vertex)).abs() > least;
-        if is_surface && is_new && cover.is_bare(vertex) {
+    let surface: Vec<(DVec3, DVec3)> = (mesh.positions.into_par_iter())
+        .filter_map(|vertex| {
+            // Caps of the mesh at the faces of its box are no surface.
+            let (value, gradient) = now.value_gradient(vertex);
+            let is_surface = (value - iso).abs() < 0.1 * spacing * fitted.slope();
+            let is_new = (value - fitted.value(vertex)).abs() > least;
+            (is_surface && is_new).then(|| (vertex, -gradient.normalize_or_zero()))
+        })
+        .collect();
+    // Scans have gaps of their own: bare is what is farther from all points than those are wide, and what lies round it.
+    let mut bare = Cover::new(GAP * spacing);
+    for (vertex, _) in surface.iter().filter(|(v, _)| cover.is_bare(*v, GAP * spacing)) {
+        bare.put(*vertex, 0);
+    }
+    for (vertex, normal) in surface {
+        if !bare.is_bare(vertex, GAP * spacing) && cover.is_bare(vertex, APART * spacing) {
             let row = cover.nearest(vertex, points);
             cover.put(vertex, row);
             changes.added.push(Placed {
                 row,
                 position: vertex,
-                normal: -gradient.normalize_or_zero(),
+                normal,
             });
         }
     }
@@ -162,42 +176,45 @@ fn fate(
     Fate::Goes
 }
 
-/// Median distance from a point to the nearest other.
+/// Edge of the square that a point of the scan has for itself: the median, from the distance of the sixth neighbour.
 fn spacing(points: &[DVec3]) -> f64 {
-    let probes = points
+    let probes: Vec<&DVec3> = points
         .iter()
-        .enumerate()
-        .step_by(points.len().div_ceil(PROBES).max(1));
-    let mut nearest: Vec<f64> = probes
-        .collect::<Vec<_>>()
+        .step_by(points.len().div_ceil(PROBES).max(1))
+        .collect();
+    let mut edges: Vec<f64> = probes
         .par_iter()
-        .map(|(n, p)| {
-            let others = points.iter().enumerate().filter(|(m, q)| m != n && q != p);
-            others
-                .fold(f64::INFINITY, |least, (_, q)| least.min(p.distance_squared(*q)))
-                .sqrt()
+        .filter_map(|p| {
+            let mut squares: Vec<f64> = points
+                .iter()
+                .map(|q| p.distance_squared(*q))
+                .filter(|d| *d > 0.0)
+                .collect();
+            let rank = NEIGHBOURS.min(squares.len()).checked_sub(1)?;
+            let (_, square, _) = squares.select_nth_unstable_by(rank, f64::total_cmp);
+            Some((std::f64::consts::PI * *square / (rank + 1) as f64).sqrt())
         })
         .collect();
-    nearest.sort_unstable_by(f64::total_cmp);
-    nearest.get(nearest.len() / 2).copied().unwrap_or(f64::INFINITY)
+    edges.sort_unstable_by(f64::total_cmp);
+    edges.get(edges.len() / 2).copied().unwrap_or(1.0)
 }
 
 /// Points in cubes, to find what lies near; asked for one place at a time, so that no order matters.
 struct Cover {
-    reach: f64,
+    edge: f64,
     cubes: HashMap<[i64; 3], Vec<(DVec3, usize)>>,
 }
 
 impl Cover {
-    fn new(reach: f64) -> Self {
+    fn new(edge: f64) -> Self {
         Self {
-            reach,
+            edge,
             cubes: HashMap::new(),
         }
     }
 
     fn cube(&self, p: DVec3) -> [i64; 3] {
-        (p / self.reach).floor().to_array().map(|v| v as i64)
+        (p / self.edge).floor().to_array().map(|v| v as i64)
     }
 
     fn put(&mut self, p: DVec3, row: usize) {
@@ -217,14 +234,15 @@ impl Cover {
         round.filter_map(|cube| self.cubes.get(&cube)).flatten()
     }
 
-    fn is_bare(&self, p: DVec3) -> bool {
-        self.near(p, 1).all(|(q, _)| q.distance(p) > self.reach)
+    /// Whether nothing lies within `gap`, at most the edge of a cube.
+    fn is_bare(&self, p: DVec3, gap: f64) -> bool {
+        self.near(p, 1).all(|(q, _)| q.distance(p) > gap)
     }
 
     /// Row of a point near `p`: of the nearest of all where none is.
     fn nearest(&self, p: DVec3, points: &[DVec3]) -> usize {
         let by_distance = |(a, _): &(f64, usize), (b, _): &(f64, usize)| a.total_cmp(b);
-        let near = self.near(p, 3).map(|(q, row)| (q.distance_squared(p), *row));
+        let near = self.near(p, 2).map(|(q, row)| (q.distance_squared(p), *row));
         let near = near.min_by(by_distance);
         let all = || {
             points

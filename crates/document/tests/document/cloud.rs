@@ -12,9 +12,9 @@ use super::common::{Draw, large};
 fn scan() -> Vec<DVec3> {
     let mut draw = Draw(9);
     let golden = 2.399_963_229_728_653;
-    (0..4000)
+    (0..16000)
         .map(|n| {
-            let z = 1.0 - 2.0 * (f64::from(n) + 0.5) / 4000.0;
+            let z = 1.0 - 2.0 * (f64::from(n) + 0.5) / 16000.0;
             let (sin, cos) = (golden * f64::from(n)).sin_cos();
             let r = (1.0 - z * z).sqrt();
             let noise = f64::from(draw.below(1000)) / 5000.0 - 0.1;
@@ -33,7 +33,7 @@ fn a_cloud_without_edits_stays_as_it_is() {
 fn points_follow_their_surface_go_with_it_and_cover_what_is_new() {
     for (text, goes, comes) in [
         (
-            "add = { shape = { sphere = { radius = 5 } }, along = [[20, 20, 34]] }",
+            "add = { shape = { box = { size = [4, 4, 7] } }, along = [[20, 20, 36]] }",
             true,
             true,
         ),
