@@ -73,9 +73,10 @@ fn scan_with_edits(args: &Args, scan: &Path, cost: &Cost) -> Outcome {
     let name = chosen(document.state(), args.object.as_deref())?.to_string();
     let choice = VolumeChoice::whole(args.series.clone(), args.volume);
     // A series is written into a directory, anything else into a file.
-    let formats: &[&str] = match formats::detect(source.path()) {
-        Ok(Kind::Volume(VolumeFormat::Dicom)) => &[],
-        Ok(Kind::Volume(_)) => &["nii", "nii.gz"],
+    let kind = formats::detect(source.path()).map_err(|e| source.reading(e))?;
+    let formats: &[&str] = match kind {
+        Kind::Volume(VolumeFormat::Dicom) => &[],
+        Kind::Volume(_) => &["nii", "nii.gz"],
         _ => &["ply", "xyz", "txt", "csv"],
     };
     let output = match formats {
