@@ -119,6 +119,7 @@ fn apart(p: &Patch<f32>, exact: &Patch<f32>) -> f64 {
 fn strokes(n: usize, m: usize, settled: &Patch<f32>, count: u64) {
     for radius in [2.0, 4.0, 6.0] {
         for contrast in [10.0, 100.0, 1000.0] {
+            let (mut means, mut paints) = (0.0, 0.0);
             let (mut medians, mut worst, mut iterations, mut error, mut made) =
                 (Vec::new(), 0.0_f64, 0, 0.0_f64, 0);
             for stroke in 0..count {
@@ -128,7 +129,7 @@ fn strokes(n: usize, m: usize, settled: &Patch<f32>, count: u64) {
                 let ends = [(); 2].map(|()| [(); 3].map(|()| edge * (0.2 + 0.6 * unit(&mut seed))));
                 // Steps without paint at the same time: the machine may do other work later.
                 let mut still = settled.clone();
-                let (mut times, mut usual) = (Vec::new(), Vec::new());
+                let (mut times, mut usual, mut spent) = (Vec::new(), Vec::new(), 0.0);
                 for k in 0..DABS {
                     let t = k as f64 / DABS as f64;
                     let centre = std::array::from_fn(|a| ends[0][a] + t * (ends[1][a] - ends[0][a]));
@@ -142,6 +143,7 @@ fn strokes(n: usize, m: usize, settled: &Patch<f32>, count: u64) {
                     let mut exact = (k % 20 == 19).then(|| p.clone());
                     let (step, used) = timed(&mut p, time_step());
                     times.push(painting + step);
+                    spent += painting;
                     iterations += used;
                     if let Some(exact) = &mut exact {
                         exact.set_matter(p.matter().clone()).expect("the same matter");
@@ -164,14 +166,18 @@ fn strokes(n: usize, m: usize, settled: &Patch<f32>, count: u64) {
                 made += p.factorizations() - settled.factorizations();
                 let usual = median(usual);
                 worst = worst.max(times.iter().copied().fold(0.0, f64::max) / usual);
+                means += times.iter().sum::<f64>() / usual / DABS as f64;
+                paints += spent / usual / DABS as f64;
                 medians.push(median(times) / usual);
             }
             let runs = count as f64;
             println!(
-                "{n}/{m} dabs of radius {radius}, contrast {contrast}: {:.2} steps (worst stroke {:.2}, worst dab {worst:.1}), \
+                "{n}/{m} dabs of radius {radius}, contrast {contrast}: {:.2} steps (worst stroke {:.2}, worst dab {worst:.1}), mean {:.2}, of which painting {:.2}, \
                  {:.1} iterations, {:.1} made a stroke, error {:.2} %",
                 median(medians.clone()),
                 medians.iter().copied().fold(0.0, f64::max),
+                means / runs,
+                paints / runs,
                 iterations as f64 / (runs * DABS as f64),
                 made as f64 / runs,
                 100.0 * error,

@@ -3,6 +3,7 @@
 use bspline::Real;
 
 use super::band_cholesky::{BandCholesky, NotPositive, SLICE};
+use super::estimates::Estimates;
 use super::galerkin::Galerkin;
 use super::pcg::Preconditioner;
 use super::v_cycle::{VCycle, VCycleOptions};
@@ -76,7 +77,7 @@ impl<T: Real> Background<T> {
     /// # Errors
     /// [`NotPositive`] as [`prepare`](Self::prepare).
     pub fn repaint(&mut self, s: &StepMatrix<T>, at: SampleBox) -> Result<(), NotPositive> {
-        self.cycle.fit(s, at)?;
+        self.cycle.follow(s, at)?;
         self.made = Work::Wait(WAIT);
         self.failed = None;
         self.stale = false;
@@ -94,7 +95,13 @@ impl<T: Real> Background<T> {
             self.cycle.prepare(matrix)?;
             self.stale = false;
         }
+        self.cycle.refresh(matrix);
         Ok(())
+    }
+
+    /// The cycle, while it solves.
+    pub fn solving_cycle(&mut self) -> Option<&mut VCycle<T>> {
+        (!self.is_done()).then_some(&mut self.cycle)
     }
 
     /// The factor, and what assembles it.
@@ -120,6 +127,11 @@ impl<T: Real> Background<T> {
     /// How far it is.
     pub fn progress(&self) -> Work {
         self.work
+    }
+
+    /// The eigenvalues that its cycle takes.
+    pub fn estimates(&self) -> Estimates {
+        self.cycle.estimates()
     }
 
     /// After a solve: the next part of the work on the factor of `matrix`, which it was prepared for.
@@ -162,7 +174,8 @@ impl<T: Real> Background<T> {
     }
 
     /// Goes to where another one was.
-    pub fn resume(&mut self, matrix: &StepMatrix<T>, work: Work) {
+    pub fn resume(&mut self, matrix: &StepMatrix<T>, work: Work, estimates: &Estimates) {
+        self.cycle.resume(estimates);
         if let Work::Wait(_) = work {
             self.work = work;
         }
@@ -178,6 +191,14 @@ impl<T: Real> Preconditioner<T> for Background<T> {
             self.factor.apply(s, r, z);
         } else {
             self.cycle.apply(s, r, z);
+        }
+    }
+
+    fn apply_each(&mut self, s: &StepMatrix<T>, rows: &mut [T], n: usize) {
+        if self.is_done() {
+            self.factor.apply_each(s, rows, n);
+        } else {
+            self.cycle.apply_each(s, rows, n);
         }
     }
 }

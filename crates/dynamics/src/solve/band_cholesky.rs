@@ -158,24 +158,41 @@ impl<T: Real> BandCholesky<T> {
     /// If the length is wrong.
     pub fn solve(&self, x: &mut [T]) {
         assert_eq!(x.len(), self.n, "a right-hand side of the matrix' size");
+        self.solve_each(x);
+    }
+
+    /// The same of several right-hand sides, one after the other in `all`, with the bits of one at a time: a large factor takes
+    /// longer to be read than to be multiplied by.
+    ///
+    /// # Panics
+    /// If the length is not a multiple of the matrix' size.
+    pub(super) fn solve_each(&self, all: &mut [T]) {
+        assert!(
+            all.len().is_multiple_of(self.n),
+            "right-hand sides of the matrix' size"
+        );
         let layout = self.layout;
         vectorized(
             #[inline(always)]
             || {
-                for i in 0..x.len() {
+                for i in 0..self.n {
                     let low = i.saturating_sub(layout.band);
                     let row = &self.rows[layout.at(i, low)..=layout.at(i, i)];
                     let (row, inverse) = (&row[..i - low], row[i - low]);
-                    x[i] = (x[i] - lanes_dot(row, &x[low..i])) * inverse;
+                    for x in all.chunks_exact_mut(self.n) {
+                        x[i] = (x[i] - lanes_dot(row, &x[low..i])) * inverse;
+                    }
                 }
-                for i in (0..x.len()).rev() {
+                for i in (0..self.n).rev() {
                     let low = i.saturating_sub(layout.band);
                     let row = &self.rows[layout.at(i, low)..=layout.at(i, i)];
                     let (row, inverse) = (&row[..i - low], row[i - low]);
-                    let v = x[i] * inverse;
-                    x[i] = v;
-                    for (x, l) in x[low..i].iter_mut().zip(row) {
-                        *x -= v * *l;
+                    for x in all.chunks_exact_mut(self.n) {
+                        let v = x[i] * inverse;
+                        x[i] = v;
+                        for (x, l) in x[low..i].iter_mut().zip(row) {
+                            *x -= v * *l;
+                        }
                     }
                 }
             },
@@ -187,6 +204,10 @@ impl<T: Real> Preconditioner<T> for BandCholesky<T> {
     fn apply(&mut self, _: &StepMatrix<T>, r: &[T], z: &mut [T]) {
         z.copy_from_slice(r);
         self.solve(z);
+    }
+
+    fn apply_each(&mut self, _: &StepMatrix<T>, rows: &mut [T], _: usize) {
+        self.solve_each(rows);
     }
 }
 

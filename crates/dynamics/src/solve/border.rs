@@ -19,6 +19,8 @@ const SHIFT: f64 = 16.0;
 /// Rows that border the matrix of a step.
 #[derive(Clone, Debug)]
 pub(crate) struct Border<T> {
+    /// Unknowns.
+    n: usize,
     springs: Vec<Vec<(usize, f64)>>,
     /// Whether the springs are part of the matrix, not of the right side alone.
     implicit: bool,
@@ -35,7 +37,6 @@ pub(crate) struct Border<T> {
     /// `BY`, made symmetric.
     gram: DMatrix<f64>,
     factor: Option<Cholesky<f64, Dyn>>,
-    right: Vec<T>,
 }
 
 impl<T: Real> Border<T> {
@@ -50,7 +51,7 @@ impl<T: Real> Border<T> {
             y: vec![T::zero(); rows * n],
             gram: DMatrix::zeros(rows, rows),
             factor: None,
-            right: vec![T::zero(); n],
+            n,
             springs,
             hard,
         }
@@ -106,28 +107,26 @@ impl<T: Real> Border<T> {
         self.hard.close(x, |_| 0.0);
     }
 
-    /// Makes `Y` for a new `P`.
-    pub fn prepare(&mut self, mut precondition: impl FnMut(&[T], &mut [T])) {
-        let n = self.right.len();
+    /// Makes `Y` for a new `P`, which is given rows of so many numbers to be solved for in place.
+    pub fn prepare(&mut self, precondition: impl FnOnce(&mut [T], usize)) {
+        let (n, soft) = (self.n, self.soft());
         let mut y = std::mem::take(&mut self.y);
+        y.fill(T::zero());
         for (row, y) in y.chunks_exact_mut(n).enumerate() {
-            let soft = self.soft();
-            let r = &mut self.right;
-            r.fill(T::zero());
             match row.checked_sub(soft) {
                 None => {
                     for (i, w) in &self.springs[row] {
-                        r[*i] = T::from_f64(*w);
+                        y[*i] = T::from_f64(*w);
                     }
                 }
                 Some(h) => {
                     for (q, i) in self.hard.row(h).iter().zip(&self.hard.columns) {
-                        r[*i] = T::from_f64(*q);
+                        y[*i] = T::from_f64(*q);
                     }
                 }
             }
-            precondition(r, y);
         }
+        precondition(&mut y, n);
         for (j, y) in y.chunks_exact(n).enumerate() {
             for i in 0..self.rows() {
                 self.gram[(i, j)] = self.row_times(i, y);
@@ -214,7 +213,7 @@ impl<T: Real> Border<T> {
             return PcgReport::default();
         }
         let mut bordered = Bordered { border: self, system };
-        let report = iteration.go_on(&mut bordered, x, impulse, cap, tolerance);
+        let report = iteration.go_on(&mut bordered, x, [impulse, 1.0], cap, tolerance);
         self.hard.close(x, |h| self.gaps[h]);
         report
     }

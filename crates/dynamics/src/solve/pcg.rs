@@ -24,9 +24,17 @@ pub trait System<T> {
 }
 
 /// An approximate inverse of `AᵀSA`, symmetric and positive definite.
-pub trait Preconditioner<T> {
+pub trait Preconditioner<T: Real> {
     /// `z ≈ (AᵀSA)⁻¹ r`.
     fn apply(&mut self, s: &StepMatrix<T>, r: &[T], z: &mut [T]);
+
+    /// The same of several rows of `n` numbers, in place, with the same bits.
+    fn apply_each(&mut self, s: &StepMatrix<T>, rows: &mut [T], n: usize) {
+        for row in rows.chunks_exact_mut(n) {
+            let r = row.to_vec();
+            self.apply(s, &r, row);
+        }
+    }
 }
 
 /// No preconditioner: `z = r`. What the source paper does.
@@ -127,15 +135,21 @@ impl<T: Real> ConjugateGradients<T> {
         if impulse == 0.0 {
             return PcgReport::default();
         }
-        self.go_on(system, x, impulse, cap, tolerance)
+        self.go_on(system, x, [impulse, 1.0], cap, tolerance)
     }
 
-    /// The same from an `x` whose residual stands in `r`, until it falls below `tolerance` times `impulse`.
+    /// The residual to go on from.
+    pub(super) fn residual_mut(&mut self) -> &mut [T] {
+        &mut self.r
+    }
+
+    /// The same from an `x` whose residual stands in `r`, the share `residual` of `impulse`, until it falls below
+    /// `tolerance`.
     pub(super) fn go_on(
         &mut self,
         system: &mut impl System<T>,
         x: &mut [T],
-        impulse: f64,
+        [impulse, residual]: [f64; 2],
         cap: usize,
         tolerance: f64,
     ) -> PcgReport {
@@ -145,7 +159,7 @@ impl<T: Real> ConjugateGradients<T> {
             last.resize(r.len(), T::zero());
         }
         let mut report = PcgReport {
-            residual: 1.0,
+            residual,
             ..PcgReport::default()
         };
         let mut before = 1.0;
