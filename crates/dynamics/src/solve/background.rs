@@ -105,7 +105,7 @@ impl<T: Real> Background<T> {
     }
 
     /// The factor, and what assembles it.
-    pub fn factor(&mut self) -> (&mut Galerkin, &mut BandCholesky<T>) {
+    pub fn made(&mut self) -> (&mut Galerkin, &mut BandCholesky<T>) {
         (&mut self.galerkin, &mut self.factor)
     }
 
@@ -194,11 +194,7 @@ impl<T: Real> Preconditioner<T> for Background<T> {
         }
     }
 
-    fn apply_each(&mut self, s: &StepMatrix<T>, rows: &mut [T], n: usize) {
-        if self.is_done() {
-            self.factor.apply_each(s, rows, n);
-        } else {
-            self.cycle.apply_each(s, rows, n);
-        }
+    fn factor(&self) -> Option<&BandCholesky<T>> {
+        self.is_done().then_some(&self.factor)
     }
 }

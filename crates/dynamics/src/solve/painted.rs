@@ -78,7 +78,7 @@ impl<T: Real> Painted<T> {
     pub fn factor(&mut self) -> Option<(&mut Galerkin, &mut BandCholesky<T>)> {
         match self {
             Self::Direct(direct) => Some((&mut direct.0, &mut direct.1)),
-            Self::Background(background) => Some(background.factor()),
+            Self::Background(background) => Some(background.made()),
             _ => None,
         }
     }
@@ -109,8 +109,8 @@ impl<T: Real> Preconditioner<T> for Dynamic<'_, T> {
         self.0.apply(s, r, z);
     }
 
-    fn apply_each(&mut self, s: &StepMatrix<T>, rows: &mut [T], n: usize) {
-        self.0.apply_each(s, rows, n);
+    fn factor(&self) -> Option<&BandCholesky<T>> {
+        self.0.factor()
     }
 }
 

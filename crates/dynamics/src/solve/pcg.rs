@@ -2,6 +2,7 @@
 
 use bspline::Real;
 
+use super::band_cholesky::BandCholesky;
 use super::dot::dot;
 use crate::lattice::{Lattice, TensorWorkspace};
 use crate::springs::StepMatrix;
@@ -12,6 +13,10 @@ pub trait System<T> {
     fn apply(&mut self, p: &[T], q: &mut [T]) -> f64;
     /// `z ≈ H⁻¹ r`, symmetric and positive definite.
     fn precondition(&mut self, r: &[T], z: &mut [T]);
+    /// The factor that [`precondition`](Self::precondition) solves with, if that is all it does.
+    fn factor(&self) -> Option<&BandCholesky<T>> {
+        None
+    }
     /// Told that the solution moved by `alpha` along the `p` that [`apply`](Self::apply) had last.
     fn moved(&mut self, _alpha: T) {}
     /// Takes out of a residual what constraints bear.
@@ -28,12 +33,20 @@ pub trait Preconditioner<T: Real> {
     /// `z ≈ (AᵀSA)⁻¹ r`.
     fn apply(&mut self, s: &StepMatrix<T>, r: &[T], z: &mut [T]);
 
-    /// The same of several rows of `n` numbers, in place, with the same bits.
-    fn apply_each(&mut self, s: &StepMatrix<T>, rows: &mut [T], n: usize) {
-        for row in rows.chunks_exact_mut(n) {
-            let r = row.to_vec();
-            self.apply(s, &r, row);
-        }
+    /// The factor whose halves, one after the other, are this inverse, if it is that of a factor.
+    fn factor(&self) -> Option<&BandCholesky<T>> {
+        None
+    }
+}
+
+impl<T: Real> Preconditioner<T> for BandCholesky<T> {
+    fn apply(&mut self, _: &StepMatrix<T>, r: &[T], z: &mut [T]) {
+        z.copy_from_slice(r);
+        self.solve(z);
+    }
+
+    fn factor(&self) -> Option<&BandCholesky<T>> {
+        Some(self)
     }
 }
 
@@ -74,6 +87,10 @@ impl<T: Real, P: Preconditioner<T>> System<T> for CoefficientSystem<'_, T, P> {
 
     fn precondition(&mut self, r: &[T], z: &mut [T]) {
         self.preconditioner.apply(self.matrix, r, z);
+    }
+
+    fn factor(&self) -> Option<&BandCholesky<T>> {
+        self.preconditioner.factor()
     }
 }
 

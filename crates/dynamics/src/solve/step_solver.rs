@@ -262,14 +262,16 @@ impl<T: Real> StepSolver<T> {
         if let Some(border) = &mut self.border {
             let preconditioner = active(self.method, &mut self.painted, &mut self.diagonalization);
             let mask = self.mask.as_deref();
-            border.prepare(|rows, n| {
-                preconditioner.apply_each(s, rows, n);
-                for row in rows.chunks_exact_mut(n) {
+            // Under a mask a factor knows nothing of the other coefficients.
+            match preconditioner.factor().filter(|_| mask.is_none()) {
+                Some(factor) => border.prepare_halves(factor),
+                None => border.prepare(|r, y| {
+                    preconditioner.apply(s, r, y);
                     if let Some(mask) = mask {
-                        mask.hold(row);
+                        mask.hold(y);
                     }
-                }
-            });
+                }),
+            }
         }
     }
 
