@@ -1,6 +1,6 @@
 //! Uniform cubic weights and the restriction of a spline to part of its cells.
 
-use bspline::restrict::{CELLS, COEFFICIENTS, RestrictedAxis, restricted_range};
+use bspline::restrict::{CELLS, COEFFICIENTS, RestrictedAxis, restricted_range, slope_ranges};
 use bspline::{Interval, Real, cubic};
 use proptest::prelude::*;
 
@@ -143,6 +143,38 @@ proptest! {
             let planes: Vec<f64> = (0..N).map(|i| evaluate(&lines[i * N..][..N], x[1])).collect();
             let f = evaluate(&planes, x[0]);
             prop_assert!(low - slack <= f && f <= high + slack, "{f} not in [{low}, {high}]");
+        }
+    }
+
+    /// The slow way: the differences along each axis as a brick, restricted.
+    #[test]
+    fn slope_ranges_are_those_of_the_differences(
+        boxes in prop::array::uniform3(parts()),
+        c in prop::collection::vec(-1.0..1.0f64, N * N * N),
+        single in any::<bool>(),
+    ) {
+        let within = boxes.map(|(a, b)| [a, b.min(a + 4.0)]);
+        let values = within.map(|[a, b]| RestrictedAxis::<f64>::new(a, b));
+        // Coefficients that are f32 make the same ranges in both precisions.
+        let c: Vec<f64> = c.into_iter().map(|c| f64::from(c as f32)).collect();
+        let (found, error): ([(f64, f64); 3], f64) = if single {
+            let c: Vec<f32> = c.iter().map(|c| *c as f32).collect();
+            let found = slope_ranges::<f32>(c.as_slice().try_into().unwrap(), &within);
+            (found.ranges.map(|(a, b)| (f64::from(a), f64::from(b))), RestrictedAxis::<f32>::axis_error())
+        } else {
+            let found = slope_ranges::<f64>(c.as_slice().try_into().unwrap(), &within);
+            (found.ranges, RestrictedAxis::<f64>::axis_error())
+        };
+        for axis in 0..3 {
+            let step = [N * N, N, 1][axis];
+            let rise = |i: usize| if i / step % N + 1 < N { c[i + step] - c[i] } else { 0.0 };
+            let rises: Vec<f64> = (0..N * N * N).map(rise).collect();
+            let mut axes = values;
+            axes[axis] = RestrictedAxis::of_slopes(within[axis][0], within[axis][1]);
+            let (lo, hi) = restricted_range(rises.as_slice().try_into().unwrap(), &axes);
+            let (a, b) = found[axis];
+            let slack = 7.0 * (error + RestrictedAxis::<f64>::axis_error());
+            prop_assert!((a - lo).abs() <= slack && (b - hi).abs() <= slack, "{axis}: {a} {b}, {lo} {hi}");
         }
     }
 }

@@ -15,9 +15,11 @@ mod document;
 mod entry;
 mod error;
 mod journal;
+mod layers;
 mod layout;
 mod object;
 mod records;
+mod revision;
 mod state;
 
 pub use change::Change;
@@ -27,4 +29,5 @@ pub use entry::{EditCounts, EditInfo};
 pub use error::DocumentError;
 pub use journal::is_document;
 pub use object::{Object, Properties};
+pub use revision::{VolumeRevision, revise_volume};
 pub use state::State;

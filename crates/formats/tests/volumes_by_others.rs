@@ -176,3 +176,83 @@ fn regions_and_strides_that_cannot_be_are_refused() {
     };
     assert_eq!(volumes::peek(&path, &options).unwrap().header.dims, [1; 3]);
 }
+
+#[test]
+fn revised_volumes_keep_every_byte_but_those_of_the_voxels_changed() {
+    let scratch = tempfile::tempdir().unwrap();
+    let limits = ReadLimits::default();
+    let mut seen = 0;
+    let of_nibabel = data("..").read_dir().unwrap().map(|e| e.unwrap().path());
+    let of_others = expected().into_iter().map(|(name, _)| data(&name));
+    for like in of_nibabel
+        .filter(|p| p.to_string_lossy().contains(".nii"))
+        .chain(of_others)
+    {
+        let name = like.display().to_string();
+        if !matches!(detect(&like), Ok(Kind::Volume(volumes::VolumeFormat::Nifti))) {
+            let options = VolumeOptions::default();
+            let e = volumes::save_revised(
+                &like,
+                &options,
+                &[],
+                &[0; 32],
+                &scratch.path().join("x.nii"),
+                &limits,
+            );
+            assert!(
+                e.unwrap_err().to_string().contains("convert the scan to .nii"),
+                "{name}"
+            );
+            continue;
+        }
+        let Ok(before) = volumes::read(&like, &VolumeOptions::default(), &limits) else {
+            continue;
+        };
+        let size = before.header.stored.size();
+        let changes: Vec<_> = (0..before.values.len())
+            .step_by(5)
+            .map(|voxel| volumes::Change {
+                voxel,
+                density: f64::from(before.values[(voxel + 1) % before.values.len()]),
+            })
+            .collect();
+        for output in ["out.nii", "out.nii.gz"].map(|n| scratch.path().join(n)) {
+            let options = VolumeOptions::default();
+            let told = volumes::save_revised(&like, &options, &changes, &[0; 32], &output, &limits).unwrap();
+            let after = volumes::read(&output, &options, &limits).unwrap();
+            assert_eq!(after.header, before.header);
+            for (voxel, value) in after.values.iter().enumerate() {
+                let expected = match voxel % 5 {
+                    0 => before.values[(voxel + 1) % before.values.len()],
+                    _ => before.values[voxel],
+                };
+                assert_eq!(value.to_bits(), expected.to_bits(), "{name}: voxel {voxel}");
+            }
+            assert_eq!(
+                (told.clamped, told.rounding < 1e-3),
+                (0, true),
+                "{name}: {told:?}"
+            );
+        }
+        let plain = |path: &std::path::Path| {
+            let bytes = std::fs::read(path).unwrap();
+            let mut out = Vec::new();
+            match bytes.starts_with(&[0x1f, 0x8b]) {
+                true => drop(std::io::Read::read_to_end(
+                    &mut flate2::read::MultiGzDecoder::new(&bytes[..]),
+                    &mut out,
+                )),
+                false => out = bytes,
+            }
+            out
+        };
+        let (old, new) = (plain(&like), plain(&scratch.path().join("out.nii")));
+        assert_eq!(old.len(), new.len(), "{name}");
+        let differ: Vec<usize> = (0..old.len()).filter(|i| old[*i] != new[*i]).collect();
+        let first = old.len() - before.values.len() * size;
+        let is_touched = |byte: usize| byte >= first && ((byte - first) / size).is_multiple_of(5);
+        assert!(differ.iter().all(|byte| is_touched(*byte)), "{name}");
+        seen += 1;
+    }
+    assert!(seen >= 4, "{seen} files");
+}

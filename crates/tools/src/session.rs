@@ -1,9 +1,12 @@
 //! Sessions: what is to be done to a document, stroke after stroke.
 
+use fitting::Control;
 use serde::{Deserialize, Serialize};
 
-use crate::geometric::Geometric;
-use crate::tool::Tool;
+use crate::geometric::{Geometric, Move};
+use crate::limits::{Limits, Mask, Region};
+use crate::paint::Paint;
+use crate::tool::{Canvas, Tool, ToolError};
 
 /// What a session file says.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -26,6 +29,18 @@ pub struct Stroke {
     /// Adds a solid.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub add: Option<Geometric>,
+    /// Carries along.
+    #[serde(default, rename = "move", skip_serializing_if = "Option::is_none")]
+    pub motion: Option<Move>,
+    /// A box that it leaves nothing outside of changed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub within: Option<Region>,
+    /// What may change.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mask: Option<Mask>,
+    /// Paints matter or touch.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub paint: Option<Paint>,
 }
 
 impl Stroke {
@@ -37,6 +52,8 @@ impl Stroke {
         let all = [
             self.carve.as_ref().map(Tool::Carve),
             self.add.as_ref().map(Tool::Add),
+            self.motion.as_ref().map(Tool::Move),
+            self.paint.as_ref().map(Tool::Paint),
         ];
         let given: Vec<_> = all.into_iter().flatten().collect();
         match given[..] {
@@ -51,6 +68,17 @@ impl Stroke {
                 other.name()
             )),
         }
+    }
+
+    /// What the stroke leaves of a canvas, and what is left to say of it, in sentences.
+    ///
+    /// # Errors
+    /// Any [`ToolError`].
+    pub fn apply(&self, canvas: Canvas, control: &mut Control) -> Result<(Canvas, Vec<String>), ToolError> {
+        let tool = self.tool().map_err(ToolError::Stroke)?;
+        let limits = Limits::new(self.within.as_ref(), self.mask.as_ref(), &canvas.others);
+        let limits = limits.map_err(ToolError::Stroke)?.at_detail(canvas.detail);
+        tool.apply(canvas, &limits, control)
     }
 }
 

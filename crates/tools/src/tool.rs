@@ -1,10 +1,17 @@
 //! All tools behind one door: what they work on, and what they leave.
 
-use bspline::HierarchicalSpline;
+use std::collections::BTreeMap;
+use std::fmt;
+use std::sync::Arc;
+
+use bspline::{Csg, CsgError, Field, HierarchicalSpline};
 use fitting::field::FieldFitReport;
 use fitting::{Control, FitError};
+use glam::DAffine3;
 
-use crate::geometric::{Geometric, GeometricError, Operation};
+use crate::geometric::{Geometric, GeometricError, Move, Operation};
+use crate::limits::Limits;
+use crate::paint::{Layer, Layers, Paint, PaintError};
 
 /// What a tool works on. Cheap to copy.
 #[derive(Clone, Debug)]
@@ -13,6 +20,64 @@ pub struct Canvas {
     pub field: HierarchicalSpline<f32>,
     /// Density of its surface.
     pub iso: f64,
+    /// Level of the field that the object is shaped to.
+    pub detail: usize,
+    /// What is painted on it.
+    pub layers: Layers,
+    /// Objects that a tool may name.
+    pub others: Others,
+}
+
+/// Objects by name, each about as the distance from its surface, positive inside, in the world of the canvas.
+#[derive(Clone, Default)]
+pub struct Others(BTreeMap<String, Arc<dyn Field>>);
+
+impl fmt::Debug for Others {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_set().entries(self.0.keys()).finish()
+    }
+}
+
+impl Others {
+    /// Puts an object in; `canvas_from_object` maps its world to that of the canvas.
+    ///
+    /// # Errors
+    /// [`CsgError`] for an iso-value that is not finite, or a map that flattens.
+    pub fn put(
+        &mut self,
+        name: &str,
+        field: &HierarchicalSpline<f32>,
+        iso: f64,
+        canvas_from_object: DAffine3,
+    ) -> Result<(), CsgError> {
+        let steep = 1.0 / field.slope();
+        let distance = Csg::sum(vec![(steep, Arc::new(field.clone()))], -iso * steep)?;
+        let placed: Arc<dyn Field> = match canvas_from_object == DAffine3::IDENTITY {
+            true => Arc::new(distance),
+            false => {
+                // A distance of the object, in lengths of the canvas.
+                let stretch = canvas_from_object.matrix3.determinant().abs().cbrt();
+                let placed = Arc::new(Csg::affine(Arc::new(distance), canvas_from_object)?);
+                Arc::new(Csg::sum(vec![(stretch, placed)], 0.0)?)
+            }
+        };
+        self.0.insert(name.into(), placed);
+        Ok(())
+    }
+
+    /// The object of a name.
+    ///
+    /// # Errors
+    /// A sentence.
+    pub fn get(&self, name: &str) -> Result<Arc<dyn Field>, String> {
+        self.0.get(name).cloned().ok_or_else(|| {
+            let known: Vec<_> = self.0.keys().map(String::as_str).collect();
+            match known.is_empty() {
+                true => format!("there is no object {name:?}, nor any other"),
+                false => format!("there is no object {name:?}; there are {}", known.join(", ")),
+            }
+        })
+    }
 }
 
 /// A tool with all that it is told.
@@ -22,6 +87,10 @@ pub enum Tool<'a> {
     Carve(&'a Geometric),
     /// Adds a solid.
     Add(&'a Geometric),
+    /// Carries along.
+    Move(&'a Move),
+    /// Paints matter or touch.
+    Paint(&'a Paint),
 }
 
 /// Why a tool cannot be used.
@@ -30,6 +99,12 @@ pub enum ToolError {
     /// A geometric tool cannot.
     #[error(transparent)]
     Geometric(#[from] GeometricError),
+    /// The stroke names no tool, or several, or limits that make no sense.
+    #[error("{0}")]
+    Stroke(String),
+    /// Paint cannot be laid on.
+    #[error(transparent)]
+    Paint(#[from] PaintError),
 }
 
 impl ToolError {
@@ -41,27 +116,53 @@ impl ToolError {
 
 impl Tool<'_> {
     /// Names of all tools, as sessions write them.
-    pub const NAMES: [&'static str; 2] = ["carve", "add"];
+    pub const NAMES: [&'static str; 4] = ["carve", "add", "move", "paint"];
 
     /// Its name, as sessions write it.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Carve(_) => "carve",
             Self::Add(_) => "add",
+            Self::Move(_) => "move",
+            Self::Paint(_) => "paint",
         }
     }
 
-    /// What the tool leaves, and what is left to say of it, in sentences.
+    /// What the tool leaves within limits, and what is left to say of it, in sentences.
     ///
     /// # Errors
     /// Any [`ToolError`].
-    pub fn apply(&self, canvas: Canvas, control: &mut Control) -> Result<(Canvas, Vec<String>), ToolError> {
+    pub fn apply(
+        &self,
+        canvas: Canvas,
+        limits: &Limits,
+        control: &mut Control,
+    ) -> Result<(Canvas, Vec<String>), ToolError> {
+        let Canvas { field: old, iso, .. } = &canvas;
         let (field, report) = match self {
-            Self::Carve(tool) => tool.apply(Operation::Carve, &canvas.field, canvas.iso, control)?,
-            Self::Add(tool) => tool.apply(Operation::Add, &canvas.field, canvas.iso, control)?,
+            Self::Carve(tool) => tool.apply(Operation::Carve, old, *iso, limits, control)?,
+            Self::Add(tool) => tool.apply(Operation::Add, old, *iso, limits, control)?,
+            Self::Move(tool) => tool.apply(old, *iso, limits, control)?,
+            Self::Paint(paint) => {
+                let layer = painted(paint, &canvas, limits)?;
+                let mut canvas = canvas;
+                canvas.layers.insert(paint.layer, layer);
+                return Ok((canvas, Vec::new()));
+            }
         };
         Ok((Canvas { field, ..canvas }, thin_parts(&report)))
     }
+}
+
+/// A layer with paint laid on, as far as the limits allow.
+fn painted(paint: &Paint, canvas: &Canvas, limits: &Limits) -> Result<Layer, ToolError> {
+    let field = &canvas.field;
+    let whole = limits.cut(&field.lattice().world_box());
+    let layer = paint.apply(field, &canvas.layers, canvas.detail, &whole)?;
+    let before = canvas.layers.get(&paint.layer).cloned();
+    let before = before.unwrap_or_else(|| Layer::empty(field.lattice(), canvas.detail));
+    let kept = limits.kept(before.tree(), layer.tree());
+    Ok(layer.with_tree(kept).expect("some of the nodes painted"))
 }
 
 /// Says what was too thin for the field.

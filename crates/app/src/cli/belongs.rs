@@ -1,7 +1,7 @@
 //! Whether a field and an input belong together.
 
 use bspline::Aabb;
-use formats::field::SourceKind;
+use formats::field::{FieldMeta, SourceKind};
 use serde_json::{Value, json};
 
 use super::failure::{Failure, Outcome};
@@ -35,30 +35,42 @@ fn stored(open: &OpenField) -> Value {
 /// # Errors
 /// Exit code 2 with what differs: the kind, the samples, or, where a field remembers no samples, the box.
 pub fn check(open: &OpenField, field: &str, input: &Input, name: &str) -> Outcome {
-    let stored = stored(open);
+    let differs = differs(
+        &open.loaded().meta,
+        &open.lattice().world_box(),
+        field,
+        input,
+        name,
+    );
+    differs.map_or(Ok(()), |differs| {
+        Err(Failure::usage(format!(
+            "{differs}; give its own input with the options that it was read with, or --anyway to measure all the same"
+        )))
+    })
+}
+
+/// How an input is told from the one that a field with such a `meta` and `extent` was fitted to.
+pub fn differs(meta: &FieldMeta, extent: &Aabb, field: &str, input: &Input, name: &str) -> Option<String> {
+    let stored: Value = serde_json::from_str(&meta.provenance).unwrap_or_default();
     let was = |key: &str| stored[key].as_str();
     let (fitted_to, given) = (was("input_kind"), kind(input));
-    let differs = if fitted_to.is_some_and(|k| k != given) {
-        format!(
+    if fitted_to.is_some_and(|k| k != given) {
+        Some(format!(
             "{field} was fitted to a {}, and {name} is taken for a {given}",
             fitted_to.unwrap_or_default()
-        )
-    } else if (open.source() == SourceKind::Volume) != matches!(input, Input::Volume(_)) {
-        format!("{name} is a {given}, which {field} was not fitted to")
+        ))
+    } else if (meta.source == SourceKind::Volume) != matches!(input, Input::Volume(_)) {
+        Some(format!("{name} is a {given}, which {field} was not fitted to"))
     } else if let Some(digest) = was("input_digest") {
-        if digest == self::digest(input) {
-            return Ok(());
-        }
         let file = was("input").unwrap_or("another file");
-        format!("{field} was fitted to other samples than those of {name} (to {file}, as it was read then)")
-    } else if overlaps(open, input) {
-        return Ok(());
+        (digest != self::digest(input)).then(|| {
+            format!(
+                "{field} was fitted to other samples than those of {name} (to {file}, as it was read then)"
+            )
+        })
     } else {
-        format!("{name} lies outside the box of {field}")
-    };
-    Err(Failure::usage(format!(
-        "{differs}; give its own input with the options that it was read with, or --anyway to measure all the same"
-    )))
+        (!overlaps(extent, input)).then(|| format!("{name} lies outside the box of {field}"))
+    }
 }
 
 fn kind(input: &Input) -> &'static str {
@@ -70,7 +82,7 @@ fn kind(input: &Input) -> &'static str {
 }
 
 /// Whether most of the input lies where the field does.
-fn overlaps(open: &OpenField, input: &Input) -> bool {
+fn overlaps(field: &Aabb, input: &Input) -> bool {
     let own: Aabb = match input {
         Input::Cloud(c) => bounding_box(&c.positions),
         Input::Mesh(m) => bounding_box(&m.vertices),
@@ -79,7 +91,6 @@ fn overlaps(open: &OpenField, input: &Input) -> bool {
             Aabb::new(glam::DVec3::ZERO, last).transformed(&v.header.world_from_voxel)
         }
     };
-    let field = open.lattice().world_box();
     let common = (own.max.min(field.max) - own.min.max(field.min)).max(glam::DVec3::ZERO);
     let size = own.size();
     (0..3).all(|a| common[a] >= 0.5 * size[a])

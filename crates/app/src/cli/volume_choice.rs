@@ -67,6 +67,15 @@ enum TiltChoice {
 }
 
 impl VolumeChoice {
+    /// The whole of a volume, one of several in its file.
+    pub fn whole(series: Option<String>, volume: Option<usize>) -> Self {
+        Self {
+            series,
+            volume,
+            ..Self::default()
+        }
+    }
+
     /// Refuses choices for DICOM series where the volume is none.
     pub fn suits(&self, kind: Kind) -> Outcome {
         let (option, value) = if let Some(series) = &self.series {
@@ -149,7 +158,7 @@ impl VolumeChoice {
     }
 }
 
-fn whole<T: FromStr>(s: &str) -> Result<T, String> {
+pub fn whole<T: FromStr>(s: &str) -> Result<T, String> {
     s.parse()
         .map_err(|_| "write a whole number in digits, 0 or more".into())
 }

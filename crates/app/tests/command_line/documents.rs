@@ -162,10 +162,13 @@ carve = { shape = { sphere = { radius = 0.2 } }, along = [[0.0, -0.4, 1.0], [0.0
 [[stroke]]
 object = "ball"
 add = { shape = { torus = { axis = [0, 1, 0], major = 0.6, minor = 0.1 } }, along = [[0.5, 0.0, 0.0]] }
+[[stroke]]
+within = { min = [-2, -2, -2], max = [2, 2, 0] }
+move = { motion = { grab = { along = [[0.0, 0.0, -1.0], [0.0, 0.0, -0.8]], radius = 0.5 } } }
 "#,
     );
     let done = bench.json("sculpt clay.isoclay --script session.toml");
-    assert_eq!(done["done"], 2);
+    assert_eq!(done["done"], 3);
     let replayed = bench.json("replay clay.isoclay");
     assert_eq!(replayed["field_sha256"], done["field_sha256"]);
     // A torus through a ball: what juts out has a hole.
@@ -182,7 +185,7 @@ add = { shape = { torus = { axis = [0, 1, 0], major = 0.6, minor = 0.1 } }, alon
         "{}",
         run.stderr
     );
-    assert_eq!(bench.json("history clay.isoclay")["done"], 2);
+    assert_eq!(bench.json("history clay.isoclay")["done"], 3);
     bench.write("typo.toml", "[[stroke]]\n\ncarv = 1\n");
     let run = bench.run("sculpt clay.isoclay --script typo.toml");
     assert!(run.stderr.contains("line 3"), "{}", run.stderr);
@@ -215,4 +218,41 @@ fn a_block_is_made_from_nothing_and_shaped() {
         assert!(run.stderr.contains(word), "{arguments}: {}", run.stderr);
     }
     assert!(!bench.path("a.isoclay").exists());
+}
+
+#[test]
+fn a_scan_comes_back_with_the_edits_of_its_object() {
+    let bench = Bench::new();
+    bench.json("phantom head -o head.nii --size 32");
+    bench.json("fit head.nii -o head.iclay");
+    bench.json("new clay.isoclay head.iclay");
+    bench.json("export clay.isoclay --like head.nii -o same.nii");
+    let bytes = |name: &str| std::fs::read(bench.path(name)).unwrap();
+    assert_eq!(bytes("same.nii"), bytes("head.nii"));
+    let corners = bench.json("info head.iclay")["box"].clone();
+    let corner = |n: usize, axis: usize| corners[n][axis].as_f64().unwrap();
+    let [x, y, z] = [0, 1, 2].map(|axis| (corner(0, axis) + corner(1, axis)) / 2.0);
+    let r = 0.2 * (corner(1, 0) - corner(0, 0));
+    bench.write(
+        "carve.toml",
+        format!(
+            "[[stroke]]\ncarve = {{ shape = {{ sphere = {{ radius = {r} }} }}, along = [[{x}, {y}, {z}]] }}\n"
+        ),
+    );
+    bench.json("sculpt clay.isoclay --script carve.toml");
+    let told = bench.run("export clay.isoclay --like head.nii -o carved.nii --fill -7");
+    assert!(told.stdout.contains("density -7"), "{}", told.stdout);
+    let (old, new) = (bytes("head.nii"), bytes("carved.nii"));
+    assert_eq!(old.len(), new.len());
+    assert_eq!(old[..352], new[..352]);
+    assert_ne!(old, new);
+    bench.json("undo clay.isoclay");
+    bench.json("export clay.isoclay --like head.nii -o back.nii.gz");
+    bench.json("export clay.isoclay --like head.nii -o back.nii");
+    assert_eq!(bytes("back.nii"), old);
+    bench.json("phantom head -o other.nii --size 32 --seed 2 --noise 1%");
+    let run = bench.run("export clay.isoclay --like other.nii -o out.nii");
+    assert_eq!(run.code, 2);
+    assert!(run.stderr.contains("other samples"), "{}", run.stderr);
+    assert!(!bench.path("out.nii").exists());
 }

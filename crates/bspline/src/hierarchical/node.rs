@@ -107,13 +107,13 @@ impl<T: Real> Node<T> {
     /// Width in cells of level 0.
     #[inline]
     pub fn width(&self) -> f64 {
-        BRICK as f64 * 2f64.powi(-i32::from(self.level))
+        BRICK as f64 * power_of_two(-self.level)
     }
 
     /// Cells of the node's level along a cell of level 0; of bricks.
     #[inline]
     pub fn scale(&self) -> f64 {
-        2f64.powi(i32::from(self.level))
+        power_of_two(self.level)
     }
 
     /// Totals of a brick.
@@ -138,6 +138,13 @@ impl<T: Real> Node<T> {
             self.children.iter().flatten().for_each(|c| c.walk(visit));
         }
     }
+}
+
+/// `2^n` by its bits; `powi` is a call.
+#[inline]
+fn power_of_two(n: i8) -> f64 {
+    const BIAS: i64 = 1023;
+    f64::from_bits(((BIAS + i64::from(n)) as u64) << (f64::MANTISSA_DIGITS - 1))
 }
 
 /// The octant of `shift` halvings above a place in which it lies.

@@ -1,14 +1,12 @@
 //! Sound intervals of the gradient over a box: differences of control coefficients.
 
-use std::ops::Range;
-
 use glam::DVec3;
 
 use super::bounds::{Roots, corners, local_box, own_part, shared};
-use super::brick::{BRICK, HALO, HALO_LEN};
+use super::brick::{BRICK, HALO};
 use super::node::Node;
-use crate::restrict::{RestrictedAxis, restricted_range};
-use crate::{Aabb, Interval, Real, vectorized, vectors};
+use crate::restrict::{RestrictedAxis, slope_ranges};
+use crate::{Aabb, Interval, Real, vectors};
 
 /// Boxes up to this many cells on an axis are restricted; for larger ones the differences of the coefficients as they
 /// are cost a tenth and say nearly as much.
@@ -72,55 +70,12 @@ fn of_part<T: Real>(brick: &Node<T>, part: &Aabb) -> [Interval; 3] {
     if !is_small {
         return differences(brick, &within).map(|s| s * scale);
     }
-    let values = within.map(|[a, b]| RestrictedAxis::<T>::new(a, b));
-    let mut rises = [T::zero(); HALO_LEN];
-    // Differences first, convex combinations of them after: no box is too tiny for that.
-    std::array::from_fn(|axis| {
-        let mut axes = values;
-        axes[axis] = RestrictedAxis::of_slopes(within[axis][0], within[axis][1]);
-        let [x, y, _] = axes.each_ref().map(RestrictedAxis::reads);
-        let largest = vectorized(
-            #[inline(always)]
-            || take_rises(brick.own_totals(), axis, x.clone(), y.clone(), &mut rises),
-        );
-        let (lo, hi) = restricted_range(&rises, &axes);
-        let share = 64.0 * T::UNIT_ROUND_OFF + 3.0 * RestrictedAxis::<T>::axis_error();
-        Interval::new(lo.as_f64(), hi.as_f64()).widened(share * largest.as_f64()) * scale
-    })
-}
-
-/// Differences along an axis of the coefficients in the rows `x`, `y`, and the largest coefficient there. Behind the
-/// last coefficient stands a difference of weight 0.
-#[inline(always)]
-fn take_rises<T: Real>(
-    totals: &[T; HALO_LEN],
-    axis: usize,
-    x: Range<usize>,
-    y: Range<usize>,
-    rises: &mut [T; HALO_LEN],
-) -> T {
-    let mut most = [T::zero(); HALO];
-    let row = |i: usize, j: usize| -> &[T; HALO] {
-        let start = (i.min(HALO - 1) * HALO + j.min(HALO - 1)) * HALO;
-        totals[start..start + HALO].try_into().expect("a row")
-    };
-    for i in x {
-        for j in y.clone() {
-            let own = row(i, j);
-            let next = match axis {
-                0 => *row(i + 1, j),
-                1 => *row(i, j + 1),
-                _ => std::array::from_fn(|k| own[(k + 1).min(HALO - 1)]),
-            };
-            let out = &mut rises[(i * HALO + j) * HALO..][..HALO];
-            for k in 0..HALO {
-                let size = own[k].abs();
-                most[k] = if size > most[k] { size } else { most[k] };
-                out[k] = next[k] - own[k];
-            }
-        }
-    }
-    most.into_iter().fold(T::zero(), |m, c| if c > m { c } else { m })
+    let found = slope_ranges(brick.own_totals(), &within);
+    let share = 64.0 * T::UNIT_ROUND_OFF + 7.0 * RestrictedAxis::<T>::axis_error();
+    let rounding = share * found.largest.as_f64();
+    found
+        .ranges
+        .map(|(lo, hi)| Interval::new(lo.as_f64(), hi.as_f64()).widened(rounding) * scale)
 }
 
 /// Least and largest difference of neighbouring coefficients among those that the cells of a box read: the derivative

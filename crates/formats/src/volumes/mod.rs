@@ -16,7 +16,8 @@
 //! A header names only data files of its own directory or below it, by a relative name without `..`.
 //!
 //! [`peek`] tells dimensions, spacing and memory need, [`range`] the densities in one pass that holds a slice,
-//! [`read`] gives the voxels; all three of a region and stride if asked. [`save_slices`] writes, slice by slice.
+//! [`read`] gives the voxels; all three of a region and stride if asked. [`save_slices`] writes, slice by slice;
+//! [`save_revised`] writes a file again with some voxels changed.
 
 #[cfg(feature = "medical")]
 mod detached;
@@ -34,6 +35,7 @@ mod open;
 mod options;
 mod part;
 mod raw;
+mod revise;
 mod save;
 mod several;
 mod slices;
@@ -56,6 +58,7 @@ pub use nifti::{parse_nifti, write_nifti};
 pub use nrrd::parse_nrrd;
 pub use options::{DicomOptions, Tilt, Uneven, VolumeOptions};
 pub use raw::{RawLayout, parse_raw};
+pub use revise::{Change, Revision, save_revised};
 pub use save::{save, save_slices};
 pub use tiff::parse_tiff;
 pub use volume::{Orientation, ValueRange, Volume, VolumeHeader};

@@ -58,7 +58,7 @@ pub(super) fn open(path: &Path, options: &VolumeOptions, budget: &mut Budget) ->
     })
 }
 
-fn format_of(path: &Path) -> Result<VolumeFormat, Fault> {
+pub(super) fn format_of(path: &Path) -> Result<VolumeFormat, Fault> {
     // What is no file cannot be looked into twice.
     if path.metadata().is_ok_and(|m| !m.is_file() && !m.is_dir()) {
         return Ok(VolumeFormat::Nifti);

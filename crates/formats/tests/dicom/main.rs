@@ -2,6 +2,7 @@
 
 mod hostile;
 mod odd;
+mod revised;
 mod writer;
 
 use std::path::{Path, PathBuf};

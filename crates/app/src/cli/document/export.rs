@@ -1,33 +1,56 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use formats::Kind;
+use formats::volumes::VolumeFormat;
+
+use super::like::Like;
 use super::{chosen, edited_meta, open};
 use crate::cli::cost::Cost;
 use crate::cli::failure::Outcome;
-use crate::cli::field;
 use crate::cli::output::Output;
+use crate::cli::quantity::finite;
+use crate::cli::source::{SAMPLES, Source};
 use crate::cli::summary::Summary;
+use crate::cli::volume_choice::{VolumeChoice, whole};
+use crate::cli::{field, interrupt};
 
 /// Arguments of `isoclay export`.
 #[derive(clap::Args)]
 pub struct Args {
     /// Document (.isoclay)
     document: PathBuf,
-    /// Field to write (.iclay), for mesh, picture, sample and the others; - writes to standard output
+    /// Field to write (.iclay), for mesh, picture, sample and the others; - writes to standard output. With --like a volume
+    /// (.nii, .nii.gz) or a new directory for a DICOM series
     #[arg(short, long, value_name = "OUT")]
     pub output: PathBuf,
     /// Object to write, where there are several
     #[arg(long, value_name = "NAME")]
     object: Option<String>,
+    /// Scan that the object was fitted to: write it with the edits, untouched voxels as they are
+    #[arg(long, value_name = "SCAN")]
+    like: Option<PathBuf>,
+    /// Density of what was carved [default: air, -1000 HU; where the unit is not known, what 1 % of the voxels are below]
+    #[arg(long, value_name = "DENSITY", value_parser = finite, allow_negative_numbers = true, requires = "like")]
+    fill: Option<f64>,
+    /// DICOM: the series to write, by its number or its identifier, where there are several
+    #[arg(long, value_name = "NUMBER|UID", requires = "like")]
+    series: Option<String>,
+    /// Which volume of a time series, of echoes or channels was fitted, counted from 0
+    #[arg(long, value_name = "N", value_parser = whole::<usize>, allow_negative_numbers = true, requires = "like")]
+    volume: Option<usize>,
     /// Print one JSON object instead of a table
     #[arg(long)]
     pub json: bool,
 }
 
-/// Writes an object's field as it is now, in the object's own place.
+/// Writes an object as it is now, in its own place: its field, or the scan that it was fitted to with its edits.
 pub fn run(args: &Args) -> Outcome {
     let cost = Cost::start();
-    let output = Output::check("-o", &args.output, &["iclay"], None, &[])?;
     let mut notes = Vec::new();
+    if let Some(scan) = &args.like {
+        return scan_with_edits(args, scan, &cost);
+    }
+    let output = Output::check("-o", &args.output, &["iclay"], None, &[])?;
     let document = open(&args.document, &mut notes)?;
     let state = document.state();
     let name = chosen(state, args.object.as_deref())?;
@@ -40,4 +63,48 @@ pub fn run(args: &Args) -> Outcome {
         ..Summary::default()
     };
     summary.with_cost(&cost).print_after(&output, args.json)
+}
+
+/// Writes the scan that an object was fitted to, with the object's edits.
+fn scan_with_edits(args: &Args, scan: &Path, cost: &Cost) -> Outcome {
+    let mut notes = Vec::new();
+    let source = Source::open(scan, None, SAMPLES, &interrupt::cancel())?.under("--like");
+    let mut document = open(&args.document, &mut notes)?;
+    let name = chosen(document.state(), args.object.as_deref())?.to_string();
+    let choice = VolumeChoice::whole(args.series.clone(), args.volume);
+    // A series is written into a directory, anything else into a file.
+    let is_series = matches!(
+        formats::detect(source.path()),
+        Ok(Kind::Volume(VolumeFormat::Dicom))
+    );
+    let output = match is_series {
+        true => None,
+        false => Some(Output::check(
+            "-o",
+            &args.output,
+            &["nii", "nii.gz"],
+            None,
+            &[&source],
+        )?),
+    };
+    let like = Like {
+        source: &source,
+        choice: &choice,
+        fill: args.fill,
+    };
+    let path = output.as_ref().map_or(&*args.output, |o| o.path());
+    notes.extend(like.export(&mut document, &name, path)?);
+    let summary = Summary {
+        notes,
+        ..Summary::default()
+    }
+    .with_cost(cost);
+    match output {
+        Some(output) => summary.print_after(&output, args.json),
+        None => Summary {
+            output: Some(args.output.display().to_string()),
+            ..summary
+        }
+        .print(args.json),
+    }
 }

@@ -2,6 +2,7 @@
 
 pub mod export;
 pub mod history;
+mod like;
 pub mod new;
 pub mod replay;
 pub mod sculpt;

@@ -12,7 +12,7 @@ use crate::cli::failure::{Failure, Outcome};
 use crate::cli::field::{OpenField, stored_text};
 use crate::cli::interrupt;
 use crate::cli::progress::Bar;
-use crate::cli::quantity::positive;
+use crate::cli::quantity::{finite, positive};
 use crate::cli::source::{FIELDS, Source};
 use crate::cli::volume_choice::{Length, OneOrThree};
 
@@ -39,6 +39,9 @@ pub struct Args {
     /// Unit of the block's lengths: um, mm, cm or m
     #[arg(long, requires = "block")]
     unit: Option<Unit>,
+    /// Density at which the fields' surfaces lie [default: the one that each names]
+    #[arg(long, value_name = "DENSITY", value_parser = finite, allow_negative_numbers = true, requires = "fields")]
+    iso: Option<f64>,
     /// Print one JSON object instead of a table
     #[arg(long)]
     pub json: bool,
@@ -71,7 +74,22 @@ pub fn run(args: &Args) -> Outcome {
                 "{name}: documents hold single precision; the field was rounded to it"
             ));
         }
-        let object = Object::new(&loaded.field, loaded.meta.clone())
+        if let Some(iso) = args.iso {
+            let range = open.field().bounds(&open.lattice().world_box());
+            if !(range.lo..=range.hi).contains(&iso) {
+                return Err(Failure::usage(format!(
+                    "--iso {iso}: densities of {} run from {:.6} to {:.6}; choose another --iso, between them",
+                    source.name(),
+                    range.lo,
+                    range.hi
+                )));
+            }
+        }
+        let meta = FieldMeta {
+            iso: args.iso.or(loaded.meta.iso),
+            ..loaded.meta.clone()
+        };
+        let object = Object::new(&loaded.field, meta)
             .map_err(|e| Failure::input(format!("{}: {e}", source.name())))?;
         state = state.with(&name, object).map_err(failure)?;
     }

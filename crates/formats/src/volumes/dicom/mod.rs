@@ -14,6 +14,7 @@ mod fragments;
 mod pixels;
 mod plane;
 mod resample;
+pub(super) mod revise;
 mod scan;
 mod series;
 mod stack;

@@ -31,6 +31,43 @@ impl Layout {
     }
 }
 
+impl Layout {
+    /// Least and largest number that a pixel can hold.
+    pub fn range(&self) -> (f64, f64) {
+        match self.kind {
+            PixelKind::Float32 => (f32::MIN.into(), f32::MAX.into()),
+            PixelKind::Float64 => (f64::MIN, f64::MAX),
+            PixelKind::Integer => {
+                let steps = (1u64 << self.bits_stored) as f64;
+                match self.signed {
+                    true => (-steps / 2.0, steps / 2.0 - 1.0),
+                    false => (0.0, steps - 1.0),
+                }
+            }
+        }
+    }
+
+    /// Puts a number that the pixel can hold in place of its (little-endian) bytes; bits beside those stored stay. Whether
+    /// it changed.
+    pub fn put(&self, bytes: &mut [u8], number: f64) -> bool {
+        let old = bytes
+            .iter()
+            .rev()
+            .fold(0u64, |word, byte| word << 8 | u64::from(*byte));
+        let new = match self.kind {
+            PixelKind::Float32 => u64::from((number as f32).to_bits()),
+            PixelKind::Float64 => number.to_bits(),
+            PixelKind::Integer => {
+                let shift = self.high_bit + 1 - self.bits_stored;
+                let stored = (1u64 << self.bits_stored) - 1;
+                old & !(stored << shift) | (number as i64 as u64 & stored) << shift
+            }
+        };
+        bytes.copy_from_slice(&new.to_le_bytes()[..bytes.len()]);
+        new != old
+    }
+}
+
 /// `slope · stored + intercept`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Rescale {
@@ -162,6 +199,29 @@ mod tests {
         assert_eq!(one(&[0x4F, 0x23], layout(2, 12, 15, false)), 0x234 as f32);
         assert_eq!(one(&[0xFF], layout(1, 8, 7, true)), -1.0);
         assert_eq!(one(&[0, 0, 0, 0x80], layout(4, 32, 31, true)), -(2f32.powi(31)));
+    }
+
+    #[test]
+    fn numbers_are_put_where_they_are_read() {
+        for (layout, numbers) in [
+            (layout(2, 12, 11, false), [0.0, 4095.0, 77.0]),
+            (layout(2, 12, 11, true), [-2048.0, 2047.0, -1.0]),
+            (layout(2, 12, 15, true), [-2048.0, 2047.0, 5.0]),
+            (layout(1, 8, 7, true), [-128.0, 127.0, 3.0]),
+            (layout(4, 32, 31, true), [-(2f64.powi(31)), 2f64.powi(30), 9.0]),
+        ] {
+            assert_eq!(layout.range().0, numbers[0]);
+            for number in numbers {
+                let mut raw = vec![0xA5; layout.bytes];
+                layout.put(&mut raw, number);
+                assert_eq!(f64::from(one(&raw, layout)), number, "{layout:?}");
+                assert!(!layout.put(&mut raw, number));
+            }
+        }
+        // An overlay in the upper bits stays.
+        let mut raw = [0x34, 0xF2];
+        assert!(layout(2, 12, 11, false).put(&mut raw, 0x111 as f64));
+        assert_eq!(raw, [0x11, 0xF1]);
     }
 
     #[test]

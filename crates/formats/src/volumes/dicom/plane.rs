@@ -31,6 +31,18 @@ impl Plane {
         self.steps[0].cross(self.steps[1]).normalize()
     }
 
+    /// A frame of the first file, wherever it lies, with its numbers as they are stored.
+    pub fn bare(frame: u32) -> Self {
+        Self {
+            file: 0,
+            frame,
+            position: DVec3::ZERO,
+            steps: [DVec3::X, DVec3::Y],
+            rescale: Rescale::NONE,
+            order: [f64::NEG_INFINITY; 5],
+        }
+    }
+
     fn of(attributes: &Attributes, file: u32, frame: u32) -> Result<Self, Fault> {
         let missing = |what: &'static str, tag: &str| Fault::Value {
             what,

@@ -127,6 +127,35 @@ impl Series {
     }
 }
 
+/// The files of a series, and for each slice of the volume the pictures that show it.
+pub(super) struct Pictures {
+    pub files: Vec<File>,
+    pub slices: Vec<Vec<Plane>>,
+    pub pixels_per_slice: usize,
+}
+
+impl Series {
+    /// Where each slice comes from; `None` if slices are made of several pictures.
+    pub fn into_pictures(self) -> Option<Pictures> {
+        if self.blend.is_some() {
+            return None;
+        }
+        let Planes {
+            files, all, copies, ..
+        } = self.planes;
+        let slices = self.slices.iter().map(|slice| {
+            let of_slice = copies.iter().filter(|(i, _)| *i == slice.below);
+            let copies = of_slice.map(|(_, copy)| copy.clone());
+            std::iter::once(all[slice.below].clone()).chain(copies).collect()
+        });
+        Some(Pictures {
+            slices: slices.collect(),
+            pixels_per_slice: self.header.dims[0] * self.header.dims[1],
+            files,
+        })
+    }
+}
+
 /// Voxel to RAS: x and y of DICOM's patient space point the other way.
 fn ras(grid: &Grid) -> DAffine3 {
     let [x, y, z] = grid.steps;

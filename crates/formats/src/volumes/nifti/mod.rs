@@ -4,6 +4,7 @@ mod affine;
 mod header;
 mod write;
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 pub(crate) use header::nifti_format;
@@ -15,6 +16,7 @@ use super::slices;
 use super::slices::SliceSource;
 use super::stream::{StreamSlices, check_length, skip};
 use super::volume::Volume;
+use super::voxel::VoxelType;
 use crate::input::{self, SkipRead};
 use crate::limits::Budget;
 use crate::{Fault, ReadLimits};
@@ -39,6 +41,38 @@ pub(super) fn open(path: &Path, volume: Option<usize>) -> Result<Box<dyn SliceSo
     }
     let consumed = parsed.consumed;
     voxels(parsed, consumed, Box::new(source), bound)
+}
+
+/// Where the voxels of a volume lie in the bytes of a file, and what they are.
+pub(super) struct Places {
+    /// All voxels of the volume, x fastest.
+    pub bytes: Range<usize>,
+    pub stored: VoxelType,
+    pub big_endian: bool,
+    pub rescale: Option<[f64; 2]>,
+}
+
+/// Finds the voxels in the (inflated) bytes of a single file; of several volumes those of number `volume`.
+pub(super) fn places(bytes: &[u8], volume: Option<usize>) -> Result<Places, Fault> {
+    let parsed = header::read(&mut &bytes[..], volume)?;
+    let header = parsed.header;
+    let length = header.voxel_count() * header.stored.size();
+    let number = parsed.several.map_or(0, |several| several.number);
+    let start = (parsed.voxels_at as usize).saturating_add(number.saturating_mul(length));
+    let end = start.saturating_add(length);
+    if end > bytes.len() {
+        return Err(Fault::Truncated {
+            what: "the voxels".into(),
+            needed: end as u64,
+            found: bytes.len() as u64,
+        });
+    }
+    Ok(Places {
+        bytes: start..end,
+        stored: header.stored,
+        big_endian: parsed.big_endian,
+        rescale: header.rescale,
+    })
 }
 
 fn single<'a>(

@@ -1,0 +1,161 @@
+//! Edits of an object in the scan that it was fitted to.
+
+use bspline::hierarchical::{HierarchicalSpline, Lattice};
+use bspline::{Aabb, Field};
+
+use document::{VolumeRevision, revise_volume};
+use fitting::Control;
+use formats::Unit;
+use formats::volumes::{Orientation, Volume, VolumeHeader, VoxelType};
+use glam::{DAffine3, DMat3, DVec3};
+use tools::geometric::{Geometric, Operation};
+use tools::limits::Limits;
+
+use super::common::Draw;
+
+const SIDE: usize = 24;
+const ISO: f64 = 50.0;
+const FILL: f64 = 3.0;
+
+/// A ball with a rim that shares its voxels with what lies outside, 0 to 100.
+fn ball(p: DVec3) -> f64 {
+    let depth = 9.0 - p.distance(DVec3::splat(12.0));
+    100.0 * (0.5 + depth / 2.0).clamp(0.0, 1.0)
+}
+
+fn fitted() -> HierarchicalSpline<f32> {
+    let lattice = Lattice {
+        world_from_lattice: DAffine3::IDENTITY,
+        cells: [SIDE as u32; 3],
+    };
+    HierarchicalSpline::schoenberg(lattice, 50.0, ball).unwrap()
+}
+
+/// What was scanned: the ball, with noise that no fit has. The voxels stand askew.
+fn scan() -> Volume {
+    let map = DAffine3::from_mat3_translation(
+        DMat3::from_rotation_z(0.3) * DMat3::from_diagonal(DVec3::new(0.7, -0.7, 0.9)),
+        DVec3::new(4.0, 17.0, 1.0),
+    );
+    let mut draw = Draw(5);
+    let values = (0..SIDE * SIDE * SIDE).map(|v| {
+        let noise = f64::from(draw.below(1000)) / 100.0;
+        (ball(map.transform_point3(index(v))) + noise) as f32
+    });
+    Volume {
+        values: values.collect(),
+        header: VolumeHeader {
+            dims: [SIDE; 3],
+            world_from_voxel: map,
+            unit: Unit::Millimetre,
+            orientation: Orientation::Directions,
+            stored: VoxelType::I16,
+            rescale: None,
+        },
+        replaced_count: 0,
+        notes: Vec::new(),
+    }
+}
+
+fn index(voxel: usize) -> DVec3 {
+    let at = [voxel % SIDE, voxel / SIDE % SIDE, voxel / (SIDE * SIDE)];
+    DVec3::from_array(at.map(|i| i as f64))
+}
+
+fn sphere(centre: DVec3, radius: f64) -> Geometric {
+    let [x, y, z] = centre.to_array();
+    toml::from_str(&format!(
+        "along = [[{x:?}, {y:?}, {z:?}]]\nshape.sphere.radius = {radius:?}"
+    ))
+    .unwrap()
+}
+
+fn edited(operation: Operation, tool: &Geometric) -> (HierarchicalSpline<f32>, VolumeRevision) {
+    let before = fitted();
+    let (now, _) = tool
+        .apply(
+            operation,
+            &before,
+            ISO,
+            &Limits::default(),
+            &mut Control::default(),
+        )
+        .unwrap();
+    let revision = revise_volume(&before, &now, &scan(), ISO, FILL).unwrap();
+    (now, revision)
+}
+
+#[test]
+fn an_object_that_was_not_edited_changes_no_voxel() {
+    let revision = revise_volume(&fitted(), &fitted(), &scan(), ISO, FILL).unwrap();
+    assert_eq!(revision, VolumeRevision::default());
+}
+
+#[test]
+fn what_is_carved_is_filled_and_leaves_no_ghost_of_its_surface() {
+    let centre = DVec3::new(12.0, 12.0, 21.0);
+    let tool = sphere(centre, 4.0);
+    let (now, revision) = edited(Operation::Carve, &tool);
+    let (before, scan) = (fitted(), scan());
+    let mut densities: Vec<f64> = scan.values.iter().map(|v| f64::from(*v)).collect();
+    revision
+        .changes
+        .iter()
+        .for_each(|c| densities[c.voxel] = c.density);
+    assert!(revision.changes.is_sorted_by(|a, b| a.voxel < b.voxel));
+    let (mut deep, mut kept) = (0, 0);
+    for (voxel, new) in densities.iter().enumerate() {
+        let place = scan.header.world_from_voxel.transform_point3(index(voxel));
+        let old = f64::from(scan.values[voxel]);
+        let depth = 4.0 - place.distance(centre);
+        if depth > 1.6 {
+            deep += 1;
+            // Air as it was there, noise and all, or the fill.
+            assert!(*new <= 10.0, "{place}: {old} became {new}");
+        }
+        if depth < -6.0 {
+            assert_eq!(*new, old, "{place} lies beside the tool");
+        }
+        let [f, g] = [before.value(place), now.value(place)];
+        if g >= ISO && f - g > 0.01 {
+            kept += 1;
+            assert!(
+                (new - (old + g - f)).abs() < 1e-9,
+                "{place}: the noise of the scan is lost"
+            );
+        }
+    }
+    assert!(
+        deep > 100 && kept > 20 && revision.carved > 100,
+        "{deep} {kept} {}",
+        revision.carved
+    );
+    // A crease is rounded, and may stand up a little.
+    assert!(revision.added * 20 < revision.carved, "{}", revision.added);
+}
+
+#[test]
+fn what_is_added_is_no_denser_than_the_scan() {
+    let centre = DVec3::new(12.0, 12.0, 20.0);
+    let (now, revision) = edited(Operation::Add, &sphere(centre, 5.0));
+    let scan = scan();
+    let largest = scan.values.iter().copied().fold(0.0, f32::max);
+    assert!(
+        revision.added > 100 && revision.carved == 0,
+        "{} {}",
+        revision.added,
+        revision.carved
+    );
+    let reach = Aabb::new(centre - 11.0, centre + 11.0);
+    for change in &revision.changes {
+        let place = scan.header.world_from_voxel.transform_point3(index(change.voxel));
+        assert!(
+            place.cmpge(reach.min).all() && place.cmple(reach.max).all(),
+            "{place}"
+        );
+        assert!(change.density <= f64::from(largest));
+        if now.value(place) > ISO + 25.0 && place.distance(centre) < 4.0 {
+            assert!(change.density > ISO, "{place}: {}", change.density);
+        }
+    }
+}
