@@ -276,7 +276,7 @@ fn what_cannot_be_is_refused_by_line_or_table_with_a_remedy_and_writes_nothing()
         (
             "damping = 1.0",
             "damping = \"w\"",
-            ["line 9", "nothing is called w"],
+            ["line 9", "no variable or function called w"],
         ),
         (
             "max = [0.5, 0.5, 1.14]",
