@@ -7,7 +7,6 @@ mod error;
 mod formula;
 mod holds;
 mod load;
-mod mask;
 mod matter;
 mod motion;
 
