@@ -122,7 +122,7 @@ impl Chart {
             }
             // A series of one point would hide under the others.
             let radius = if line.len() == 1 { 7 } else { 4 };
-            chart.draw_series(line.iter().map(|&p| Circle::new(p, radius, color.filled())))?;
+            chart.draw_series(line.iter().map(|&p| marker(i, p, radius)))?;
             for (x, y, label) in points {
                 let at = chart.backend_coord(&(x, y));
                 words.push((at, label, color));
@@ -160,7 +160,7 @@ impl Chart {
             let name = Text::new(self.legend(series), (x + 34, y - 7), ("sans-serif", 14));
             let drawn = area
                 .draw(&PathElement::new([(x, y), (x + 24, y)], color.stroke_width(3)))
-                .and_then(|()| area.draw(&Circle::new((x + 12, y), 4, color.filled())))
+                .and_then(|()| area.draw(&marker(i, (x + 12, y), 4)))
                 .and_then(|()| area.draw(&name));
             drawn.map_err(|e| e.to_string())?;
         }
@@ -205,6 +205,16 @@ impl Chart {
                 .map_err(|e| e.to_string())?;
         }
         Ok(())
+    }
+}
+
+/// The sign of a series: of as many as there are colours a disk, of as many more a triangle, then a cross.
+fn marker<'a, 'b: 'a, C: Clone + 'a>(i: usize, at: C, radius: i32) -> DynElement<'a, SVGBackend<'b>, C> {
+    let color = COLORS[i % COLORS.len()];
+    match i / COLORS.len() {
+        0 => Circle::new(at, radius, color.filled()).into_dyn(),
+        1 => TriangleMarker::new(at, radius + 2, color.filled()).into_dyn(),
+        _ => Cross::new(at, radius + 1, color.stroke_width(3)).into_dyn(),
     }
 }
 
@@ -320,6 +330,26 @@ mod tests {
         assert_eq!(lines(&chart.svg().unwrap()) + 1, lines(&svg));
         // The marker of the legend and the two points.
         assert_eq!(svg.matches("<circle").count(), 3);
+    }
+
+    #[test]
+    fn series_of_one_colour_have_other_signs() {
+        let series = |i: usize| Series {
+            name: format!("series {i}"),
+            points: vec![(1.0, 1.0 + i as f64, String::new()), (2.0, 2.0, String::new())],
+        };
+        let chart = |count: usize| Chart {
+            title: String::new(),
+            x_title: String::new(),
+            y_title: String::new(),
+            depth: DEPTH,
+            series: (0..count).map(series).collect(),
+            is_joined: true,
+        };
+        let disks = |count: usize| chart(count).svg().unwrap().matches("<circle").count();
+        let triangles = |count: usize| chart(count).svg().unwrap().matches("<polygon").count();
+        assert_eq!([8, 16, 17].map(disks), [24; 3]);
+        assert_eq!([8, 16, 17].map(triangles), [0, 24, 24]);
     }
 
     #[test]
