@@ -122,9 +122,9 @@ impl Chart {
             }
             // A series of one point would hide under the others.
             let radius = if line.len() == 1 { 7 } else { 4 };
-            chart.draw_series(line.iter().map(|&p| marker(i, p, radius)))?;
             for (x, y, label) in points {
                 let at = chart.backend_coord(&(x, y));
+                draw_marker(&above, i, at, radius)?;
                 words.push((at, label, color));
             }
         }
@@ -160,9 +160,10 @@ impl Chart {
             let name = Text::new(self.legend(series), (x + 34, y - 7), ("sans-serif", 14));
             let drawn = area
                 .draw(&PathElement::new([(x, y), (x + 24, y)], color.stroke_width(3)))
-                .and_then(|()| area.draw(&marker(i, (x + 12, y), 4)))
-                .and_then(|()| area.draw(&name));
-            drawn.map_err(|e| e.to_string())?;
+                .map_err(|e| e.to_string())
+                .and_then(|()| draw_marker(area, i, (x + 12, y), 4))
+                .and_then(|()| area.draw(&name).map_err(|e| e.to_string()));
+            drawn?;
         }
         Ok(())
     }
@@ -208,14 +209,20 @@ impl Chart {
     }
 }
 
-/// The sign of a series: of as many as there are colours a disk, of as many more a triangle, then a cross.
-fn marker<'a, 'b: 'a, C: Clone + 'a>(i: usize, at: C, radius: i32) -> DynElement<'a, SVGBackend<'b>, C> {
+/// The sign of series `i` at a pixel: of as many as there are colours a disk, of as many more a triangle, then a cross.
+fn draw_marker(
+    area: &DrawingArea<SVGBackend<'_>, Shift>,
+    i: usize,
+    at: (i32, i32),
+    radius: i32,
+) -> Result<(), String> {
     let color = COLORS[i % COLORS.len()];
-    match i / COLORS.len() {
-        0 => Circle::new(at, radius, color.filled()).into_dyn(),
-        1 => TriangleMarker::new(at, radius + 2, color.filled()).into_dyn(),
-        _ => Cross::new(at, radius + 1, color.stroke_width(3)).into_dyn(),
-    }
+    let drawn = match i / COLORS.len() {
+        0 => area.draw(&Circle::new(at, radius, color.filled())),
+        1 => area.draw(&TriangleMarker::new(at, radius + 2, color.filled())),
+        _ => area.draw(&Cross::new(at, radius + 1, color.stroke_width(3))),
+    };
+    drawn.map_err(|e| e.to_string())
 }
 
 /// Writes the words beside their points where they hide neither a point nor another word; where no side is free,
