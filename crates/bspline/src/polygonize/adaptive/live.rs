@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::around::Around;
 use super::changed::Changed;
 use super::grid::{Cells, Grids, NONE};
-use super::octree::Place;
+use super::octree::{Change, Place};
 use super::patch::{At, Calming, calm};
 use super::pieces::{Calm, Corner, Parts, Pen, Piece, corner};
 use super::polygons::EXTRA;
@@ -150,8 +150,13 @@ impl AdaptiveBlockMesh {
             depth: self.options.depth,
             blocks: self.options.max_blocks,
         };
-        let keys = first.map_or(&[][..], Dirty::blocks);
-        let followed = self.parts.octree.follow(&judge, &roots, keys, boxes, &limits)?;
+        let followed = self.parts.octree.follow(&Change {
+            judge: &judge,
+            roots: &roots,
+            dirty: first.map_or(&[][..], Dirty::blocks),
+            boxes,
+            limits: &limits,
+        })?;
         let mut update = AdaptiveUpdate {
             sampled: followed.sampled,
             ..Default::default()
