@@ -6,9 +6,11 @@ use std::sync::Arc;
 use bspline::hierarchical::BrickDiff;
 use formats::field::{decode_difference, encode, encode_difference};
 use serde::{Deserialize, Serialize};
+use tools::paint::{Layer, Substance};
 
 use crate::bulk::Bulk;
 use crate::error::{damaged, fault};
+use crate::layers::{self, LayerHead};
 use crate::{DocumentError, Object, Properties, State};
 
 /// What an edit does to one object.
@@ -35,6 +37,17 @@ pub enum Change {
         /// The bricks.
         diff: BrickDiff<f32>,
     },
+    /// Changes bricks of what is painted on it.
+    Layer {
+        /// Its name.
+        object: String,
+        /// What is painted.
+        layer: Substance,
+        /// Level of the object's lattice whose knots are the nodes.
+        level: usize,
+        /// The bricks.
+        diff: BrickDiff<f32>,
+    },
     /// Changes its properties.
     Properties {
         /// Its name.
@@ -54,11 +67,19 @@ pub(crate) enum ChangeHead {
         object: String,
         properties: Properties,
         bytes: u64,
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        layers: Vec<LayerHead>,
     },
     Removed {
         object: String,
         properties: Properties,
         bytes: u64,
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        layers: Vec<LayerHead>,
+    },
+    Layer {
+        object: String,
+        of: LayerHead,
     },
     Field {
         object: String,
@@ -102,6 +123,7 @@ impl Change {
                     diff,
                 });
             }
+            layers_between(&object, before, after, &mut later);
             if before.properties != after.properties {
                 let (old, new) = (before.properties.clone(), after.properties.clone());
                 later.push(Self::Properties { object, old, new });
@@ -128,6 +150,17 @@ impl Change {
                 object,
                 diff: diff.reversed(),
             },
+            Self::Layer {
+                object,
+                layer,
+                level,
+                diff,
+            } => Self::Layer {
+                object,
+                layer,
+                level,
+                diff: diff.reversed(),
+            },
             Self::Properties { object, old, new } => Self::Properties {
                 object,
                 old: new,
@@ -146,6 +179,21 @@ impl Change {
                 changed.field = changed.field.applied(diff).map_err(|e| e.to_string())?;
                 state.set(object, Some(changed));
             }
+            Self::Layer {
+                object,
+                layer,
+                level,
+                diff,
+            } => {
+                let mut changed = state.object(object).map_err(|e| e.to_string())?.clone();
+                let old = changed.layers.remove(layer).filter(|old| old.level() == *level);
+                let old = old.unwrap_or_else(|| Layer::empty(changed.field.lattice(), *level));
+                let new = layers::followed(&old, diff)?;
+                if !new.is_empty() {
+                    changed.layers.insert(*layer, new);
+                }
+                state.set(object, Some(changed));
+            }
             Self::Properties { object, new, .. } => {
                 let mut changed = state.object(object).map_err(|e| e.to_string())?.clone();
                 changed.properties = new.clone();
@@ -157,25 +205,38 @@ impl Change {
 
     /// As the journal has it; appends what is not JSON to `bytes`.
     pub(crate) fn write(&self, path: &Path, bytes: &mut Vec<u8>) -> Result<ChangeHead, DocumentError> {
-        let mut put = |part: Result<Vec<u8>, formats::Fault>| {
+        let put = |part: Result<Vec<u8>, formats::Fault>, bytes: &mut Vec<u8>| {
             let part = part.map_err(|f| fault(path, f))?;
             bytes.extend_from_slice(&part);
             Ok::<_, DocumentError>(part.len() as u64)
         };
+        let painted =
+            |of: &Object, bytes: &mut Vec<u8>| layers::write(&of.layers, of.field.lattice(), path, bytes);
         Ok(match self {
             Self::Added { object, new } => ChangeHead::Added {
                 object: object.clone(),
                 properties: new.properties.clone(),
-                bytes: put(encode(&new.field, &new.meta))?,
+                bytes: put(encode(&new.field, &new.meta), bytes)?,
+                layers: painted(new, bytes)?,
             },
             Self::Removed { object, old } => ChangeHead::Removed {
                 object: object.clone(),
                 properties: old.properties.clone(),
-                bytes: put(encode(&old.field, &old.meta))?,
+                bytes: put(encode(&old.field, &old.meta), bytes)?,
+                layers: painted(old, bytes)?,
             },
             Self::Field { object, diff } => ChangeHead::Field {
                 object: object.clone(),
-                bytes: put(encode_difference(diff))?,
+                bytes: put(encode_difference(diff), bytes)?,
+            },
+            Self::Layer {
+                object,
+                layer,
+                level,
+                diff,
+            } => ChangeHead::Layer {
+                object: object.clone(),
+                of: layers::write_difference(*layer, *level, diff, path, bytes)?,
             },
             Self::Properties { object, old, new } => ChangeHead::Properties {
                 object: object.clone(),
@@ -192,17 +253,19 @@ impl Change {
                 object,
                 properties,
                 bytes,
+                layers,
             } => Self::Added {
                 object: object.clone(),
-                new: bulk.object(*bytes, properties)?,
+                new: bulk.object(*bytes, properties, layers)?,
             },
             ChangeHead::Removed {
                 object,
                 properties,
                 bytes,
+                layers,
             } => Self::Removed {
                 object: object.clone(),
-                old: bulk.object(*bytes, properties)?,
+                old: bulk.object(*bytes, properties, layers)?,
             },
             ChangeHead::Field { object, bytes } => {
                 let known = beside
@@ -215,11 +278,53 @@ impl Change {
                     diff,
                 }
             }
+            ChangeHead::Layer { object, of } => {
+                let known = beside
+                    .object(object)
+                    .map_err(|e| damaged(bulk.path, e.to_string()))?;
+                Self::Layer {
+                    object: object.clone(),
+                    layer: of.layer,
+                    level: of.level,
+                    diff: layers::read_difference(of, bulk, known.field.lattice())?,
+                }
+            }
             ChangeHead::Properties { object, old, new } => Self::Properties {
                 object: object.clone(),
                 old: old.clone(),
                 new: new.clone(),
             },
         })
+    }
+}
+
+/// What leads from the layers of one version of an object to those of another, in the order of substances.
+fn layers_between(object: &str, before: &Object, after: &Object, changes: &mut Vec<Change>) {
+    let lattice = before.field.lattice();
+    let mut add = |substance: Substance, old: &Layer, new: &Layer| {
+        let diff = old
+            .tree()
+            .difference(new.tree())
+            .expect("both lie on the lattice of one object");
+        changes.extend((!diff.bricks.is_empty()).then(|| Change::Layer {
+            object: object.into(),
+            layer: substance,
+            level: old.level(),
+            diff,
+        }));
+    };
+    let mut substances: Vec<Substance> = before.layers.keys().chain(after.layers.keys()).copied().collect();
+    substances.sort_unstable();
+    substances.dedup();
+    for substance in substances {
+        let [old, new] = [before, after].map(|o| o.layers.get(&substance));
+        match (old, new) {
+            (Some(old), Some(new)) if old.level() == new.level() => add(substance, old, new),
+            _ => {
+                // By way of a layer on which nothing is painted: the two have no node in common.
+                old.inspect(|old| add(substance, old, &Layer::empty(lattice, old.level())));
+                new.inspect(|new| add(substance, &Layer::empty(lattice, new.level()), new));
+            }
+        }
     }
 }

@@ -2,10 +2,12 @@
 
 use bspline::HierarchicalSpline;
 use fitting::{Control, FitError};
+use glam::DAffine3;
 use serde::{Deserialize, Serialize};
+use tools::paint::Layers;
 use tools::scene::{Scene, SimulateError, Simulation};
 use tools::session::{Session, Stroke};
-use tools::tool::{Canvas, ToolError};
+use tools::tool::{Canvas, Others, ToolError};
 
 use crate::{DocumentError, State};
 
@@ -102,27 +104,32 @@ impl Command {
     pub fn apply(&self, state: &State, control: &mut Control) -> Result<(State, Vec<String>), CommandError> {
         let (Self::Scene { object: name, .. } | Self::Stroke { object: name, .. }) = self;
         let mut object = state.object(name)?.clone();
-        let mut notes = Vec::new();
+        let notes;
         match self {
             Self::Scene { script, .. } => {
                 let scene: Scene = parsed(script)?;
                 let iso = scene.iso.map(|i| i.0).or(object.meta.iso);
-                object.field = played(&scene, object.field, iso, control)?;
+                (object.field, notes) = played(&scene, object.field, iso, &object.layers, control)?;
             }
             Self::Stroke { stroke, .. } => {
-                let tool = stroke.tool().map_err(CommandError::Script)?;
                 let iso = object
                     .meta
                     .iso
                     .ok_or_else(|| CommandError::NoSurface(name.clone()))?;
-                let field = object.field;
-                let (canvas, told) =
-                    tool.apply(Canvas { field, iso }, control)
-                        .map_err(|e| match e.is_cancelled() {
-                            true => CommandError::Cancelled(FitError::Cancelled),
-                            false => e.into(),
-                        })?;
-                object.field = canvas.field;
+                let canvas = Canvas {
+                    detail: object.detail(),
+                    field: object.field,
+                    iso,
+                    layers: object.layers,
+                    others: others(state, name)?,
+                };
+                let (canvas, told) = stroke
+                    .apply(canvas, control)
+                    .map_err(|e| match e.is_cancelled() {
+                        true => CommandError::Cancelled(FitError::Cancelled),
+                        false => e.into(),
+                    })?;
+                (object.field, object.layers) = (canvas.field, canvas.layers);
                 notes = told;
             }
         }
@@ -130,23 +137,42 @@ impl Command {
     }
 }
 
+/// All objects that have a surface, as they lie to the one of a name.
+fn others(state: &State, name: &str) -> Result<Others, CommandError> {
+    let own = state.placement(name)?.inverse();
+    let mut others = Others::default();
+    for (other, object) in state.objects() {
+        if let Some(iso) = object.meta.iso {
+            // Of the object itself no rounding.
+            let map = match other == name {
+                true => DAffine3::IDENTITY,
+                false => own * state.placement(other)?,
+            };
+            let put = others.put(other, &object.field, iso, map);
+            put.map_err(|e| CommandError::Script(format!("object {other:?} cannot be used: {e}")))?;
+        }
+    }
+    Ok(others)
+}
+
 fn parsed<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, CommandError> {
     toml::from_str(text).map_err(|e| CommandError::Script(e.to_string().trim_end().into()))
 }
 
-/// What a scene leaves of a field.
+/// What a scene leaves of a field, and what is to be told of it.
 fn played(
     scene: &Scene,
     field: HierarchicalSpline<f32>,
     iso: Option<f64>,
+    layers: &Layers,
     control: &mut Control,
-) -> Result<HierarchicalSpline<f32>, CommandError> {
-    let mut simulation = Simulation::new(scene, field, iso)?;
+) -> Result<(HierarchicalSpline<f32>, Vec<String>), CommandError> {
+    let mut simulation = Simulation::new(scene, field, iso, layers)?;
     while !simulation.is_over() {
         control
             .step("simulating", simulation.progress())
             .map_err(CommandError::Cancelled)?;
         simulation.step()?;
     }
-    Ok(simulation.baked()?)
+    Ok((simulation.baked()?, simulation.notes().to_vec()))
 }

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::change::ChangeHead;
+use crate::layers::LayerHead;
 use crate::{Object, Properties};
 
 /// What kind of record it is.
@@ -43,6 +44,8 @@ pub(crate) struct ObjectHead {
     pub name: String,
     pub properties: Properties,
     pub bytes: u64,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub layers: Vec<LayerHead>,
 }
 
 /// Head of an edit; fields and differences follow.
@@ -86,11 +89,12 @@ pub struct EditCounts {
 }
 
 impl ObjectHead {
-    pub fn new(name: &str, object: &Object, bytes: u64) -> Self {
+    pub fn new(name: &str, object: &Object, bytes: u64, layers: Vec<LayerHead>) -> Self {
         Self {
             name: name.into(),
             properties: object.properties.clone(),
             bytes,
+            layers,
         }
     }
 }

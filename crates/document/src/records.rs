@@ -11,6 +11,7 @@ use crate::bulk::Bulk;
 use crate::entry::{EditHead, ObjectHead, SnapshotHead, hex};
 use crate::error::{damaged, fault};
 use crate::journal::{Journal, Parts, Record};
+use crate::layers;
 use crate::{Change, DocumentError, State};
 
 /// All objects as a record.
@@ -19,8 +20,10 @@ pub(crate) fn snapshot(path: &Path, state: &State, forgotten: u64) -> Result<Par
     let mut objects = Vec::new();
     for (name, object) in state.objects() {
         let bytes = encode(&object.field, &object.meta).map_err(|f| fault(path, f))?;
-        objects.push(ObjectHead::new(name, object, bytes.len() as u64));
+        let count = bytes.len() as u64;
         bulk.extend(bytes);
+        let layers = layers::write(&object.layers, object.field.lattice(), path, &mut bulk)?;
+        objects.push(ObjectHead::new(name, object, count, layers));
     }
     let sha256 = hex(state.sha256());
     Ok(Parts {
@@ -49,7 +52,10 @@ pub(crate) fn restored(
     };
     let mut state = State::new();
     for object in head.objects {
-        state.set(&object.name, Some(bulk.object(object.bytes, &object.properties)?));
+        state.set(
+            &object.name,
+            Some(bulk.object(object.bytes, &object.properties, &object.layers)?),
+        );
     }
     checked(path, state, &head.sha256)
 }

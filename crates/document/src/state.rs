@@ -1,5 +1,7 @@
 use std::collections::BTreeMap;
 
+use bspline::hierarchical::MAX_LEVELS;
+use glam::DAffine3;
 use sha2::{Digest, Sha256};
 
 use crate::{DocumentError, Object};
@@ -33,6 +35,20 @@ impl State {
             name: name.into(),
             known: self.objects.keys().cloned().collect(),
         })
+    }
+
+    /// Map from an object's own world to that which all objects without a parent share.
+    ///
+    /// # Errors
+    /// [`DocumentError::NoObject`].
+    pub fn placement(&self, name: &str) -> Result<DAffine3, DocumentError> {
+        let mut properties = &self.object(name)?.properties;
+        let mut map = properties.parent_from_object();
+        while let Some(parent) = &properties.parent {
+            properties = &self.object(parent)?.properties;
+            map = properties.parent_from_object() * map;
+        }
+        Ok(map)
     }
 
     /// With an object put in, in place of one that had the name.
@@ -97,6 +113,12 @@ impl State {
             })
         };
         let properties = &self.object(name)?.properties;
+        if let Some(detail) = properties.detail.filter(|level| *level >= MAX_LEVELS) {
+            return wrong(format!(
+                "its detail is level {detail}; there are levels 0 to {}",
+                MAX_LEVELS - 1
+            ));
+        }
         let map = properties.parent_from_object();
         if !properties.placement.as_flattened().iter().all(|v| v.is_finite()) {
             return wrong(format!(

@@ -1,10 +1,18 @@
 //! All tools behind one door: what they work on, and what they leave.
 
-use bspline::HierarchicalSpline;
+use std::collections::BTreeMap;
+use std::fmt;
+use std::sync::Arc;
+
+use bspline::{Aabb, Csg, CsgError, Field, HierarchicalSpline};
 use fitting::field::FieldFitReport;
 use fitting::{Control, FitError};
+use glam::DAffine3;
 
-use crate::geometric::{Geometric, GeometricError, Operation};
+use crate::force::{ForceError, ForceTool};
+use crate::geometric::{Geometric, GeometricError, Move, Operation};
+use crate::limits::Limits;
+use crate::paint::{Layer, Layers, Paint, PaintError};
 
 /// What a tool works on. Cheap to copy.
 #[derive(Clone, Debug)]
@@ -13,6 +21,64 @@ pub struct Canvas {
     pub field: HierarchicalSpline<f32>,
     /// Density of its surface.
     pub iso: f64,
+    /// Level of the field that the object is shaped to.
+    pub detail: usize,
+    /// What is painted on it.
+    pub layers: Layers,
+    /// Objects that a tool may name.
+    pub others: Others,
+}
+
+/// Objects by name, each about as the distance from its surface, positive inside, in the world of the canvas.
+#[derive(Clone, Default)]
+pub struct Others(BTreeMap<String, Arc<dyn Field>>);
+
+impl fmt::Debug for Others {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_set().entries(self.0.keys()).finish()
+    }
+}
+
+impl Others {
+    /// Puts an object in; `canvas_from_object` maps its world to that of the canvas.
+    ///
+    /// # Errors
+    /// [`CsgError`] for an iso-value that is not finite, or a map that flattens.
+    pub fn put(
+        &mut self,
+        name: &str,
+        field: &HierarchicalSpline<f32>,
+        iso: f64,
+        canvas_from_object: DAffine3,
+    ) -> Result<(), CsgError> {
+        let steep = 1.0 / field.slope();
+        let distance = Csg::sum(vec![(steep, Arc::new(field.clone()))], -iso * steep)?;
+        let placed: Arc<dyn Field> = match canvas_from_object == DAffine3::IDENTITY {
+            true => Arc::new(distance),
+            false => {
+                // A distance of the object, in lengths of the canvas.
+                let stretch = canvas_from_object.matrix3.determinant().abs().cbrt();
+                let placed = Arc::new(Csg::affine(Arc::new(distance), canvas_from_object)?);
+                Arc::new(Csg::sum(vec![(stretch, placed)], 0.0)?)
+            }
+        };
+        self.0.insert(name.into(), placed);
+        Ok(())
+    }
+
+    /// The object of a name.
+    ///
+    /// # Errors
+    /// A sentence.
+    pub fn get(&self, name: &str) -> Result<Arc<dyn Field>, String> {
+        self.0.get(name).cloned().ok_or_else(|| {
+            let known: Vec<_> = self.0.keys().map(String::as_str).collect();
+            match known.is_empty() {
+                true => format!("there is no object {name:?}, nor any other"),
+                false => format!("there is no object {name:?}; there are {}", known.join(", ")),
+            }
+        })
+    }
 }
 
 /// A tool with all that it is told.
@@ -22,6 +88,12 @@ pub enum Tool<'a> {
     Carve(&'a Geometric),
     /// Adds a solid.
     Add(&'a Geometric),
+    /// Pushes or pulls.
+    Force(ForceTool<'a>),
+    /// Carries along.
+    Move(&'a Move),
+    /// Paints matter or touch.
+    Paint(&'a Paint),
 }
 
 /// Why a tool cannot be used.
@@ -30,38 +102,118 @@ pub enum ToolError {
     /// A geometric tool cannot.
     #[error(transparent)]
     Geometric(#[from] GeometricError),
+    /// A force tool cannot.
+    #[error(transparent)]
+    Force(#[from] ForceError),
+    /// The stroke names no tool, or several, or limits that make no sense.
+    #[error("{0}")]
+    Stroke(String),
+    /// Paint cannot be laid on.
+    #[error(transparent)]
+    Paint(#[from] PaintError),
 }
 
 impl ToolError {
     /// Whether the user said stop.
     pub fn is_cancelled(&self) -> bool {
-        matches!(self, Self::Geometric(GeometricError::Fit(FitError::Cancelled)))
+        match self {
+            Self::Geometric(e) => matches!(e, GeometricError::Fit(FitError::Cancelled)),
+            Self::Force(e) => e.is_cancelled(),
+            Self::Stroke(_) | Self::Paint(_) => false,
+        }
     }
 }
 
 impl Tool<'_> {
     /// Names of all tools, as sessions write them.
-    pub const NAMES: [&'static str; 2] = ["carve", "add"];
+    pub const NAMES: [&'static str; 9] = {
+        let [pull, chisel, squirt, drill, join] = ForceTool::NAMES;
+        ["carve", "add", pull, chisel, squirt, drill, join, "move", "paint"]
+    };
 
     /// Its name, as sessions write it.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Carve(_) => "carve",
             Self::Add(_) => "add",
+            Self::Force(tool) => tool.name(),
+            Self::Move(_) => "move",
+            Self::Paint(_) => "paint",
         }
     }
 
-    /// What the tool leaves, and what is left to say of it, in sentences.
+    /// What the tool leaves within limits, and what is left to say of it, in sentences.
     ///
     /// # Errors
     /// Any [`ToolError`].
-    pub fn apply(&self, canvas: Canvas, control: &mut Control) -> Result<(Canvas, Vec<String>), ToolError> {
+    pub fn apply(
+        &self,
+        canvas: Canvas,
+        limits: &Limits,
+        control: &mut Control,
+    ) -> Result<(Canvas, Vec<String>), ToolError> {
+        let Canvas { field: old, iso, .. } = &canvas;
         let (field, report) = match self {
-            Self::Carve(tool) => tool.apply(Operation::Carve, &canvas.field, canvas.iso, control)?,
-            Self::Add(tool) => tool.apply(Operation::Add, &canvas.field, canvas.iso, control)?,
+            Self::Carve(tool) => tool.apply(Operation::Carve, old, *iso, limits, control)?,
+            Self::Add(tool) => tool.apply(Operation::Add, old, *iso, limits, control)?,
+            Self::Move(tool) => {
+                let (field, report) = tool.apply(old, *iso, limits, control)?;
+                let layers = carried(tool, &canvas, limits)?;
+                let moved = Canvas {
+                    field,
+                    layers,
+                    ..canvas
+                };
+                return Ok((moved, thin_parts(&report)));
+            }
+            Self::Paint(paint) => {
+                let layer = painted(paint, &canvas, limits)?;
+                let mut canvas = canvas;
+                canvas.layers.insert(paint.layer, layer);
+                return Ok((canvas, Vec::new()));
+            }
+            Self::Force(tool) => {
+                let (field, told) = tool.apply(old, *iso, control)?;
+                let field = limits.kept(old, &field);
+                return Ok((Canvas { field, ..canvas }, told));
+            }
         };
         Ok((Canvas { field, ..canvas }, thin_parts(&report)))
     }
+}
+
+/// What is painted, carried along by a move as far as the limits allow.
+fn carried(tool: &Move, canvas: &Canvas, limits: &Limits) -> Result<Layers, ToolError> {
+    let whole = canvas.field.lattice().world_box();
+    let origin = tool.motion.origin(&whole)?;
+    let reach = origin.reach();
+    let within = limits.cut(&Aabb {
+        min: reach.min.max(whole.min),
+        max: reach.max.min(whole.max),
+    });
+    let painted = canvas.layers.iter().filter(|(_, layer)| !layer.is_empty());
+    let layers = painted.map(|(substance, layer)| {
+        let moved = layer
+            .carried(&within, |p| origin.back(p))
+            .map_err(PaintError::from)?;
+        let kept = limits.kept(layer.tree(), moved.tree());
+        Ok((
+            *substance,
+            layer.with_tree(kept).expect("nodes of the same level"),
+        ))
+    });
+    layers.collect()
+}
+
+/// A layer with paint laid on, as far as the limits allow.
+fn painted(paint: &Paint, canvas: &Canvas, limits: &Limits) -> Result<Layer, ToolError> {
+    let field = &canvas.field;
+    let whole = limits.cut(&field.lattice().world_box());
+    let layer = paint.apply(field, &canvas.layers, canvas.detail, &whole)?;
+    let before = canvas.layers.get(&paint.layer).cloned();
+    let before = before.unwrap_or_else(|| Layer::empty(field.lattice(), canvas.detail));
+    let kept = limits.kept(before.tree(), layer.tree());
+    Ok(layer.with_tree(kept).expect("some of the nodes painted"))
 }
 
 /// Says what was too thin for the field.

@@ -8,6 +8,7 @@ use fitting::Cancel;
 use formats::Unit;
 use formats::field::{AnyField, FieldMeta, Stored};
 use serde::Serialize;
+use tools::paint::Layers;
 use tools::scene::{Scene, SimulateError, Simulation, StepLine};
 
 use super::cost::Cost;
@@ -180,7 +181,7 @@ impl Stage<'_> {
     fn play<T: Stored>(&mut self, field: HierarchicalSpline<T>) -> Outcome<Total> {
         let name = self.name;
         let failed = |e: SimulateError| Failure::input(format!("{name}: {e}"));
-        let mut simulation = Simulation::new(self.scene, field, self.iso).map_err(failed)?;
+        let mut simulation = Simulation::new(self.scene, field, self.iso, &Layers::new()).map_err(failed)?;
         let lattice = simulation.region().patch().lattice();
         let mut total = Total {
             samples: lattice.sample_count(),

@@ -161,11 +161,14 @@ fn a_session_carves_and_adds_stroke_by_stroke() {
 carve = { shape = { sphere = { radius = 0.2 } }, along = [[0.0, -0.4, 1.0], [0.0, 0.4, 1.0]], blend = 0.05 }
 [[stroke]]
 object = "ball"
-add = { shape = { torus = { axis = [0, 1, 0], major = 0.6, minor = 0.1 } }, along = [[0.5, 0.0, 0.0]] }
+add = { shape = { torus = { axis = [0, 1, 0], major = 0.5, minor = 0.1 } }, along = [[0.45, 0.0, 0.0]] }
+[[stroke]]
+within = { min = [-2, -2, -2], max = [2, 2, 0] }
+move = { motion = { grab = { along = [[0.0, 0.0, -1.0], [0.0, 0.0, -0.8]], radius = 0.5 } } }
 "#,
     );
     let done = bench.json("sculpt clay.isoclay --script session.toml");
-    assert_eq!(done["done"], 2);
+    assert_eq!(done["done"], 3);
     let replayed = bench.json("replay clay.isoclay");
     assert_eq!(replayed["field_sha256"], done["field_sha256"]);
     // A torus through a ball: what juts out has a hole.
@@ -182,7 +185,7 @@ add = { shape = { torus = { axis = [0, 1, 0], major = 0.6, minor = 0.1 } }, alon
         "{}",
         run.stderr
     );
-    assert_eq!(bench.json("history clay.isoclay")["done"], 2);
+    assert_eq!(bench.json("history clay.isoclay")["done"], 3);
     bench.write("typo.toml", "[[stroke]]\n\ncarv = 1\n");
     let run = bench.run("sculpt clay.isoclay --script typo.toml");
     assert!(run.stderr.contains("line 3"), "{}", run.stderr);

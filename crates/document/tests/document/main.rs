@@ -502,3 +502,106 @@ fn edits_of_a_field_take_the_bytes_of_what_they_change() {
     drop(document);
     assert_eq!(open(&path).state().sha256(), next.sha256());
 }
+
+#[test]
+fn paint_is_kept_with_its_object_and_felt_by_scenes() {
+    let directory = tempdir().unwrap();
+    let path = directory.path().join("painted.isoclay");
+    let mut large = object(&common::large());
+    large.meta = FieldMeta {
+        iso: Some(0.0),
+        ..FieldMeta::default()
+    }
+    .into();
+    let state = State::new().with("ball", large).unwrap();
+    let plain = state.sha256();
+    let mut document = Document::create(&path, state.clone(), Options::default()).unwrap();
+    let session = r#"
+[[stroke]]
+paint = { layer = "stiffness", brush = { value = 50, along = [[20, 20, 34]], radius = 6 } }
+[[stroke]]
+paint = { layer = "friction", formula = "0.1 + 0.01 * z" }
+"#;
+    let named = |_: Option<&str>| Ok::<_, document::CommandError>("ball".to_string());
+    for command in document::Command::of_script(session, named).unwrap() {
+        let (next, _) = command
+            .apply(document.state(), &mut fitting::Control::default())
+            .unwrap();
+        assert!(document.commit(&command.title(), json!(command), next).unwrap());
+    }
+    let painted = document.state().clone();
+    assert_ne!(painted.sha256(), plain);
+    let size = std::fs::metadata(&path).unwrap().len();
+    drop(document);
+    let mut document = open(&path);
+    assert_eq!(document.state().sha256(), painted.sha256());
+    assert_eq!(document.state().objects()["ball"].layers.len(), 2);
+    assert!(document.undo(2).is_ok());
+    assert_eq!(document.state().sha256(), plain);
+    assert!(document.redo(2).is_ok());
+    assert_eq!(document.state().sha256(), painted.sha256());
+    // An object that goes and comes takes its paint along.
+    let without = document.state().without("ball").unwrap();
+    document.commit("away", Value::Null, without).unwrap();
+    drop(document);
+    let mut document = open(&path);
+    document.undo(1).unwrap();
+    assert_eq!(document.state().sha256(), painted.sha256());
+    assert!(size < 3 << 20, "{size} bytes");
+
+    let scene = r#"
+field = "unused"
+[region]
+min = [12, 12, 27]
+max = [28, 28, 39]
+[[pull]]
+at = [20, 20, 36]
+radius = 2.5
+strength = 30.0
+[material]
+mass = 0.01
+damping = 0.5
+[time]
+duration = 0.3
+step = 0.05
+"#;
+    let pulled = |state: &State| {
+        let command = document::Command::of_script(scene, named).unwrap().remove(0);
+        let (next, _) = command.apply(state, &mut fitting::Control::default()).unwrap();
+        let moved = &next.objects()["ball"].field;
+        let before = &state.objects()["ball"].field;
+        let top = DVec3::new(20.0, 20.0, 36.0);
+        bspline::Field::value(moved, top) - bspline::Field::value(before, top)
+    };
+    let (soft, stiff) = (pulled(&state), pulled(&painted));
+    assert!(soft > 0.05 && stiff < 0.4 * soft && stiff > 0.0, "{soft} {stiff}");
+}
+
+#[test]
+fn strokes_after_strokes_get_no_finer_by_themselves() {
+    let mut large = object(&common::large());
+    large.meta = FieldMeta {
+        iso: Some(0.0),
+        ..FieldMeta::default()
+    }
+    .into();
+    let mut state = State::new().with("ball", large).unwrap();
+    let stroke = |n: u32| {
+        let z = 30.0 + f64::from(n % 3);
+        format!(
+            "[[stroke]]\ncarve = {{ shape = {{ sphere = {{ radius = 4 }} }}, along = [[{}, 20, {z}]] }}\n",
+            10 + n
+        )
+    };
+    let mut sizes = Vec::new();
+    for n in 0..8 {
+        let named = |_: Option<&str>| Ok::<_, document::CommandError>("ball".to_string());
+        let command = document::Command::of_script(&stroke(n), named).unwrap().remove(0);
+        (state, _) = command.apply(&state, &mut fitting::Control::default()).unwrap();
+        let field = &state.objects()["ball"].field;
+        sizes.push(field.coefficient_count());
+        assert_eq!(field.level_count(), 2, "stroke {n}");
+    }
+    let grown = sizes[7] - sizes[0];
+    assert!(grown < 4 * sizes[0], "{sizes:?}");
+}

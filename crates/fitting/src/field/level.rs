@@ -70,7 +70,7 @@ impl<T: Real> LevelFit<'_, T> {
         let spread = tiles.map(|i| tiles.spread(i, &exceeding, 1));
         let (first, last) = self.region.allowed();
         let takes_part: Vec<Mask> = (spread.iter().zip(&tiles.keys))
-            .map(|(spread, key)| and(spread, &between(*key, first, last)))
+            .map(|(spread, key)| self.free(*key, and(spread, &between(*key, first, last))))
             .collect();
         let coefficients = self.coefficients(tiles, rest, &takes_part);
         Ok(Round {
@@ -78,6 +78,20 @@ impl<T: Real> LevelFit<'_, T> {
             open: self.open(&samples, &judge, &spread),
             samples: samples.count,
         })
+    }
+
+    /// Those of the functions `asked` of a tile that may change.
+    fn free(&self, key: TileKey, asked: Mask) -> Mask {
+        let ends = [0, TILE * TILE * TILE - 1].map(|place| knot_of(key, place));
+        if asked == NONE || self.region.are_free(ends[0], ends[1]) {
+            return asked;
+        }
+        let mut free = NONE;
+        for place in places(&asked) {
+            let knot = knot_of(key, place);
+            free[place / 64] |= u64::from(self.region.are_free(knot, knot)) << (place % 64);
+        }
+        free
     }
 
     /// What is left at the middles of cells in `keys`; with the number of samples.
@@ -121,7 +135,7 @@ impl<T: Real> LevelFit<'_, T> {
         let tiles = Tiles::new(keys);
         let fields = [self.target, self.field as &dyn Field];
         let (target, rest, counts) =
-            tiles.fill_both(|i, target, rest| sample(fields, &self.region, tiles.keys[i], target, rest));
+            tiles.fill_runs(|run, target, rest| sample(fields, &self.region, run[0], target, rest));
         for (key, target) in tiles.keys.iter().zip(&target) {
             let inside = between(*key, lo, hi);
             if let Some(bad) = places(&inside).find(|i| !target[*i].is_finite()) {

@@ -54,7 +54,7 @@ pub enum Aim {
     },
 }
 
-/// What a fit did, and how close it came.
+/// What a fit did, and how close it came. There is no solver to tell of: the coefficients are a quasi-interpolant.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FieldFitReport {
     /// Levels that got functions, or other coefficients, coarsest first.
@@ -86,6 +86,22 @@ pub fn fit_field<T: Real>(
     options: &FieldFitOptions,
     control: &mut Control,
 ) -> Result<(HierarchicalSpline<T>, BrickDiff<T>, FieldFitReport), FitError> {
+    fit_field_where(target, onto, within, options, &|_| true, control)
+}
+
+/// [`fit_field`] with those functions alone of whose supports, world boxes, `is_free` is true; all others keep their
+/// coefficients to the bit. It has to be true of what lies within a box of which it is true.
+///
+/// # Errors
+/// As [`fit_field`].
+pub fn fit_field_where<T: Real>(
+    target: &dyn Field,
+    onto: &HierarchicalSpline<T>,
+    within: &Aabb,
+    options: &FieldFitOptions,
+    is_free: &(dyn Fn(&Aabb) -> bool + Sync),
+    control: &mut Control,
+) -> Result<(HierarchicalSpline<T>, BrickDiff<T>, FieldFitReport), FitError> {
     let start = Instant::now();
     let local = within.transformed(onto.lattice_from_world());
     let extent = local.max - local.min;
@@ -98,6 +114,7 @@ pub fn fit_field<T: Real>(
         finest: options.finest,
         within: &local,
         is_between,
+        is_free,
     };
     let across = |level: &usize| extent.min_element() * (1u64 << *level) as f64 >= ACROSS;
     let first = (0..options.finest).find(across).unwrap_or(options.finest);

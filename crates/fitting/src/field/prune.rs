@@ -83,7 +83,9 @@ fn deactivated<T: Real>(region: &Region, key: BrickKey) -> Option<BlockEdit<T>> 
     // Function `k + 1` is centred on knot `k`.
     let first: [i64; 3] = std::array::from_fn(|a| (lo[a] + 1).max(i64::from(key.0[a]) * BRICK as i64));
     let last: [i64; 3] = std::array::from_fn(|a| (hi[a] + 1).min(i64::from(key.0[a]) * BRICK as i64 + 7));
-    (0..3).all(|a| first[a] <= last[a]).then(|| BlockEdit {
+    let is_any = (0..3).all(|a| first[a] <= last[a]);
+    let are_free = is_any && region.are_free(first.map(|f| f - 1), last.map(|l| l - 1));
+    are_free.then(|| BlockEdit {
         level: region.level,
         first: first.map(|f| f as u32),
         shape: std::array::from_fn(|a| (last[a] - first[a] + 1) as usize),

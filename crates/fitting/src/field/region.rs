@@ -5,7 +5,7 @@ use bspline::{Aabb, Frame};
 use glam::{DAffine3, DVec3};
 
 /// The knots of one level about the box.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub(super) struct Region<'a> {
     pub lattice: &'a Lattice,
     pub level: usize,
@@ -15,6 +15,8 @@ pub(super) struct Region<'a> {
     pub within: &'a Aabb,
     /// Half an interval beside the knots: the middles of cells.
     pub is_between: bool,
+    /// Whether functions whose supports lie in a world box may change.
+    pub is_free: &'a (dyn Fn(&Aabb) -> bool + Sync),
 }
 
 impl Region<'_> {
@@ -30,6 +32,17 @@ impl Region<'_> {
     /// support of the finest level.
     pub fn allowed(&self) -> ([i64; 3], [i64; 3]) {
         self.knots_in(2.0 * self.spacing(self.finest), 2, 0.0)
+    }
+
+    /// Whether all functions centred on the knots `lo ..= hi` may change.
+    pub fn are_free(&self, lo: [i64; 3], hi: [i64; 3]) -> bool {
+        let limit = self.lattice.extent();
+        let end = |knot: [i64; 3], reach: i64| {
+            let knots = DVec3::from_array(knot.map(|k| (k + reach) as f64));
+            (knots * self.spacing(self.level)).clamp(DVec3::ZERO, limit)
+        };
+        let supports = Aabb::new(end(lo, -2), end(hi, 2));
+        (self.is_free)(&supports.transformed(&self.lattice.world_from_lattice))
     }
 
     /// First and last knot at which values are asked for: one about all of the others.

@@ -5,27 +5,29 @@
 //! that depths and blends are lengths on any field.
 
 mod block;
+mod motion;
 mod shape;
+mod swept;
+mod write;
 
 use std::sync::Arc;
 
 use bspline::csg::Rounding;
-use bspline::hierarchical::MAX_LEVELS;
 use bspline::{Csg, Field, HierarchicalSpline, Real};
-use fitting::field::{Aim, FieldFitOptions, FieldFitReport, fit_field};
+use fitting::field::FieldFitReport;
 use fitting::{Control, FitError};
+use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
 pub use block::block;
+pub use motion::{Motion, Move, Origin, reflection};
 pub use shape::Shape;
+use swept::Pose;
+use write::{Fineness, TOLERANCE, Writer};
 
+use crate::limits::Limits;
 use crate::number::{NonNegative, Point, Positive};
-
-/// Tolerance over the finest knot interval where none is asked for.
-const TOLERANCE: f64 = 0.02;
-
-/// Knot intervals of the finest level that a tool's box reaches beyond the tool and its blend: the supports of what changes.
-const MARGIN: f64 = 4.0;
+use crate::warp::WarpError;
 
 /// What a geometric tool does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,22 +44,24 @@ pub enum Operation {
 pub struct Geometric {
     /// The solid.
     pub shape: Shape,
-    /// Where its centre goes, in the world of the object: one place or more. A sphere sweeps all between them; others act
-    /// at each place.
+    /// Where its centre goes, in the world of the object: one place or more. It sweeps all between them.
     pub along: Vec<Point>,
+    /// How it is turned at each place: the axis of the turn, as long as its angle in degrees. As it is if missing; one for
+    /// all, or one a place.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub turn: Vec<Point>,
+    /// Whether it acts at each place alone and sweeps nothing between.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub each: bool,
     /// Width over which the crease is rounded, a world length; 0 leaves it as sharp as the field can be.
     #[serde(default)]
     pub blend: NonNegative,
     /// Distance from the true surface that may stay off the creases, a world length; a fiftieth of the finest knot interval if
     /// missing.
     pub tolerance: Option<Positive>,
-    /// Levels finer than the field has that may be added.
-    #[serde(default = "one")]
-    pub finer: u8,
-}
-
-fn one() -> u8 {
-    1
+    /// Levels finer than the object's detail that may be added; if missing one, and as many more as show the thinnest part.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub finer: Option<u8>,
 }
 
 /// Why a geometric tool cannot be used.
@@ -76,12 +80,57 @@ pub enum GeometricError {
         /// Corners of the field's box.
         field: [[f64; 3]; 2],
     },
+    /// The solid would be cut off.
+    #[error(
+        "the solid would leave the box of its field at {at:?}; let the tool end before, or start with more room about the \
+         object"
+    )]
+    Leaves {
+        /// Where.
+        at: [f64; 3],
+    },
+    /// A motion makes no sense.
+    #[error(transparent)]
+    Warp(#[from] WarpError),
     /// The result cannot be written back.
     #[error(transparent)]
     Fit(#[from] FitError),
 }
 
+impl GeometricError {
+    fn shape(error: impl std::fmt::Display) -> Self {
+        Self::Shape(error.to_string())
+    }
+}
+
 impl Geometric {
+    fn poses(&self) -> Result<Vec<Pose>, String> {
+        let (places, turns) = (self.along.len(), self.turn.len());
+        if turns > 1 && turns != places {
+            return Err(format!(
+                "there are {places} places and {turns} turns; write one turn for all, or one for each place"
+            ));
+        }
+        let turn = |n: usize| {
+            let turn = self
+                .turn
+                .get(n)
+                .or(self.turn.first())
+                .map_or(DVec3::ZERO, |t| t.0);
+            let angle = turn.length().to_radians();
+            let axis = turn.normalize_or_zero();
+            let (sine, cosine) = (libm::sin(0.5 * angle), libm::cos(0.5 * angle));
+            DQuat::from_xyzw(axis.x * sine, axis.y * sine, axis.z * sine, cosine)
+        };
+        let places = self.along.iter().enumerate();
+        Ok(places
+            .map(|(n, at)| Pose {
+                at: at.0,
+                turn: turn(n),
+            })
+            .collect())
+    }
+
     /// What the tool leaves of a field whose surface lies at `iso`, and how close it is.
     ///
     /// Beyond the tool's box, which ends a few knot intervals beside the tool and its blend, no coefficient changes.
@@ -93,57 +142,46 @@ impl Geometric {
         operation: Operation,
         field: &HierarchicalSpline<T>,
         iso: f64,
+        limits: &Limits,
         control: &mut Control,
     ) -> Result<(HierarchicalSpline<T>, FieldFitReport), GeometricError> {
-        let wrong = |e: &dyn std::fmt::Display| GeometricError::Shape(e.to_string());
-        let places: Vec<_> = self.along.iter().map(|p| p.0).collect();
-        let (solids, reach) = self.shape.solids(&places).map_err(GeometricError::Shape)?;
-        let finest = (field.level_count() - 1 + usize::from(self.finer)).min(MAX_LEVELS - 1);
-        let spacing = field.lattice().spacing(finest);
-        let coarse = field.finest_spacing();
-        let margin = self.blend.0 + MARGIN * coarse;
-        let whole = field.lattice().world_box();
-        let own = bspline::Aabb::new(reach.min - margin, reach.max + margin);
-        if own.max.cmplt(whole.min).any() || own.min.cmpgt(whole.max).any() {
-            let corners = |b: &bspline::Aabb| [b.min.to_array(), b.max.to_array()];
-            return Err(GeometricError::Outside {
-                tool: corners(&reach),
-                field: corners(&whole),
-            });
-        }
-        let within = bspline::Aabb::new(own.min.max(whole.min), own.max.min(whole.max));
+        let poses = self.poses().map_err(GeometricError::Shape)?;
+        let solids = self.shape.solids(&poses, self.each);
+        let (solids, mut reach) = solids.map_err(GeometricError::Shape)?;
+        reach.min -= self.blend.0;
+        reach.max += self.blend.0;
+        let writer = Writer { field, iso, limits };
+        let within = writer.within(&reach)?;
         let slope = field.slope();
         let solid: Arc<dyn Field> = Arc::new(field.clone());
         let tools: Result<Vec<Arc<dyn Field>>, _> = solids
             .into_iter()
             .map(|tool| Csg::sum(vec![(slope, tool)], iso).map(|tool| Arc::new(tool) as Arc<dyn Field>))
             .collect();
-        let tools = tools.map_err(|e| wrong(&e))?;
+        let tools = tools.map_err(GeometricError::shape)?;
         let rounding = Rounding::Bounded {
             range: self.blend.0 * slope,
         };
         let target: Arc<dyn Field> = match (operation, self.blend.0 > 0.0) {
-            (Operation::Carve, false) => Arc::new(Csg::difference(solid, tools, iso).map_err(|e| wrong(&e))?),
+            (Operation::Carve, false) => {
+                Arc::new(Csg::difference(solid, tools, iso).map_err(GeometricError::shape)?)
+            }
             (Operation::Carve, true) => {
-                Csg::smooth_difference(solid, tools, rounding, iso).map_err(|e| wrong(&e))?
+                Csg::smooth_difference(solid, tools, rounding, iso).map_err(GeometricError::shape)?
             }
             (Operation::Add, is_smooth) => {
                 let all = [vec![solid], tools].concat();
                 match is_smooth {
-                    false => Arc::new(Csg::union(all).map_err(|e| wrong(&e))?),
-                    true => Csg::smooth_union(all, rounding, iso).map_err(|e| wrong(&e))?,
+                    false => Arc::new(Csg::union(all).map_err(GeometricError::shape)?),
+                    true => Csg::smooth_union(all, rounding, iso).map_err(GeometricError::shape)?,
                 }
             }
         };
-        let options = FieldFitOptions {
-            aim: Aim::Surface {
-                iso,
-                tolerance: self.tolerance.map_or(TOLERANCE * spacing.min_element(), |t| t.0),
-            },
-            finest,
-            look: true,
+        let fineness = Fineness {
+            tolerance: self.tolerance,
+            finer: self.finer,
+            feature: Some(self.shape.feature()),
         };
-        let (field, _, report) = fit_field(&*target, field, &within, &options, control)?;
-        Ok((field, report))
+        writer.written(&*target, &within, &fineness, control)
     }
 }

@@ -1,10 +1,11 @@
 use std::sync::Arc;
 
-use bspline::primitives::{Capsule, Cuboid, Cylinder, PrimitiveError, Sphere, Torus};
-use bspline::{Aabb, Field};
-use glam::DVec3;
+use bspline::primitives::{Capsule, Cuboid, Cylinder, Primitive, PrimitiveError, Sphere, Torus};
+use bspline::{Aabb, Csg, Field};
+use glam::{DAffine3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
+use super::swept::{Pose, Swept};
 use crate::number::{Point, Positive};
 
 /// A solid about its centre. Lengths are those of the world.
@@ -16,7 +17,7 @@ pub enum Shape {
         /// Its radius.
         radius: Positive,
     },
-    /// A box along the axes of the world.
+    /// A box along the axes.
     Box {
         /// Its edges.
         size: [Positive; 3],
@@ -50,75 +51,99 @@ pub enum Shape {
     },
 }
 
+/// Distances, positive inside, that together make a tool on its way, and a box about them.
+pub(super) type Solids = (Vec<Arc<dyn Field>>, Aabb);
+
 impl Shape {
-    /// Distances, positive inside, that together make the tool on its way, and a box about them.
-    pub(super) fn solids(&self, places: &[DVec3]) -> Result<(Vec<Arc<dyn Field>>, Aabb), String> {
-        if places.is_empty() {
-            return Err("along has no place; write at least one point".into());
+    /// Radius of the smallest ball that touches opposite sides of it.
+    pub(super) fn feature(&self) -> f64 {
+        match self {
+            Self::Sphere { radius } | Self::Capsule { radius, .. } => radius.0,
+            Self::Box { size } => 0.5 * size.iter().fold(f64::INFINITY, |least, edge| least.min(edge.0)),
+            Self::Cylinder { radius, height, .. } => radius.0.min(0.5 * height.0),
+            Self::Torus { minor, .. } => minor.0,
         }
-        let mut solids = Vec::new();
-        let mut put = |solid: Result<Arc<dyn Field>, PrimitiveError>| {
-            solids.push(solid.map_err(|e| e.to_string())?);
-            Ok::<_, String>(())
+    }
+
+    /// The tool on its way from pose to pose, or at each of them alone.
+    pub(super) fn solids(&self, poses: &[Pose], is_each: bool) -> Result<Solids, String> {
+        let (solid, size) = self.solid().map_err(|e| e.to_string())?;
+        let (Some(first), Some(last)) = (poses.first(), poses.last()) else {
+            return Err("along has no place; write at least one point".into());
         };
-        let reach = match self {
-            Self::Sphere { radius } => {
-                let mut last: Option<DVec3> = None;
-                for &at in places {
-                    put(match last.replace(at).filter(|from| *from != at) {
-                        Some(from) => Capsule::new(from, at, radius.0).map(shared),
-                        None => Sphere::new(at, radius.0).map(shared),
-                    })?;
-                }
-                DVec3::splat(radius.0)
-            }
-            Self::Box { size } => {
-                let half = 0.5 * DVec3::from_array(size.map(|s| s.0));
-                places
-                    .iter()
-                    .try_for_each(|&at| put(Cuboid::new(at, half).map(shared)))?;
-                half
-            }
-            Self::Cylinder { axis, radius, height } => {
-                let half = half_of(axis, height)?;
-                for &at in places {
-                    put(Cylinder::new(at - half, at + half, radius.0).map(shared))?;
-                }
-                half.abs() + radius.0
-            }
-            Self::Capsule { axis, radius, height } => {
-                let half = half_of(axis, height)?;
-                for &at in places {
-                    put(Capsule::new(at - half, at + half, radius.0).map(shared))?;
-                }
-                half.abs() + radius.0
-            }
-            Self::Torus { axis, major, minor } => {
-                for &at in places {
-                    put(Torus::new(at, axis.0, major.0, minor.0).map(shared))?;
-                }
-                DVec3::splat(major.0 + minor.0)
-            }
+        let mut solids: Vec<Arc<dyn Field>> = Vec::new();
+        let mut reach = Aabb {
+            min: DVec3::INFINITY,
+            max: DVec3::NEG_INFINITY,
         };
-        let low = places.iter().copied().reduce(DVec3::min).expect("a place") - reach;
-        let high = places.iter().copied().reduce(DVec3::max).expect("a place") + reach;
-        match low.is_finite() && high.is_finite() {
-            true => Ok((solids, Aabb::new(low, high))),
+        let legs = poses.windows(2).filter(|leg| leg[0] != leg[1]);
+        if is_each || first == last && legs.clone().next().is_none() {
+            for pose in poses {
+                solids.push(placed(&solid, pose)?);
+            }
+        } else {
+            for leg in legs {
+                solids.push(match self {
+                    // However it is turned, a ball is a ball.
+                    Self::Sphere { .. } if leg[0].at == leg[1].at => placed(&solid, &leg[0])?,
+                    Self::Sphere { radius } => {
+                        Arc::new(Capsule::new(leg[0].at, leg[1].at, radius.0).map_err(|e| e.to_string())?)
+                    }
+                    _ => Arc::new(Swept::new(solid.clone(), size, leg[0], leg[1])),
+                });
+            }
+        }
+        for pose in poses {
+            reach.min = reach.min.min(pose.at - size);
+            reach.max = reach.max.max(pose.at + size);
+        }
+        match reach.min.is_finite() && reach.max.is_finite() {
+            true => Ok((solids, reach)),
             false => Err("the tool reaches beyond all numbers; make it smaller".into()),
         }
     }
+
+    /// The solid about the origin, and the radius of a ball that holds it.
+    fn solid(&self) -> Result<(Primitive, f64), PrimitiveError> {
+        let ends = |axis: &Point, height: &Positive| {
+            let half = direction(axis)? * (0.5 * height.0);
+            Ok((-half, half))
+        };
+        Ok(match self {
+            Self::Sphere { radius } => (Sphere::new(DVec3::ZERO, radius.0)?.into(), radius.0),
+            Self::Box { size } => {
+                let half = 0.5 * DVec3::from_array(size.map(|s| s.0));
+                (Cuboid::new(DVec3::ZERO, half)?.into(), half.length())
+            }
+            Self::Cylinder { axis, radius, height } => {
+                let (from, to) = ends(axis, height)?;
+                let size = DVec2::new(0.5 * height.0, radius.0).length();
+                (Cylinder::new(from, to, radius.0)?.into(), size)
+            }
+            Self::Capsule { axis, radius, height } => {
+                let (from, to) = ends(axis, height)?;
+                (
+                    Capsule::new(from, to, radius.0)?.into(),
+                    0.5 * height.0 + radius.0,
+                )
+            }
+            Self::Torus { axis, major, minor } => {
+                let ring = Torus::new(DVec3::ZERO, axis.0, major.0, minor.0)?;
+                (ring.into(), major.0 + minor.0)
+            }
+        })
+    }
 }
 
-fn shared<F: Field + 'static>(solid: F) -> Arc<dyn Field> {
-    Arc::new(solid)
+fn placed(solid: &Primitive, pose: &Pose) -> Result<Arc<dyn Field>, String> {
+    let map = DAffine3::from_rotation_translation(pose.turn, pose.at);
+    let placed = Csg::affine(Arc::new(solid.clone()), map).map_err(|e| e.to_string())?;
+    Ok(Arc::new(placed))
 }
 
-fn half_of(axis: &Point, height: &Positive) -> Result<DVec3, String> {
-    let direction = axis.0.try_normalize().ok_or_else(|| {
-        format!(
-            "axis {:?} gives no direction; write one that is not zero",
-            axis.0.to_array()
-        )
-    })?;
-    Ok(direction * (0.5 * height.0))
+fn direction(axis: &Point) -> Result<DVec3, PrimitiveError> {
+    axis.0.try_normalize().ok_or_else(|| PrimitiveError::NoDirection {
+        name: "axis",
+        length: axis.0.length(),
+    })
 }

@@ -9,7 +9,7 @@ use glam::DVec3;
 use super::error::{SimulateError, wrong};
 use super::place::Samples;
 use super::script::{Amount, Material, Paint, Scene, Substance};
-use crate::number::Point;
+use crate::paint::{self, Layers, distance};
 
 /// Matter and scale of rest lengths.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,6 +56,28 @@ impl Clay {
             },
             rest_scale: on("rest-scale", &material.rest_scale, 1.0, true)?,
         })
+    }
+
+    /// Multiplies the material by what is painted on the object.
+    pub fn scale_by(&mut self, layers: &Layers, samples: &Samples) {
+        for (substance, quantity) in [
+            (paint::Substance::Stiffness, &mut self.matter.stiffness),
+            (paint::Substance::Mass, &mut self.matter.mass),
+            (paint::Substance::Damping, &mut self.matter.damping),
+            (paint::Substance::RestLength, &mut self.rest_scale),
+        ] {
+            let Some(factors) = paint::values(layers, substance, &samples.positions) else {
+                continue;
+            };
+            // Where a region meets no paint its matter stays uniform, and its solver fast.
+            if factors.iter().any(|f| *f != 1.0) {
+                let values = quantity.paint(samples.positions.len());
+                values
+                    .iter_mut()
+                    .zip(factors)
+                    .for_each(|(value, factor)| *value *= factor);
+            }
+        }
     }
 
     /// Lays paint on. Between the edge and where it is full the value changes linearly.
@@ -119,21 +141,4 @@ pub fn plasticity<T: Real>(scene: &Scene, samples: &Samples) -> Result<Plasticit
         rate,
         weights: samples.positions.iter().map(weight).collect(),
     })
-}
-
-/// From a place to a point or a polyline.
-fn distance(p: DVec3, along: &[Point]) -> f64 {
-    let points = along.iter().map(|p| p.0);
-    let to_segment = |(a, b): (DVec3, DVec3)| {
-        let ab = b - a;
-        let t = if ab == DVec3::ZERO {
-            0.0
-        } else {
-            ((p - a).dot(ab) / ab.length_squared()).clamp(0.0, 1.0)
-        };
-        p.distance(a + t * ab)
-    };
-    let ends = points.clone().map(|a| p.distance(a));
-    let segments = points.clone().zip(points.skip(1)).map(to_segment);
-    ends.chain(segments).fold(f64::INFINITY, f64::min)
 }

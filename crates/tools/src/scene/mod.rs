@@ -15,5 +15,6 @@ mod script;
 mod when;
 
 pub use error::SimulateError;
+pub use formula::Formula;
 pub use motion::{Simulation, StepLine};
 pub use script::Scene;

@@ -11,6 +11,7 @@ use super::load::Load;
 use super::matter::{self, Clay};
 use super::place::{self, Samples};
 use super::script::{ReleaseKind, Scene, Scheme};
+use crate::paint::Layers;
 
 /// What a step did.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -86,7 +87,7 @@ const ROUNDING: f64 = 1e-9;
 const ENERGY_GAIN: f64 = 0.01;
 
 impl<'a, T: Real> Simulation<'a, T> {
-    /// The scene at its start. `iso` is the density of the field's surface.
+    /// The scene at its start. `iso` is the density of the field's surface; `layers` are what is painted on the field.
     ///
     /// # Errors
     /// [`SimulateError::Scene`].
@@ -94,12 +95,14 @@ impl<'a, T: Real> Simulation<'a, T> {
         scene: &'a Scene,
         field: HierarchicalSpline<T>,
         iso: Option<f64>,
+        layers: &Layers,
     ) -> Result<Self, SimulateError> {
         check_times(scene)?;
         let mut notes = Vec::new();
         let mut region = place::cut(scene, &field, &mut notes)?;
         let samples = Samples::of(&region);
-        let clay = Clay::new(&scene.material, &samples)?;
+        let mut clay = Clay::new(&scene.material, &samples)?;
+        clay.scale_by(layers, &samples);
         clay.give(&mut region)?;
         let plasticity = matter::plasticity(scene, &samples)?;
         let set = region.patch_mut().set_plasticity(plasticity);

@@ -1,10 +1,11 @@
 //! Small fields, and edits drawn at random.
 
-use bspline::AnyField;
 use bspline::hierarchical::{HierarchicalSpline, Lattice, LevelEdit};
+use bspline::{Aabb, AnyField};
 use document::{Object, Properties, State};
 use formats::field::FieldMeta;
 use glam::{DAffine3, DVec3};
+use tools::paint::{Layer, LayerError, Substance};
 
 /// SplitMix64.
 pub struct Draw(pub u64);
@@ -62,7 +63,18 @@ pub fn random_edit(state: &State, draw: &mut Draw) -> State {
     }
     let name = names[draw.below(names.len() as u32) as usize].clone();
     let mut changed = state.objects()[&name].clone();
-    match draw.below(12) {
+    match draw.below(14) {
+        12 | 13 => {
+            // Two substances, and strokes that meet.
+            let substance = [Substance::Stiffness, Substance::Friction][draw.below(2) as usize];
+            let old = changed.layers.remove(&substance);
+            let old = old.unwrap_or_else(|| Layer::empty(changed.field.lattice(), 0));
+            let centre = DVec3::from_array(std::array::from_fn(|_| f64::from(draw.below(6))));
+            let reach = Aabb::new(centre - 1.5, centre + 1.5);
+            let value = f64::from(draw.below(9));
+            let new = old.painted(&reach, |p, _| Ok::<_, LayerError>(Some(value + p.x)));
+            changed.layers.insert(substance, new.unwrap());
+        }
         0 => return state.without(&name).unwrap_or_else(|_| state.clone()),
         1 => {
             return state

@@ -1,5 +1,8 @@
 //! Geometric tools: volumes, what stays, and what is refused.
 
+mod limits;
+mod moves;
+
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -9,7 +12,8 @@ use bspline::{Aabb, Field, Frame};
 use fitting::Control;
 use glam::{DAffine3, DVec3};
 use tools::geometric::{Geometric, GeometricError, Operation, block as block_of};
-use tools::session::Session;
+use tools::limits::Limits;
+use tools::session::{Session, Stroke};
 
 /// Cells of the block's box, half a world length each.
 const CELLS: u32 = 48;
@@ -26,14 +30,28 @@ fn block() -> HierarchicalSpline<f32> {
 const SLOPE: f64 = 40.0;
 const ISO: f64 = 300.0;
 
+/// A stroke as a session writes it.
+fn stroke(text: &str) -> Stroke {
+    toml::from_str(text).unwrap_or_else(|e| panic!("{text}: {e}"))
+}
+
+/// Numbers at random between two bounds, the same for the same seed.
+fn random(seed: u64) -> impl FnMut(f64, f64) -> f64 {
+    let mut state = seed.wrapping_mul(2).wrapping_add(1);
+    move |low, high| {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        low + (high - low) * (state >> 40) as f64 / (1u64 << 24) as f64
+    }
+}
+
 fn tool(text: &str) -> Geometric {
-    let script = format!("[[stroke]]\ncarve = {{ {text} }}");
-    let session: Session = toml::from_str(&script).unwrap_or_else(|e| panic!("{e}"));
-    session.stroke[0].carve.clone().unwrap()
+    stroke(&format!("carve = {{ {text} }}")).carve.unwrap()
 }
 
 fn apply(field: &HierarchicalSpline<f32>, operation: Operation, text: &str) -> HierarchicalSpline<f32> {
-    let done = tool(text).apply(operation, field, ISO, &mut Control::default());
+    let done = tool(text).apply(operation, field, ISO, &Limits::default(), &mut Control::default());
     let (field, report) = done.unwrap();
     assert_eq!(report.left.unwrap().wrong_signs, 0, "{text}");
     field
@@ -134,31 +152,85 @@ fn a_block_is_as_large_as_asked() {
     }
 }
 
-/// A sweep has no gaps and takes the same at any spacing of its poses.
+/// A sweep has no gaps and takes the same at any spacing of its poses. All go through the face of the block, so half counts.
 #[test]
-fn a_swept_sphere_takes_a_capsule_at_any_spacing_of_poses() {
+fn swept_tools_take_the_same_at_any_spacing_of_poses() {
     let block = block();
     let before = volume(&block);
-    let whole = PI * 4.0 * 10.0 + 4.0 / 3.0 * PI * 8.0;
-    for count in [2, 3, 11, 60] {
+    let along = |from: [f64; 2], to: [f64; 2], count: usize| {
+        let at = |i: usize, a: usize| from[a] + (to[a] - from[a]) * i as f64 / (count - 1) as f64;
         let places: Vec<String> = (0..count)
-            .map(|i| {
-                format!(
-                    "[{}, 12.0, 12.0]",
-                    7.0 + 10.0 * f64::from(i) / f64::from(count - 1)
-                )
-            })
+            .map(|i| format!("[{}, {}, 12.0]", at(i, 0), at(i, 1)))
             .collect();
-        let text = format!(
-            "shape = {{ sphere = {{ radius = 2.0 }} }}, along = [{}], finer = 2",
-            places.join(", ")
-        );
-        let taken = before - volume(&apply(&block, Operation::Carve, &text));
-        assert!(
-            (taken / (0.5 * whole) - 1.0).abs() < 0.005,
-            "{count} poses: {taken}"
-        );
+        format!("along = [{}]", places.join(", "))
+    };
+    let turned = |count: usize| {
+        let turns: Vec<String> = (0..count)
+            .map(|i| format!("[0, 0, {}]", 90.0 * i as f64 / (count - 1) as f64))
+            .collect();
+        format!("turn = [{}]", turns.join(", "))
+    };
+    let diagonal = |count| along([7.0, 8.0], [15.0, 14.0], count);
+    for (shape, way, whole) in [
+        (
+            "sphere = { radius = 2.0 }",
+            &|n| along([7.0, 12.0], [17.0, 12.0], n) as String,
+            PI * 4.0 * 10.0 + 4.0 / 3.0 * PI * 8.0,
+        ),
+        // Its own volume, and what its faces run through.
+        (
+            "box = { size = [4.0, 3.0, 5.0] }",
+            &diagonal,
+            60.0 + 8.0 * 15.0 + 6.0 * 20.0,
+        ),
+        (
+            "cylinder = { axis = [0, 0, 1], radius = 2.0, height = 4.0 }",
+            &diagonal,
+            16.0 * PI + 10.0 * 16.0,
+        ),
+        (
+            "capsule = { axis = [0, 0, 1], radius = 2.0, height = 4.0 }",
+            &diagonal,
+            16.0 * PI + 32.0 / 3.0 * PI + 10.0 * (16.0 + 4.0 * PI),
+        ),
+        // Half of it lies in what the other half runs through.
+        (
+            "torus = { axis = [3, 4, 0], major = 4.0, minor = 1.5 }",
+            &|n| along([9.0, 10.0], [12.0, 14.0], n),
+            2.0 * PI * 4.0 * (PI * 2.25 + 5.0 * 3.0),
+        ),
+        (
+            "box = { size = [9.0, 2.0, 4.0] }",
+            &|n| format!("{}, {}", along([12.0, 12.0], [12.0, 12.0], n), turned(n)),
+            4.0 * swept_rectangle(4.5, 1.0),
+        ),
+    ] as [(&str, &dyn Fn(usize) -> String, f64); 6]
+    {
+        for count in [2, 5] {
+            let text = format!("shape = {{ {shape} }}, {}, finer = 2", way(count));
+            let taken = before - volume(&apply(&block, Operation::Carve, &text));
+            let off = taken / (0.5 * whole) - 1.0;
+            assert!(off.abs() < 0.005, "{shape}, {count} poses: {taken}, off by {off}");
+        }
     }
+}
+
+/// Area that a rectangle of these half edges runs through when it turns by a right angle about its middle.
+fn swept_rectangle(a: f64, b: f64) -> f64 {
+    let (side, angles) = (800, 400);
+    let reach = (a * a + b * b).sqrt();
+    let cell = 2.0 * reach / f64::from(side);
+    let is_hit = |x: f64, y: f64| {
+        (0..=angles).any(|n| {
+            let (sine, cosine) = (0.5 * PI * f64::from(n) / f64::from(angles)).sin_cos();
+            (cosine * x + sine * y).abs() <= a && (cosine * y - sine * x).abs() <= b
+        })
+    };
+    let at = |i: i32| (f64::from(i) + 0.5) * cell - reach;
+    let hits = (0..side * side)
+        .filter(|n| is_hit(at(n / side), at(n % side)))
+        .count();
+    hits as f64 * cell * cell
 }
 
 /// Strokes at random: beyond the tool, its blend and a few knot intervals nothing changes, to the bit; any number of
@@ -166,13 +238,7 @@ fn a_swept_sphere_takes_a_capsule_at_any_spacing_of_poses() {
 #[test]
 fn no_coefficient_changes_beyond_the_tool() {
     let block = block();
-    let mut draw = 1u64;
-    let mut random = |low: f64, high: f64| {
-        draw = draw
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        low + (high - low) * (draw >> 40) as f64 / (1u64 << 24) as f64
-    };
+    let mut random = random(0);
     for _ in 0..20 {
         let (radius, blend) = (random(0.6, 3.0), random(0.0, 1.0));
         let places = [0, 1].map(|_| [random(4.0, 20.0), random(4.0, 20.0), random(9.0, 15.0)]);
@@ -253,7 +319,13 @@ fn tools_that_make_no_sense_are_refused() {
     let block = block();
     let refused = |text: &str| {
         tool(text)
-            .apply(Operation::Carve, &block, ISO, &mut Control::default())
+            .apply(
+                Operation::Carve,
+                &block,
+                ISO,
+                &Limits::default(),
+                &mut Control::default(),
+            )
             .unwrap_err()
     };
     let error = refused("shape = { sphere = { radius = 1.0 } }, along = []");
@@ -267,6 +339,10 @@ fn tools_that_make_no_sense_are_refused() {
     assert!(error.to_string().contains("less than"), "{error}");
     let error = refused("shape = { sphere = { radius = 1.0 } }, along = [[99, 99, 99]]");
     assert!(matches!(error, GeometricError::Outside { .. }), "{error}");
+    let error = refused(
+        "shape = { box = { size = [1, 1, 1] } }, along = [[9, 9, 9], [9, 9, 8], [9, 8, 8]], turn = [[0, 0, 9], [0, 0, 0]]",
+    );
+    assert!(error.to_string().contains("3 places and 2 turns"), "{error}");
     for text in [
         "shape = { sphere = { radius = -1.0 } }, along = [[9, 9, 9]]",
         "shape = { sphere = { radius = nan } }, along = [[9, 9, 9]]",

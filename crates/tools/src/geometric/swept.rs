@@ -1,0 +1,175 @@
+use bspline::primitives::Primitive;
+use bspline::{Aabb, Field, Interval, Jet};
+use glam::{DMat3, DQuat, DVec3};
+
+/// Share of the solid's size to which the nearest pose is told from others that are as near.
+const APART: f64 = 1e-3;
+
+/// Steps of the golden section: they leave `0.618³⁰ ≈ 5e-7` of the way.
+const SECTIONS: usize = 30;
+
+/// Where a tool is, and how it is turned.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Pose {
+    pub at: DVec3,
+    pub turn: DQuat,
+}
+
+/// The union of all poses of a solid on its way from one pose to another: straight, and turning evenly.
+///
+/// `f(x) = max_t d(x(t))`, `x(t)` the point in the coordinates of the solid, is the distance to what was swept outside, and no more
+/// than that inside. Of convex solids that do not turn `d(x(t))` is concave in `t`, and a golden section finds the largest; of others
+/// a search that uses that `d` is a distance, so `d(x(t))` changes no faster than the point moves \[Piyavskii72\].
+#[derive(Clone)]
+pub(super) struct Swept {
+    solid: Primitive,
+    /// Radius of a ball about the origin that holds the solid.
+    size: f64,
+    from: Pose,
+    by: DVec3,
+    axis: DVec3,
+    angle: f64,
+    is_concave: bool,
+}
+
+impl Swept {
+    /// `solid` about the origin, within `size` of it, on its way between two poses.
+    pub fn new(solid: Primitive, size: f64, from: Pose, to: Pose) -> Self {
+        let between = to.turn * from.turn.inverse();
+        // The short way round.
+        let between = if between.w < 0.0 { -between } else { between };
+        let (axis, angle) = match between.xyz().length() {
+            sine if sine < 1e-12 => (DVec3::Z, 0.0),
+            sine => (between.xyz() / sine, 2.0 * libm::atan2(sine, between.w)),
+        };
+        let is_convex = !matches!(solid, Primitive::Torus(_));
+        Self {
+            solid,
+            size,
+            from,
+            by: to.at - from.at,
+            axis,
+            angle,
+            is_concave: is_convex && angle == 0.0,
+        }
+    }
+
+    /// World from solid at `t` between 0 and 1.
+    fn turn(&self, t: f64) -> DMat3 {
+        let own = DMat3::from_quat(self.from.turn);
+        match self.angle == 0.0 {
+            true => own,
+            false => crate::warp::rotation(self.axis, self.angle * t) * own,
+        }
+    }
+
+    fn local(&self, p: DVec3, t: f64) -> DVec3 {
+        self.turn(t).transpose() * (p - self.from.at - self.by * t)
+    }
+
+    fn at(&self, p: DVec3, t: f64) -> f64 {
+        self.solid.value(self.local(p, t))
+    }
+
+    /// Where on its way the solid is nearest, and its distance there.
+    fn nearest(&self, p: DVec3) -> (f64, f64) {
+        let ends = [0.0, 1.0].map(|t| (t, self.at(p, t)));
+        let found = match self.is_concave {
+            true => self.golden(p, 0.0, 1.0),
+            false => self.searched(p, ends),
+        };
+        // An end counts as much as what is between.
+        ends.into_iter()
+            .fold(found, |best, end| if end.1 >= best.1 { end } else { best })
+    }
+
+    /// The nearest pose, told from others to a share of the solid's size, and then followed to its peak.
+    fn searched(&self, p: DVec3, ends: [(f64, f64); 2]) -> (f64, f64) {
+        let away = p - self.from.at;
+        let farthest = away.length().max((away - self.by).length());
+        let speed = (self.by.length() + self.angle * farthest) * (1.0 + 1e-9);
+        let [first, last] = ends;
+        let mut best = if last.1 > first.1 { last } else { first };
+        let mut around = (first.0, last.0);
+        let mut open = vec![(first, last)];
+        while let Some((a, b)) = open.pop() {
+            let peak = 0.5 * (a.1 + b.1 + speed * (b.0 - a.0));
+            if peak <= best.1 + self.slack(best.1) {
+                continue;
+            }
+            let t = (0.5 * (a.0 + b.0) + 0.5 * (b.1 - a.1) / speed).clamp(a.0, b.0);
+            let middle = (t, self.at(p, t));
+            if middle.1 > best.1 {
+                (best, around) = (middle, (a.0, b.0));
+            }
+            // The likelier half is looked at first.
+            match a.1 > b.1 {
+                true => open.extend([(middle, b), (a, middle)]),
+                false => open.extend([(a, middle), (middle, b)]),
+            }
+        }
+        let refined = self.golden(p, around.0, around.1);
+        if refined.1 > best.1 { refined } else { best }
+    }
+
+    /// How far a distance may be off; far from the surface nobody asks for more.
+    fn slack(&self, value: f64) -> f64 {
+        APART * self.size + 0.02 * value.abs()
+    }
+
+    fn golden(&self, p: DVec3, mut low: f64, mut high: f64) -> (f64, f64) {
+        const SHARE: f64 = 0.618_033_988_749_894_9;
+        let mut inner = [high - SHARE * (high - low), low + SHARE * (high - low)];
+        let mut values = inner.map(|t| self.at(p, t));
+        for _ in 0..SECTIONS {
+            if values[0] < values[1] {
+                low = inner[0];
+                inner = [inner[1], low + SHARE * (high - low)];
+                values = [values[1], self.at(p, inner[1])];
+            } else {
+                high = inner[1];
+                inner = [high - SHARE * (high - low), inner[0]];
+                values = [self.at(p, inner[0]), values[0]];
+            }
+        }
+        match values[0] < values[1] {
+            true => (inner[1], values[1]),
+            false => (inner[0], values[0]),
+        }
+    }
+}
+
+impl Field for Swept {
+    fn value(&self, p: DVec3) -> f64 {
+        self.nearest(p).1
+    }
+
+    /// That of the nearest pose: it does not change the largest value to first order.
+    fn value_gradient(&self, p: DVec3) -> (f64, DVec3) {
+        let (t, _) = self.nearest(p);
+        let (value, gradient) = self.solid.value_gradient(self.local(p, t));
+        (value, self.turn(t) * gradient)
+    }
+
+    /// By central differences of the gradient over a thousandth of the solid's size.
+    fn jet(&self, p: DVec3) -> Jet {
+        let (value, gradient) = self.value_gradient(p);
+        let step = APART * self.size;
+        let column = |a: usize| {
+            let [up, down] = [step, -step].map(|s| self.value_gradient(p + s * DVec3::AXES[a]).1);
+            (up - down) / (2.0 * step)
+        };
+        let h = DMat3::from_cols(column(0), column(1), column(2));
+        Jet {
+            value,
+            gradient,
+            hessian: (h + h.transpose()) * 0.5,
+        }
+    }
+
+    /// The largest of distances is no steeper than they are.
+    fn bounds(&self, b: &Aabb) -> Interval {
+        let value = self.value(b.center());
+        Interval::point(value).widened(0.5 * b.size().length() + self.slack(value))
+    }
+}
