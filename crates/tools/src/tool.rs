@@ -173,7 +173,7 @@ impl Tool<'_> {
                 return Ok((canvas, Vec::new()));
             }
             Self::Force(tool) => {
-                let (field, told) = tool.apply(old, *iso, control)?;
+                let (field, told) = tool.apply(old, *iso, &canvas.layers, control)?;
                 let field = limits.kept(old, &field);
                 return Ok((Canvas { field, ..canvas }, told));
             }

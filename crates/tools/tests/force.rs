@@ -288,6 +288,56 @@ fn elastic_strokes_end_in_balance_and_leave_the_field() {
 }
 
 #[test]
+fn painted_matter_shows() {
+    let field = block::<f32>(24);
+    let paint = "[[stroke]]\npaint = { layer = 'stiffness', formula = '1 + 9 * (x < 12)' }";
+    let session: Session = toml::from_str(paint).unwrap();
+    let canvas = Canvas {
+        field: field.clone(),
+        iso: ISO,
+        layers: Default::default(),
+        others: Default::default(),
+        detail: 0,
+    };
+    let (canvas, _) = session.stroke[0].apply(canvas, &mut Control::default()).unwrap();
+    let travel = |x: f64, rule: &str| {
+        let text = format!(
+            "along = [[{x}, 12, 12]]\nlift = 1.2\nradius = {R}\nhow = {{ solid = 'elastic', rule = '{rule}', gain = 0.1 }}"
+        );
+        let mut stroke = pull(&text)
+            .begin(&field, ISO)
+            .unwrap()
+            .painted(&canvas.layers)
+            .unwrap();
+        for _ in 0..40 {
+            stroke.step().unwrap();
+        }
+        let mut region = stroke.region().clone();
+        let held = region
+            .static_response(Against::Painted, &[stroke.load()])
+            .unwrap()[0]
+            .p
+            .clone();
+        let now = &region.patch().state().p;
+        let most = |list: &[f32]| list.iter().fold(0.0, |m: f32, v| m.max(v.abs()));
+        let off: Vec<f32> = held.iter().zip(now).map(|(a, b)| a - b).collect();
+        assert!(
+            most(&off) < 1e-3 * most(&held),
+            "{text}: {} of {}",
+            most(&off),
+            most(&held)
+        );
+        stroke.release().unwrap().1.arrival.least
+    };
+    let (stiff, soft) = (travel(9.0, "compliance"), travel(15.0, "compliance"));
+    println!("{stiff} {soft}");
+    assert!(stiff < 0.2 * soft, "{stiff} {soft}");
+    // Every side arrives where it has to.
+    let (stiff, soft) = (travel(9.0, "arrive"), travel(15.0, "arrive"));
+    assert!((stiff / soft - 1.0).abs() < 0.02, "{stiff} {soft}");
+}
+
+#[test]
 fn clay_stays_to_the_bit() {
     let field = block::<f32>(24);
     let text = format!("along = [[12.1, 11.8, 12]]\nlift = 1.92\nradius = {R}");

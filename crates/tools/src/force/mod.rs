@@ -12,11 +12,14 @@
 mod chisel;
 mod drill;
 mod filter;
+mod ground;
 mod path;
 mod pull;
 pub mod quadrature;
+mod report;
 mod row;
 mod spread;
+mod step;
 mod stroke;
 mod system;
 mod target;
@@ -28,7 +31,8 @@ pub use drill::Drill;
 pub use filter::Filter;
 pub use path::{Path, first_crossing, nearest_surface};
 pub use pull::Pull;
-pub use stroke::{Arrival, Extent, ForceReport, ForceStroke, Told};
+pub use report::{Arrival, ForceReport, Told};
+pub use stroke::{Extent, ForceStroke};
 pub use target::Target;
 pub use tool::ForceTool;
 

@@ -2,6 +2,7 @@ use bspline::{HierarchicalSpline, Real};
 use fitting::Control;
 
 use super::{Chisel, Drill, ForceError, ForceReport, ForceStroke, Pull};
+use crate::paint::Layers;
 
 /// A force tool with all that it is told.
 #[derive(Clone, Copy, Debug)]
@@ -51,7 +52,7 @@ impl ForceTool<'_> {
         }
     }
 
-    /// What it leaves of the field, and what is left to say of it, in sentences.
+    /// What it leaves of the field with the matter that is painted on it, and what is left to say of it, in sentences.
     ///
     /// # Errors
     /// Any [`ForceError`].
@@ -59,9 +60,10 @@ impl ForceTool<'_> {
         &self,
         field: &HierarchicalSpline<T>,
         iso: f64,
+        layers: &Layers,
         control: &mut Control,
     ) -> Result<(HierarchicalSpline<T>, Vec<String>), ForceError> {
-        let mut stroke = self.begin(field, iso)?;
+        let mut stroke = self.begin(field, iso)?.painted(layers)?;
         while !stroke.is_over() {
             control
                 .step("pulling", stroke.progress())

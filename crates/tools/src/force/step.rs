@@ -1,0 +1,289 @@
+//! One step of a stroke: what each path asks for, and the forces that give it.
+
+use bspline::Real;
+use dynamics::integrators::Integrator;
+use dynamics::response::Against;
+use glam::DVec3;
+
+use super::quadrature::Tolerance;
+use super::report::{Arrival, Told};
+use super::row::{Functions, Row};
+use super::spread::{Load, Part, Spread};
+use super::stroke::{Acting, ForceStroke};
+use super::target::Span;
+use super::{ForceError, Rule, Solid, system};
+
+/// Radii that the goal of the longest path advances in a step.
+const ADVANCE: f64 = 0.3;
+/// Share of what is missing by which rest lengths follow in a step of clay, as an exponent: `λΔt`.
+const FLOW: f64 = 0.1;
+/// Steps, in `1/λ`, of elastic solids.
+const LONG: f64 = 10.0;
+/// Softness of paths that have to arrive, over their own stiffness.
+const SOFT: [f64; 2] = [0.01, 0.003];
+/// Of the integrals: over the value, and of the mean over the fall of the density in a radius.
+const EXACT: Tolerance = Tolerance {
+    relative: 1e-4,
+    mean: 1e-5,
+};
+
+/// What a path asks of a step.
+struct Bearing {
+    spread: Spread,
+    row: Row,
+    /// Mean that it is short of.
+    short: f64,
+    span: Span,
+}
+
+impl<T: Real> ForceStroke<T> {
+    /// One step.
+    ///
+    /// # Errors
+    /// [`ForceError`]; the stroke cannot go on then.
+    pub fn step(&mut self) -> Result<Told, ForceError> {
+        self.advance()?;
+        let goals = self.goals();
+        let bearings = self.bearings(&goals)?;
+        let (dt, keep) = match self.how.solid {
+            Solid::Clay => (self.dt(), libm::exp(-FLOW)),
+            Solid::Elastic => (self.dt(), 1.0),
+        };
+        for (acting, bearing) in self.acting.iter_mut().zip(&bearings) {
+            acting.force = if bearing.is_some() {
+                keep * acting.force
+            } else {
+                0.0
+            };
+        }
+        let mut solves = 1;
+        if self.scales {
+            self.scale(&bearings, dt)?;
+            solves += 1;
+        }
+        let soft = self.softness(&bearings)?;
+        let forces = self.acting.iter().map(|a| a.force);
+        let load = Load::<T>::of(pairs(&bearings, forces));
+        let before = self.region.patch().state().p.clone();
+        let patch = self.region.patch_mut();
+        patch.set_force_on(load.on_box())?;
+        patch.step(Integrator::Paper, dt)?;
+        let moved: Vec<T> = patch
+            .state()
+            .p
+            .iter()
+            .zip(&before)
+            .map(|(now, then)| *now - *then)
+            .collect();
+        let live: Vec<usize> = (0..bearings.len()).filter(|i| bearings[*i].is_some()).collect();
+        let bearing = |i: usize| bearings[i].as_ref().expect("live paths have one");
+        let right: Vec<f64> = live
+            .iter()
+            .map(|&i| bearing(i).short - bearing(i).row.times(&moved) - soft[i] * self.acting[i].force)
+            .collect();
+        let soft: Vec<f64> = live.iter().map(|&i| soft[i]).collect();
+        let diagonal: Vec<f64> = live
+            .iter()
+            .zip(&soft)
+            .map(|(&i, soft)| self.acting[i].stiffness / self.targets[self.acting[i].index].weight + soft)
+            .collect();
+        let most = self.extent.solves();
+        let region = &mut self.region;
+        let solved = system::solve(&right, &soft, &diagonal, most, 1e-4, |z| {
+            let of = live.iter().zip(z).map(|(&i, z)| (&bearing(i).spread, *z));
+            let load = Load::<T>::of(of);
+            let mut found = region.respond(Integrator::Paper, dt, &[load.on_box()])?;
+            let p = found.pop().map(|r| r.p).unwrap_or_default();
+            let felt = live.iter().map(|&i| bearing(i).row.times(&p)).collect();
+            Ok::<_, ForceError>((p, felt))
+        })?;
+        solves += solved.parts.len();
+        for (&i, force) in live.iter().zip(&solved.forces) {
+            self.acting[i].force += force;
+        }
+        self.load = Load::of(pairs(&bearings, self.acting.iter().map(|a| a.force)));
+        self.move_on(&solved.parts, dt)?;
+        if self.how.solid == Solid::Clay {
+            let patch = self.region.patch_mut();
+            let d = patch.state().d.clone();
+            patch.springs_mut().relax(&d, -libm::expm1(-FLOW));
+        }
+        Ok(self.told(solves, solved.residual))
+    }
+
+    fn dt(&self) -> f64 {
+        match self.how.solid {
+            Solid::Clay => FLOW,
+            Solid::Elastic => LONG,
+        }
+    }
+
+    /// Adds what the solved forces do in a step of `dt`.
+    fn move_on(&mut self, parts: &[(f64, Vec<T>)], dt: f64) -> Result<(), ForceError> {
+        let patch = self.region.patch_mut();
+        let state = patch.state();
+        let mut change = vec![0.0; state.p.len()];
+        for (share, p) in parts {
+            change
+                .iter_mut()
+                .zip(p)
+                .for_each(|(c, p)| *c += share * p.as_f64());
+        }
+        let add = |to: &[T], factor: f64| -> Vec<T> {
+            let sums = to.iter().zip(&change);
+            sums.map(|(a, c)| T::from_f64(a.as_f64() + factor * c)).collect()
+        };
+        let (p, v) = (add(&state.p, 1.0), add(&state.v, 1.0 / dt));
+        patch.set_state(&p, &v)?;
+        Ok(())
+    }
+
+    /// Arc lengths to which the surface is to go in this step.
+    fn goals(&mut self) -> Vec<f64> {
+        let share = self.share();
+        let (mut all, steps) = (true, self.longest / (ADVANCE * self.radius));
+        let goals = self.acting.iter_mut().map(|a| {
+            a.age += 1;
+            let part = (a.age as f64 / steps).min(1.0);
+            all &= part == 1.0;
+            part * share * self.targets[a.index].path.length()
+        });
+        let goals = goals.collect();
+        self.settled += usize::from(all);
+        goals
+    }
+
+    /// What each path that acts asks of this step; `None` of those that have nothing to do.
+    fn bearings(&self, goals: &[f64]) -> Result<Vec<Option<Bearing>>, ForceError> {
+        let functions = Functions::of(&self.field, &self.region);
+        let p = &self.region.patch().state().p;
+        let value = |at: DVec3| functions.value(p, at);
+        let step = self.look();
+        let exact = Tolerance {
+            mean: EXACT.mean * self.radius * self.field.slope(),
+            ..EXACT
+        };
+        let one = |(acting, goal): (&Acting, &f64)| {
+            let target = &self.targets[acting.index];
+            let Some(span) = acting
+                .crossing
+                .and_then(|at| target.span(&value, self.iso, at, *goal, step))
+            else {
+                return Ok(None);
+            };
+            // A path without length is the place where it ends.
+            let least = 1e-6 * self.radius;
+            let span = Span {
+                from: span.from.min(span.to - least),
+                ..span
+            };
+            let integral = target.integral(value, self.iso, span, exact);
+            let part = Part {
+                path: &target.path,
+                from: span.from,
+                to: span.to,
+            };
+            let spread =
+                Spread::new(&self.region, &part, &self.shape, self.radius).map_err(ForceError::Tool)?;
+            if spread.shares.is_empty() {
+                return Ok(None);
+            }
+            Ok(Some(Bearing {
+                spread,
+                row: Row::mean(&functions, &integral.nodes, |s| target.path.at(s)),
+                short: integral.value / (span.to - span.from),
+                span,
+            }))
+        };
+        self.acting.iter().zip(goals).map(one).collect()
+    }
+
+    /// How far each path goes by a unit of force on all, by their weights.
+    fn scale(&mut self, bearings: &[Option<Bearing>], dt: f64) -> Result<(), ForceError> {
+        let targets = &self.targets;
+        let weights = self.acting.iter().map(|a| targets[a.index].weight);
+        let load = Load::<T>::of(pairs(bearings, weights));
+        let mut found = self.region.respond(Integrator::Paper, dt, &[load.on_box()])?;
+        let p = found.pop().map(|r| r.p).unwrap_or_default();
+        let each = |b: &Option<Bearing>| b.as_ref().map_or(0.0, |b| b.row.times(&p));
+        let moved: Vec<f64> = bearings.iter().map(each).collect();
+        let most = moved.iter().copied().fold(0.0, f64::max);
+        for (acting, moved) in self.acting.iter_mut().zip(moved) {
+            // Paths that the region hardly moves must not rule the others.
+            acting.stiffness = moved.max(1e-3 * most).max(f64::MIN_POSITIVE);
+        }
+        Ok(())
+    }
+
+    /// What each path may stay short of, per force.
+    fn softness(&mut self, bearings: &[Option<Bearing>]) -> Result<Vec<f64>, ForceError> {
+        let weight = |a: &Acting| self.targets[a.index].weight;
+        match self.how.rule {
+            Rule::Arrive => {
+                let soft = SOFT[usize::from(self.how.solid == Solid::Elastic)];
+                Ok(self
+                    .acting
+                    .iter()
+                    .map(|a| soft * a.stiffness / weight(a))
+                    .collect())
+            }
+            Rule::Raw(alpha) => {
+                let of = |b: &Option<Bearing>| b.as_ref().map_or(1.0, |b| b.span.to - b.span.from);
+                Ok(bearings.iter().map(|b| 1.0 / (alpha.0 * of(b).powi(2))).collect())
+            }
+            Rule::Compliance => {
+                let load = Load::<T>::of(pairs(bearings, self.acting.iter().map(weight)));
+                let against = Against::Reference {
+                    stiffness: 1.0,
+                    ground: 0.0,
+                };
+                let mut found = self.region.static_response(against, &[load.on_box()])?;
+                let p = found.pop().map(|r| r.p).unwrap_or_default();
+                let rows = self.acting.iter().zip(bearings);
+                Ok(rows
+                    .map(|(a, b)| match b {
+                        None => 1.0,
+                        Some(b) => b.row.times(&p) / (2.0 * self.gain * weight(a)),
+                    })
+                    .collect())
+            }
+        }
+    }
+
+    /// What the step did.
+    fn told(&mut self, solves: usize, residual: f64) -> Told {
+        self.look_up();
+        let (mut least, mut most, mut force) = (f64::INFINITY, f64::NEG_INFINITY, 0.0);
+        for acting in &self.acting {
+            let target = &self.targets[acting.index];
+            force += acting.force;
+            let share = acting.crossing.map_or(1.0, |s| s / target.path.length());
+            (least, most) = (least.min(share), most.max(share));
+            if !target.ends_early {
+                self.report.overshoot = self.report.overshoot.max(share - 1.0);
+            }
+        }
+        let report = &mut self.report;
+        report.solves += solves;
+        report.force = report.force.max(force.abs());
+        if report.steps_to_99.is_none() && least >= 0.99 && most <= 1.01 && self.begun == self.targets.len() {
+            report.steps_to_99 = Some(report.steps);
+        }
+        Told {
+            arrival: Arrival { least, most },
+            acting: self.acting.len(),
+            force: force.abs(),
+            solves,
+            residual,
+        }
+    }
+}
+
+/// Spreads of the paths that ask for something, with a factor each.
+fn pairs(
+    bearings: &[Option<Bearing>],
+    factors: impl Iterator<Item = f64> + Clone,
+) -> impl Iterator<Item = (&Spread, f64)> + Clone {
+    let both = bearings.iter().zip(factors);
+    both.filter_map(|(b, f)| b.as_ref().map(|b| (&b.spread, f)))
+}
