@@ -2,6 +2,7 @@
 //! add and [carry along](warp). A [session] is a row of strokes; each uses one [tool], within [limits]. Haptics are not built yet.
 
 pub mod fade;
+pub mod force;
 pub mod geometric;
 pub mod limits;
 pub mod mix;

@@ -4,11 +4,12 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
-use bspline::{Csg, CsgError, Field, HierarchicalSpline};
+use bspline::{Aabb, Csg, CsgError, Field, HierarchicalSpline};
 use fitting::field::FieldFitReport;
 use fitting::{Control, FitError};
 use glam::DAffine3;
 
+use crate::force::{ForceError, ForceTool};
 use crate::geometric::{Geometric, GeometricError, Move, Operation};
 use crate::limits::Limits;
 use crate::paint::{Layer, Layers, Paint, PaintError};
@@ -87,6 +88,8 @@ pub enum Tool<'a> {
     Carve(&'a Geometric),
     /// Adds a solid.
     Add(&'a Geometric),
+    /// Pushes or pulls.
+    Force(ForceTool<'a>),
     /// Carries along.
     Move(&'a Move),
     /// Paints matter or touch.
@@ -99,6 +102,9 @@ pub enum ToolError {
     /// A geometric tool cannot.
     #[error(transparent)]
     Geometric(#[from] GeometricError),
+    /// A force tool cannot.
+    #[error(transparent)]
+    Force(#[from] ForceError),
     /// The stroke names no tool, or several, or limits that make no sense.
     #[error("{0}")]
     Stroke(String),
@@ -110,19 +116,27 @@ pub enum ToolError {
 impl ToolError {
     /// Whether the user said stop.
     pub fn is_cancelled(&self) -> bool {
-        matches!(self, Self::Geometric(GeometricError::Fit(FitError::Cancelled)))
+        match self {
+            Self::Geometric(e) => matches!(e, GeometricError::Fit(FitError::Cancelled)),
+            Self::Force(e) => e.is_cancelled(),
+            Self::Stroke(_) | Self::Paint(_) => false,
+        }
     }
 }
 
 impl Tool<'_> {
     /// Names of all tools, as sessions write them.
-    pub const NAMES: [&'static str; 4] = ["carve", "add", "move", "paint"];
+    pub const NAMES: [&'static str; 9] = {
+        let [pull, chisel, squirt, drill, join] = ForceTool::NAMES;
+        ["carve", "add", pull, chisel, squirt, drill, join, "move", "paint"]
+    };
 
     /// Its name, as sessions write it.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Carve(_) => "carve",
             Self::Add(_) => "add",
+            Self::Force(tool) => tool.name(),
             Self::Move(_) => "move",
             Self::Paint(_) => "paint",
         }
@@ -142,16 +156,53 @@ impl Tool<'_> {
         let (field, report) = match self {
             Self::Carve(tool) => tool.apply(Operation::Carve, old, *iso, limits, control)?,
             Self::Add(tool) => tool.apply(Operation::Add, old, *iso, limits, control)?,
-            Self::Move(tool) => tool.apply(old, *iso, limits, control)?,
+            Self::Move(tool) => {
+                let (field, report) = tool.apply(old, *iso, limits, control)?;
+                let layers = carried(tool, &canvas, limits)?;
+                let moved = Canvas {
+                    field,
+                    layers,
+                    ..canvas
+                };
+                return Ok((moved, thin_parts(&report)));
+            }
             Self::Paint(paint) => {
                 let layer = painted(paint, &canvas, limits)?;
                 let mut canvas = canvas;
                 canvas.layers.insert(paint.layer, layer);
                 return Ok((canvas, Vec::new()));
             }
+            Self::Force(tool) => {
+                let (field, told) = tool.apply(old, *iso, control)?;
+                let field = limits.kept(old, &field);
+                return Ok((Canvas { field, ..canvas }, told));
+            }
         };
         Ok((Canvas { field, ..canvas }, thin_parts(&report)))
     }
+}
+
+/// What is painted, carried along by a move as far as the limits allow.
+fn carried(tool: &Move, canvas: &Canvas, limits: &Limits) -> Result<Layers, ToolError> {
+    let whole = canvas.field.lattice().world_box();
+    let origin = tool.motion.origin(&whole)?;
+    let reach = origin.reach();
+    let within = limits.cut(&Aabb {
+        min: reach.min.max(whole.min),
+        max: reach.max.min(whole.max),
+    });
+    let painted = canvas.layers.iter().filter(|(_, layer)| !layer.is_empty());
+    let layers = painted.map(|(substance, layer)| {
+        let moved = layer
+            .carried(&within, |p| origin.back(p))
+            .map_err(PaintError::from)?;
+        let kept = limits.kept(layer.tree(), moved.tree());
+        Ok((
+            *substance,
+            layer.with_tree(kept).expect("nodes of the same level"),
+        ))
+    });
+    layers.collect()
 }
 
 /// A layer with paint laid on, as far as the limits allow.

@@ -20,7 +20,7 @@ use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
 pub use block::block;
-pub use motion::{Motion, Move, reflection};
+pub use motion::{Motion, Move, Origin, reflection};
 pub use shape::Shape;
 use swept::Pose;
 use write::{Fineness, TOLERANCE, Writer};

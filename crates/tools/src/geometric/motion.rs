@@ -121,7 +121,62 @@ impl Move {
     }
 }
 
+/// Where what is now at a place came from by a motion.
+#[derive(Clone, Debug)]
+pub enum Origin {
+    /// Through a motion of space.
+    Warp(Warp),
+    /// From the other side of a mirror.
+    Mirror {
+        /// The reflection.
+        map: DAffine3,
+        /// A place on the mirror.
+        at: DVec3,
+        /// To the side that is copied.
+        normal: DVec3,
+    },
+}
+
+impl Origin {
+    /// The place that what is now at `p` came from; `p` to the bit where nothing moved.
+    pub fn back(&self, p: DVec3) -> DVec3 {
+        match self {
+            Self::Warp(warp) => warp.back(p),
+            Self::Mirror { map, at, normal } => match (p - at).dot(*normal) < 0.0 {
+                true => map.transform_point3(p),
+                false => p,
+            },
+        }
+    }
+
+    /// A box outside which nothing moves; infinite where a motion has no end.
+    pub fn reach(&self) -> Aabb {
+        match self {
+            Self::Warp(warp) => warp.reach(),
+            Self::Mirror { .. } => Aabb {
+                min: DVec3::NEG_INFINITY,
+                max: DVec3::INFINITY,
+            },
+        }
+    }
+}
+
 impl Motion {
+    /// Where all that lies in a box comes from.
+    ///
+    /// # Errors
+    /// Any [`GeometricError`] of the motion.
+    pub fn origin(&self, within: &Aabb) -> Result<Origin, GeometricError> {
+        Ok(match self {
+            Self::Mirror { at, normal, .. } => Origin::Mirror {
+                map: reflection(at.0, normal.0)?,
+                at: at.0,
+                normal: normal.0,
+            },
+            _ => Origin::Warp(self.warp(within)?),
+        })
+    }
+
     /// The motion of all that lies in a box.
     ///
     /// # Errors
