@@ -96,7 +96,7 @@ mod tests {
         );
         assert_eq!(
             told(&[few_on_purpose]),
-            "1 solves, 8 iterations: fixed numbers of them, 0.0500 of the residual left"
+            "1 solves, 8 iterations: fixed numbers of them, 0.05000 of the residual left"
         );
     }
 }

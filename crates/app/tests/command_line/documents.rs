@@ -256,3 +256,23 @@ fn a_scan_comes_back_with_the_edits_of_its_object() {
     assert!(run.stderr.contains("other samples"), "{}", run.stderr);
     assert!(!bench.path("out.nii").exists());
 }
+
+#[test]
+fn a_cloud_comes_back_with_the_edits_of_its_object() {
+    let bench = ball();
+    let bytes = |name: &str| std::fs::read(bench.path(name)).unwrap();
+    bench.json("new clay.isoclay ball.iclay");
+    bench.json("export clay.isoclay --like cloud.ply -o same.ply");
+    assert_eq!(bytes("same.ply"), bytes("cloud.ply"));
+    // Inflated on one side.
+    bench.write(
+        "swell.toml",
+        "[[stroke]]\nadd = { shape = { sphere = { radius = 0.5 } }, along = [[0, 0, 0.62]], blend = 0.1 }\n",
+    );
+    bench.json("sculpt clay.isoclay --script swell.toml");
+    bench.json("export clay.isoclay --like cloud.ply -o swollen.ply");
+    bench.json("export clay.isoclay -o swollen.iclay");
+    let check = bench.json("check swollen.iclay swollen.ply --anyway");
+    assert!(number(&check, "rms") < 0.01, "{check}");
+    assert!(number(&check, "input_count") >= 2000.0);
+}

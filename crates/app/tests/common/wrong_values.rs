@@ -84,7 +84,7 @@ pub const ROWS: &[Row] = &[
     ("export", "--output", "clay.isoclay -o *out.ply", ".iclay"),
     ("export", "--output", "clay.isoclay --like head.nii -o *out.ply", ".nii.gz"),
     ("export", "--like", "clay.isoclay -o out.nii --like *nowhere.nii", "check the path"),
-    ("export", "--like", "clay.isoclay -o out.nii --like *cloud.ply", "export its field"),
+    ("export", "--output", "clay.isoclay --like cloud.ply -o *out.nii", ".ply"),
     ("export", "--fill", "clay.isoclay -o out.nii --like head.nii --fill *air", "number"),
     ("export", "--series", "clay.isoclay -o out.nii --like head.nii --series *7", "DICOM"),
     ("export", "--volume", "clay.isoclay -o out.nii --like head.nii --volume *x", "whole number"),

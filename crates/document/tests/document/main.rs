@@ -1,5 +1,6 @@
 //! Documents: edits, undo, and files that crashes and faults have cut.
 
+mod cloud;
 mod common;
 mod revision;
 

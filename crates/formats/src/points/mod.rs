@@ -9,6 +9,7 @@ mod normals;
 pub(crate) mod obj;
 pub(crate) mod pcd;
 pub(crate) mod ply;
+mod revise;
 mod save;
 mod xyz;
 
@@ -22,6 +23,7 @@ pub use las::parse_las;
 pub use obj::parse_obj;
 pub use pcd::parse_pcd;
 pub use ply::parse_ply;
+pub use revise::{CloudChanges, Placed, save_revised};
 pub use save::save;
 pub use xyz::parse_xyz;
 

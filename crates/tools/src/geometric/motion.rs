@@ -149,6 +149,14 @@ impl Origin {
         }
     }
 
+    /// The place where what was at `p` is now; of a mirror `p`, since its other side is covered by the copy.
+    pub fn forth(&self, p: DVec3) -> DVec3 {
+        match self {
+            Self::Warp(warp) => warp.forth(p),
+            Self::Mirror { .. } => p,
+        }
+    }
+
     /// A box outside which nothing moves; infinite where a motion has no end.
     pub fn reach(&self) -> Aabb {
         match self {

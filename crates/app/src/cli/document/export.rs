@@ -20,7 +20,7 @@ pub struct Args {
     /// Document (.isoclay)
     document: PathBuf,
     /// Field to write (.iclay), for mesh, picture, sample and the others; - writes to standard output. With --like a volume
-    /// (.nii, .nii.gz) or a new directory for a DICOM series
+    /// (.nii, .nii.gz), a cloud (.ply, .xyz) or a new directory for a DICOM series
     #[arg(short, long, value_name = "OUT")]
     pub output: PathBuf,
     /// Object to write, where there are several
@@ -73,19 +73,15 @@ fn scan_with_edits(args: &Args, scan: &Path, cost: &Cost) -> Outcome {
     let name = chosen(document.state(), args.object.as_deref())?.to_string();
     let choice = VolumeChoice::whole(args.series.clone(), args.volume);
     // A series is written into a directory, anything else into a file.
-    let is_series = matches!(
-        formats::detect(source.path()),
-        Ok(Kind::Volume(VolumeFormat::Dicom))
-    );
-    let output = match is_series {
-        true => None,
-        false => Some(Output::check(
-            "-o",
-            &args.output,
-            &["nii", "nii.gz"],
-            None,
-            &[&source],
-        )?),
+    let kind = formats::detect(source.path()).map_err(|e| source.reading(e))?;
+    let formats: &[&str] = match kind {
+        Kind::Volume(VolumeFormat::Dicom) => &[],
+        Kind::Volume(_) => &["nii", "nii.gz"],
+        _ => &["ply", "xyz", "txt", "csv"],
+    };
+    let output = match formats {
+        [] => None,
+        formats => Some(Output::check("-o", &args.output, formats, None, &[&source])?),
     };
     let like = Like {
         source: &source,

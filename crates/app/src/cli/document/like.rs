@@ -2,8 +2,10 @@
 
 use std::path::Path;
 
-use document::{Command, Document, Journey, Object, revise_volume};
+use document::{Command, Document, Journey, Object, revise_cloud, revise_volume};
+use formats::Fault;
 use formats::field::FieldMeta;
+use formats::points::PointCloud;
 use formats::volumes::{Revision, Volume, save_revised};
 
 use super::failure;
@@ -52,11 +54,46 @@ impl Like<'_> {
         let journey = Journey::new(&done(document)?, name, &extent);
         match input {
             Input::Volume(volume) => self.volume([&fitted, &now], &journey, &volume, &identity, output),
-            Input::Cloud(_) | Input::Mesh(_) => Err(Failure::usage(format!(
-                "{}: only volumes are written back; mesh the object, or export its field",
+            Input::Cloud(cloud) => self.cloud([&fitted, &now], &journey, &cloud, output),
+            Input::Mesh(_) => Err(Failure::usage(format!(
+                "{}: volumes and clouds are written back, and this is a mesh; mesh the object, or export its field",
                 self.source.name()
             ))),
         }
+    }
+
+    fn cloud(
+        &self,
+        [fitted, now]: [&Object; 2],
+        journey: &Journey,
+        cloud: &PointCloud,
+        output: &Path,
+    ) -> Outcome<Vec<String>> {
+        let left_out = cloud.file_count - cloud.positions.len();
+        if left_out > 0 {
+            return Err(Failure::input(format!(
+                "{}: {} of its points were left out when it was read, so that rows cannot be told; convert the scan and fit that",
+                self.source.name(),
+                human_count(left_out)
+            )));
+        }
+        let iso = now.meta.iso.unwrap_or(0.0);
+        let changes = revise_cloud(&fitted.field, &now.field, &cloud.positions, iso, journey)
+            .map_err(|e| Failure::input(format!("{e}; was the object replaced?")))?;
+        formats::points::save_revised(self.source.path(), &changes, output, &limits(None)).map_err(|e| {
+            match e.fault {
+                Fault::Io { .. } => writing(e),
+                _ => self.source.reading(e),
+            }
+        })?;
+        let count = |n: usize| human_count(n);
+        Ok(vec![format!(
+            "{} of {} points moved with the surface, {} are on no surface any more, {} are new (the last of the file)",
+            count(changes.moved.len()),
+            count(cloud.positions.len()),
+            count(changes.removed.len()),
+            count(changes.added.len()),
+        )])
     }
 
     fn volume(
@@ -78,7 +115,7 @@ impl Like<'_> {
         let path = self.source.path();
         let told = save_revised(path, &options, &revision.changes, identity, output, &limits(None)).map_err(
             |e| match e.fault {
-                formats::Fault::Io { .. } => writing(e.fault.at(output)),
+                Fault::Io { .. } => writing(e.fault.at(output)),
                 _ => self.source.reading(e),
             },
         )?;

@@ -6,7 +6,7 @@ use crate::text::{Lines, integer};
 
 /// Type of a stored number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Scalar {
+pub(in crate::points) enum Scalar {
     I8,
     U8,
     I16,
@@ -44,19 +44,19 @@ impl Scalar {
 
 /// What a property holds in each row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Shape {
+pub(in crate::points) enum Shape {
     One(Scalar),
     List { count: Scalar, item: Scalar },
 }
 
 #[derive(Debug)]
-pub(super) struct Property {
+pub(in crate::points) struct Property {
     pub name: String,
     pub shape: Shape,
 }
 
 #[derive(Debug)]
-pub(super) struct Element {
+pub(in crate::points) struct Element {
     pub name: String,
     pub count: u64,
     pub properties: Vec<Property>,
@@ -95,14 +95,14 @@ impl Element {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Encoding {
+pub(in crate::points) enum Encoding {
     Ascii,
     Little,
     Big,
 }
 
 #[derive(Debug)]
-pub(super) struct Header {
+pub(in crate::points) struct Header {
     pub encoding: Encoding,
     pub elements: Vec<Element>,
     /// Byte at which the rows start.
@@ -112,7 +112,7 @@ pub(super) struct Header {
 }
 
 /// Reads the header at the start of `bytes`.
-pub(super) fn read(bytes: &[u8]) -> Result<Header, Fault> {
+pub(in crate::points) fn read(bytes: &[u8]) -> Result<Header, Fault> {
     let mut lines = Lines::new(bytes);
     if lines.next().map(<[u8]>::trim_ascii) != Some(b"ply") {
         return Err(Fault::line(

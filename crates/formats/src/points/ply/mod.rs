@@ -1,7 +1,7 @@
 //! PLY in and out. Read are ascii and both binary encodings, any types and order of properties, extra ones skipped.
 
 mod body;
-mod header;
+pub(super) mod header;
 mod write;
 
 use glam::DVec3;

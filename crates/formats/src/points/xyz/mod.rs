@@ -3,6 +3,6 @@
 mod read;
 mod write;
 
-pub(super) use read::parse;
 pub use read::parse_xyz;
+pub(super) use read::{Line, parse};
 pub(super) use write::write;

@@ -40,16 +40,15 @@ pub(in crate::points) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<RawS
     let mut lines = Lines::new(bytes);
     while let Some(text) = lines.next() {
         let text = text.trim_ascii();
-        if text.is_empty() || text.starts_with(b"#") || text.starts_with(b"//") {
-            continue;
-        }
         let line = lines.line;
-        if std::mem::take(&mut is_first) {
-            if let Some(n) = integer(text) {
+        match Line::of(text, &mut is_first) {
+            Line::Point => {}
+            Line::Nothing => continue,
+            Line::Count(n) => {
                 promised = Some(n);
                 continue;
             }
-            if is_column_names(text) {
+            Line::Names => {
                 notes.push(format!(
                     "line {line}: column names {} were skipped",
                     excerpt(text)
@@ -117,6 +116,32 @@ pub(in crate::points) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<RawS
         notes,
         ..Default::default()
     })
+}
+
+/// What a line is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::points) enum Line {
+    /// Empty, or a comment.
+    Nothing,
+    /// The first one, with the number of points.
+    Count(i64),
+    /// The first one, with the names of the columns.
+    Names,
+    Point,
+}
+
+impl Line {
+    /// What the text of a line is, without blanks about it; `is_first` until one was no comment.
+    pub fn of(text: &[u8], is_first: &mut bool) -> Self {
+        if text.is_empty() || text.starts_with(b"#") || text.starts_with(b"//") {
+            return Self::Nothing;
+        }
+        match (std::mem::take(is_first), integer(text)) {
+            (true, Some(n)) => Self::Count(n),
+            (true, None) if is_column_names(text) => Self::Names,
+            _ => Self::Point,
+        }
+    }
 }
 
 /// Whether a line holds words only, as `X,Y,Z` does.

@@ -1,4 +1,4 @@
-//! What the edits of an object mean for the scan that it was fitted to.
+//! What the edits of an object mean for the volume that it was fitted to.
 //!
 //! Where nothing was edited a voxel stays. Elsewhere it changes by what the field changed, `v + f_new − f_fit`, so that what the
 //! fit had smoothed away stays in the scan. Matter that was taken out becomes another matter, mostly air: within one voxel of
@@ -13,11 +13,8 @@ use bspline::{Aabb, Field, HierarchicalSpline};
 use formats::volumes::{Change, Volume};
 use glam::DVec3;
 use rayon::prelude::*;
-use tools::geometric::Origin;
-use tools::limits::Limits;
-use tools::tool::Others;
 
-use crate::Command;
+use super::Journey;
 
 /// Voxels on an edge of the tiles in which changed voxels are looked for.
 const TILE: usize = 8;
@@ -36,47 +33,6 @@ pub struct VolumeRevision {
     pub added: usize,
     /// Those that were carved and filled.
     emptied: Vec<usize>,
-}
-
-/// Where what is now at a place came from, through all moves of an object.
-#[derive(Default)]
-pub struct Journey(Vec<(Origin, Limits)>);
-
-impl Journey {
-    /// The moves among commands in their order, of the object `name`, which lies in a box.
-    pub fn new(commands: &[Command], name: &str, within: &Aabb) -> Self {
-        let moves = commands.iter().filter_map(|command| match command {
-            Command::Stroke { object, stroke } if object == name => {
-                let origin = stroke.motion.as_ref()?.motion.origin(within).ok()?;
-                // Masks by other objects are left out: these may have changed since.
-                let limits = Limits::new(stroke.within.as_ref(), stroke.mask.as_ref(), &Others::default());
-                Some((origin, limits.unwrap_or_default()))
-            }
-            _ => None,
-        });
-        Self(moves.collect())
-    }
-
-    /// Boxes in `within` outside which nothing was moved.
-    fn reaches(&self, within: &Aabb) -> impl Iterator<Item = Aabb> {
-        let cut = |(origin, limits): &(Origin, Limits)| {
-            let reach = limits.cut(&origin.reach());
-            Aabb {
-                min: reach.min.max(within.min),
-                max: reach.max.min(within.max),
-            }
-        };
-        self.0.iter().map(cut).filter(|b| b.min.cmple(b.max).all())
-    }
-
-    fn back(&self, place: DVec3) -> DVec3 {
-        self.0.iter().rev().fold(place, |p, (origin, limits)| {
-            match limits.is_free(&Aabb { min: p, max: p }) {
-                true => origin.back(p),
-                false => p,
-            }
-        })
-    }
 }
 
 impl VolumeRevision {

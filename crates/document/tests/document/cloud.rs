@@ -1,0 +1,102 @@
+//! Edits of an object in the cloud that it was fitted to.
+
+use bspline::Field;
+use document::{Command, Journey, revise_cloud};
+use fitting::Control;
+use glam::DVec3;
+use tools::limits::Limits;
+
+use super::common::{Draw, large};
+
+/// Points about the ball of forty cells, with noise.
+fn scan() -> Vec<DVec3> {
+    let mut draw = Draw(9);
+    let golden = 2.399_963_229_728_653;
+    (0..16000)
+        .map(|n| {
+            let z = 1.0 - 2.0 * (f64::from(n) + 0.5) / 16000.0;
+            let (sin, cos) = (golden * f64::from(n)).sin_cos();
+            let r = (1.0 - z * z).sqrt();
+            let noise = f64::from(draw.below(1000)) / 5000.0 - 0.1;
+            DVec3::splat(20.0) + (16.0 + noise) * DVec3::new(r * cos, r * sin, z)
+        })
+        .collect()
+}
+
+#[test]
+fn a_cloud_without_edits_stays_as_it_is() {
+    let changes = revise_cloud(&large(), &large(), &scan(), 0.0, &Journey::default()).unwrap();
+    assert_eq!(changes, Default::default());
+}
+
+#[test]
+fn points_follow_their_surface_go_with_it_and_cover_what_is_new() {
+    for (text, goes, comes) in [
+        (
+            "add = { shape = { box = { size = [4, 4, 7] } }, along = [[20, 20, 36]] }",
+            true,
+            true,
+        ),
+        (
+            "carve = { shape = { sphere = { radius = 5 } }, along = [[20, 20, 36]] }",
+            false,
+            true,
+        ),
+        (
+            "move = { motion = { grab = { along = [[20, 20, 35], [20, 20, 37]], radius = 9 } } }",
+            false,
+            false,
+        ),
+    ] {
+        let named = |_: Option<&str>| Ok::<_, document::CommandError>("ball".to_string());
+        let commands = Command::of_script(&format!("[[stroke]]\n{text}\n"), named).unwrap();
+        let Command::Stroke { stroke, .. } = &commands[0] else {
+            unreachable!()
+        };
+        let (before, limits, control) = (large(), Limits::default(), &mut Control::default());
+        let now = match stroke.tool().unwrap() {
+            tools::tool::Tool::Carve(t) => {
+                t.apply(tools::geometric::Operation::Carve, &before, 0.0, &limits, control)
+                    .unwrap()
+                    .0
+            }
+            tools::tool::Tool::Add(t) => {
+                t.apply(tools::geometric::Operation::Add, &before, 0.0, &limits, control)
+                    .unwrap()
+                    .0
+            }
+            tools::tool::Tool::Move(t) => t.apply(&before, 0.0, &limits, control).unwrap().0,
+            _ => unreachable!(),
+        };
+        let points = scan();
+        let journey = Journey::new(&commands, "ball", &before.lattice().world_box());
+        let changes = revise_cloud(&before, &now, &points, 0.0, &journey).unwrap();
+        assert!(!changes.moved.is_empty(), "{text}");
+        assert_eq!(
+            comes,
+            changes.added.len() > 5,
+            "{text}: {} new",
+            changes.added.len()
+        );
+        assert!(!goes || !changes.removed.is_empty(), "{text}");
+        for moved in &changes.moved {
+            // Its distance from the surface is that which it had: the noise stays.
+            let off = now.value(moved.position) - before.value(points[moved.row]);
+            assert!(off.abs() < 0.05, "{text}: row {} is off by {off}", moved.row);
+            assert!((moved.normal.length() - 1.0).abs() < 1e-9);
+        }
+        for added in &changes.added {
+            assert!(now.value(added.position).abs() < 0.2, "{text}");
+        }
+        // Far from the tool nothing happens.
+        let far = |row: usize| points[row].distance(DVec3::new(20.0, 20.0, 36.0)) > 20.0;
+        assert!(
+            !changes
+                .moved
+                .iter()
+                .map(|m| m.row)
+                .chain(changes.removed.iter().copied())
+                .any(far)
+        );
+    }
+}
