@@ -4,14 +4,21 @@
 //! is pulled by a tool that moves; a step of eq. 12 is a sixtieth of a second, thirty times the explicit limit. A dab a step, 60
 //! of them along a stroke, over twenty strokes; the error is that of an increment against a solver of the matter of that step.
 
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use bspline::HierarchicalSpline;
+use bspline::hierarchical::{BrickKey, Corrections, Lattice as FieldLattice, LevelCorrections};
 use dynamics::constraints::{Constraint, Hold, On};
 use dynamics::integrators::Integrator;
 use dynamics::lattice::{Lattice, OnBox, Rim, SampleBox};
 use dynamics::matter::{Matter, Quantity};
 use dynamics::paint::Substance;
 use dynamics::patch::Patch;
+use dynamics::region::{Cells, Region, RegionOptions};
 use dynamics::solve::SolverOptions;
 use dynamics::springs::{Law, Neighbours};
+use glam::DAffine3;
 use rustix::time::{ClockId, clock_gettime};
 
 const DABS: usize = 60;
@@ -119,6 +126,7 @@ fn apart(p: &Patch<f32>, exact: &Patch<f32>) -> f64 {
 fn strokes(n: usize, m: usize, settled: &Patch<f32>, count: u64) {
     for radius in [2.0, 4.0, 6.0] {
         for contrast in [10.0, 100.0, 1000.0] {
+            let (mut means, mut paints) = (0.0, 0.0);
             let (mut medians, mut worst, mut iterations, mut error, mut made) =
                 (Vec::new(), 0.0_f64, 0, 0.0_f64, 0);
             for stroke in 0..count {
@@ -128,7 +136,7 @@ fn strokes(n: usize, m: usize, settled: &Patch<f32>, count: u64) {
                 let ends = [(); 2].map(|()| [(); 3].map(|()| edge * (0.2 + 0.6 * unit(&mut seed))));
                 // Steps without paint at the same time: the machine may do other work later.
                 let mut still = settled.clone();
-                let (mut times, mut usual) = (Vec::new(), Vec::new());
+                let (mut times, mut usual, mut spent) = (Vec::new(), Vec::new(), 0.0);
                 for k in 0..DABS {
                     let t = k as f64 / DABS as f64;
                     let centre = std::array::from_fn(|a| ends[0][a] + t * (ends[1][a] - ends[0][a]));
@@ -142,6 +150,7 @@ fn strokes(n: usize, m: usize, settled: &Patch<f32>, count: u64) {
                     let mut exact = (k % 20 == 19).then(|| p.clone());
                     let (step, used) = timed(&mut p, time_step());
                     times.push(painting + step);
+                    spent += painting;
                     iterations += used;
                     if let Some(exact) = &mut exact {
                         exact.set_matter(p.matter().clone()).expect("the same matter");
@@ -164,14 +173,18 @@ fn strokes(n: usize, m: usize, settled: &Patch<f32>, count: u64) {
                 made += p.factorizations() - settled.factorizations();
                 let usual = median(usual);
                 worst = worst.max(times.iter().copied().fold(0.0, f64::max) / usual);
+                means += times.iter().sum::<f64>() / usual / DABS as f64;
+                paints += spent / usual / DABS as f64;
                 medians.push(median(times) / usual);
             }
             let runs = count as f64;
             println!(
-                "{n}/{m} dabs of radius {radius}, contrast {contrast}: {:.2} steps (worst stroke {:.2}, worst dab {worst:.1}), \
+                "{n}/{m} dabs of radius {radius}, contrast {contrast}: {:.2} steps (worst stroke {:.2}, worst dab {worst:.1}), mean {:.2}, of which painting {:.2}, \
                  {:.1} iterations, {:.1} made a stroke, error {:.2} %",
                 median(medians.clone()),
                 medians.iter().copied().fold(0.0, f64::max),
+                means / runs,
+                paints / runs,
                 iterations as f64 / (runs * DABS as f64),
                 made as f64 / runs,
                 100.0 * error,
@@ -217,6 +230,87 @@ fn pins(p: &Patch<f32>, height: f64) -> Vec<Constraint> {
         .collect()
 }
 
+/// A region of so many cells along each axis, with as stiff a ball, that is pushed and let go again and again: what letting go
+/// and the step after it take.
+fn release(cells: u32) {
+    let n = cells + 16;
+    let lattice = FieldLattice {
+        world_from_lattice: DAffine3::IDENTITY,
+        cells: [n; 3],
+    };
+    let mut bricks: LevelCorrections<f32> = BTreeMap::new();
+    for x in 0..n + 3 {
+        for (y, z) in (0..n + 3).flat_map(|y| (0..n + 3).map(move |z| (y, z))) {
+            let key = BrickKey([x, y, z].map(|c| c / 8));
+            let brick = bricks
+                .entry(key)
+                .or_insert_with(|| Arc::new(Corrections::empty()));
+            let value = 0.5 * n as f32 - x as f32 + 0.01 * ((x * 7 + y * 5 + z * 3) % 11) as f32;
+            Arc::make_mut(brick).set([x, y, z].map(|c| c as usize % 8), value);
+        }
+    }
+    let mut field = HierarchicalSpline::from_corrections(lattice, 1.0, vec![bricks]);
+    let of = Cells {
+        level: 0,
+        first: [8; 3],
+        count: [cells; 3],
+    };
+    let m = cells as usize * 4 / 3 + 1;
+    let mut matter = Matter {
+        damping: Quantity::Constant(0.2),
+        ..Matter::default()
+    };
+    let centre = 0.5 * (m - 1) as f64;
+    for (i, k) in matter.stiffness.paint(m * m * m).iter_mut().enumerate() {
+        let p = [i / (m * m), i / m % m, i % m].map(|c| c as f64 - centre);
+        if p.iter().map(|c| c * c).sum::<f64>() < (0.3 * m as f64).powi(2) {
+            *k = 10.0;
+        }
+    }
+    let options = RegionOptions::of(&field, 0);
+    let mut region = Region::new(&field, of, matter, &options).expect("a region");
+    let dt = 30.0 * region.patch_mut().explicit_limit().expect("a limit");
+    let push = |region: &mut Region<f32>| {
+        let edge = region.patch().lattice().spacing()[0] * (m - 1) as f64;
+        let (at, kernel) = region
+            .patch()
+            .lattice()
+            .gaussian([0.4, 0.5, 0.5].map(|c| c * edge), 1.5);
+        let values: Vec<f32> = kernel.iter().map(|k| 0.3 * *k as f32).collect();
+        region
+            .set_force_on(OnBox { at, values: &values })
+            .expect("a force");
+    };
+    let step = |region: &mut Region<f32>| {
+        let begun = seconds();
+        region.step(Integrator::Paper, dt).expect("a step");
+        seconds() - begun
+    };
+    let (mut letting_go, mut first, mut later) = (Vec::new(), Vec::new(), Vec::new());
+    for _ in 0..AGAIN {
+        push(&mut region);
+        region.settle();
+        for _ in 0..100 {
+            step(&mut region);
+        }
+        region.settle();
+        let usual = median((0..9).map(|_| step(&mut region)).collect());
+        let begun = seconds();
+        field = region.release_clay(&field).expect("a release");
+        letting_go.push((seconds() - begun) / usual);
+        push(&mut region);
+        first.push(step(&mut region) / usual);
+        later.push((0..40).map(|_| step(&mut region) / usual).fold(0.0, f64::max));
+    }
+    println!(
+        "{} free coefficients, released: {:.2} steps, and a first step of {:.2}; the most of the next forty {:.2}",
+        (cells - 3).pow(3),
+        median(letting_go),
+        median(first),
+        median(later)
+    );
+}
+
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let asked: Vec<&String> = arguments.iter().filter(|a| a.contains('/')).collect();
@@ -255,5 +349,8 @@ fn main() {
             p.set_constraints(&pins).expect("pins");
         });
         strokes(n, m, &settled, count);
+    }
+    for cells in [12, 18, 21] {
+        release(cells);
     }
 }

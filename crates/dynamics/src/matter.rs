@@ -52,28 +52,43 @@ impl Quantity {
         samples: usize,
         may_vanish: bool,
     ) -> Result<(), MatterError> {
-        let wrong = |v: f64| !(v.is_finite() && (v > 0.0 || (may_vanish && v == 0.0)));
         match self {
-            Self::Constant(v) if wrong(*v) => Err(MatterError::Value {
+            Self::Constant(v) if !is_matter(*v, may_vanish) => Err(MatterError::Value {
                 what,
                 index: 0,
                 value: *v,
             }),
-            Self::PerSample(v) if v.len() != samples => Err(MatterError::Length {
-                what,
-                found: v.len(),
-                needed: samples,
-            }),
-            Self::PerSample(v) => match v.iter().position(|v| wrong(*v)) {
-                Some(index) => Err(MatterError::Value {
-                    what,
-                    index,
-                    value: v[index],
-                }),
-                None => Ok(()),
-            },
+            Self::PerSample(v) => check_each(what, v, samples, may_vanish),
             Self::Constant(_) => Ok(()),
         }
+    }
+}
+
+fn is_matter(v: f64, may_vanish: bool) -> bool {
+    v.is_finite() && (v > 0.0 || (may_vanish && v == 0.0))
+}
+
+/// The check of a list.
+pub(crate) fn check_each(
+    what: &'static str,
+    list: &[f64],
+    needed: usize,
+    may_vanish: bool,
+) -> Result<(), MatterError> {
+    if list.len() != needed {
+        return Err(MatterError::Length {
+            what,
+            found: list.len(),
+            needed,
+        });
+    }
+    match list.iter().position(|v| !is_matter(*v, may_vanish)) {
+        Some(index) => Err(MatterError::Value {
+            what,
+            index,
+            value: list[index],
+        }),
+        None => Ok(()),
     }
 }
 
@@ -220,7 +235,7 @@ impl Matter {
         Ok((scaled, lumped.springs))
     }
 
-    /// Stiffness of the springs of direction `n` by the sample where they begin. Half of a spring lies in the volume of each of
+    /// Stiffness of the springs of direction `n` by the sample where they begin, its number and its place. Half of a spring lies in the volume of each of
     /// its samples: it has the harmonic mean of their stiffness. Where the lattice ends and there is no spring it is that of the
     /// sample, so that each number depends on what is near it only.
     pub(crate) fn spring_weight<U: Real>(
@@ -228,7 +243,7 @@ impl Matter {
         lattice: &Lattice<U>,
         n: usize,
         direction: Direction,
-    ) -> impl Fn(usize) -> f64 + '_ {
+    ) -> impl Fn(usize, [usize; 3]) -> f64 + '_ {
         // Along an axis of spacing h: κV/h². Diagonals are for cubic lattices, where all spacings agree.
         let axis = direction.step.iter().position(|&s| s != 0).unwrap_or(0);
         let (spacing, dims) = (lattice.spacing(), lattice.sample_dims());
@@ -236,12 +251,11 @@ impl Matter {
         let own = self.spring_factors.as_ref().map(|f| &f[n]);
         let [dx, dy, dz] = direction.step;
         let offset = (dx * dims[1] as isize + dy) * dims[2] as isize + dz;
-        move |i| {
+        move |i, at| {
             let own = own.map_or(1.0, |f| f[i]);
             let mean = match &self.stiffness {
                 Quantity::Constant(v) if self.spring_factors.is_none() => return v * factor,
                 stiffness => {
-                    let at = [i / (dims[1] * dims[2]), i / dims[2] % dims[1], i % dims[2]];
                     let ends = |a: usize| at[a].wrapping_add_signed(direction.step[a]) < dims[a];
                     let j = if (0..3).all(ends) {
                         i.wrapping_add_signed(offset)
@@ -282,8 +296,11 @@ impl Matter {
         let springs = directions.into_iter().enumerate().map(|(n, direction)| {
             let weight = self.spring_weight(lattice, n, direction);
             let weights = match (&self.stiffness, &self.spring_factors) {
-                (Quantity::Constant(_), None) => Weights::Constant(T::from_f64(weight(0))),
-                _ => Weights::Each((0..samples).map(|i| T::from_f64(weight(i))).collect()),
+                (Quantity::Constant(_), None) => Weights::Constant(T::from_f64(weight(0, [0; 3]))),
+                _ => {
+                    let all = lattice.all_samples().places(lattice.sample_dims());
+                    Weights::Each(all.map(|(i, at)| T::from_f64(weight(i, at))).collect())
+                }
             };
             SpringWeights { direction, weights }
         });

@@ -3,7 +3,7 @@
 use bspline::Real;
 
 use crate::lattice::OnBox;
-use crate::matter::{MatterError, Quantity};
+use crate::matter::{MatterError, Quantity, check_each};
 use crate::patch::{Patch, PatchError};
 
 /// What can be painted.
@@ -46,8 +46,8 @@ impl<T: Real> Patch<T> {
         if !paint.at.fits(dims) {
             return Err(PatchError::Box { at: paint.at, dims });
         }
-        let values = Quantity::PerSample(paint.values.to_vec());
-        values.check(substance.name(), paint.at.len(), substance != Substance::Mass)?;
+        let may_vanish = substance != Substance::Mass;
+        check_each(substance.name(), paint.values, paint.at.len(), may_vanish)?;
         let samples = self.motion.base.len();
         let quantity = match substance {
             Substance::Stiffness => &mut self.material.matter.stiffness,
@@ -98,7 +98,7 @@ impl<T: Real> Patch<T> {
         let lattice = self.cache.solver.lattice();
         let dims = lattice.sample_dims();
         let near = paint.at.grown(1, dims);
-        let changed: Vec<Vec<(usize, f64)>> = self
+        let changed: Vec<Vec<f64>> = self
             .material
             .neighbours
             .directions()
@@ -106,23 +106,25 @@ impl<T: Real> Patch<T> {
             .enumerate()
             .map(|(n, direction)| {
                 let weight = self.material.matter.spring_weight(lattice, n, direction);
-                near.indices(dims).map(|i| (i, weight(i))).collect()
+                let mut list = Vec::with_capacity(near.len());
+                near.places(dims).for_each(|(i, at)| list.push(weight(i, at)));
+                list
             })
             .collect();
-        let all = changed.iter().flatten().map(|(_, k)| *k);
-        let (least, largest) = all.fold((f64::INFINITY, 0.0_f64), |(l, h), k| (l.min(k), h.max(k)));
-        if !largest.is_finite() {
+        let all = changed.iter().flatten();
+        let most = all.clone().fold(0.0_f64, |h, k| h.max(*k));
+        if !most.is_finite() {
             return Err(MatterError::Range {
                 what: "stiffness",
-                least,
-                largest,
+                least: all.fold(f64::INFINITY, |l, k| l.min(*k)),
+                largest: most,
                 precision: match T::NAME {
                     "f32" => "single precision",
                     _ => "double precision",
                 },
             });
         }
-        self.material.network.paint_on(&changed);
+        self.material.network.paint_on(near, &changed, most);
         Ok(())
     }
 }

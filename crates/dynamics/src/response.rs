@@ -86,7 +86,7 @@ impl<T: Real> Patch<T> {
         self.forces(Some(b / unit));
         self.write_impulse(load, dims, share * b / unit);
         self.aim(0.0, 0.0, 0.0);
-        let first = self.solve_step_to(a, b, Some(RESPONSE))?;
+        let first = self.solve_step_to(a, b, Some(RESPONSE), None)?;
         let response = |work: &crate::patch::Scratch<T>, solve| Response {
             p: work.x.clone(),
             d: work.dx.clone(),
@@ -112,7 +112,7 @@ impl<T: Real> Patch<T> {
             *g = T::from_f64(g.as_f64() + inertia * e.d[i].as_f64());
         }
         self.aim(0.0, 0.0, 0.0);
-        let second = self.solve_step_to(a, b, Some(RESPONSE))?;
+        let second = self.solve_step_to(a, b, Some(RESPONSE), None)?;
         let mut whole = response(&self.cache.work, first.and(second));
         let add = |to: &mut [T], from: &[T]| to.iter_mut().zip(from).for_each(|(a, b)| *a += *b);
         add(&mut whole.p, &e.p);

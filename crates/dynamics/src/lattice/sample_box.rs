@@ -73,6 +73,15 @@ impl SampleBox {
         self.rows(dims).flat_map(move |row| row..row + count)
     }
 
+    /// The same with their places along the axes.
+    pub(crate) fn places(&self, dims: [usize; 3]) -> impl Iterator<Item = (usize, [usize; 3])> + use<> {
+        let Self { first, count } = *self;
+        self.rows(dims).enumerate().flat_map(move |(r, row)| {
+            let (x, y) = (first[0] + r / count[1], first[1] + r % count[1]);
+            (0..count[2]).map(move |k| (row + k, [x, y, first[2] + k]))
+        })
+    }
+
     /// The first number of each of its rows along z.
     pub(crate) fn rows(&self, dims: [usize; 3]) -> impl Iterator<Item = usize> + use<> {
         let Self { first, count } = *self;

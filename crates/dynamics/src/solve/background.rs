@@ -3,6 +3,7 @@
 use bspline::Real;
 
 use super::band_cholesky::{BandCholesky, NotPositive, SLICE};
+use super::estimates::Estimates;
 use super::galerkin::Galerkin;
 use super::pcg::Preconditioner;
 use super::v_cycle::{VCycle, VCycleOptions};
@@ -76,7 +77,7 @@ impl<T: Real> Background<T> {
     /// # Errors
     /// [`NotPositive`] as [`prepare`](Self::prepare).
     pub fn repaint(&mut self, s: &StepMatrix<T>, at: SampleBox) -> Result<(), NotPositive> {
-        self.cycle.fit(s, at)?;
+        self.cycle.follow(s, at)?;
         self.made = Work::Wait(WAIT);
         self.failed = None;
         self.stale = false;
@@ -94,11 +95,17 @@ impl<T: Real> Background<T> {
             self.cycle.prepare(matrix)?;
             self.stale = false;
         }
+        self.cycle.refresh(matrix);
         Ok(())
     }
 
+    /// The cycle, while it solves.
+    pub fn solving_cycle(&mut self) -> Option<&mut VCycle<T>> {
+        (!self.is_done()).then_some(&mut self.cycle)
+    }
+
     /// The factor, and what assembles it.
-    pub fn factor(&mut self) -> (&mut Galerkin, &mut BandCholesky<T>) {
+    pub fn made(&mut self) -> (&mut Galerkin, &mut BandCholesky<T>) {
         (&mut self.galerkin, &mut self.factor)
     }
 
@@ -120,6 +127,11 @@ impl<T: Real> Background<T> {
     /// How far it is.
     pub fn progress(&self) -> Work {
         self.work
+    }
+
+    /// The eigenvalues that its cycle takes.
+    pub fn estimates(&self) -> Estimates {
+        self.cycle.estimates()
     }
 
     /// After a solve: the next part of the work on the factor of `matrix`, which it was prepared for.
@@ -162,7 +174,8 @@ impl<T: Real> Background<T> {
     }
 
     /// Goes to where another one was.
-    pub fn resume(&mut self, matrix: &StepMatrix<T>, work: Work) {
+    pub fn resume(&mut self, matrix: &StepMatrix<T>, work: Work, estimates: &Estimates) {
+        self.cycle.resume(estimates);
         if let Work::Wait(_) = work {
             self.work = work;
         }
@@ -179,5 +192,9 @@ impl<T: Real> Preconditioner<T> for Background<T> {
         } else {
             self.cycle.apply(s, r, z);
         }
+    }
+
+    fn factor(&self) -> Option<&BandCholesky<T>> {
+        self.is_done().then_some(&self.factor)
     }
 }

@@ -3,9 +3,6 @@
 use bspline::Real;
 use bspline::vectorized;
 
-use super::pcg::Preconditioner;
-use crate::springs::StepMatrix;
-
 /// Columns that are eliminated together.
 const TILE: usize = 4;
 const LANES: usize = 16;
@@ -157,17 +154,70 @@ impl<T: Real> BandCholesky<T> {
     /// # Panics
     /// If the length is wrong.
     pub fn solve(&self, x: &mut [T]) {
+        self.forward(x, &[0]);
+        self.backward(x);
+    }
+
+    /// `L⁻¹` of right-hand sides, one after the other in `all`, each 0 before a row of its own. A large factor takes longer to
+    /// be read than to be multiplied by.
+    ///
+    /// # Panics
+    /// If a length is wrong.
+    pub(super) fn forward(&self, all: &mut [T], first: &[usize]) {
+        assert_eq!(
+            all.len(),
+            self.n * first.len(),
+            "right-hand sides of the matrix' size"
+        );
+        let (layout, start) = (self.layout, first.iter().copied().min().unwrap_or(0));
+        vectorized(
+            #[inline(always)]
+            || {
+                for i in start..self.n {
+                    let low = i.saturating_sub(layout.band);
+                    let row = &self.rows[layout.at(i, low)..=layout.at(i, i)];
+                    let (row, inverse) = (&row[..i - low], row[i - low]);
+                    for (some, first) in all.chunks_mut(TILE * self.n).zip(first.chunks(TILE)) {
+                        let begun = |first: &usize| i >= *first;
+                        if first.len() == TILE && first.iter().all(begun) {
+                            let at = [0, 1, 2, 3].map(
+                                #[inline(always)]
+                                |c| c * self.n,
+                            );
+                            let sums = lanes_dots(
+                                row,
+                                at.map(
+                                    #[inline(always)]
+                                    |at| &some[at + low..at + i],
+                                ),
+                            );
+                            for c in 0..TILE {
+                                let x = &mut some[at[c] + i];
+                                *x = (*x - sums[c]) * inverse;
+                            }
+                            continue;
+                        }
+                        for (x, first) in some.chunks_exact_mut(self.n).zip(first) {
+                            if begun(first) {
+                                x[i] = (x[i] - lanes_dot(row, &x[low..i])) * inverse;
+                            }
+                        }
+                    }
+                }
+            },
+        );
+    }
+
+    /// `L⁻ᵀx` in place.
+    ///
+    /// # Panics
+    /// If the length is wrong.
+    pub(super) fn backward(&self, x: &mut [T]) {
         assert_eq!(x.len(), self.n, "a right-hand side of the matrix' size");
         let layout = self.layout;
         vectorized(
             #[inline(always)]
             || {
-                for i in 0..x.len() {
-                    let low = i.saturating_sub(layout.band);
-                    let row = &self.rows[layout.at(i, low)..=layout.at(i, i)];
-                    let (row, inverse) = (&row[..i - low], row[i - low]);
-                    x[i] = (x[i] - lanes_dot(row, &x[low..i])) * inverse;
-                }
                 for i in (0..x.len()).rev() {
                     let low = i.saturating_sub(layout.band);
                     let row = &self.rows[layout.at(i, low)..=layout.at(i, i)];
@@ -180,13 +230,6 @@ impl<T: Real> BandCholesky<T> {
                 }
             },
         );
-    }
-}
-
-impl<T: Real> Preconditioner<T> for BandCholesky<T> {
-    fn apply(&mut self, _: &StepMatrix<T>, r: &[T], z: &mut [T]) {
-        z.copy_from_slice(r);
-        self.solve(z);
     }
 }
 
@@ -300,6 +343,29 @@ fn tree<T: Real>(s: &[T; HALF]) -> T {
     ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]))
 }
 
+/// [`lanes_dot`] of one list with each of several.
+#[inline(always)]
+fn lanes_dots<T: Real>(a: &[T], b: [&[T]; TILE]) -> [T; TILE] {
+    let mut sums = [[T::zero(); LANES]; TILE];
+    let (a, a_rest) = a.as_chunks::<LANES>();
+    let [b0, b1, b2, b3] = b.map(
+        #[inline(always)]
+        |b| &b.as_chunks::<LANES>().0[..a.len()],
+    );
+    for (k, a) in a.iter().enumerate() {
+        for (sum, b) in sums.iter_mut().zip([&b0[k], &b1[k], &b2[k], &b3[k]]) {
+            for l in 0..LANES {
+                sum[l] += a[l] * b[l];
+            }
+        }
+    }
+    let mut totals = [T::zero(); TILE];
+    for ((total, sum), b) in totals.iter_mut().zip(&sums).zip(b) {
+        *total = total_of(sum, a_rest, &b[b.len() - a_rest.len()..]);
+    }
+    totals
+}
+
 #[inline(always)]
 fn lanes_dot<T: Real>(a: &[T], b: &[T]) -> T {
     let mut sum = [T::zero(); LANES];
@@ -310,6 +376,12 @@ fn lanes_dot<T: Real>(a: &[T], b: &[T]) -> T {
             sum[l] += a[l] * b[l];
         }
     }
+    total_of(&sum, a_rest, b_rest)
+}
+
+/// What lanes add up to, with the products of what they left.
+#[inline(always)]
+fn total_of<T: Real>(sum: &[T; LANES], a_rest: &[T], b_rest: &[T]) -> T {
     let half = std::array::from_fn(|l| sum[l] + sum[l + HALF]);
     let mut total = tree(&half);
     for (a, b) in a_rest.iter().zip(b_rest) {

@@ -8,6 +8,7 @@
 use bspline::Real;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
+use super::band_cholesky::BandCholesky;
 use super::dot::dot;
 use super::orthonormal::OrthonormalRows;
 use super::pcg::{ConjugateGradients, PcgReport, System, add_scaled};
@@ -19,6 +20,8 @@ const SHIFT: f64 = 16.0;
 /// Rows that border the matrix of a step.
 #[derive(Clone, Debug)]
 pub(crate) struct Border<T> {
+    /// Unknowns.
+    n: usize,
     springs: Vec<Vec<(usize, f64)>>,
     /// Whether the springs are part of the matrix, not of the right side alone.
     implicit: bool,
@@ -30,12 +33,13 @@ pub(crate) struct Border<T> {
     pub impulses: Vec<f64>,
     /// `g`.
     pub gaps: Vec<f64>,
-    /// `Y`, a row per row of the border.
+    /// `Y`, a row per row of the border; of a factor `L⁻¹Bᵀ`, so that `Y = L⁻ᵀ(L⁻¹Bᵀ)`.
     y: Vec<T>,
+    /// Which of the two it is.
+    halves: bool,
     /// `BY`, made symmetric.
     gram: DMatrix<f64>,
     factor: Option<Cholesky<f64, Dyn>>,
-    right: Vec<T>,
 }
 
 impl<T: Real> Border<T> {
@@ -48,9 +52,10 @@ impl<T: Real> Border<T> {
             impulses: vec![0.0; springs.len()],
             gaps: vec![0.0; hard.count()],
             y: vec![T::zero(); rows * n],
+            halves: false,
             gram: DMatrix::zeros(rows, rows),
             factor: None,
-            right: vec![T::zero(); n],
+            n,
             springs,
             hard,
         }
@@ -108,27 +113,14 @@ impl<T: Real> Border<T> {
 
     /// Makes `Y` for a new `P`.
     pub fn prepare(&mut self, mut precondition: impl FnMut(&[T], &mut [T])) {
-        let n = self.right.len();
+        self.halves = false;
+        self.write_rows();
         let mut y = std::mem::take(&mut self.y);
-        for (row, y) in y.chunks_exact_mut(n).enumerate() {
-            let soft = self.soft();
-            let r = &mut self.right;
-            r.fill(T::zero());
-            match row.checked_sub(soft) {
-                None => {
-                    for (i, w) in &self.springs[row] {
-                        r[*i] = T::from_f64(*w);
-                    }
-                }
-                Some(h) => {
-                    for (q, i) in self.hard.row(h).iter().zip(&self.hard.columns) {
-                        r[*i] = T::from_f64(*q);
-                    }
-                }
-            }
-            precondition(r, y);
+        for y in y.chunks_exact_mut(self.n) {
+            let r = y.to_vec();
+            precondition(&r, y);
         }
-        for (j, y) in y.chunks_exact(n).enumerate() {
+        for (j, y) in y.chunks_exact(self.n).enumerate() {
             for i in 0..self.rows() {
                 self.gram[(i, j)] = self.row_times(i, y);
             }
@@ -136,6 +128,44 @@ impl<T: Real> Border<T> {
         self.gram = 0.5 * (&self.gram + self.gram.transpose());
         self.y = y;
         self.factor = None;
+    }
+
+    /// The same for `P = LLᵀ`: makes `L⁻¹Bᵀ`, half the work, of which that before the first coefficient of a row is none.
+    pub fn prepare_halves(&mut self, factor: &BandCholesky<T>) {
+        self.halves = true;
+        self.write_rows();
+        let y = self.y.chunks_exact(self.n);
+        let first = y.map(|y| y.iter().position(|v| *v != T::zero()).unwrap_or(self.n));
+        let first: Vec<usize> = first.collect();
+        factor.forward(&mut self.y, &first);
+        for (i, a) in self.y.chunks_exact(self.n).enumerate() {
+            for (j, b) in self.y.chunks_exact(self.n).enumerate().take(i + 1) {
+                let product = dot(a, b);
+                self.gram[(i, j)] = product;
+                self.gram[(j, i)] = product;
+            }
+        }
+        self.factor = None;
+    }
+
+    /// Writes `B` where `Y` will be.
+    fn write_rows(&mut self) {
+        self.y.fill(T::zero());
+        let soft = self.soft();
+        for (row, y) in self.y.chunks_exact_mut(self.n).enumerate() {
+            match row.checked_sub(soft) {
+                None => {
+                    for (i, w) in &self.springs[row] {
+                        y[*i] = T::from_f64(*w);
+                    }
+                }
+                Some(h) => {
+                    for (q, i) in self.hard.row(h).iter().zip(&self.hard.columns) {
+                        y[*i] = T::from_f64(*q);
+                    }
+                }
+            }
+        }
     }
 
     /// Factor of `BY + [E⁻¹, 0]`.
@@ -165,7 +195,7 @@ impl<T: Real> Border<T> {
         }
     }
 
-    /// `z += sign Y (BY + [E⁻¹, 0])⁻¹ a`.
+    /// `z += sign Y (BY + [E⁻¹, 0])⁻¹ a`, of halves `L⁻¹Y` in place of `Y`.
     fn add_border(&self, z: &mut [T], mut a: DVector<f64>, sign: f64) {
         if let Some(factor) = &self.factor {
             factor.solve_mut(&mut a);
@@ -202,6 +232,9 @@ impl<T: Real> Border<T> {
                 |i, _| if i < soft { 0.0 } else { self.gaps[i - soft] },
             );
             self.add_border(x, wanted, 1.0);
+            if let (true, Some(factor)) = (self.halves, system.factor()) {
+                factor.backward(x);
+            }
             self.hard.close(x, |h| self.gaps[h]);
             self.apply(system, x, q);
             add_scaled(r, -T::one(), q);
@@ -214,7 +247,7 @@ impl<T: Real> Border<T> {
             return PcgReport::default();
         }
         let mut bordered = Bordered { border: self, system };
-        let report = iteration.go_on(&mut bordered, x, impulse, cap, tolerance);
+        let report = iteration.go_on(&mut bordered, x, [impulse, 1.0], cap, tolerance);
         self.hard.close(x, |h| self.gaps[h]);
         report
     }
@@ -244,6 +277,16 @@ impl<T: Real, S: System<T>> System<T> for Bordered<'_, T, S> {
 
     fn precondition(&mut self, r: &[T], z: &mut [T]) {
         let border = self.border;
+        if let (true, Some(factor)) = (border.halves, self.system.factor()) {
+            z.copy_from_slice(r);
+            factor.forward(z, &[0]);
+            let rows = border.y.chunks_exact(border.n);
+            let along = DVector::from_iterator(border.rows(), rows.map(|y| dot(y, z)));
+            border.add_border(z, along, -1.0);
+            factor.backward(z);
+            border.project(z);
+            return;
+        }
         self.system.precondition(r, z);
         let along = DVector::from_fn(border.rows(), |i, _| border.row_times(i, z));
         border.add_border(z, along, -1.0);

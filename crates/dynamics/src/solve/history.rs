@@ -4,6 +4,7 @@ use bspline::Real;
 use serde::{Deserialize, Serialize};
 
 use super::background::Work;
+use super::estimates::Estimates;
 use super::painted::Painted;
 use super::renewal::{Renewal, Stage};
 use super::report::SolveError;
@@ -15,7 +16,8 @@ use crate::springs::{SpringWeights, StepMatrix, Weights};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct SolverHistory<T> {
     matrix: MatrixRecord<T>,
-    progress: Option<Work>,
+    progress: Option<(Work, Estimates)>,
+    estimates: Option<Estimates>,
     slow: usize,
     renewal: Option<(MatrixRecord<T>, Stage)>,
 }
@@ -74,7 +76,11 @@ impl<T: Real> StepSolver<T> {
             slow: self.slow,
             renewal: renewal.map(|(matrix, stage)| (MatrixRecord::of(matrix), stage)),
             progress: match &self.painted {
-                Painted::Background(background) => Some(background.progress()),
+                Painted::Background(background) => Some((background.progress(), background.estimates())),
+                _ => None,
+            },
+            estimates: match &self.painted {
+                Painted::VCycle(cycle) => Some(cycle.estimates()),
                 _ => None,
             },
         })
@@ -93,8 +99,12 @@ impl<T: Real> StepSolver<T> {
         let s = history.matrix.matrix(like);
         let border = self.border.take();
         self.prepare(&s)?;
-        if let (Painted::Background(background), Some(progress)) = (&mut self.painted, history.progress) {
-            background.resume(&s, progress);
+        match (&mut self.painted, &history.progress, &history.estimates) {
+            (Painted::Background(background), Some((work, estimates)), _) => {
+                background.resume(&s, *work, estimates);
+            }
+            (Painted::VCycle(cycle), _, Some(estimates)) => cycle.resume(estimates),
+            _ => (),
         }
         self.slow = history.slow;
         if let (Some((matrix, stage)), Some((galerkin, factor))) = (&history.renewal, self.painted.factor()) {

@@ -2,6 +2,7 @@
 
 use bspline::Real;
 
+use super::dot::dot;
 use super::painted::{Dynamic, Painted, active};
 use super::pcg::{CoefficientSystem, PcgReport};
 use super::report::{ITERATED, Method, SolveReport};
@@ -65,10 +66,11 @@ impl<T: Real> StepSolver<T> {
     /// # Panics
     /// If a length is wrong.
     pub fn solve(&mut self, s: &StepMatrix<T>, g: &[T], x: &mut [T], dx: &mut [T]) -> SolveReport {
-        self.solve_to(s, g, x, dx, None)
+        self.solve_to(s, g, x, dx, None, false)
     }
 
-    /// The same to a residual, if one is asked for; in more iterations than steps take if it is less than theirs.
+    /// The same to a residual, if one is asked for; in more iterations than steps take if it is less than theirs. Where `x` and
+    /// `dx` hold what is `expected`, an iteration begins there if that is better than nothing.
     pub(crate) fn solve_to(
         &mut self,
         s: &StepMatrix<T>,
@@ -76,6 +78,7 @@ impl<T: Real> StepSolver<T> {
         x: &mut [T],
         dx: &mut [T],
         asked: Option<f64>,
+        expected: bool,
     ) -> SolveReport {
         let usual = self.tolerance();
         let (tolerance, cap) = match asked {
@@ -114,7 +117,9 @@ impl<T: Real> StepSolver<T> {
             inverse.apply(dx, x);
             report
         } else {
-            let report = self.iterate(s, x, Some(dx), cap, tolerance);
+            let begin = expected && self.border.is_none();
+            let from = begin.then(|| self.expect(s, g, unit, x, dx)).flatten();
+            let report = self.iterate(s, x, Some(dx), from, cap, tolerance);
             if solved_by == Method::Direct {
                 self.keep_up(s, report.iterations);
             } else if let (Painted::Background(background), Method::VCycle) = (&mut self.painted, solved_by) {
@@ -142,6 +147,36 @@ impl<T: Real> StepSolver<T> {
             method: solved_by,
             iteration,
         }
+    }
+
+    /// Scales what is expected, and writes its residual into the iteration: the impulse, and the share of it that is left, if
+    /// that is less than all.
+    fn expect(
+        &mut self,
+        s: &StepMatrix<T>,
+        g: &[T],
+        unit: f64,
+        x: &mut [T],
+        dx: &mut [T],
+    ) -> Option<[f64; 2]> {
+        if unit != 1.0 {
+            for x in x.iter_mut().chain(dx.iter_mut()) {
+                *x = T::from_f64(x.as_f64() / unit);
+            }
+        }
+        let [_, pushed] = &mut self.samples;
+        s.apply(dx, pushed);
+        let inverse = T::from_f64(1.0 / unit);
+        for (p, g) in pushed.iter_mut().zip(g) {
+            *p = *g * inverse - *p;
+        }
+        let left = self.iteration.residual_mut();
+        self.lattice.gather(pushed, left, &mut self.workspace);
+        if let Some(mask) = &self.mask {
+            mask.hold(left);
+        }
+        let (impulse, left) = (dot(&self.b, &self.b).sqrt(), dot(left, left).sqrt());
+        (left < impulse).then_some([impulse, left / impulse])
     }
 
     /// Residual at which steps stop.
@@ -174,15 +209,24 @@ impl<T: Real> StepSolver<T> {
         if let Some(mask) = &self.mask {
             mask.hold(&mut self.b);
         }
-        self.iterate(s, x, None, self.options.iterations, 16.0 * T::UNIT_ROUND_OFF);
+        self.iterate(
+            s,
+            x,
+            None,
+            None,
+            self.options.iterations,
+            16.0 * T::UNIT_ROUND_OFF,
+        );
     }
 
-    /// Solves for the right-hand side in `self.b`: with constraints if the samples are asked for too.
+    /// Solves for the right-hand side in `self.b`: with constraints if the samples are asked for too, and `from` what is in
+    /// `x`, with the impulse and the share of it that is left.
     fn iterate(
         &mut self,
         s: &StepMatrix<T>,
         x: &mut [T],
         dx: Option<&mut [T]>,
+        from: Option<[f64; 2]>,
         cap: usize,
         tolerance: f64,
     ) -> PcgReport {
@@ -201,10 +245,15 @@ impl<T: Real> StepSolver<T> {
                 self.iteration.solve(&mut system, &self.b, x, cap, tolerance)
             }
             (Some(dx), None) => {
-                dx.fill(T::zero());
+                if from.is_none() {
+                    dx.fill(T::zero());
+                }
                 let system = Sampled { system, dx };
                 let mut system = Projected { system, mask };
-                self.iteration.solve(&mut system, &self.b, x, cap, tolerance)
+                match from {
+                    Some(from) => self.iteration.go_on(&mut system, x, from, cap, tolerance),
+                    None => self.iteration.solve(&mut system, &self.b, x, cap, tolerance),
+                }
             }
             (Some(dx), Some(border)) => {
                 let mut system = Projected { system, mask };

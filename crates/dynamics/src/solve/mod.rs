@@ -5,6 +5,7 @@ pub(crate) mod band_cholesky;
 mod border;
 mod chebyshev;
 mod dot;
+mod estimates;
 pub(crate) mod fast_diagonalization;
 pub(crate) mod galerkin;
 mod history;

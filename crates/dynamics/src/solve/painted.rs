@@ -65,11 +65,20 @@ impl<T: Real> Painted<T> {
         }
     }
 
+    /// The cycle that solves, if one does.
+    pub fn cycle(&mut self) -> Option<&mut VCycle<T>> {
+        match self {
+            Self::Background(background) => background.solving_cycle(),
+            Self::VCycle(cycle) => Some(cycle),
+            _ => None,
+        }
+    }
+
     /// The factor on the coefficients, if there is one, and what assembles it.
     pub fn factor(&mut self) -> Option<(&mut Galerkin, &mut BandCholesky<T>)> {
         match self {
             Self::Direct(direct) => Some((&mut direct.0, &mut direct.1)),
-            Self::Background(background) => Some(background.factor()),
+            Self::Background(background) => Some(background.made()),
             _ => None,
         }
     }
@@ -93,11 +102,15 @@ pub(super) fn active<'a, T: Real>(
 }
 
 /// A preconditioner behind a pointer.
-pub(super) struct Dynamic<'a, T>(pub &'a mut dyn Preconditioner<T>);
+pub(super) struct Dynamic<'a, T: Real>(pub &'a mut dyn Preconditioner<T>);
 
-impl<T> Preconditioner<T> for Dynamic<'_, T> {
+impl<T: Real> Preconditioner<T> for Dynamic<'_, T> {
     fn apply(&mut self, s: &StepMatrix<T>, r: &[T], z: &mut [T]) {
         self.0.apply(s, r, z);
+    }
+
+    fn factor(&self) -> Option<&BandCholesky<T>> {
+        self.0.factor()
     }
 }
 

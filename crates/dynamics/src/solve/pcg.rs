@@ -2,6 +2,7 @@
 
 use bspline::Real;
 
+use super::band_cholesky::BandCholesky;
 use super::dot::dot;
 use crate::lattice::{Lattice, TensorWorkspace};
 use crate::springs::StepMatrix;
@@ -12,6 +13,10 @@ pub trait System<T> {
     fn apply(&mut self, p: &[T], q: &mut [T]) -> f64;
     /// `z ≈ H⁻¹ r`, symmetric and positive definite.
     fn precondition(&mut self, r: &[T], z: &mut [T]);
+    /// The factor that [`precondition`](Self::precondition) solves with, if that is all it does.
+    fn factor(&self) -> Option<&BandCholesky<T>> {
+        None
+    }
     /// Told that the solution moved by `alpha` along the `p` that [`apply`](Self::apply) had last.
     fn moved(&mut self, _alpha: T) {}
     /// Takes out of a residual what constraints bear.
@@ -24,9 +29,25 @@ pub trait System<T> {
 }
 
 /// An approximate inverse of `AᵀSA`, symmetric and positive definite.
-pub trait Preconditioner<T> {
+pub trait Preconditioner<T: Real> {
     /// `z ≈ (AᵀSA)⁻¹ r`.
     fn apply(&mut self, s: &StepMatrix<T>, r: &[T], z: &mut [T]);
+
+    /// The factor whose halves, one after the other, are this inverse, if it is that of a factor.
+    fn factor(&self) -> Option<&BandCholesky<T>> {
+        None
+    }
+}
+
+impl<T: Real> Preconditioner<T> for BandCholesky<T> {
+    fn apply(&mut self, _: &StepMatrix<T>, r: &[T], z: &mut [T]) {
+        z.copy_from_slice(r);
+        self.solve(z);
+    }
+
+    fn factor(&self) -> Option<&BandCholesky<T>> {
+        Some(self)
+    }
 }
 
 /// No preconditioner: `z = r`. What the source paper does.
@@ -66,6 +87,10 @@ impl<T: Real, P: Preconditioner<T>> System<T> for CoefficientSystem<'_, T, P> {
 
     fn precondition(&mut self, r: &[T], z: &mut [T]) {
         self.preconditioner.apply(self.matrix, r, z);
+    }
+
+    fn factor(&self) -> Option<&BandCholesky<T>> {
+        self.preconditioner.factor()
     }
 }
 
@@ -127,15 +152,21 @@ impl<T: Real> ConjugateGradients<T> {
         if impulse == 0.0 {
             return PcgReport::default();
         }
-        self.go_on(system, x, impulse, cap, tolerance)
+        self.go_on(system, x, [impulse, 1.0], cap, tolerance)
     }
 
-    /// The same from an `x` whose residual stands in `r`, until it falls below `tolerance` times `impulse`.
+    /// The residual to go on from.
+    pub(super) fn residual_mut(&mut self) -> &mut [T] {
+        &mut self.r
+    }
+
+    /// The same from an `x` whose residual stands in `r`, the share `residual` of `impulse`, until it falls below
+    /// `tolerance`.
     pub(super) fn go_on(
         &mut self,
         system: &mut impl System<T>,
         x: &mut [T],
-        impulse: f64,
+        [impulse, residual]: [f64; 2],
         cap: usize,
         tolerance: f64,
     ) -> PcgReport {
@@ -145,7 +176,7 @@ impl<T: Real> ConjugateGradients<T> {
             last.resize(r.len(), T::zero());
         }
         let mut report = PcgReport {
-            residual: 1.0,
+            residual,
             ..PcgReport::default()
         };
         let mut before = 1.0;

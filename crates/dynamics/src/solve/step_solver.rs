@@ -130,6 +130,8 @@ impl<T: Real> StepSolver<T> {
             self.painted_for = Some(s.clone());
         } else if let (Painted::Background(background), false) = (&mut self.painted, self.begun) {
             background.begin_again(s)?;
+        } else if let Some(cycle) = self.painted.cycle() {
+            cycle.refresh(s);
         }
         self.begun = true;
         self.settle_method();
@@ -137,9 +139,10 @@ impl<T: Real> StepSolver<T> {
         Ok(())
     }
 
-    /// Whether nothing that it was made for differs from a matrix.
-    pub(crate) fn is_made_for(&self, s: &StepMatrix<T>) -> bool {
-        self.method == Method::FastDiagonalization || self.painted_for.as_ref() == Some(s)
+    /// Whether nothing that it was made for differs from a matrix, estimates of eigenvalues included.
+    pub(crate) fn is_made_for(&mut self, s: &StepMatrix<T>) -> bool {
+        let rough = self.painted.cycle().is_some_and(|c| c.is_rough());
+        self.method == Method::FastDiagonalization || (self.painted_for.as_ref() == Some(s) && !rough)
     }
 
     /// Whether it can follow paint at the cost of the box.
@@ -169,7 +172,7 @@ impl<T: Real> StepSolver<T> {
             }
             Painted::VCycle(cycle) => {
                 matrix.copy_on(s, at);
-                cycle.fit(&matrix, at)?;
+                cycle.follow(&matrix, at)?;
             }
             _ => unreachable!("asked above"),
         }
@@ -259,12 +262,16 @@ impl<T: Real> StepSolver<T> {
         if let Some(border) = &mut self.border {
             let preconditioner = active(self.method, &mut self.painted, &mut self.diagonalization);
             let mask = self.mask.as_deref();
-            border.prepare(|r, z| {
-                preconditioner.apply(s, r, z);
-                if let Some(mask) = mask {
-                    mask.hold(z);
-                }
-            });
+            // Under a mask a factor knows nothing of the other coefficients.
+            match preconditioner.factor().filter(|_| mask.is_none()) {
+                Some(factor) => border.prepare_halves(factor),
+                None => border.prepare(|r, y| {
+                    preconditioner.apply(s, r, y);
+                    if let Some(mask) = mask {
+                        mask.hold(y);
+                    }
+                }),
+            }
         }
     }
 

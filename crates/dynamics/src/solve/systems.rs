@@ -2,6 +2,7 @@
 
 use bspline::Real;
 
+use super::band_cholesky::BandCholesky;
 use super::dot::dot;
 use super::pcg::{CoefficientSystem, Preconditioner, System, add_scaled};
 use crate::springs::StepMatrix;
@@ -20,6 +21,9 @@ impl<T: Real, P: Preconditioner<T>> System<T> for SampleSystem<'_, T, P> {
     fn precondition(&mut self, r: &[T], z: &mut [T]) {
         self.preconditioner.apply(self.matrix, r, z);
     }
+    fn factor(&self) -> Option<&BandCholesky<T>> {
+        self.preconditioner.factor()
+    }
 }
 
 /// Sums the solution on the samples from what the iteration samples anyway.
@@ -34,6 +38,9 @@ impl<T: Real, P: Preconditioner<T>> System<T> for Sampled<'_, '_, T, P> {
     }
     fn precondition(&mut self, r: &[T], z: &mut [T]) {
         self.system.precondition(r, z);
+    }
+    fn factor(&self) -> Option<&BandCholesky<T>> {
+        self.system.factor()
     }
     fn moved(&mut self, alpha: T) {
         add_scaled(self.dx, alpha, &self.system.samples[0]);

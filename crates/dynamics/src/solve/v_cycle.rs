@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::band_cholesky::{BandCholesky, NotPositive};
 use super::chebyshev::Chebyshev;
+use super::estimates::{self, Estimates};
 use super::fast_diagonalization::FastDiagonalization;
 use super::galerkin::Galerkin;
 use super::lanczos::Lanczos;
@@ -93,6 +94,8 @@ pub struct VCycle<T> {
     means: Vec<GeometricMean>,
     right: Vec<Vec<T>>,
     solution: Vec<Vec<T>>,
+    /// Dabs of paint since the eigenvalues were estimated, that one included.
+    dabs: usize,
     samples: [Vec<T>; 2],
     workspace: TensorWorkspace<T>,
 }
@@ -162,6 +165,7 @@ impl<T: Real> VCycle<T> {
             assembly,
             factor,
             raised: 0.0,
+            dabs: 0,
             means: vec![GeometricMean::default(); steps.len() + 1],
         }
     }
@@ -180,15 +184,57 @@ impl<T: Real> VCycle<T> {
     /// # Errors
     /// [`NotPositive`] if the coarsest level cannot be factorized.
     pub fn prepare(&mut self, s: &StepMatrix<T>) -> Result<(), NotPositive> {
-        self.fit(s, SampleBox::all(s.dims()))
+        self.dabs = 0;
+        self.fit(s, SampleBox::all(s.dims()), true)
     }
 
     /// The same where the matrix differs from the one before on a box of samples only, springs being counted where they
-    /// start. What is made is no other, to the bit, but sums cost the box.
+    /// start. What is made is no other, to the bit, but sums cost the box, and eigenvalues, which cost ten products, are
+    /// [estimated](estimates) only now and then.
     ///
     /// # Errors
     /// [`NotPositive`] as [`prepare`](Self::prepare).
-    pub(super) fn fit(&mut self, s: &StepMatrix<T>, at: SampleBox) -> Result<(), NotPositive> {
+    pub(super) fn follow(&mut self, s: &StepMatrix<T>, at: SampleBox) -> Result<(), NotPositive> {
+        self.dabs = estimates::after(self.dabs);
+        self.fit(s, at, self.dabs == 1)
+    }
+
+    /// Whether eigenvalues are those of a matrix before.
+    pub(super) fn is_rough(&self) -> bool {
+        self.dabs > 1
+    }
+
+    /// Estimates eigenvalues that are those of a matrix before; all is then as after [`prepare`](Self::prepare).
+    pub(super) fn refresh(&mut self, s: &StepMatrix<T>) {
+        if self.is_rough() {
+            for l in 0..self.levels.len() {
+                self.levels[l].largest_eigenvalue = self.largest_eigenvalue(s, l, false);
+                if self.levels[l].schwarz.is_some() {
+                    self.levels[l].schwarz_eigenvalue = self.largest_eigenvalue(s, l, true);
+                }
+            }
+        }
+        self.dabs = 0;
+    }
+
+    /// The eigenvalues in use.
+    pub(super) fn estimates(&self) -> Estimates {
+        let levels = self.levels.iter();
+        Estimates::new(
+            self.dabs,
+            levels.map(|l| [l.largest_eigenvalue, l.schwarz_eigenvalue]),
+        )
+    }
+
+    /// Takes the eigenvalues of another cycle of this kind.
+    pub(super) fn resume(&mut self, estimates: &Estimates) {
+        self.dabs = estimates.dabs();
+        for (level, [all, blocks]) in self.levels.iter_mut().zip(estimates.levels()) {
+            (level.largest_eigenvalue, level.schwarz_eigenvalue) = (all, blocks);
+        }
+    }
+
+    fn fit(&mut self, s: &StepMatrix<T>, at: SampleBox, estimate: bool) -> Result<(), NotPositive> {
         let first = self.assembly.accumulate_on(s, at);
         let first = if self.raised == 0.0 { first } else { 0 };
         self.raised = f64::INFINITY;
@@ -214,14 +260,16 @@ impl<T: Real> VCycle<T> {
                 level.variation[i] = actual[i] / constant;
                 *scale = T::from_f64((constant / actual[i]).sqrt());
             }
-            self.levels[l].largest_eigenvalue = self.largest_eigenvalue(s, l, false);
-            self.fit_blocks(s, l, at);
+            if estimate {
+                self.levels[l].largest_eigenvalue = self.largest_eigenvalue(s, l, false);
+            }
+            self.fit_blocks(s, l, at, estimate);
         }
         Ok(())
     }
 
     /// The blocks of a level, where its material asks for them.
-    fn fit_blocks(&mut self, s: &StepMatrix<T>, l: usize, at: SampleBox) {
+    fn fit_blocks(&mut self, s: &StepMatrix<T>, l: usize, at: SampleBox, estimate: bool) {
         let (options, level) = (self.options, &mut self.levels[l]);
         let range = |(low, high): (f64, f64), v: &f64| (low.min(*v), high.max(*v));
         let (low, high) = level.variation.iter().fold((f64::INFINITY, 0.0), range);
@@ -242,7 +290,7 @@ impl<T: Real> VCycle<T> {
         let (size, stride) = (options.blocks, options.stride);
         let blocks = Schwarz::new(all, size, stride, &level.variation, options.block_contrast, kept);
         level.schwarz = (blocks.block_count() > 0).then_some(blocks);
-        if level.schwarz.is_some() {
+        if level.schwarz.is_some() && (estimate || before.is_none()) {
             self.levels[l].schwarz_eigenvalue = self.largest_eigenvalue(s, l, true);
         }
     }

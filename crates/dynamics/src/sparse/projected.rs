@@ -1,7 +1,7 @@
 use bspline::Real;
 
 use super::Mask;
-use crate::solve::System;
+use crate::solve::{BandCholesky, System};
 
 /// A system on the coefficients that a mask lets move, the others being 0.
 pub(crate) struct Projected<'a, S> {
@@ -23,6 +23,10 @@ impl<T: Real, S: System<T>> System<T> for Projected<'_, S> {
         if let Some(mask) = self.mask {
             mask.hold(z);
         }
+    }
+
+    fn factor(&self) -> Option<&BandCholesky<T>> {
+        self.system.factor().filter(|_| self.mask.is_none())
     }
 
     fn moved(&mut self, alpha: T) {

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::law::{Law, length, spring};
 use super::stencil::{SpringWeights, Weights};
+use crate::lattice::SampleBox;
 use crate::units::{binary_unit, largest, springs_in_units};
 
 /// Rest of all springs: `Δ₀` per direction and starting sample, and how much each is scaled.
@@ -155,20 +156,18 @@ impl<T: Real> SpringNetwork<T> {
         (self.stiffness_unit, self.springs) = springs_in_units(springs);
     }
 
-    /// The same of some springs of each direction, whose stiffness is one per spring.
-    pub(crate) fn paint_on(&mut self, springs: &[Vec<(usize, f64)>]) {
-        let all = springs.iter().flatten();
-        let most = all.fold(0.0_f64, |m, (_, k)| m.max(*k));
+    /// The same of the springs that begin in a box, whose stiffness is one per spring and at most `most`.
+    pub(crate) fn paint_on(&mut self, at: SampleBox, springs: &[Vec<f64>], most: f64) {
         self.set_unit(binary_unit(most).max(self.stiffness_unit));
         for (to, from) in self.springs.iter_mut().zip(springs) {
             if let Weights::Each(weights) = &mut to.weights {
-                for (i, k) in from {
-                    // The unit is 0 if all weights are.
-                    weights[*i] = T::from_f64(if *k > 0.0 {
-                        k * (1.0 / self.stiffness_unit)
-                    } else {
-                        0.0
-                    });
+                // The unit is 0 if all weights are.
+                let unit = self.stiffness_unit;
+                let inverse = if unit > 0.0 { 1.0 / unit } else { 0.0 };
+                for (row, from) in at.rows(self.dims).zip(from.chunks_exact(at.count[2].max(1))) {
+                    for (w, k) in weights[row..].iter_mut().zip(from) {
+                        *w = T::from_f64(k * inverse);
+                    }
                 }
             }
         }

@@ -184,7 +184,7 @@ fn goes_on(p: &Patch<f32>, steps: usize) {
 }
 
 /// Cycles and sums that followed paint have the bits of those that are made for all of the matter, as a restored patch
-/// makes them.
+/// makes them; but for eigenvalues, which it is told.
 #[test]
 fn what_follows_paint_is_what_is_made_anew() {
     let four_d = Law::FourD { scale: 0.7 };
@@ -227,14 +227,15 @@ fn what_follows_paint_is_what_is_made_anew() {
             let mut other = p.clone();
             p.step(Integrator::Paper, 0.4).unwrap();
             if law == linear {
-                // Other matter is all looked at anew, in another unit perhaps; of the 4-D law tangents beside the paint are too.
+                // Other matter is all looked at anew, in another unit perhaps, and with other eigenvalues: both solve to 10⁻³ of the
+                // impulse. Of the 4-D law tangents beside the paint are new too.
                 other.set_matter(p.matter().clone()).unwrap();
                 other.step(Integrator::Paper, 0.4).unwrap();
                 let pairs = p.state().w.iter().zip(&other.state().w);
                 let apart = pairs.fold(0.0_f32, |m, (a, b)| m.max((a - b).abs()));
                 let size = other.state().w.iter().fold(0.0_f32, |m, b| m.max(b.abs()));
                 assert!(
-                    apart < 1e-4 * size,
+                    apart < 2e-2 * size,
                     "{neighbours:?} dab {dab}: {apart:.1e} of {size:.1e}"
                 );
             }
@@ -263,6 +264,38 @@ fn a_dab_costs_no_factor() {
                 made <= 30 && mean < 8.0,
                 "{m}/{n} {contrast}: {made} made, {mean} iterations"
             );
+        }
+    }
+}
+
+/// An estimate of eigenvalues serves several dabs. One that presses a thousand times harder makes it far too low: the cycle is
+/// then no preconditioner, and has to be seen to be none.
+#[test]
+fn a_brush_that_suddenly_presses_harder_is_followed() {
+    for dabs_before in [1, 2, 5] {
+        for seed in 0..7 {
+            let (n, m) = (13, 17);
+            let mut p = patch::<f32>(m, n, Neighbours::Six, 100);
+            let mut random = Random(90 + seed);
+            let force: Vec<f32> = (0..m * m * m).map(|_| random.unit() as f32 - 0.5).collect();
+            p.set_force(&force).unwrap();
+            for dab in 0..=dabs_before {
+                let value = if dab < dabs_before { 1.5 } else { 3e3 };
+                let first = [0; 3].map(|_| 2 + (random.unit() * (m - 9) as f64) as usize);
+                let at = SampleBox { first, count: [5; 3] };
+                let values = vec![value; at.len()];
+                p.paint(Substance::Stiffness, OnBox { at, values: &values })
+                    .unwrap();
+                let mut exact = settled(&p, 3.0);
+                let report = p.step(Integrator::Paper, 3.0).unwrap();
+                assert!(report.solve.iteration.residual < 3e-3, "{report:?}");
+                exact.step(Integrator::Paper, 3.0).unwrap();
+                let pairs = || p.state().w.iter().zip(&exact.state().w);
+                let apart: f64 = pairs().map(|(a, b)| f64::from(a - b).powi(2)).sum();
+                let size: f64 = pairs().map(|(_, b)| f64::from(*b).powi(2)).sum();
+                let error = (apart / size).sqrt();
+                assert!(error < 1e-2, "{dabs_before} {seed} dab {dab}: {error:.1e}");
+            }
         }
     }
 }

@@ -9,6 +9,7 @@ use dynamics::paint::Substance;
 use dynamics::patch::Patch;
 use dynamics::region::{Cells, Region, RegionOptions, RegionSnapshot, Schedule, Turn};
 use dynamics::solve::{Method, SolverOptions};
+use dynamics::sparse::{Mask, MaskedWay};
 use dynamics::springs::{Law, Neighbours, Plasticity};
 use sha2::{Digest, Sha256};
 
@@ -364,7 +365,14 @@ fn a_budget_of_time_is_replayed_by_how_many_had_their_turn() {
 }
 
 /// Hash of a scene in which every solver and law takes part.
-fn recorded_scene(m: usize, n: usize, law: Law, neighbours: Neighbours, direct_limit: usize) -> String {
+fn recorded_scene(
+    m: usize,
+    n: usize,
+    law: Law,
+    neighbours: Neighbours,
+    direct_limit: usize,
+    masked: Option<MaskedWay>,
+) -> String {
     let rim = if n == m { Rim::Free } else { Rim::Fixed };
     let lattice = Lattice::<f32>::cube(n, m, rim, 0.5).unwrap();
     let count = lattice.sample_count();
@@ -383,9 +391,15 @@ fn recorded_scene(m: usize, n: usize, law: Law, neighbours: Neighbours, direct_l
     };
     let options = SolverOptions {
         direct_limit,
+        masked: masked.unwrap_or(MaskedWay::Best),
         ..SolverOptions::default()
     };
     let mut patch = Patch::new(lattice, matter, law, neighbours, &d, options).unwrap();
+    if masked.is_some() {
+        let inside = (0..count).map(|i| at(i).map(|c| (c - 0.5).powi(2)).iter().sum::<f64>() < 0.2);
+        let mask = Mask::new(patch.lattice(), inside.collect(), Rim::Free, neighbours).unwrap();
+        patch = patch.with_mask(mask).unwrap();
+    }
     patch.set_plasticity(Plasticity::Clay { rate: 3.0 }).unwrap();
     let force: Vec<f32> = (0..count)
         .map(|i| {
@@ -417,19 +431,31 @@ fn recorded_hashes_hold_on_every_processor() {
     let (linear, four_d) = (Law::Linear { scale: 1.0 }, Law::FourD { scale: 1.0 });
     let found = [
         // Factor, factor beside the steps, and factor and multigrid on the samples.
-        recorded_scene(12, 10, linear, Neighbours::Six, 1000),
-        recorded_scene(14, 12, linear, Neighbours::Six, 100),
-        recorded_scene(12, 10, four_d, Neighbours::Eighteen, 1000),
-        recorded_scene(9, 9, linear, Neighbours::Six, 1000),
-        recorded_scene(9, 9, linear, Neighbours::Six, 100),
+        recorded_scene(12, 10, linear, Neighbours::Six, 1000, None),
+        recorded_scene(14, 12, linear, Neighbours::Six, 100, None),
+        recorded_scene(12, 10, four_d, Neighbours::Eighteen, 1000, None),
+        recorded_scene(9, 9, linear, Neighbours::Six, 1000, None),
+        recorded_scene(9, 9, linear, Neighbours::Six, 100, None),
+        // A ball of the box.
+        recorded_scene(12, 10, linear, Neighbours::Six, 1000, Some(MaskedWay::Best)),
+        recorded_scene(
+            12,
+            10,
+            four_d,
+            Neighbours::Six,
+            1000,
+            Some(MaskedWay::SparseFactor),
+        ),
     ];
     assert_eq!(found, RECORDED);
 }
 
-const RECORDED: [&str; 5] = [
+const RECORDED: [&str; 7] = [
     "af9486a266bc6d3a",
-    "43ef845bf9fe1675",
-    "595938a85e542f90",
+    "6b98a66b2011166d",
+    "bede5369be31f6db",
     "608c5e69271f2778",
     "eb8b4b5a4b17d7d7",
+    "210dbdaa4c371502",
+    "d74e1dd636759f22",
 ];
