@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use bspline::HierarchicalSpline;
-use bspline::hierarchical::{BrickKey, DenseCorrections, Lattice};
+use bspline::hierarchical::{BrickKey, DenseCorrections, Lattice, LevelEdit};
 use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 
@@ -50,6 +50,15 @@ impl Ball {
     pub fn function(&self, p: DVec3) -> [u32; 3] {
         let p = p * f64::from(1u32 << self.level);
         p.to_array().map(|p| p as u32 + 1)
+    }
+
+    /// Adds to the function next to a point, in cells of the finest level.
+    pub fn edit(&self, p: DVec3, cells: f64) -> LevelEdit<f32> {
+        LevelEdit {
+            level: self.level,
+            function: self.function(p),
+            delta: (cells * self.cell()) as f32,
+        }
     }
 
     /// Where a stroke along the surface is after `i` steps of one finest interval each.

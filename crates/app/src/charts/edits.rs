@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Instant;
 
-use bspline::hierarchical::{BlockEdit, Change, LevelEdit};
+use bspline::hierarchical::{BlockEdit, Change};
 use bspline::polygonize::{
     AdaptiveBlockMesh, AdaptiveOptions, BlockMesh, PolygonizeError, PolygonizeOptions,
 };
@@ -60,20 +60,17 @@ pub fn edit_costs(
     Ok(all)
 }
 
+const OF_LATTICE: &str = "functions next to the ball are the lattice's";
+
 fn measure(ball: &Ball) -> Result<EditCosts, PolygonizeError> {
     let field = &ball.field;
-    let edit = |p: DVec3| LevelEdit {
-        level: ball.level,
-        function: ball.function(p),
-        delta: 0.01 * ball.cell() as f32,
-    };
+    let edit = |p: DVec3| ball.edit(p, 0.01);
     let block = |i: usize| BlockEdit {
         level: ball.level,
         first: ball.function(ball.stroke(i)).map(|f| f - 12),
         shape: [24; 3],
         change: Change::Add(vec![0.001 * ball.cell() as f32; 24 * 24 * 24]),
     };
-    const OF_LATTICE: &str = "functions next to the ball are the lattice's";
     let one = |i: usize| field.edited(&[edit(ball.stroke(i))]).expect(OF_LATTICE);
     let scattered: Vec<_> = (0..10_000).map(|i| edit(Ball::scattered(i))).collect();
     // The first hash is that of the whole field.
@@ -109,8 +106,12 @@ fn measure(ball: &Ball) -> Result<EditCosts, PolygonizeError> {
     });
     costs.push(("drop_us", middle(drops.collect())));
     costs.push(("remesh20_us", remeshed(ball)?));
-    costs.push(("remesh20_live_us", remeshed_adaptively(ball, false)?));
-    costs.push(("remesh20_settled_ms", remeshed_adaptively(ball, true)? / 1e3));
+    let [live, live_edit] = remeshed_adaptively(ball, false)?;
+    let [settled, settled_edit] = remeshed_adaptively(ball, true)?;
+    costs.push(("remesh20_live_us", live));
+    costs.push(("remesh20_settled_ms", settled / 1e3));
+    costs.push(("remesh_edit_live_us", live_edit));
+    costs.push(("remesh_edit_settled_ms", settled_edit / 1e3));
     let tools = [("tool10_ms", 10.0), ("tool20_ms", 20.0), ("tool40_ms", 40.0)];
     costs.extend(tools.map(|(name, across)| (name, carved(ball, across))));
     costs.extend(questions(ball));
@@ -139,8 +140,9 @@ fn remeshed(ball: &Ball) -> Result<f64, PolygonizeError> {
     remeshing(ball, |changed| mesh.update(&ball.field, &[changed]).map(drop))
 }
 
-/// Microseconds to mesh 20 cells again in a mesh that follows the surface, of cells as small as the field's.
-fn remeshed_adaptively(ball: &Ball, settled: bool) -> Result<f64, PolygonizeError> {
+/// Microseconds to mesh again, in a mesh that follows the surface, of cells as small as the field's: 20 cells, and where
+/// an edit of one coefficient changed values or bounds.
+fn remeshed_adaptively(ball: &Ball, settled: bool) -> Result<[f64; 2], PolygonizeError> {
     let frame = Frame {
         world_from_grid: DAffine3::IDENTITY,
         cells: [CELLS; 3],
@@ -152,7 +154,20 @@ fn remeshed_adaptively(ball: &Ball, settled: bool) -> Result<f64, PolygonizeErro
     };
     let error = 0.02 * ball.cell();
     let mut mesh = AdaptiveBlockMesh::new(&ball.field, &frame, &options, error, settled)?;
-    remeshing(ball, |changed| mesh.update(&ball.field, &[changed]).map(drop))
+    let of_cells = remeshing(ball, |changed| mesh.update(&ball.field, &[changed]).map(drop))?;
+    let within = ball.field.lattice().world_box();
+    let mut field = ball.field.clone();
+    let times = (0..50).map(|i| {
+        let edited = field
+            .edited(&[ball.edit(ball.stroke(i), 0.05)])
+            .expect(OF_LATTICE);
+        let changed = edited.changed_boxes(&field, &within);
+        field = edited;
+        let start = Instant::now();
+        mesh.update(&field, &changed)?;
+        Ok(start.elapsed().as_secs_f64() * 1e6)
+    });
+    Ok([of_cells, middle(times.collect::<Result<_, _>>()?)])
 }
 
 /// Median time of 50 updates, microseconds.

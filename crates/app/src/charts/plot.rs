@@ -122,9 +122,9 @@ impl Chart {
             }
             // A series of one point would hide under the others.
             let radius = if line.len() == 1 { 7 } else { 4 };
-            chart.draw_series(line.iter().map(|&p| Circle::new(p, radius, color.filled())))?;
             for (x, y, label) in points {
                 let at = chart.backend_coord(&(x, y));
+                draw_marker(&above, i, at, radius)?;
                 words.push((at, label, color));
             }
         }
@@ -160,9 +160,10 @@ impl Chart {
             let name = Text::new(self.legend(series), (x + 34, y - 7), ("sans-serif", 14));
             let drawn = area
                 .draw(&PathElement::new([(x, y), (x + 24, y)], color.stroke_width(3)))
-                .and_then(|()| area.draw(&Circle::new((x + 12, y), 4, color.filled())))
-                .and_then(|()| area.draw(&name));
-            drawn.map_err(|e| e.to_string())?;
+                .map_err(|e| e.to_string())
+                .and_then(|()| draw_marker(area, i, (x + 12, y), 4))
+                .and_then(|()| area.draw(&name).map_err(|e| e.to_string()));
+            drawn?;
         }
         Ok(())
     }
@@ -206,6 +207,22 @@ impl Chart {
         }
         Ok(())
     }
+}
+
+/// The sign of series `i` at a pixel: of as many as there are colours a disk, of as many more a triangle, then a cross.
+fn draw_marker(
+    area: &DrawingArea<SVGBackend<'_>, Shift>,
+    i: usize,
+    at: (i32, i32),
+    radius: i32,
+) -> Result<(), String> {
+    let color = COLORS[i % COLORS.len()];
+    let drawn = match i / COLORS.len() {
+        0 => area.draw(&Circle::new(at, radius, color.filled())),
+        1 => area.draw(&TriangleMarker::new(at, radius + 2, color.filled())),
+        _ => area.draw(&Cross::new(at, radius + 1, color.stroke_width(3))),
+    };
+    drawn.map_err(|e| e.to_string())
 }
 
 /// Writes the words beside their points where they hide neither a point nor another word; where no side is free,
@@ -320,6 +337,26 @@ mod tests {
         assert_eq!(lines(&chart.svg().unwrap()) + 1, lines(&svg));
         // The marker of the legend and the two points.
         assert_eq!(svg.matches("<circle").count(), 3);
+    }
+
+    #[test]
+    fn series_of_one_colour_have_other_signs() {
+        let series = |i: usize| Series {
+            name: format!("series {i}"),
+            points: vec![(1.0, 1.0 + i as f64, String::new()), (2.0, 2.0, String::new())],
+        };
+        let chart = |count: usize| Chart {
+            title: String::new(),
+            x_title: String::new(),
+            y_title: String::new(),
+            depth: DEPTH,
+            series: (0..count).map(series).collect(),
+            is_joined: true,
+        };
+        let disks = |count: usize| chart(count).svg().unwrap().matches("<circle").count();
+        let triangles = |count: usize| chart(count).svg().unwrap().matches("<polygon").count();
+        assert_eq!([8, 16, 17].map(disks), [24; 3]);
+        assert_eq!([8, 16, 17].map(triangles), [0, 24, 24]);
     }
 
     #[test]

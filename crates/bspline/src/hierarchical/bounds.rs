@@ -1,13 +1,15 @@
 //! A sound interval over a box: the field is inside the convex hull of its control coefficients.
 
+use std::ops::Range;
+
 use glam::DVec3;
 
-use super::brick::{BRICK, HALO};
+use super::brick::{BRICK, HALO, HALO_LEN};
 use super::node::Node;
 use super::spline::HierarchicalSpline;
 use crate::placed_box::PlacedBox;
 use crate::restrict::{RestrictedAxis, restricted_range};
-use crate::{Aabb, Interval, Real};
+use crate::{Aabb, Interval, Real, vectorized};
 
 /// Distance, in cells of the finest level, within which the end of a box counts as lying on a knot plane.
 const ON_KNOT: f64 = 1e-9;
@@ -157,13 +159,29 @@ fn visit<T: Real>(node: &Node<T>, extent: &DVec3, b: &Aabb, hull: &mut Hull) {
     if !node.has_children() {
         return hull.add_part(node, &part);
     }
-    for octant in 0..8usize {
+    for octant in octants_met(node, extent, b) {
         if let Some(child) = node.child(octant) {
             visit(child, extent, b, hull);
         } else if let Some(part) = own_part(node, octant, extent, b) {
             hull.add_part(node, &part);
         }
     }
+}
+
+/// The octants of a node with which a box [shares](shared) a part, found axis by axis.
+pub(super) fn octants_met<T: Real>(
+    node: &Node<T>,
+    extent: &DVec3,
+    b: &Aabb,
+) -> impl Iterator<Item = usize> + use<T> {
+    let (corner, end) = corners(node, extent);
+    let middle = corner + node.width() / 2.0;
+    let met = |low: DVec3, high: DVec3| {
+        let (min, max) = (b.min.max(low), b.max.min(high));
+        (min.cmplt(max) | (min.cmpeq(max) & b.min.cmpeq(b.max))).bitmask() as usize
+    };
+    let halves = [met(corner, middle.min(end)), met(middle, end)];
+    (0..8).filter(move |octant| (0..3).all(|a| halves[octant >> (2 - a) & 1] >> a & 1 == 1))
 }
 
 /// The box of a node's cells, in lattice coordinates.
@@ -209,17 +227,50 @@ fn read_range<T: Real>(brick: &Node<T>, within: &[[f64; 2]; 3]) -> [f64; 2] {
         let first = (a as usize).min(BRICK - 1);
         first..(b.ceil() as usize).max(first + 1) + 3
     });
-    // Comparisons as written here turn into vector instructions; `Float::min` does not.
     let totals = brick.own_totals();
-    let (mut lo, mut hi) = (T::infinity(), T::neg_infinity());
-    for x in x {
-        for y in y.clone() {
-            let row = (x * HALO + y) * HALO;
-            for &c in &totals[row + z.start..row + z.end] {
-                lo = if c < lo { c } else { lo };
-                hi = if c > hi { c } else { hi };
+    vectorized(
+        #[inline(always)]
+        || match z.len() <= 8 {
+            true => range_of::<T, 8>(totals, &x, &y, &z),
+            false => range_of::<T, 16>(totals, &x, &y, &z),
+        },
+    )
+}
+
+/// Least and largest coefficient of the ranges, `z` no longer than `L`: a lane for each along `z`. What the lanes beyond
+/// find nobody looks at.
+#[inline(always)]
+fn range_of<T: Real, const L: usize>(
+    totals: &[T; HALO_LEN],
+    x: &Range<usize>,
+    y: &Range<usize>,
+    z: &Range<usize>,
+) -> [f64; 2] {
+    let (mut lo, mut hi) = ([T::infinity(); L], [T::neg_infinity(); L]);
+    for i in x.clone() {
+        for j in y.clone() {
+            let row: [T; L] = lanes(totals, (i * HALO + j) * HALO + z.start);
+            for k in 0..L {
+                // Comparisons as written here turn into vector instructions; `Float::min` does not.
+                lo[k] = if row[k] < lo[k] { row[k] } else { lo[k] };
+                hi[k] = if row[k] > hi[k] { row[k] } else { hi[k] };
             }
         }
     }
-    [lo.as_f64(), hi.as_f64()]
+    let least = lo[..z.len()]
+        .iter()
+        .fold(T::infinity(), |m, c| if *c < m { *c } else { m });
+    let most = hi[..z.len()]
+        .iter()
+        .fold(T::neg_infinity(), |m, c| if *c > m { *c } else { m });
+    [least.as_f64(), most.as_f64()]
+}
+
+/// `L` totals from a place on; those beyond the last are 0.
+#[inline(always)]
+pub(super) fn lanes<T: Real, const L: usize>(totals: &[T; HALO_LEN], start: usize) -> [T; L] {
+    match totals.get(start..start + L) {
+        Some(row) => row.try_into().expect("L of them"),
+        None => std::array::from_fn(|k| totals.get(start + k).copied().unwrap_or(T::zero())),
+    }
 }

@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use glam::{DMat3, DVec3};
 
-use super::bounds::{corners, local_box, onto_knots, own_part, shared};
-use super::brick::{BRICK, HALO, HALO_LEN};
+use super::bounds::{corners, lanes, local_box, octants_met, onto_knots, own_part, shared};
+use super::brick::{BRICK, HALO};
 use super::node::Node;
 use super::spline::HierarchicalSpline;
 use crate::{Aabb, Real, vectorized};
@@ -67,7 +67,7 @@ fn over_parts<T: Real>(spline: &HierarchicalSpline<T>, node: &Node<T>, part: &Aa
     }
     let extent = spline.lattice().extent();
     let mut most = 0f64;
-    for octant in 0..8 {
+    for octant in octants_met(node, &extent, part) {
         if let Some(child) = node.child(octant) {
             most = most.max(over_node(spline, child, part));
         } else if let Some(part) = own_part(node, octant, &extent, part) {
@@ -97,15 +97,6 @@ fn of_part<T: Real>(brick: &Node<T>, part: &Aabb) -> Second {
     let rounding = 128.0 * T::UNIT_ROUND_OFF * largest.as_f64();
     let scale = brick.scale().powi(2);
     found.map(|d| (d.as_f64() + rounding) * scale)
-}
-
-/// `L` coefficients from a place on; those beyond the last are 0.
-#[inline(always)]
-fn lanes<T: Real, const L: usize>(totals: &[T; HALO_LEN], start: usize) -> [T; L] {
-    match totals.get(start..start + L) {
-        Some(row) => row.try_into().expect("L of them"),
-        None => std::array::from_fn(|k| totals.get(start + k).copied().unwrap_or(T::zero())),
-    }
 }
 
 #[inline(always)]

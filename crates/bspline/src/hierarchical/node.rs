@@ -24,6 +24,8 @@ pub(crate) struct Node<T> {
     pub corrections: Option<Arc<Corrections<T>>>,
     /// Least and largest coefficient that the evaluation of any point of the node reads, here or below.
     pub hull: [T; 2],
+    /// Least and largest of the totals, if some of the node's points are evaluated from them.
+    own_hull: Option<[T; 2]>,
     /// Active functions here and below.
     pub count: u64,
     /// Bricks with totals here and below.
@@ -51,8 +53,9 @@ impl<T> fmt::Debug for Node<T> {
 }
 
 impl<T: Real> Node<T> {
-    /// A node with its summary, gathered from its own totals and its children.
+    /// A node with its summary, gathered from its own totals and its children; `old` is what stood there before.
     pub fn new(
+        old: Option<&Self>,
         (level, key): (i8, BrickKey),
         totals: Option<Arc<[T; HALO_LEN]>>,
         corrections: Option<Arc<Corrections<T>>>,
@@ -63,6 +66,7 @@ impl<T: Real> Node<T> {
             level,
             key,
             hull: [T::infinity(), T::neg_infinity()],
+            own_hull: None,
             count: own_count,
             brick_count: u64::from(totals.is_some()),
             level_count: if own_count > 0 { level as u8 + 1 } else { 0 },
@@ -82,8 +86,12 @@ impl<T: Real> Node<T> {
             node.hull = [node.hull[0].min(child.hull[0]), node.hull[1].max(child.hull[1])];
         }
         // A child that is missing leaves its cells to this brick.
-        if let Some(totals) = node.totals.as_deref().filter(|_| !is_covered) {
-            let own = min_max(totals.as_slice());
+        if let Some(totals) = node.totals.as_ref().filter(|_| !is_covered) {
+            // Totals that are shared need not be read again: of a node on the way to a change they are far from the cache.
+            let is_old = |old: &&Self| old.totals.as_ref().is_some_and(|t| Arc::ptr_eq(t, totals));
+            let known = old.filter(is_old).and_then(|old| old.own_hull);
+            let own = known.unwrap_or_else(|| min_max(totals.as_slice()));
+            node.own_hull = Some(own);
             node.hull = [node.hull[0].min(own[0]), node.hull[1].max(own[1])];
         }
         node

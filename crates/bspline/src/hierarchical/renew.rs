@@ -92,6 +92,7 @@ impl<T: Real> Renewal<'_, T> {
             return Some(old.clone());
         }
         Some(Arc::new(Node::new(
+            self.old.map(|old| &**old),
             self.place,
             totals,
             corrections.cloned(),

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::bounds::{Roots, corners, local_box, own_part, shared};
+use super::bounds::{Roots, corners, local_box, octants_met, own_part, shared};
 use super::brick::{BRICK, HALO};
 use super::node::Node;
 use crate::restrict::{RestrictedAxis, slope_ranges};
@@ -52,12 +52,13 @@ fn visit<T: Real>(node: &Node<T>, extent: &DVec3, b: &Aabb, hull: &mut Option<[I
     if !node.has_children() {
         return add(&part);
     }
-    for octant in 0..8 {
+    let octants = || octants_met(node, extent, b);
+    for octant in octants() {
         if let (None, Some(part)) = (node.child(octant), own_part(node, octant, extent, b)) {
             add(&part);
         }
     }
-    for child in (0..8).filter_map(|octant| node.child(octant)) {
+    for child in octants().filter_map(|octant| node.child(octant)) {
         visit(child, extent, b, hull);
     }
 }

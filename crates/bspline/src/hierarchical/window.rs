@@ -156,7 +156,12 @@ impl<'a, T: Real> Window<'a, T> {
             return None;
         }
         let mut totals = old.clone();
-        for (slots, (ahead, corrections)) in changed.iter().zip(self.corrections()) {
+        for (n, slots) in changed.iter().enumerate() {
+            // Nodes beside the place are not read where nothing changes in them.
+            if *slots == [0; BRICK] {
+                continue;
+            }
+            let (ahead, corrections) = (ahead(n), self.places[n].corrections(self.depth));
             for slot in active_slots(slots) {
                 let within = [slot / 64, slot / 8 % 8, slot % 8];
                 let at = std::array::from_fn(|a| BRICK * ahead[a] + within[a]);

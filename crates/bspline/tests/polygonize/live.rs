@@ -2,13 +2,14 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use bspline::hierarchical::{BrickKey, Corrections, Lattice, LevelCorrections, LevelEdit};
 use bspline::polygonize::{
     AdaptiveBlock, AdaptiveBlockMesh, AdaptiveOptions, Mesh, PolygonizeError, check_mesh,
 };
 use bspline::primitives::Sphere;
-use bspline::{Aabb, Field, HierarchicalSpline};
+use bspline::{Aabb, Field, HierarchicalSpline, Interval, Jet};
 use glam::{DAffine3, DVec3};
 
 use super::adaptive::{meshed, options};
@@ -230,6 +231,46 @@ fn an_update_costs_what_changed_and_not_the_mesh() {
         ] {
             assert!(many <= 2 * few, "{first:?} grows to {last:?}");
         }
+    }
+}
+
+/// A field that counts the points at which its gradient is asked for.
+struct Asked(Sphere, AtomicUsize);
+
+impl Field for Asked {
+    fn value(&self, p: DVec3) -> f64 {
+        self.0.value(p)
+    }
+    fn value_gradient(&self, p: DVec3) -> (f64, DVec3) {
+        self.1.fetch_add(1, Ordering::Relaxed);
+        self.0.value_gradient(p)
+    }
+    fn jet(&self, p: DVec3) -> Jet {
+        self.0.jet(p)
+    }
+    fn bounds(&self, b: &Aabb) -> Interval {
+        self.0.bounds(b)
+    }
+}
+
+/// Vertices are placed cell by cell: those of the 20 blocks that such a box meets with their neighbours' are a thousand.
+#[test]
+fn a_change_of_one_cell_asks_for_vertices_next_to_it_alone() {
+    let sphere = Sphere::new(DVec3::ZERO, 0.7).expect("a sphere");
+    let field = Asked(sphere, AtomicUsize::new(0));
+    let frame = cube(1.0, 8);
+    let mut mesh = AdaptiveBlockMesh::new(&field, &frame, &options(3), 1e-4, false).expect("a mesh");
+    let cell = 2.0 / 64.0;
+    for direction in [DVec3::X, DVec3::ONE, DVec3::new(0.3, -0.8, 0.5)] {
+        let corner = (0.7 * direction.normalize() / cell).floor() * cell;
+        let before = field.1.load(Ordering::Relaxed);
+        let update = mesh
+            .update(&field, &[Aabb::new(corner, corner + cell)])
+            .expect("an update");
+        let asked = field.1.load(Ordering::Relaxed) - before;
+        assert!(update.placed > 0 && asked > 0);
+        // Two steps each; a sheet of 5 by 5 cells, of two levels or where three faces meet.
+        assert!(asked <= 2 * 100, "{asked} points");
     }
 }
 

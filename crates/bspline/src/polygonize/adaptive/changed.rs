@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::grid::{Grids, octant_place};
+use super::grid::{Cells, Grids, octant_place};
 use crate::Aabb;
 use crate::polygonize::blocks::{BlockKey, CELLS};
 
@@ -53,6 +53,28 @@ impl Changed {
         among
             .filter(|b| self.meets(level, lo, CELLS as f64, reach, *b))
             .collect()
+    }
+
+    /// Cells of a block that some of the boxes meet within `reach` cells, ends included.
+    pub fn cells(&self, level: usize, key: BlockKey, reach: f64, among: &[u32]) -> Cells {
+        let scale = self.scale(level);
+        let mut found = [0; CELLS];
+        for &b in among {
+            let [min, max] = self.boxes[b as usize];
+            // Cells from the first to the last on each axis; too far ones saturate.
+            let range = |a: usize| {
+                let start = f64::from(key[a]) * CELLS as f64;
+                let first = (min[a] / scale - reach - start - 1.0).ceil().max(0.0) as usize;
+                let end = (max[a] / scale + reach - start).floor().max(-1.0) + 1.0;
+                first..(end as usize).min(CELLS)
+            };
+            let [x, y, z] = [range(0), range(1), range(2)];
+            let plane = y.fold(0u64, |word, j| {
+                z.clone().fold(word, |word, k| word | 1 << (CELLS * j + k))
+            });
+            x.for_each(|i| found[i] |= plane);
+        }
+        found
     }
 
     /// Whether box `b` meets `size` cells of `level` from the place `lo`, ends included, within `reach` cells.

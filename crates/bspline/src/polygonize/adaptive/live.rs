@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::around::Around;
 use super::changed::Changed;
 use super::grid::{Cells, Grids, NONE};
-use super::octree::Place;
+use super::octree::{Change, Place};
 use super::patch::{At, Calming, calm};
 use super::pieces::{Calm, Corner, Parts, Pen, Piece, corner};
 use super::polygons::EXTRA;
@@ -17,7 +17,7 @@ use super::sample::Judge;
 use super::tree::Limits;
 use super::vertices::{self, BlockVertices, Placer};
 use super::{AdaptiveOptions, checked, steps};
-use crate::polygonize::blocks::{BlockGrid, Dirty, find_blocks};
+use crate::polygonize::blocks::{BlockGrid, CELLS, Dirty, find_blocks};
 use crate::polygonize::{PolygonizeError, PolygonizeOptions};
 use crate::{Aabb, Field, Frame};
 
@@ -150,8 +150,13 @@ impl AdaptiveBlockMesh {
             depth: self.options.depth,
             blocks: self.options.max_blocks,
         };
-        let keys = first.map_or(&[][..], Dirty::blocks);
-        let followed = self.parts.octree.follow(&judge, &roots, keys, boxes, &limits)?;
+        let followed = self.parts.octree.follow(&Change {
+            judge: &judge,
+            roots: &roots,
+            dirty: first.map_or(&[][..], Dirty::blocks),
+            boxes,
+            limits: &limits,
+        })?;
         let mut update = AdaptiveUpdate {
             sampled: followed.sampled,
             ..Default::default()
@@ -175,13 +180,8 @@ impl AdaptiveBlockMesh {
         let world = dirty.map(|d| d.1);
         let mut seeds: Vec<At> = Vec::new();
 
-        let mut renew = followed.about.clone();
-        renew.extend(
-            self.near(boxes, world, NEWTON)
-                .into_iter()
-                .map(|(place, _)| place),
-        );
-        let moved = self.place(field, &mut renew, &mut seeds);
+        let renew = self.to_place(boxes, world, &followed.about);
+        let moved = self.place(field, &renew, &mut seeds);
         update.placed = renew.len();
 
         let mut redraw = followed.about;
@@ -264,16 +264,30 @@ impl AdaptiveBlockMesh {
         found
     }
 
-    /// Places the vertices of some blocks anew, which it sorts; gives the blocks where that changed something, with the
-    /// leaves, and adds the vertices that are new or moved to `seeds`.
+    /// Blocks whose vertices are to be placed, with the cells in which: all in blocks that are divided otherwise or lie
+    /// beside such, else those near the change.
+    fn to_place(&self, boxes: &Changed, world: Option<&[Aabb]>, about: &[Place]) -> Vec<(Place, Cells)> {
+        const ALL: Cells = [u64::MAX; CELLS];
+        let mut renew: Vec<(Place, Cells)> = about.iter().map(|place| (*place, ALL)).collect();
+        for (place, among) in self.near(boxes, world, NEWTON) {
+            let own = self.parts.octree.block(place).key;
+            let stale = boxes.cells(place.0, own, NEWTON, &among);
+            if about.binary_search(&place).is_err() && stale != [0; CELLS] {
+                renew.push((place, stale));
+            }
+        }
+        renew.sort_unstable();
+        renew
+    }
+
+    /// Places the vertices of some cells of blocks anew; gives the blocks where that changed something, with the leaves,
+    /// and adds the vertices that are new or moved to `seeds`.
     fn place(
         &mut self,
         field: &dyn Field,
-        renew: &mut Vec<Place>,
+        renew: &[(Place, Cells)],
         seeds: &mut Vec<At>,
     ) -> Vec<(Place, Cells)> {
-        renew.sort_unstable();
-        renew.dedup();
         let tree = &self.parts.octree.tree;
         let placer = Placer {
             field,
@@ -284,13 +298,14 @@ impl AdaptiveBlockMesh {
         let made: Vec<BlockVertices> = renew
             .par_iter()
             .with_min_len(2)
-            .map_init(vertices::Scratch::default, |scratch, &(level, slot)| {
-                let around = Around::new(tree, level, &tree[level][slot as usize]);
-                BlockVertices::new(&placer, &around, scratch)
+            .map_init(vertices::Scratch::default, |scratch, ((level, slot), cells)| {
+                let around = Around::new(tree, *level, &tree[*level][*slot as usize]);
+                let old = &self.parts.vertices[*level][*slot as usize];
+                BlockVertices::renewed(&placer, &around, Some((old, cells)), scratch)
             })
             .collect();
         let mut moved = Vec::new();
-        for (&(level, slot), new) in renew.iter().zip(made) {
+        for (&((level, slot), _), new) in renew.iter().zip(made) {
             let old = &mut self.parts.vertices[level][slot as usize];
             if old.is_same(&new) {
                 continue;

@@ -35,6 +35,18 @@ pub(super) struct Octree {
     blank: Arc<Sample>,
 }
 
+/// A change of the field, and what to judge cells by now.
+pub(super) struct Change<'a> {
+    pub judge: &'a Judge<'a>,
+    /// Blocks of the first level in `dirty` that may hold surface, sorted.
+    pub roots: &'a [BlockKey],
+    /// Blocks of the first level in which the field may have changed, sorted.
+    pub dirty: &'a [BlockKey],
+    /// Where it may have changed.
+    pub boxes: &'a Changed,
+    pub limits: &'a Limits,
+}
+
 /// What has become of the blocks.
 #[derive(Default)]
 pub(super) struct Followed {
@@ -151,21 +163,14 @@ impl Octree {
         found.filter(|n| **n != NONE).map(move |n| (place.0 + 1, *n))
     }
 
-    /// Follows a change of the field. `roots` are the blocks of the first level in `dirty` that may hold surface, and
-    /// `dirty` those in which the field may have changed, both sorted.
-    pub fn follow(
-        &mut self,
-        judge: &Judge,
-        roots: &[BlockKey],
-        dirty: &[BlockKey],
-        changed: &Changed,
-        limits: &Limits,
-    ) -> Result<Followed, PolygonizeError> {
+    /// Follows a change of the field.
+    pub fn follow(&mut self, change: &Change) -> Result<Followed, PolygonizeError> {
+        let (judge, limits) = (change.judge, change.limits);
         let mut found = Followed::default();
         // Blocks that are divided otherwise, by level, with how they were.
         let mut divided: Vec<Vec<(u32, Cells)>> = vec![Vec::new(); limits.depth + 1];
         let mut unsampled = Vec::new();
-        let first = self.judge(judge, roots, dirty, changed, limits, &mut found, &mut divided)?;
+        let first = self.judge(change, &mut found, &mut divided)?;
         self.balance(judge.grids, &mut divided, &mut unsampled);
         self.settle_cells(judge.grids, first, &divided, &mut unsampled, &mut found);
         let samples: Vec<Arc<Sample>> = unsampled
@@ -196,14 +201,17 @@ impl Octree {
     /// Step 1. Gives the blocks of the first level that it met.
     fn judge(
         &mut self,
-        judge: &Judge,
-        roots: &[BlockKey],
-        dirty: &[BlockKey],
-        changed: &Changed,
-        limits: &Limits,
+        change: &Change,
         found: &mut Followed,
         divided: &mut [Vec<(u32, Cells)>],
     ) -> Result<Vec<u32>, PolygonizeError> {
+        let Change {
+            judge,
+            roots,
+            dirty,
+            boxes: changed,
+            limits,
+        } = *change;
         let grids = judge.grids;
         let all = changed.all();
         let mut keys: Vec<(BlockKey, Cells)> = roots.iter().map(|&key| (key, grids.domain(0, key))).collect();

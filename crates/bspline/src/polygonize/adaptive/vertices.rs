@@ -124,6 +124,16 @@ impl BlockVertices {
 
     /// Finds and places the vertices of a block.
     pub fn new(placer: &Placer, around: &Around, scratch: &mut Scratch) -> Self {
+        Self::renewed(placer, around, None, scratch)
+    }
+
+    /// [`Self::new`] where of the cells of `known` all but some are as they were when its vertices were placed.
+    pub fn renewed(
+        placer: &Placer,
+        around: &Around,
+        known: Option<(&Self, &Cells)>,
+        scratch: &mut Scratch,
+    ) -> Self {
         let (grids, level, block) = (placer.grids, around.level, around.block);
         let own = block.key.map(|b| b * CELLS as i32);
         let cells: [i32; 3] = std::array::from_fn(|a| grids.cells(level, a));
@@ -133,7 +143,8 @@ impl BlockVertices {
         let border = grids.meets_border(level, block.key);
         let mut made = Self::default();
         scratch.cells.clear();
-        let candidates: Cells = std::array::from_fn(|x| leaves[x] & (crossed[x] | beside[x]));
+        let stale = known.map_or([u64::MAX; CELLS], |(_, stale)| *stale);
+        let candidates: Cells = std::array::from_fn(|x| leaves[x] & (crossed[x] | beside[x]) & stale[x]);
         for c in each(candidates) {
             let cell: [i32; 3] = std::array::from_fn(|a| own[a] + c[a] as i32);
             let capped = border && (0..3).any(|a| cell[a] < 0 || cell[a] >= cells[a]);
@@ -190,7 +201,33 @@ impl BlockVertices {
         }
         // Leaves with one loop beside others with several need no names: the lookup gives them loop 0.
         made.place(placer, level, scratch);
-        made
+        match known {
+            Some((known, stale)) => made.with_others(known, stale),
+            None => made,
+        }
+    }
+
+    /// Adds the vertices of another version of the block but for those of some cells.
+    fn with_others(self, other: &Self, but: &Cells) -> Self {
+        let is_kept = |leaf: u16| {
+            let c = [leaf >> 6, leaf >> 3 & 7, leaf & 7].map(usize::from);
+            !holds(but, c)
+        };
+        let mut both = Self {
+            holding: std::array::from_fn(|x| self.holding[x] | other.holding[x] & !but[x]),
+            ..Self::default()
+        };
+        let kept = (0..other.names.len()).filter(|n| is_kept(other.names[*n] >> LOOP_BITS));
+        let mut from: Vec<(&Self, usize)> = kept.map(|n| (other, n)).collect();
+        from.extend((0..self.names.len()).map(|n| (&self, n)));
+        from.sort_unstable_by_key(|(of, n)| of.names[*n]);
+        for (of, n) in from {
+            both.push(of.positions[n], of.keys[n], of.names[n], of.fixed[n]);
+        }
+        both.more = joined(&other.more, &self.more, |m| m.0, is_kept);
+        both.crossings = joined(&other.crossings, &self.crossings, |c| c.0, is_kept);
+        both.twice = joined(&other.twice, &self.twice, |s| s.0, is_kept);
+        both
     }
 
     fn push(&mut self, at: DVec3, key: u64, name: u16, fixed: bool) {
@@ -239,6 +276,15 @@ impl BlockVertices {
             }
         }
     }
+}
+
+/// What is said of the leaves kept, and of others, in the order of the leaves.
+fn joined<E: Copy>(old: &[E], new: &[E], leaf: impl Fn(&E) -> u16, is_kept: impl Fn(u16) -> bool) -> Vec<E> {
+    let kept = old.iter().filter(|e| is_kept(leaf(e)));
+    let mut both: Vec<E> = kept.chain(new).copied().collect();
+    // Those of a leaf stay in their order.
+    both.sort_by_key(leaf);
+    both
 }
 
 /// Newton steps onto the surface, none longer than `longest`.
