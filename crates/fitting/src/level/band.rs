@@ -3,45 +3,14 @@
 use bspline::Real;
 use rustc_hash::{FxHashMap, FxHashSet};
 
+pub(crate) use super::brick::{BRICK, BRICK_LEN, HALO, HALO_LEN, Key, halo_start, key_of, slot_of};
 use super::full_grid::FullGrid;
-use super::prolong::prolonged;
+use super::prolong::{PARENTS, SPAN, prolonged};
 
 /// How far the penalty of an active function reaches.
 pub(crate) const REACH: u32 = 2;
 /// No brick there.
 pub(crate) const NONE: u32 = u32::MAX;
-
-/// Coefficients along one edge of a brick: half as many as in the field's bricks, since of a deep brick of those hardly one
-/// function in a hundred is active.
-pub(crate) const BRICK: usize = 4;
-/// Coefficients in a brick.
-pub(crate) const BRICK_LEN: usize = BRICK * BRICK * BRICK;
-/// Edge of a brick with all that its cells read.
-pub(crate) const HALO: usize = BRICK + 3;
-/// Coefficients in a brick with halo.
-pub(crate) const HALO_LEN: usize = HALO * HALO * HALO;
-
-/// Place of a brick on its level, in bricks.
-pub(crate) type Key = [u32; 3];
-
-/// The brick that holds a cell or a slot.
-pub(crate) fn key_of(at: [u32; 3]) -> Key {
-    at.map(|c| c / BRICK as u32)
-}
-
-/// Number of a cell or a slot in its brick.
-#[inline]
-pub(crate) fn slot_of(at: [u32; 3]) -> usize {
-    let [x, y, z] = at.map(|c| c as usize % BRICK);
-    (x * BRICK + y) * BRICK + z
-}
-
-/// Where the 4³ coefficients of a cell start in its brick's halo.
-#[inline]
-pub(crate) fn halo_start(cell: [u32; 3]) -> usize {
-    let [x, y, z] = cell.map(|c| c as usize % BRICK);
-    (x * HALO + y) * HALO + z
-}
 
 /// Bricks of a level with their totals and active functions.
 ///
@@ -68,6 +37,27 @@ pub(crate) struct Band<T> {
 pub(crate) enum Coarser<'a, T> {
     Full(&'a FullGrid<f64>),
     Band(&'a Band<T>),
+}
+
+impl<T: Real> Coarser<'_, T> {
+    /// The 4³ totals from slot `first` on. A function whose parents are not in the coarser band is of no use to the next
+    /// one and gets whatever zeros give.
+    fn read(&self, first: [usize; 3], out: &mut [T; PARENTS]) {
+        match self {
+            Coarser::Full(grid) => {
+                let m = grid.width();
+                for (i, value) in out.iter_mut().enumerate() {
+                    let at = [i / SPAN / SPAN, i / SPAN % SPAN, i % SPAN];
+                    let s: [usize; 3] = std::array::from_fn(|a| first[a] + at[a]);
+                    *value = match s.iter().all(|&s| s < m) {
+                        true => T::from_f64(grid.values[(s[0] * m + s[1]) * m + s[2]]),
+                        false => T::zero(),
+                    };
+                }
+            }
+            Coarser::Band(band) => gather_span(band, first, out),
+        }
+    }
 }
 
 impl<T: Real> Band<T> {
@@ -99,7 +89,7 @@ impl<T: Real> Band<T> {
         for m in &masks {
             offsets.push(offsets[offsets.len() - 1] + m.count_ones() as usize);
         }
-        let totals = prolonged(&keys, coarser);
+        let totals = prolonged(&keys, |first, parents| coarser.read(first, parents));
         Self {
             depth,
             keys,
@@ -320,6 +310,36 @@ fn bricks_round(depth: usize, active: &[(Key, u64)], reach: u32) -> (Vec<Key>, F
     keys.sort_unstable();
     let index = keys.iter().enumerate().map(|(i, k)| (*k, i as u32)).collect();
     (keys, index)
+}
+
+/// The 4³ totals from slot `first` on, from up to eight bricks.
+fn gather_span<T: Real>(band: &Band<T>, first: [usize; 3], source: &mut [T]) {
+    let nothing = [T::zero(); BRICK_LEN];
+    let key = first.map(|s| (s / BRICK) as u32);
+    let own = band.find(key);
+    let blocks: [&[T]; 8] = std::array::from_fn(|octant| {
+        let d = [octant >> 2, octant >> 1 & 1, octant & 1];
+        let brick = match own {
+            Some(b) => Some(band.ahead[b][octant]).filter(|&b| b != NONE),
+            None => band
+                .find(std::array::from_fn(|a| key[a] + d[a] as u32))
+                .map(|b| b as u32),
+        };
+        brick.map_or(&nothing[..], |b| {
+            &band.totals[b as usize * BRICK_LEN..][..BRICK_LEN]
+        })
+    });
+    let first = first.map(|s| s % BRICK);
+    for x in 0..SPAN {
+        for y in 0..SPAN {
+            for z in 0..SPAN {
+                let s = [first[0] + x, first[1] + y, first[2] + z];
+                let octant = 4 * (s[0] / BRICK) + 2 * (s[1] / BRICK) + s[2] / BRICK;
+                let at = ((s[0] % BRICK) * BRICK + s[1] % BRICK) * BRICK + s[2] % BRICK;
+                source[(x * SPAN + y) * SPAN + z] = blocks[octant][at];
+            }
+        }
+    }
 }
 
 #[cfg(test)]

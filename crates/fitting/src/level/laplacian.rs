@@ -2,7 +2,8 @@
 
 use bspline::Real;
 
-use super::band::{BRICK, BRICK_LEN, Band, NONE};
+use super::band::{Band, NONE};
+use super::brick::{BRICK, BRICK_LEN};
 
 /// Seven-point Laplacian (its own transpose) of an array of bricks, at the slots of one brick.
 pub(super) fn seven_point<T: Real>(band: &Band<T>, dense: &[T], brick: usize, out: &mut [T]) {

@@ -9,6 +9,7 @@
 pub(crate) mod assemble;
 pub(crate) mod band;
 pub(crate) mod band_problem;
+mod brick;
 pub(crate) mod cg;
 pub(crate) mod full_grid;
 pub(crate) mod full_operator;

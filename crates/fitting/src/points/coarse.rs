@@ -22,8 +22,8 @@ const ITERATIONS: usize = 60;
 /// continuation of 16³ in holes (2 to 10 are alike, 25 lose a third of the accuracy in holes).
 const BASE_ITERATIONS: usize = 5;
 
-/// Coefficients of the 32³ level, distances in units of the box, positive inside, and how each level was solved. Under `suspicion` a half-cell that
-/// holds fewer samples than most weighs less: what is left of the outliers lies in such.
+/// Coefficients of the 32³ level, distances in units of the box, positive inside, and how each level was solved. Under
+/// `suspicion` a half-cell that holds fewer samples than most weighs less: what is left of the outliers lies in such.
 pub(crate) fn solve(samples: &Samples, beta_s: f64, suspicion: bool) -> (FullGrid<f64>, Vec<SolverOutcome>) {
     let mut by_depth = vec![clusters(samples, BASE_DEPTH)];
     for depth in (2..BASE_DEPTH).rev() {
