@@ -5,12 +5,11 @@
 
 use std::sync::Arc;
 
-use bspline::hierarchical::{BRICK, BrickChange, Corrections, DenseCorrections};
 use bspline::primitives::Cuboid;
 use bspline::{Aabb, Csg, Field, HierarchicalSpline, Real};
-use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
+use crate::coefficients::{changed, coefficient, support, with_functions};
 use crate::mix::{Faded, Mixed};
 use crate::number::{Point, Positive};
 use crate::tool::Others;
@@ -50,6 +49,8 @@ pub struct Limits {
     region: Option<(Aabb, Cuboid)>,
     mask: Option<Arc<dyn Field>>,
     weight: Option<Faded>,
+    /// Finest level that may change.
+    finest: Option<usize>,
 }
 
 impl Region {
@@ -109,7 +110,21 @@ impl Limits {
             region,
             mask: Some(named),
             weight,
+            finest: None,
         })
+    }
+
+    /// With no functions finer than those of a level.
+    pub fn up_to(self, finest: usize) -> Self {
+        Self {
+            finest: Some(finest),
+            ..self
+        }
+    }
+
+    /// Finest level that may change.
+    pub fn finest(&self) -> Option<usize> {
+        self.finest
     }
 
     /// Whether all is free.
@@ -156,59 +171,16 @@ impl Limits {
         if self.is_none() {
             return new.clone();
         }
-        let mut difference = old.difference(new).expect("versions of one field");
-        for change in &mut difference.bricks {
-            change.new = self.kept_brick(old, change);
-        }
-        old.applied(&difference).expect("the old version is at hand")
-    }
-
-    fn kept_brick<T: Real>(
-        &self,
-        field: &HierarchicalSpline<T>,
-        change: &BrickChange<T>,
-    ) -> Option<Arc<Corrections<T>>> {
-        let value = |side: &Option<Arc<Corrections<T>>>, slot| side.as_ref().and_then(|c| c.get(slot));
-        let mut kept = DenseCorrections::empty();
-        for slot in 0..BRICK * BRICK * BRICK {
-            let at = [slot / BRICK / BRICK, slot / BRICK % BRICK, slot % BRICK];
-            let (old, new) = (value(&change.old, slot), value(&change.new, slot));
-            let function = std::array::from_fn(|a| change.key.0[a] * BRICK as u32 + at[a] as u32);
-            let result = match old == new {
-                true => old,
-                false => {
-                    let (knot, support) = support(field, change.level, function);
-                    match (self.is_free(&support), &self.weight) {
-                        (false, _) => old,
-                        (true, None) => new,
-                        (true, Some(weight)) => {
-                            let zero = T::zero();
-                            let (from, to) = (old.unwrap_or(zero), new.unwrap_or(zero));
-                            Some(from + T::from_f64(weight.value(knot)) * (to - from))
-                        }
-                    }
-                }
-            };
-            if let Some(result) = result {
-                kept.set(at, result);
+        let mut functions = changed(old, new).expect("versions of one field");
+        functions.retain(|(level, function), value| {
+            let (knot, support) = support(old, *level, *function);
+            if let Some(weight) = &self.weight {
+                let [from, to] =
+                    [coefficient(old, *level, *function), *value].map(|c| c.unwrap_or(T::zero()));
+                *value = Some(from + T::from_f64(weight.value(knot)) * (to - from));
             }
-        }
-        let kept = kept.pack();
-        (kept.count() > 0).then(|| Arc::new(kept))
+            self.is_free(&support)
+        });
+        with_functions(old, &functions).expect("functions of the lattice")
     }
-}
-
-/// World place of a function's knot, and a world box about its support in the field's own box.
-pub fn support<T: Real>(field: &HierarchicalSpline<T>, level: usize, function: [u32; 3]) -> (DVec3, Aabb) {
-    let lattice = field.lattice();
-    let spacing = 1.0 / (1u64 << level) as f64;
-    // Function `s` is centred on knot `s - 1`.
-    let knot = (DVec3::from_array(function.map(f64::from)) - 1.0) * spacing;
-    let extent = lattice.extent();
-    let end = |reach: f64| (knot + reach * spacing).clamp(DVec3::ZERO, extent);
-    let map = &lattice.world_from_lattice;
-    (
-        map.transform_point3(knot),
-        Aabb::new(end(-2.0), end(2.0)).transformed(map),
-    )
 }

@@ -9,7 +9,9 @@ use fitting::field::FieldFitReport;
 use fitting::{Control, FitError};
 use glam::DAffine3;
 
-use crate::geometric::{Geometric, GeometricError, Move, Operation};
+use crate::geometric::{
+    Copy, Cut, Geometric, GeometricError, Inflate, Move, Operation, Paste, Refine, Simplify, Smooth,
+};
 use crate::limits::Limits;
 use crate::paint::{Layer, Layers, Paint, PaintError};
 
@@ -24,6 +26,8 @@ pub struct Canvas {
     pub layers: Layers,
     /// Objects that a tool may name.
     pub others: Others,
+    /// Names under which the object as it was before is to be kept.
+    pub copies: Vec<String>,
 }
 
 /// Objects by name, each about as the distance from its surface, positive inside, in the world of the canvas.
@@ -87,6 +91,20 @@ pub enum Tool<'a> {
     Add(&'a Geometric),
     /// Carries along.
     Move(&'a Move),
+    /// Evens out.
+    Smooth(&'a Smooth),
+    /// Lifts or lowers.
+    Inflate(&'a Inflate),
+    /// Keeps a copy.
+    Copy(&'a Copy),
+    /// Takes a box out.
+    Cut(&'a Cut),
+    /// Puts a box of an object in.
+    Paste(&'a Paste),
+    /// Puts knots in.
+    Refine(&'a Refine),
+    /// Takes knots out.
+    Simplify(&'a Simplify),
     /// Paints matter or touch.
     Paint(&'a Paint),
 }
@@ -114,7 +132,9 @@ impl ToolError {
 
 impl Tool<'_> {
     /// Names of all tools, as sessions write them.
-    pub const NAMES: [&'static str; 4] = ["carve", "add", "move", "paint"];
+    pub const NAMES: [&'static str; 11] = [
+        "carve", "add", "move", "smooth", "inflate", "copy", "cut", "paste", "refine", "simplify", "paint",
+    ];
 
     /// Its name, as sessions write it.
     pub fn name(&self) -> &'static str {
@@ -122,6 +142,13 @@ impl Tool<'_> {
             Self::Carve(_) => "carve",
             Self::Add(_) => "add",
             Self::Move(_) => "move",
+            Self::Smooth(_) => "smooth",
+            Self::Inflate(_) => "inflate",
+            Self::Copy(_) => "copy",
+            Self::Cut(_) => "cut",
+            Self::Paste(_) => "paste",
+            Self::Refine(_) => "refine",
+            Self::Simplify(_) => "simplify",
             Self::Paint(_) => "paint",
         }
     }
@@ -137,18 +164,37 @@ impl Tool<'_> {
         control: &mut Control,
     ) -> Result<(Canvas, Vec<String>), ToolError> {
         let Canvas { field: old, iso, .. } = &canvas;
+        let mut copies = canvas.copies.clone();
         let (field, report) = match self {
-            Self::Carve(tool) => tool.apply(Operation::Carve, old, *iso, limits, control)?,
-            Self::Add(tool) => tool.apply(Operation::Add, old, *iso, limits, control)?,
-            Self::Move(tool) => tool.apply(old, *iso, limits, control)?,
             Self::Paint(paint) => {
                 let layer = painted(paint, &canvas, limits)?;
                 let mut canvas = canvas;
                 canvas.layers.insert(paint.layer, layer);
                 return Ok((canvas, Vec::new()));
             }
+            Self::Copy(copy) => {
+                copies.push(copy.to.clone());
+                return Ok((Canvas { copies, ..canvas }, Vec::new()));
+            }
+            Self::Refine(tool) => (tool.apply(old, limits)?, FieldFitReport::default()),
+            Self::Simplify(tool) => (tool.apply(old, limits)?, FieldFitReport::default()),
+            Self::Carve(tool) => tool.apply(Operation::Carve, old, *iso, limits, control)?,
+            Self::Add(tool) => tool.apply(Operation::Add, old, *iso, limits, control)?,
+            Self::Move(tool) => tool.apply(old, *iso, limits, control)?,
+            Self::Smooth(tool) => tool.apply(old, *iso, limits, control)?,
+            Self::Inflate(tool) => tool.apply(old, *iso, limits, control)?,
+            Self::Cut(tool) => {
+                copies.extend(tool.to.clone());
+                tool.apply(old, *iso, limits, control)?
+            }
+            Self::Paste(tool) => tool.apply(old, *iso, &canvas.others, limits, control)?,
         };
-        Ok((Canvas { field, ..canvas }, thin_parts(&report)))
+        let canvas = Canvas {
+            field,
+            copies,
+            ..canvas
+        };
+        Ok((canvas, thin_parts(&report)))
     }
 }
 

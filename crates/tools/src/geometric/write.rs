@@ -76,6 +76,7 @@ impl<T: Real> Writer<'_, T> {
         control: &mut Control,
     ) -> Result<(HierarchicalSpline<T>, FieldFitReport), GeometricError> {
         let finest = fineness.finest(self.field);
+        let finest = finest.min(self.limits.finest().unwrap_or(finest));
         let spacing = self.field.lattice().spacing(finest).min_element();
         let mixed = self.limits.mixed(self.field, target);
         let target: &dyn Field = mixed.as_ref().map_or(target, |mixed| mixed);

@@ -1,7 +1,10 @@
 //! Geometric tools: volumes, what stays, and what is refused.
 
+mod brushes;
 mod limits;
 mod moves;
+mod parts;
+mod symmetry;
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -14,6 +17,7 @@ use glam::{DAffine3, DVec3};
 use tools::geometric::{Geometric, GeometricError, Operation, block as block_of};
 use tools::limits::Limits;
 use tools::session::{Session, Stroke};
+use tools::tool::{Canvas, Others};
 
 /// Cells of the block's box, half a world length each.
 const CELLS: u32 = 48;
@@ -33,6 +37,29 @@ const ISO: f64 = 300.0;
 /// A stroke as a session writes it.
 fn stroke(text: &str) -> Stroke {
     toml::from_str(text).unwrap_or_else(|e| panic!("{text}: {e}"))
+}
+
+/// A canvas with nothing beside it.
+fn canvas(field: &HierarchicalSpline<f32>) -> Canvas {
+    Canvas {
+        field: field.clone(),
+        iso: ISO,
+        layers: Default::default(),
+        others: Others::default(),
+        copies: Vec::new(),
+    }
+}
+
+/// What a stroke leaves.
+fn done(field: &HierarchicalSpline<f32>, text: &str) -> HierarchicalSpline<f32> {
+    let left = stroke(text).apply(canvas(field), &mut Control::default());
+    left.unwrap_or_else(|e| panic!("{text}: {e}")).0.field
+}
+
+/// Why a stroke is refused.
+fn refused(field: &HierarchicalSpline<f32>, text: &str) -> String {
+    let left = stroke(text).apply(canvas(field), &mut Control::default());
+    left.expect_err(text).to_string()
 }
 
 /// Numbers at random between two bounds, the same for the same seed.
