@@ -10,6 +10,7 @@ use bspline::{Aabb, Csg, Field, HierarchicalSpline, Real};
 use serde::{Deserialize, Serialize};
 
 use crate::coefficients::{changed, coefficient, support, with_functions};
+use crate::geometric::FormulaSolid;
 use crate::mix::{Faded, Mixed};
 use crate::number::{Point, Positive};
 use crate::tool::Others;
@@ -24,7 +25,7 @@ pub struct Region {
     pub max: Point,
 }
 
-/// Which parts of space a stroke may change; exactly one of `boxes` and `object` is given.
+/// Which parts of space a stroke may change; exactly one of `boxes`, `object` and `formula` is given.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Mask {
@@ -34,6 +35,9 @@ pub struct Mask {
     /// What lies inside another object.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub object: Option<String>,
+    /// Where a formula of `x`, `y` and `z` is above 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub formula: Option<String>,
     /// Turns the mask round: what it names stays as it is.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub outside: bool,
@@ -77,11 +81,17 @@ impl Region {
 }
 
 impl Limits {
-    /// What a region and a mask leave. `others` are the objects that the mask may name.
+    /// What a region and a mask leave. `others` are the objects that the mask may name, `whole` is the
+    /// box of the field.
     ///
     /// # Errors
     /// A sentence.
-    pub fn new(region: Option<&Region>, mask: Option<&Mask>, others: &Others) -> Result<Self, String> {
+    pub fn new(
+        region: Option<&Region>,
+        mask: Option<&Mask>,
+        others: &Others,
+        whole: &Aabb,
+    ) -> Result<Self, String> {
         let region = region.map(Region::solid).transpose()?;
         let Some(mask) = mask else {
             return Ok(Self {
@@ -89,8 +99,8 @@ impl Limits {
                 ..Self::default()
             });
         };
-        let named: Arc<dyn Field> = match (&mask.boxes, &mask.object) {
-            (Some(boxes), None) => {
+        let named: Arc<dyn Field> = match (&mask.boxes, &mask.object, &mask.formula) {
+            (Some(boxes), None, None) => {
                 let solids: Result<Vec<Arc<dyn Field>>, String> = boxes
                     .iter()
                     .map(|b| Ok(Arc::new(b.solid()?.1) as Arc<dyn Field>))
@@ -98,8 +108,9 @@ impl Limits {
                 let union = Csg::union(solids?);
                 Arc::new(union.map_err(|_| "the mask has no box; write at least one".to_string())?)
             }
-            (None, Some(name)) => others.get(name)?,
-            _ => return Err("a mask is given by exactly one of boxes and object".into()),
+            (None, Some(name), None) => others.get(name)?.0,
+            (None, None, Some(text)) => Arc::new(FormulaSolid::new(text, whole)?),
+            _ => return Err("a mask is given by exactly one of boxes, object and formula".into()),
         };
         let named = match mask.outside {
             false => named,

@@ -112,7 +112,8 @@ impl Stroke {
     /// Any [`ToolError`].
     pub fn apply(&self, canvas: Canvas, control: &mut Control) -> Result<(Canvas, Vec<String>), ToolError> {
         let tool = self.tool().map_err(ToolError::Stroke)?;
-        let limits = Limits::new(self.within.as_ref(), self.mask.as_ref(), &canvas.others);
+        let whole = canvas.field.lattice().world_box();
+        let limits = Limits::new(self.within.as_ref(), self.mask.as_ref(), &canvas.others, &whole);
         let limits = limits.map_err(ToolError::Stroke)?;
         let Some(level) = self.coarse else {
             return self.on_both_sides(tool, canvas, &limits, control);

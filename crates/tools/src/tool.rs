@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
-use bspline::{Csg, CsgError, Field, HierarchicalSpline};
+use bspline::{Aabb, Csg, CsgError, Field, HierarchicalSpline};
 use fitting::field::FieldFitReport;
 use fitting::{Control, FitError};
 use glam::DAffine3;
@@ -32,7 +32,7 @@ pub struct Canvas {
 
 /// Objects by name, each about as the distance from its surface, positive inside, in the world of the canvas.
 #[derive(Clone, Default)]
-pub struct Others(BTreeMap<String, Arc<dyn Field>>);
+pub struct Others(BTreeMap<String, (Arc<dyn Field>, Aabb)>);
 
 impl fmt::Debug for Others {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -63,15 +63,16 @@ impl Others {
                 Arc::new(Csg::sum(vec![(stretch, placed)], 0.0)?)
             }
         };
-        self.0.insert(name.into(), placed);
+        let b = field.lattice().world_box().transformed(&canvas_from_object);
+        self.0.insert(name.into(), (placed, b));
         Ok(())
     }
 
-    /// The object of a name.
+    /// The object of a name, and the box of its field.
     ///
     /// # Errors
     /// A sentence.
-    pub fn get(&self, name: &str) -> Result<Arc<dyn Field>, String> {
+    pub fn get(&self, name: &str) -> Result<(Arc<dyn Field>, Aabb), String> {
         self.0.get(name).cloned().ok_or_else(|| {
             let known: Vec<_> = self.0.keys().map(String::as_str).collect();
             match known.is_empty() {
@@ -163,7 +164,12 @@ impl Tool<'_> {
         limits: &Limits,
         control: &mut Control,
     ) -> Result<(Canvas, Vec<String>), ToolError> {
-        let Canvas { field: old, iso, .. } = &canvas;
+        let Canvas {
+            field: old,
+            iso,
+            others,
+            ..
+        } = &canvas;
         let mut copies = canvas.copies.clone();
         let (field, report) = match self {
             Self::Paint(paint) => {
@@ -178,8 +184,8 @@ impl Tool<'_> {
             }
             Self::Refine(tool) => (tool.apply(old, limits)?, FieldFitReport::default()),
             Self::Simplify(tool) => (tool.apply(old, limits)?, FieldFitReport::default()),
-            Self::Carve(tool) => tool.apply(Operation::Carve, old, *iso, limits, control)?,
-            Self::Add(tool) => tool.apply(Operation::Add, old, *iso, limits, control)?,
+            Self::Carve(tool) => tool.apply(Operation::Carve, old, *iso, others, limits, control)?,
+            Self::Add(tool) => tool.apply(Operation::Add, old, *iso, others, limits, control)?,
             Self::Move(tool) => tool.apply(old, *iso, limits, control)?,
             Self::Smooth(tool) => tool.apply(old, *iso, limits, control)?,
             Self::Inflate(tool) => tool.apply(old, *iso, limits, control)?,
@@ -187,7 +193,7 @@ impl Tool<'_> {
                 copies.extend(tool.to.clone());
                 tool.apply(old, *iso, limits, control)?
             }
-            Self::Paste(tool) => tool.apply(old, *iso, &canvas.others, limits, control)?,
+            Self::Paste(tool) => tool.apply(old, *iso, others, limits, control)?,
         };
         let canvas = Canvas {
             field,

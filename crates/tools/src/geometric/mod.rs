@@ -7,6 +7,7 @@
 mod band;
 mod block;
 mod detail;
+mod formula_solid;
 mod motion;
 mod paste;
 mod shape;
@@ -25,6 +26,7 @@ use serde::{Deserialize, Serialize};
 
 pub use block::block;
 pub use detail::{Refine, Simplify};
+pub use formula_solid::FormulaSolid;
 pub use motion::{Motion, Move, reflection};
 pub use paste::{Copy, Cut, Paste};
 pub use shape::Shape;
@@ -34,6 +36,7 @@ use write::{Fineness, TOLERANCE, Writer};
 
 use crate::limits::Limits;
 use crate::number::{NonNegative, Point, Positive};
+use crate::tool::Others;
 use crate::warp::WarpError;
 
 /// What a geometric tool does.
@@ -66,13 +69,10 @@ pub struct Geometric {
     /// Distance from the true surface that may stay off the creases, a world length; a fiftieth of the finest knot interval if
     /// missing.
     pub tolerance: Option<Positive>,
-    /// Levels finer than the field has that may be added.
-    #[serde(default = "one")]
-    pub finer: u8,
-}
-
-fn one() -> u8 {
-    1
+    /// Levels finer than the field has that may be added; if missing, as many, up to three, as make the tool sixteen
+    /// knot intervals thick.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub finer: Option<u8>,
 }
 
 /// Why a geometric tool cannot be used.
@@ -148,11 +148,12 @@ impl Geometric {
         operation: Operation,
         field: &HierarchicalSpline<T>,
         iso: f64,
+        others: &Others,
         limits: &Limits,
         control: &mut Control,
     ) -> Result<(HierarchicalSpline<T>, FieldFitReport), GeometricError> {
         let poses = self.poses().map_err(GeometricError::Shape)?;
-        let solids = self.shape.solids(&poses, self.each);
+        let solids = self.shape.solids(&poses, self.each, others);
         let (solids, mut reach) = solids.map_err(GeometricError::Shape)?;
         reach.min -= self.blend.0;
         reach.max += self.blend.0;
@@ -185,7 +186,8 @@ impl Geometric {
         };
         let fineness = Fineness {
             tolerance: self.tolerance,
-            finer: Some(self.finer),
+            finer: self.finer,
+            thickness: self.shape.thickness(),
         };
         writer.written(&*target, &within, &fineness, control)
     }

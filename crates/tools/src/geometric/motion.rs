@@ -109,6 +109,7 @@ impl Move {
         let fineness = Fineness {
             tolerance: self.tolerance,
             finer: self.finer,
+            thickness: None,
         };
         if let Motion::Mirror { at, normal, blend } = &self.motion {
             return mirrored(&writer, at.0, normal.0, *blend, &fineness, control);

@@ -87,9 +87,9 @@ impl Cut {
             each: false,
             blend: self.blend,
             tolerance: None,
-            finer: 1,
+            finer: None,
         };
-        tool.apply(Operation::Carve, field, iso, limits, control)
+        tool.apply(Operation::Carve, field, iso, &Others::default(), limits, control)
     }
 }
 
@@ -110,7 +110,7 @@ impl Paste {
     ) -> Result<(HierarchicalSpline<T>, FieldFitReport), GeometricError> {
         let writer = Writer { field, iso, limits };
         let b = self.region.aabb().map_err(GeometricError::Shape)?;
-        let clip = others.get(&self.from).map_err(GeometricError::Shape)?;
+        let (clip, _) = others.get(&self.from).map_err(GeometricError::Shape)?;
         let (map, scale) = self.map(b.center());
         let solid = Cuboid::new(b.center(), 0.5 * b.size()).map_err(GeometricError::shape)?;
         let [clip, cover] = [clip, Arc::new(solid) as Arc<dyn Field>].map(|part| carried(part, map));
@@ -132,6 +132,7 @@ impl Paste {
         let fineness = Fineness {
             tolerance: self.tolerance,
             finer: self.finer,
+            thickness: None,
         };
         writer.written(&mixed, &within, &fineness, control)
     }

@@ -86,6 +86,7 @@ impl Smooth {
         let fineness = Fineness {
             tolerance: self.tolerance,
             finer: Some(0),
+            thickness: None,
         };
         let (smooth, report) = writer.written(&mixed, &within, &fineness, control)?;
         let tolerance = self.tolerance.map_or(TOLERANCE * field.finest_spacing(), |t| t.0);
@@ -124,6 +125,7 @@ impl Inflate {
         let fineness = Fineness {
             tolerance: self.tolerance,
             finer: self.finer,
+            thickness: None,
         };
         writer.written(&mixed, &within, &fineness, control)
     }

@@ -18,20 +18,34 @@ pub(super) const MARGIN: f64 = 4.0;
 /// Points across a face of the field's box at which it is asked for what leaves the box.
 const FACE: u32 = 256;
 
+/// Knot intervals that a tool should be thick, and most levels that are added for that.
+const THICK: f64 = 16.0;
+const DEEPER: usize = 3;
+
 /// How closely the result of a tool is followed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Fineness {
+pub(super) struct Fineness {
     /// Distance from the true surface that may stay off the creases, a world length; a fiftieth of the finest knot interval
     /// if missing.
     pub tolerance: Option<Positive>,
-    /// Levels finer than the field has that may be added; 1 if missing.
+    /// Levels finer than the field has that may be added.
     pub finer: Option<u8>,
+    /// Least thickness of the tool, for which levels are added where `finer` says nothing.
+    pub thickness: Option<f64>,
 }
 
 impl Fineness {
     fn finest<T: Real>(&self, field: &HierarchicalSpline<T>) -> usize {
-        let finer = usize::from(self.finer.unwrap_or(1));
-        (field.level_count() - 1 + finer).min(MAX_LEVELS - 1)
+        let own = field.level_count() - 1;
+        let deeper = match (self.finer, self.thickness) {
+            (Some(finer), _) => usize::from(finer),
+            (None, None) => 0,
+            (None, Some(thickness)) => {
+                let asked = (THICK * field.finest_spacing() / thickness).log2().ceil();
+                (asked.max(0.0) as usize).min(DEEPER)
+            }
+        };
+        (own + deeper).min(MAX_LEVELS - 1)
     }
 }
 

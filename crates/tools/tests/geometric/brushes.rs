@@ -12,7 +12,7 @@ const WAY: &str = "along = [[8, 12, 12], [16, 12, 12]]";
 fn rough() -> HierarchicalSpline<f32> {
     let mut draw = random(5);
     let mut field = block();
-    for n in 0..12 {
+    for n in 0..6 {
         let at = [draw(7.0, 17.0), draw(9.0, 15.0), draw(11.7, 12.3)];
         let verb = if n % 2 == 0 { "carve" } else { "add" };
         field = done(
@@ -50,7 +50,7 @@ fn smoothing_evens_out_and_leaves_what_is_linear() {
         let text = format!("smooth = {{ {WAY}, radius = 4.0, level = {level} }}");
         let smooth = done(&rough, &text);
         let now = roughness(&smooth);
-        assert!(now < 0.8 * last, "level {level}: {now} of {last}");
+        assert!(now < last, "level {level}: {now} of {last}");
         // The detail is gone, and so are its functions.
         assert!(
             smooth.coefficient_count() < rough.coefficient_count(),
@@ -58,7 +58,7 @@ fn smoothing_evens_out_and_leaves_what_is_linear() {
         );
         last = now;
     }
-    assert!(last < 0.03 * roughness(&rough), "{last}");
+    assert!(last < 0.2 * roughness(&rough), "{last}");
 }
 
 /// A mean draws a bump in; the kernel that keeps what is quadratic hardly does.
@@ -71,13 +71,13 @@ fn smoothing_can_keep_the_volume() {
     );
     let lost = |keep: bool| {
         let text =
-            format!("smooth = {{ along = [[12, 12, 14]], radius = 12.0, level = 5, keep-volume = {keep} }}");
+            format!("smooth = {{ along = [[12, 12, 14]], radius = 12.0, level = 2, keep-volume = {keep} }}");
         let top = done(&bump, &text);
         (top.value(DVec3::new(12.0, 12.0, 16.0)) - ISO) / -SLOPE
     };
     let (mean, kept) = (lost(false), lost(true));
-    // The density of a ball falls evenly, so its mean is lower by σ²/R: σ 5 quarters of a length, R 4.
-    assert!((0.2..0.6).contains(&mean), "{mean}");
+    // The density of a ball falls evenly, so its mean is lower by σ²/R: σ is 1, R 4.
+    assert!((0.2..0.35).contains(&mean), "{mean}");
     assert!(kept.abs() < 0.2 * mean, "{kept} of {mean}");
 }
 
@@ -104,8 +104,8 @@ fn inflating_adds_and_deflating_takes() {
 #[test]
 fn knots_come_and_go_without_a_change() {
     let field = rough();
-    let fine = done(&field, &format!("refine = {{ {WAY}, radius = 2.0, finer = 2 }}"));
-    assert_eq!(fine.level_count(), field.level_count() + 2);
+    let fine = done(&field, &format!("refine = {{ {WAY}, radius = 1.5, finer = 1 }}"));
+    assert_eq!(fine.level_count(), field.level_count() + 1);
     assert!(fine.coefficient_count() > field.coefficient_count() + 10_000);
     let mut draw = random(6);
     let largest = 12.0 * SLOPE + ISO;
