@@ -121,6 +121,7 @@ impl Command {
                     .iso
                     .ok_or_else(|| CommandError::NoSurface(name.clone()))?;
                 let canvas = Canvas {
+                    detail: object.detail(),
                     field: object.field,
                     iso,
                     layers: object.layers,

@@ -29,5 +29,5 @@ pub use entry::{EditCounts, EditInfo};
 pub use error::DocumentError;
 pub use journal::is_document;
 pub use object::{Object, Properties};
-pub use revision::{VolumeRevision, revise_volume};
+pub use revision::{Journey, VolumeRevision, revise_volume};
 pub use state::State;

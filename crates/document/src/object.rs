@@ -29,6 +29,10 @@ pub struct Properties {
     pub placement: [[f64; 3]; 4],
     /// The object that it moves with.
     pub parent: Option<String>,
+    /// Level of its field that shows what it is shaped to: tools ask for little more than that by themselves, however fine single
+    /// places have become. That of the field when it became an object; the finest that it has if missing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub detail: Option<usize>,
 }
 
 impl Default for Properties {
@@ -49,6 +53,7 @@ impl Properties {
         Self {
             placement: [x_axis, y_axis, z_axis, map.translation].map(|c| c.to_array()),
             parent: None,
+            detail: None,
         }
     }
 
@@ -66,12 +71,23 @@ impl Object {
     /// # Errors
     /// [`EditError::NotFinite`] for a coefficient beyond single precision.
     pub fn new(field: &AnyField, meta: FieldMeta) -> Result<Self, EditError> {
+        let field = field.to_single()?;
+        let detail = Some(field.level_count() - 1);
         Ok(Self {
-            field: field.to_single()?,
+            field,
             meta: Arc::new(meta),
             layers: Layers::new(),
-            properties: Properties::default(),
+            properties: Properties {
+                detail,
+                ..Properties::default()
+            },
         })
+    }
+
+    /// Level of the field that tools work at.
+    pub fn detail(&self) -> usize {
+        let finest = self.field.level_count() - 1;
+        self.properties.detail.unwrap_or(finest)
     }
 
     /// Names field, properties and layers; what came with the field does not enter.
@@ -83,6 +99,7 @@ impl Object {
         let parent = self.properties.parent.as_deref().unwrap_or_default();
         hash.update((parent.len() as u64).to_le_bytes());
         hash.update(parent);
+        hash.update((self.detail() as u64).to_le_bytes());
         for (substance, layer) in self.layers.iter().filter(|(_, layer)| !layer.is_empty()) {
             hash.update(substance.name());
             hash.update(layer.tree().sha256());

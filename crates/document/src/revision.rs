@@ -3,7 +3,8 @@
 //! Where nothing was edited a voxel stays. Elsewhere it changes by what the field changed, `v + f_new − f_fit`, so that what the
 //! fit had smoothed away stays in the scan. Matter that was taken out becomes another matter, mostly air: within one voxel of
 //! the new surface its density runs from the iso-value to that of the fill. The voxels that it had shared with what lay beside it
-//! become what lies there: else a ghost of the old surface would stay. What never was part of the solid stays.
+//! become what lies there: else a ghost of the old surface would stay. What never was part of the solid stays. Moves carry along what
+//! the fit had smoothed away: `v = f_new(x) + (v − f_fit)(w⁻¹(x))`.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,6 +13,11 @@ use bspline::{Aabb, Field, HierarchicalSpline};
 use formats::volumes::{Change, Volume};
 use glam::DVec3;
 use rayon::prelude::*;
+use tools::geometric::Origin;
+use tools::limits::Limits;
+use tools::tool::Others;
+
+use crate::Command;
 
 /// Voxels on an edge of the tiles in which changed voxels are looked for.
 const TILE: usize = 8;
@@ -28,10 +34,60 @@ pub struct VolumeRevision {
     pub carved: usize,
     /// Voxels that joined it.
     pub added: usize,
+    /// Those that were carved and filled.
+    emptied: Vec<usize>,
+}
+
+/// Where what is now at a place came from, through all moves of an object.
+#[derive(Default)]
+pub struct Journey(Vec<(Origin, Limits)>);
+
+impl Journey {
+    /// The moves among commands in their order, of the object `name`, which lies in a box.
+    pub fn new(commands: &[Command], name: &str, within: &Aabb) -> Self {
+        let moves = commands.iter().filter_map(|command| match command {
+            Command::Stroke { object, stroke } if object == name => {
+                let origin = stroke.motion.as_ref()?.motion.origin(within).ok()?;
+                // Masks by other objects are left out: these may have changed since.
+                let limits = Limits::new(stroke.within.as_ref(), stroke.mask.as_ref(), &Others::default());
+                Some((origin, limits.unwrap_or_default()))
+            }
+            _ => None,
+        });
+        Self(moves.collect())
+    }
+
+    /// Boxes in `within` outside which nothing was moved.
+    fn reaches(&self, within: &Aabb) -> impl Iterator<Item = Aabb> {
+        let cut = |(origin, limits): &(Origin, Limits)| {
+            let reach = limits.cut(&origin.reach());
+            Aabb {
+                min: reach.min.max(within.min),
+                max: reach.max.min(within.max),
+            }
+        };
+        self.0.iter().map(cut).filter(|b| b.min.cmple(b.max).all())
+    }
+
+    fn back(&self, place: DVec3) -> DVec3 {
+        self.0.iter().rev().fold(place, |p, (origin, limits)| {
+            match limits.is_free(&Aabb { min: p, max: p }) {
+                true => origin.back(p),
+                false => p,
+            }
+        })
+    }
+}
+
+impl VolumeRevision {
+    /// Whether some voxels got the density of the fill.
+    pub fn is_filled(&self) -> bool {
+        !self.emptied.is_empty()
+    }
 }
 
 /// What the way from `fitted` to `now` means for the `volume` that `fitted` was fitted to. The surface lies at `iso`; what was
-/// carved gets the density `fill`, and no density rises above the largest of the volume.
+/// carved gets the density `fill`, and no density rises above the largest of the volume. What was moved went on the `journey`.
 ///
 /// # Errors
 /// [`DiffError::Lattice`] if the two are no versions of one field.
@@ -41,17 +97,65 @@ pub fn revise_volume(
     volume: &Volume,
     iso: f64,
     fill: f64,
+    journey: &Journey,
 ) -> Result<VolumeRevision, DiffError> {
     // Versions that were read from a file share nothing; by way of the difference they do.
-    let now = fitted.applied(&fitted.difference(now)?)?;
+    let now = &fitted.applied(&fitted.difference(now)?)?;
     let header = &volume.header;
-    let [nx, ny, nz] = header.dims;
-    let voxel_from_world = header.world_from_voxel.inverse();
+    let world_from_voxel = header.world_from_voxel;
+    let voxel_from_world = world_from_voxel.inverse();
     let last = DVec3::from_array(header.dims.map(|n| (n - 1) as f64));
-    let whole = Aabb::new(DVec3::ZERO, last).transformed(&header.world_from_voxel);
+    let whole = Aabb::new(DVec3::ZERO, last).transformed(&world_from_voxel);
+    let boxes = now
+        .changed_boxes(fitted, &whole)
+        .into_iter()
+        .chain(journey.reaches(&whole));
+    let reaches = boxes.map(|b| b.transformed(&voxel_from_world));
+    let tiles = tiles(reaches, last);
+    let matter = Matter::new(volume, fitted.slope(), iso, fill);
+    let [nx, ny, nz] = header.dims;
+    let parts = tiles.par_iter().map(|[tz, ty, tx]| {
+        let along = |tile: &usize, count: usize| tile * TILE..count.min((tile + 1) * TILE);
+        let mut part = VolumeRevision::default();
+        for z in along(tz, nz) {
+            for y in along(ty, ny) {
+                for x in along(tx, nx) {
+                    let voxel = x + nx * (y + ny * z);
+                    let place = DVec3::new(x as f64, y as f64, z as f64);
+                    let place = world_from_voxel.transform_point3(place);
+                    let densities = [fitted.value(place), now.value(place)];
+                    let origin = journey.back(place);
+                    let density = match origin == place {
+                        true => matter.revised(voxel, volume.values[voxel].into(), densities, &mut part),
+                        false => {
+                            let there = sampled(volume, voxel_from_world.transform_point3(origin));
+                            Some(matter.moved(densities, there - fitted.value(origin), &mut part))
+                        }
+                    };
+                    let change = density.map(|density| Change { voxel, density });
+                    part.changes.extend(change);
+                }
+            }
+        }
+        part
+    });
+    let parts: Vec<VolumeRevision> = parts.collect();
+    let mut all = VolumeRevision::default();
+    for part in parts {
+        all.changes.extend(part.changes);
+        all.emptied.extend(part.emptied);
+        all.carved += part.carved;
+        all.added += part.added;
+    }
+    all.changes.sort_unstable_by_key(|c| c.voxel);
+    without_ghosts(&mut all, volume, iso);
+    Ok(all)
+}
+
+/// Tiles of voxels that boxes of voxels meet, in their order; `last` is the last voxel.
+fn tiles(boxes: impl Iterator<Item = Aabb>, last: DVec3) -> Vec<[usize; 3]> {
     let mut tiles = BTreeSet::new();
-    for changed in now.changed_boxes(fitted, &whole) {
-        let reach = changed.transformed(&voxel_from_world);
+    for reach in boxes {
         let [from, to] = [reach.min.ceil().max(DVec3::ZERO), reach.max.floor().min(last)];
         if from.cmpgt(to).any() {
             continue;
@@ -64,55 +168,7 @@ pub fn revise_volume(
             }
         }
     }
-    let m = header.world_from_voxel.matrix3;
-    let step = [m.x_axis, m.y_axis, m.z_axis]
-        .map(DVec3::length)
-        .into_iter()
-        .fold(f64::INFINITY, f64::min);
-    let (least, largest) = volume
-        .values
-        .iter()
-        .fold((f32::INFINITY, f32::NEG_INFINITY), |(lo, hi), v| {
-            (lo.min(*v), hi.max(*v))
-        });
-    let matter = Matter {
-        iso,
-        fill,
-        ramp: fitted.slope() * step,
-        largest: largest.into(),
-        rounding: ROUNDING * f64::from(least.abs().max(largest.abs())),
-    };
-    let tiles = Vec::from_iter(tiles);
-    let parts: Vec<VolumeRevision> = tiles
-        .par_iter()
-        .map(|[tz, ty, tx]| {
-            let along = |tile: &usize, count: usize| tile * TILE..count.min((tile + 1) * TILE);
-            let mut part = VolumeRevision::default();
-            for z in along(tz, nz) {
-                for y in along(ty, ny) {
-                    for x in along(tx, nx) {
-                        let place = DVec3::new(x as f64, y as f64, z as f64);
-                        let place = header.world_from_voxel.transform_point3(place);
-                        let voxel = x + nx * (y + ny * z);
-                        let densities = [fitted.value(place), now.value(place)];
-                        let density = matter.revised(f64::from(volume.values[voxel]), densities, &mut part);
-                        part.changes
-                            .extend(density.map(|density| Change { voxel, density }));
-                    }
-                }
-            }
-            part
-        })
-        .collect();
-    let mut all = VolumeRevision::default();
-    for part in parts {
-        all.changes.extend(part.changes);
-        all.carved += part.carved;
-        all.added += part.added;
-    }
-    all.changes.sort_unstable_by_key(|c| c.voxel);
-    without_ghosts(&mut all, volume, iso);
-    Ok(all)
+    tiles.into_iter().collect()
 }
 
 /// Gives voxels beside what was carved, and beside no solid that is left, the least density that stood round them.
@@ -120,13 +176,9 @@ fn without_ghosts(revision: &mut VolumeRevision, volume: &Volume, iso: f64) {
     let (old, dims, iso) = (&volume.values, volume.header.dims, iso as f32);
     let mut new: BTreeMap<usize, f64> = revision.changes.iter().map(|c| (c.voxel, c.density)).collect();
     let is_solid = |v: usize| new.get(&v).map_or(old[v], |d| *d as f32) >= iso;
-    let carved = revision
-        .changes
-        .iter()
-        .map(|c| c.voxel)
-        .filter(|v| old[*v] >= iso && !is_solid(*v));
-    let beside: BTreeSet<usize> = carved
-        .flat_map(|v| neighbours(v, dims))
+    let emptied = revision.emptied.iter().filter(|v| !is_solid(**v));
+    let beside: BTreeSet<usize> = emptied
+        .flat_map(|v| neighbours(*v, dims))
         .filter(|v| old[*v] < iso && !is_solid(*v))
         .collect();
     let freed = beside.into_iter().filter(|v| !neighbours(*v, dims).any(is_solid));
@@ -140,6 +192,23 @@ fn without_ghosts(revision: &mut VolumeRevision, volume: &Volume, iso: f64) {
     new.extend(cleared);
     let changes = new.into_iter().map(|(voxel, density)| Change { voxel, density });
     revision.changes = changes.collect();
+}
+
+/// The density between voxels, linear along each axis; beyond them that of the nearest.
+fn sampled(volume: &Volume, at: DVec3) -> f64 {
+    let dims = volume.header.dims;
+    let last = DVec3::from_array(dims.map(|n| (n - 1) as f64));
+    let at = at.clamp(DVec3::ZERO, last);
+    let cell = at.floor().min((last - 1.0).max(DVec3::ZERO));
+    let share = at - cell;
+    let first = cell.to_array().map(|v| v as usize);
+    let corners = (0..8).map(|corner: usize| {
+        let step = [corner & 1, corner >> 1 & 1, corner >> 2];
+        let weight = |a: usize| if step[a] == 1 { share[a] } else { 1.0 - share[a] };
+        let [x, y, z] = std::array::from_fn(|a| (first[a] + step[a]).min(dims[a] - 1));
+        weight(0) * weight(1) * weight(2) * f64::from(volume.values[x + dims[0] * (y + dims[1] * z)])
+    });
+    corners.sum()
 }
 
 /// The voxels round one, at most 26.
@@ -157,20 +226,54 @@ struct Matter {
     fill: f64,
     /// Density over which what was carved becomes the fill.
     ramp: f64,
+    /// Densities of the volume.
+    least: f64,
     largest: f64,
     /// A difference that is none.
     rounding: f64,
 }
 
 impl Matter {
+    fn new(volume: &Volume, slope: f64, iso: f64, fill: f64) -> Self {
+        let m = volume.header.world_from_voxel.matrix3;
+        let steps = [m.x_axis, m.y_axis, m.z_axis].map(DVec3::length);
+        let range = (f32::INFINITY, f32::NEG_INFINITY);
+        let densities = volume.values.iter();
+        let (least, largest) = densities.fold(range, |(lo, hi), v| (lo.min(*v), hi.max(*v)));
+        Self {
+            iso,
+            fill,
+            ramp: slope * steps.into_iter().fold(f64::INFINITY, f64::min),
+            least: least.into(),
+            largest: largest.into(),
+            rounding: ROUNDING * f64::from(least.abs().max(largest.abs())),
+        }
+    }
+
+    /// The density of a voxel whose matter came from elsewhere: on what the field is here, what stood in the scan there less
+    /// what the fit made of it.
+    fn moved(&self, [fitted, now]: [f64; 2], residual: f64, told: &mut VolumeRevision) -> f64 {
+        let (was_in, is_in) = (fitted >= self.iso, now >= self.iso);
+        told.carved += usize::from(was_in && !is_in);
+        told.added += usize::from(is_in && !was_in);
+        (now + residual).clamp(self.least, self.largest)
+    }
+
     /// The new density of a voxel, if it has one.
-    fn revised(&self, old: f64, [fitted, now]: [f64; 2], told: &mut VolumeRevision) -> Option<f64> {
+    fn revised(
+        &self,
+        voxel: usize,
+        old: f64,
+        [fitted, now]: [f64; 2],
+        told: &mut VolumeRevision,
+    ) -> Option<f64> {
         if (now - fitted).abs() <= self.rounding {
             return None;
         }
         let (was_in, is_in) = (fitted >= self.iso, now >= self.iso);
         if was_in && !is_in {
             told.carved += 1;
+            told.emptied.push(voxel);
             let share = ((self.iso - now) / self.ramp).min(1.0);
             return Some(self.iso + share * (self.fill - self.iso));
         }

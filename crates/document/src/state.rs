@@ -1,5 +1,6 @@
 use std::collections::BTreeMap;
 
+use bspline::hierarchical::MAX_LEVELS;
 use glam::DAffine3;
 use sha2::{Digest, Sha256};
 
@@ -112,6 +113,12 @@ impl State {
             })
         };
         let properties = &self.object(name)?.properties;
+        if let Some(detail) = properties.detail.filter(|level| *level >= MAX_LEVELS) {
+            return wrong(format!(
+                "its detail is level {detail}; there are levels 0 to {}",
+                MAX_LEVELS - 1
+            ));
+        }
         let map = properties.parent_from_object();
         if !properties.placement.as_flattened().iter().all(|v| v.is_finite()) {
             return wrong(format!(

@@ -1,3 +1,5 @@
+use crate::level::SolverOutcome;
+use crate::level::outcome::note;
 use crate::orient::{Route, UNSURE};
 
 /// Why a leaf was not split further.
@@ -104,6 +106,18 @@ pub struct FitReport {
     pub leaves: Vec<Leaf>,
     /// Of a cloud that came without normals.
     pub signs: Option<SignReport>,
+    /// Iterative solves that the field rests on, in order: of a cloud the full levels and those of the last cascade, of a
+    /// mesh the levels below the first, of a volume the joint solves between exchanges of functions. Empty where nothing is
+    /// iterated (an interpolated volume).
+    pub solves: Vec<SolverOutcome>,
     /// Repairs and doubts, each a sentence with its figures.
     pub notes: Vec<String>,
+}
+
+impl FitReport {
+    /// Takes the outcomes of the solves, and tells where one missed the residual asked for.
+    pub(crate) fn told_solves(&mut self, solves: Vec<SolverOutcome>) {
+        self.notes.extend(note(&solves));
+        self.solves = solves;
+    }
 }

@@ -119,6 +119,13 @@ fn a_tighter_tolerance_costs_coefficients_and_a_budget_stops_it() {
     let (_, loose, _) = fit(&mesh, &tolerance(0.01));
     let (_, tight, _) = fit(&mesh, &tolerance(0.003));
     assert!(tight.coefficients > loose.coefficients && tight.max < loose.max);
+    assert!(
+        tight
+            .solves
+            .iter()
+            .map(|s| s.depth)
+            .eq((6..=tight.depth).map(Some))
+    );
     let spent = MeshOptions {
         coefficients: Some(loose.coefficients),
         ..tolerance(0.003)

@@ -316,3 +316,32 @@ fn cells_wider_than_the_spacing_take_the_samples_at_their_word() {
     // 4.36 degrees; a fifth more with conditions between them.
     assert!(error < 4.6, "{error} degrees");
 }
+
+/// With so much bending eight iterations under the diagonal do not solve a level.
+#[test]
+fn a_level_that_does_not_converge_is_told() {
+    let samples = cloud(Solid::Torus, &CloudOptions::default());
+    let (_, fair) = fit::<f32>(&samples, &to_depth(6)).expect("a clean cloud");
+    let depths: Vec<Option<usize>> = fair.solves.iter().map(|s| s.depth).collect();
+    assert_eq!(depths, [2, 3, 4, 5, 6].map(Some));
+    for solve in &fair.solves {
+        // 32³ is left early on purpose: nothing is asked of it.
+        assert_eq!(solve.goal.is_none(), solve.depth == Some(5), "{solve:?}");
+        assert_eq!(
+            solve.is_converged,
+            solve.goal.is_some_and(|goal| solve.residual <= goal),
+            "{solve:?}"
+        );
+    }
+    let says_so = |notes: &[String]| notes.iter().any(|n| n.contains("did not converge on level 6:"));
+    assert!(!says_so(&fair.notes), "{:?}", fair.notes);
+    let options = PointOptions {
+        smoothing: Some(100.0),
+        ..to_depth(6)
+    };
+    let (_, stiff) = fit::<f32>(&samples, &options).expect("a clean cloud");
+    let last = stiff.solves.last().expect("a solve of each level");
+    assert!(!last.is_converged && last.iterations == 8, "{last:?}");
+    assert!(last.goal.is_some_and(|goal| last.residual > goal), "{last:?}");
+    assert!(says_so(&stiff.notes), "{:?}", stiff.notes);
+}

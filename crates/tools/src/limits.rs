@@ -55,6 +55,8 @@ pub struct Limits {
     weight: Option<Faded>,
     /// Finest level that may change.
     finest: Option<usize>,
+    /// Level that the object is shaped to.
+    detail: Option<usize>,
 }
 
 impl Region {
@@ -122,6 +124,7 @@ impl Limits {
             mask: Some(named),
             weight,
             finest: None,
+            detail: None,
         })
     }
 
@@ -133,9 +136,22 @@ impl Limits {
         }
     }
 
+    /// With the level of the field that the object is shaped to.
+    pub fn at_detail(self, level: usize) -> Self {
+        Self {
+            detail: Some(level),
+            ..self
+        }
+    }
+
     /// Finest level that may change.
     pub fn finest(&self) -> Option<usize> {
         self.finest
+    }
+
+    /// Level of the field that the object is shaped to, if it is told.
+    pub fn detail(&self) -> Option<usize> {
+        self.detail
     }
 
     /// Whether all is free.

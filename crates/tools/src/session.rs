@@ -114,7 +114,7 @@ impl Stroke {
         let tool = self.tool().map_err(ToolError::Stroke)?;
         let whole = canvas.field.lattice().world_box();
         let limits = Limits::new(self.within.as_ref(), self.mask.as_ref(), &canvas.others, &whole);
-        let limits = limits.map_err(ToolError::Stroke)?;
+        let limits = limits.map_err(ToolError::Stroke)?.at_detail(canvas.detail);
         let Some(level) = self.coarse else {
             return self.on_both_sides(tool, canvas, &limits, control);
         };
@@ -150,6 +150,10 @@ impl Stroke {
         if matches!(tool, Tool::Paint(_) | Tool::Copy(_)) {
             let why = format!("{} knows no symmetry; write a stroke for each side", tool.name());
             return Err(ToolError::Stroke(why));
+        }
+        if matches!(tool, Tool::Move(_)) && canvas.layers.values().any(|layer| !layer.is_empty()) {
+            let why = "a painted object cannot be moved on both sides at once; write a stroke for each side";
+            return Err(ToolError::Stroke(why.into()));
         }
         let (mut left, mut notes) = (canvas.clone(), Vec::new());
         left.field = symmetry.apply(&canvas.field, |field| {

@@ -22,6 +22,8 @@ pub struct Canvas {
     pub field: HierarchicalSpline<f32>,
     /// Density of its surface.
     pub iso: f64,
+    /// Level of the field that the object is shaped to.
+    pub detail: usize,
     /// What is painted on it.
     pub layers: Layers,
     /// Objects that a tool may name.
@@ -172,6 +174,16 @@ impl Tool<'_> {
         } = &canvas;
         let mut copies = canvas.copies.clone();
         let (field, report) = match self {
+            Self::Move(tool) => {
+                let (field, report) = tool.apply(old, *iso, limits, control)?;
+                let layers = carried(tool, &canvas, limits)?;
+                let moved = Canvas {
+                    field,
+                    layers,
+                    ..canvas
+                };
+                return Ok((moved, thin_parts(&report)));
+            }
             Self::Paint(paint) => {
                 let layer = painted(paint, &canvas, limits)?;
                 let mut canvas = canvas;
@@ -186,7 +198,6 @@ impl Tool<'_> {
             Self::Simplify(tool) => (tool.apply(old, limits)?, FieldFitReport::default()),
             Self::Carve(tool) => tool.apply(Operation::Carve, old, *iso, others, limits, control)?,
             Self::Add(tool) => tool.apply(Operation::Add, old, *iso, others, limits, control)?,
-            Self::Move(tool) => tool.apply(old, *iso, limits, control)?,
             Self::Smooth(tool) => tool.apply(old, *iso, limits, control)?,
             Self::Inflate(tool) => tool.apply(old, *iso, limits, control)?,
             Self::Cut(tool) => {
@@ -204,13 +215,36 @@ impl Tool<'_> {
     }
 }
 
+/// What is painted, carried along by a move as far as the limits allow.
+fn carried(tool: &Move, canvas: &Canvas, limits: &Limits) -> Result<Layers, ToolError> {
+    let whole = canvas.field.lattice().world_box();
+    let origin = tool.motion.origin(&whole)?;
+    let reach = origin.reach();
+    let within = limits.cut(&Aabb {
+        min: reach.min.max(whole.min),
+        max: reach.max.min(whole.max),
+    });
+    let painted = canvas.layers.iter().filter(|(_, layer)| !layer.is_empty());
+    let layers = painted.map(|(substance, layer)| {
+        let moved = layer
+            .carried(&within, |p| origin.back(p))
+            .map_err(PaintError::from)?;
+        let kept = limits.kept(layer.tree(), moved.tree());
+        Ok((
+            *substance,
+            layer.with_tree(kept).expect("nodes of the same level"),
+        ))
+    });
+    layers.collect()
+}
+
 /// A layer with paint laid on, as far as the limits allow.
 fn painted(paint: &Paint, canvas: &Canvas, limits: &Limits) -> Result<Layer, ToolError> {
     let field = &canvas.field;
     let whole = limits.cut(&field.lattice().world_box());
-    let layer = paint.apply(field, &canvas.layers, &whole)?;
+    let layer = paint.apply(field, &canvas.layers, canvas.detail, &whole)?;
     let before = canvas.layers.get(&paint.layer).cloned();
-    let before = before.unwrap_or_else(|| Layer::empty(field.lattice(), field.level_count() - 1));
+    let before = before.unwrap_or_else(|| Layer::empty(field.lattice(), canvas.detail));
     let kept = limits.kept(before.tree(), layer.tree());
     Ok(layer.with_tree(kept).expect("some of the nodes painted"))
 }

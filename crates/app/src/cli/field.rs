@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::failure::{Failure, Outcome};
 use super::input::limits;
 use super::output::Output;
+use super::solves::Solve;
 use super::source::Source;
 use super::summary::hex;
 
@@ -38,6 +39,8 @@ struct StoredReport {
     left_out: Vec<u32>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     signs: Option<StoredSigns>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    solves: Vec<Solve>,
 }
 
 /// The figures of a [`SignReport`]; the confidences of the leaves have a place of their own.
@@ -106,6 +109,7 @@ impl OpenField {
                 .collect(),
             signs: stored.signs.map(|s| signs(s, &loaded.meta.sign_confidence)),
             leaves,
+            solves: stored.solves.into_iter().map(Into::into).collect(),
             notes: loaded.meta.notes.clone(),
         };
         Ok(Self { loaded, report })
@@ -305,6 +309,7 @@ pub fn stored_text(report: &FitReport) -> String {
             outlier_count: s.outlier_count,
             unsure_count: s.unsure_count,
         }),
+        solves: report.solves.iter().map(Solve::from).collect(),
     };
     serde_json::to_string(&stored).expect("a struct of plain fields is always JSON")
 }

@@ -19,6 +19,7 @@ use super::input::{self, Input, Shape, bounding_box};
 use super::output::Output;
 use super::progress::Bar;
 use super::quantity::{Memory, Tolerance, between, count, human_number, positive, threads};
+use super::solves::Solve;
 use super::source::{SAMPLES, Source, input_formats};
 use super::summary::Summary;
 use super::unoriented::{Oriented, Unoriented};
@@ -487,6 +488,7 @@ impl Fitted {
             outliers: r.signs.as_ref().map(|s| s.outlier_count),
             unsure_signs: r.signs.as_ref().map(|s| s.unsure_count),
             leaves_of_unsure_sign: r.signs.as_ref().map(|s| s.unsure_leaves()),
+            solves: r.solves.iter().map(Solve::from).collect(),
             defects: self.defects.as_ref().map(defects),
             notes: r.notes.iter().map(|n| flags::named(n)).collect(),
             ..Default::default()

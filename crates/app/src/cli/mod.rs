@@ -37,6 +37,7 @@ mod progress;
 mod quantity;
 mod sample;
 mod simulate;
+mod solves;
 mod source;
 mod staged;
 mod store;

@@ -8,6 +8,7 @@ use super::keep::LeftOut;
 use super::mesh_check::MeshQuality;
 use super::output::Output;
 use super::quantity::{human_bytes, human_count, human_number};
+use super::solves::{self, Solve};
 
 /// What a subcommand tells when it is done: one JSON object, or a table. Fields that do not apply stay `None` and
 /// are left out.
@@ -80,6 +81,9 @@ pub struct Summary {
     /// Leaves where that is so on the mean of their points.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub leaves_of_unsure_sign: Option<usize>,
+    /// How the solver of a fit ended, solve by solve.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub solves: Vec<Solve>,
     /// Points that Newton's method could not bring to the surface.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unprojected: Option<usize>,
@@ -211,6 +215,7 @@ impl Summary {
             ("  over tolerance", self.leaves_over_tolerance.map(count)),
             ("  at edges of the mesh", self.leaves_at_edges.map(count)),
             ("  refused for lack of data", self.leaves_without_data.map(count)),
+            ("solver", solves::row(&self.solves)),
             ("coefficients", self.coefficients.map(count)),
             ("bricks", self.bricks.map(count)),
             ("totals", self.totals_bytes.map(|b| human_bytes(b as u64))),

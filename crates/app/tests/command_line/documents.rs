@@ -161,7 +161,7 @@ fn a_session_carves_and_adds_stroke_by_stroke() {
 carve = { shape = { sphere = { radius = 0.2 } }, along = [[0.0, -0.4, 1.0], [0.0, 0.4, 1.0]], blend = 0.05 }
 [[stroke]]
 object = "ball"
-add = { shape = { torus = { axis = [0, 1, 0], major = 0.6, minor = 0.1 } }, along = [[0.5, 0.0, 0.0]] }
+add = { shape = { torus = { axis = [0, 1, 0], major = 0.5, minor = 0.1 } }, along = [[0.45, 0.0, 0.0]] }
 [[stroke]]
 within = { min = [-2, -2, -2], max = [2, 2, 0] }
 move = { motion = { grab = { along = [[0.0, 0.0, -1.0], [0.0, 0.0, -0.8]], radius = 0.5 } } }

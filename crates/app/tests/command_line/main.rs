@@ -3,6 +3,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod documents;
+mod gallery;
 mod meshes;
 #[path = "../common/wrong_values.rs"]
 mod wrong_values;

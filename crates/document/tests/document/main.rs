@@ -576,3 +576,32 @@ step = 0.05
     let (soft, stiff) = (pulled(&state), pulled(&painted));
     assert!(soft > 0.05 && stiff < 0.4 * soft && stiff > 0.0, "{soft} {stiff}");
 }
+
+#[test]
+fn strokes_after_strokes_get_no_finer_by_themselves() {
+    let mut large = object(&common::large());
+    large.meta = FieldMeta {
+        iso: Some(0.0),
+        ..FieldMeta::default()
+    }
+    .into();
+    let mut state = State::new().with("ball", large).unwrap();
+    let stroke = |n: u32| {
+        let z = 30.0 + f64::from(n % 3);
+        format!(
+            "[[stroke]]\ncarve = {{ shape = {{ sphere = {{ radius = 4 }} }}, along = [[{}, 20, {z}]] }}\n",
+            10 + n
+        )
+    };
+    let mut sizes = Vec::new();
+    for n in 0..8 {
+        let named = |_: Option<&str>| Ok::<_, document::CommandError>("ball".to_string());
+        let command = document::Command::of_script(&stroke(n), named).unwrap().remove(0);
+        (state, _) = command.apply(&state, &mut fitting::Control::default()).unwrap();
+        let field = &state.objects()["ball"].field;
+        sizes.push(field.coefficient_count());
+        assert_eq!(field.level_count(), 2, "stroke {n}");
+    }
+    let grown = sizes[7] - sizes[0];
+    assert!(grown < 4 * sizes[0], "{sizes:?}");
+}

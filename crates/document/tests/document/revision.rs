@@ -3,7 +3,7 @@
 use bspline::hierarchical::{HierarchicalSpline, Lattice};
 use bspline::{Aabb, Field};
 
-use document::{VolumeRevision, revise_volume};
+use document::{Command, Journey, VolumeRevision, revise_volume};
 use fitting::Control;
 use formats::Unit;
 use formats::volumes::{Orientation, Volume, VolumeHeader, VoxelType};
@@ -83,13 +83,13 @@ fn edited(operation: Operation, tool: &Geometric) -> (HierarchicalSpline<f32>, V
             &mut Control::default(),
         )
         .unwrap();
-    let revision = revise_volume(&before, &now, &scan(), ISO, FILL).unwrap();
+    let revision = revise_volume(&before, &now, &scan(), ISO, FILL, &Journey::default()).unwrap();
     (now, revision)
 }
 
 #[test]
 fn an_object_that_was_not_edited_changes_no_voxel() {
-    let revision = revise_volume(&fitted(), &fitted(), &scan(), ISO, FILL).unwrap();
+    let revision = revise_volume(&fitted(), &fitted(), &scan(), ISO, FILL, &Journey::default()).unwrap();
     assert_eq!(revision, VolumeRevision::default());
 }
 
@@ -160,4 +160,60 @@ fn what_is_added_is_no_denser_than_the_scan() {
             assert!(change.density > ISO, "{place}: {}", change.density);
         }
     }
+}
+
+#[test]
+fn what_is_moved_takes_the_noise_of_its_scan_along() {
+    let before = fitted();
+    let by = DVec3::new(3.0, 0.0, 0.0);
+    // All of the ball, and well beyond it.
+    let text = "[[stroke]]\nmove = { motion = { shift = { region = { min = [0, 0, 0], max = [24, 24, 24] }, by = [3, 0, 0], blend = 9 } } }\n";
+    let named = |_: Option<&str>| Ok::<_, document::CommandError>("ball".to_string());
+    let commands = Command::of_script(text, named).unwrap();
+    let Command::Stroke { stroke, .. } = &commands[0] else {
+        unreachable!()
+    };
+    let tool = stroke.motion.as_ref().unwrap();
+    let limits = Limits::default();
+    let (now, _) = tool
+        .apply(&before, ISO, &limits, &mut Control::default())
+        .unwrap();
+    let journey = Journey::new(&commands, "ball", &before.lattice().world_box());
+    let (scan, mut checked, mut worst) = (scan(), 0, 0.0f64);
+    let revision = revise_volume(&before, &now, &scan, ISO, FILL, &journey).unwrap();
+    let value = |p: DVec3| ball(p);
+    for change in &revision.changes {
+        let place = scan.header.world_from_voxel.transform_point3(index(change.voxel));
+        let origin = place - by;
+        // Inside, away from the rim, the field is flat and all that moves is the noise.
+        if value(place) == 100.0 && value(origin) == 100.0 && now.value(place) > 99.9 {
+            let at = scan.header.world_from_voxel.inverse().transform_point3(origin);
+            if at.cmplt(DVec3::ONE).any() || at.cmpgt(DVec3::splat(SIDE as f64 - 2.0)).any() {
+                continue;
+            }
+            let expected = trilinear(&scan, at);
+            worst = worst.max((change.density - expected).abs());
+            checked += 1;
+        }
+    }
+    assert!(checked > 50 && worst < 1.0, "{checked} {worst}");
+}
+
+fn trilinear(scan: &Volume, at: DVec3) -> f64 {
+    let cell = at.floor();
+    (0..8)
+        .map(|corner: usize| {
+            let step = DVec3::new(
+                (corner & 1) as f64,
+                (corner >> 1 & 1) as f64,
+                (corner >> 2) as f64,
+            );
+            let weight = (1.0 - (at - cell - step).abs())
+                .to_array()
+                .iter()
+                .product::<f64>();
+            let [x, y, z] = (cell + step).to_array().map(|v| v as usize);
+            weight * f64::from(scan.values[x + SIDE * (y + SIDE * z)])
+        })
+        .sum()
 }

@@ -135,7 +135,7 @@ impl<T: Real> LevelFit<'_, T> {
         let tiles = Tiles::new(keys);
         let fields = [self.target, self.field as &dyn Field];
         let (target, rest, counts) =
-            tiles.fill_both(|i, target, rest| sample(fields, &self.region, tiles.keys[i], target, rest));
+            tiles.fill_runs(|run, target, rest| sample(fields, &self.region, run[0], target, rest));
         for (key, target) in tiles.keys.iter().zip(&target) {
             let inside = between(*key, lo, hi);
             if let Some(bad) = places(&inside).find(|i| !target[*i].is_finite()) {

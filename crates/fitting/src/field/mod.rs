@@ -54,7 +54,7 @@ pub enum Aim {
     },
 }
 
-/// What a fit did, and how close it came.
+/// What a fit did, and how close it came. There is no solver to tell of: the coefficients are a quasi-interpolant.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FieldFitReport {
     /// Levels that got functions, or other coefficients, coarsest first.

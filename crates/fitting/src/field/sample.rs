@@ -1,25 +1,26 @@
-//! Target and field at the knots of a tile.
+//! Target and field at the knots of tiles.
 
 use bspline::Field;
 
 use super::region::Region;
-use super::tiles::{TILE, TileKey, Values};
+use super::tiles::{RUN, TILE, TileKey, Values};
 
-/// Target and rest (`target - field`) at the knots of a tile; gives the number of points asked for. Knots that are not
-/// sampled get the target NaN.
+/// Target and rest (`target - field`) at the knots of a run of tiles along z, from the one of `key` on; gives the number of
+/// points asked for. Knots that are not sampled get the target NaN.
 pub(super) fn sample(
     [target, field]: [&dyn Field; 2],
     region: &Region,
     key: TileKey,
-    targets: &mut Values,
-    rests: &mut Values,
+    targets: &mut [Values],
+    rests: &mut [Values],
 ) -> u64 {
-    targets.fill(f64::NAN);
+    targets.as_flattened_mut().fill(f64::NAN);
     let (lo, hi) = region.sampled();
     let last = region.last();
     let first = key.map(|k| i64::from(k) * TILE as i64);
+    let size = [TILE, TILE, TILE * targets.len()];
     let start: [i64; 3] = std::array::from_fn(|a| first[a].max(lo[a]));
-    let end: [i64; 3] = std::array::from_fn(|a| (first[a] + TILE as i64 - 1).min(hi[a]));
+    let end: [i64; 3] = std::array::from_fn(|a| (first[a] + size[a] as i64 - 1).min(hi[a]));
     if (0..3).any(|a| start[a] > end[a]) {
         return 0;
     }
@@ -29,7 +30,7 @@ pub(super) fn sample(
     let to: [i64; 3] = std::array::from_fn(|a| end[a].min(last[a]).max((from[a] + 1).min(last[a])));
     let count: [usize; 3] = std::array::from_fn(|a| (to[a] - from[a] + 1) as usize);
     let len = count.iter().product::<usize>();
-    let mut target_values = [0.0; (TILE + 2) * (TILE + 2) * (TILE + 2)];
+    let mut target_values = [0.0; (TILE + 2) * (TILE + 2) * (RUN * TILE + 2)];
     let mut field_values = target_values;
     let (target_values, field_values) = (&mut target_values[..len], &mut field_values[..len]);
     let frame = region.frame();
@@ -39,38 +40,48 @@ pub(super) fn sample(
         let [x, y, z]: [usize; 3] = std::array::from_fn(|a| (i[a] - from[a]) as usize);
         (x * count[1] + y) * count[2] + z
     };
-    for x in start[0]..=end[0] {
-        for y in start[1]..=end[1] {
-            let to_row = ((x - first[0]) as usize * TILE + (y - first[1]) as usize) * TILE;
-            for z in start[2]..=end[2] {
-                let to = to_row + (z - first[2]) as usize;
-                let (t, f) = match leaves_box {
-                    false => {
-                        let i = at([x, y, z]);
-                        (target_values[i], field_values[i])
+    for (n, (targets, rests)) in targets.iter_mut().zip(rests.iter_mut()).enumerate() {
+        let first = [first[0], first[1], first[2] + (n * TILE) as i64];
+        let [begin, stop] = [start[2].max(first[2]), end[2].min(first[2] + TILE as i64 - 1)];
+        for x in start[0]..=end[0] {
+            for y in start[1]..=end[1] {
+                let to_row = ((x - first[0]) as usize * TILE + (y - first[1]) as usize) * TILE;
+                if !leaves_box {
+                    let (i, to) = (at([x, y, begin]), to_row + (begin - first[2]) as usize);
+                    let len = (stop - begin + 1) as usize;
+                    let (t, f) = (&target_values[i..i + len], &field_values[i..i + len]);
+                    targets[to..to + len].copy_from_slice(t);
+                    for (rest, (t, f)) in rests[to..to + len].iter_mut().zip(t.iter().zip(f)) {
+                        *rest = t - f;
                     }
-                    true => {
-                        let on = |values: &[f64]| straight([x, y, z], last, |i| values[at(i)]);
-                        (on(target_values), on(field_values))
-                    }
-                };
-                targets[to] = t;
-                rests[to] = t - f;
+                    continue;
+                }
+                for z in begin..=stop {
+                    let to = to_row + (z - first[2]) as usize;
+                    let on = |values: &[f64]| straight([x, y, z], last, |i| values[at(i)]);
+                    let (t, f) = (on(target_values), on(field_values));
+                    (targets[to], rests[to]) = (t, t - f);
+                }
             }
         }
-    }
-    // Beside what is sampled the rest goes on as it is.
-    if (0..3).any(|a| start[a] > first[a] || end[a] < first[a] + TILE as i64 - 1) {
-        for i in 0..rests.len() {
-            let at = [i / TILE / TILE, i / TILE % TILE, i % TILE];
-            let [x, y, z] = std::array::from_fn(|a| {
-                let knot = first[a] + at[a] as i64;
-                (knot.clamp(start[a], end[a]) - first[a]) as usize
-            });
-            rests[i] = rests[(x * TILE + y) * TILE + z];
-        }
+        go_on(first, [start[0], start[1], begin], [end[0], end[1], stop], rests);
     }
     len as u64
+}
+
+/// Beside what is sampled, `start ..= end` of the tile that begins at `first`, the rest goes on as it is.
+fn go_on(first: [i64; 3], start: [i64; 3], end: [i64; 3], rests: &mut Values) {
+    if (0..3).all(|a| start[a] == first[a] && end[a] == first[a] + TILE as i64 - 1) {
+        return;
+    }
+    for i in 0..rests.len() {
+        let at = [i / TILE / TILE, i / TILE % TILE, i % TILE];
+        let [x, y, z] = std::array::from_fn(|a| {
+            let knot = first[a] + at[a] as i64;
+            (knot.clamp(start[a], end[a]) - first[a]) as usize
+        });
+        rests[i] = rests[(x * TILE + y) * TILE + z];
+    }
 }
 
 /// Value at a knot, outside `0 ..= last` continued linearly on each axis.

@@ -14,6 +14,9 @@ const PADDED: usize = TILE + 2;
 /// Tiles from which on the threads share them: some tenths of a millisecond's work. Waking another takes a part of that.
 const SIDE_BY_SIDE: usize = 24;
 
+/// Most tiles that are sampled together.
+pub(super) const RUN: usize = 4;
+
 /// Tile `k` holds the knots `8k .. 8k + 8`, as the cells of a brick begin.
 pub(super) type TileKey = [i32; 3];
 /// Values of a tile, z fastest.
@@ -59,7 +62,7 @@ pub(super) struct Tiles {
 impl Tiles {
     /// Of `keys`, sorted.
     pub fn new(keys: Vec<TileKey>) -> Self {
-        let neighbours = each((0..keys.len()).collect(), |i: usize| {
+        let neighbours = each(keys.len(), |i| {
             let mut all = [ABSENT; 27];
             for (column, row) in all.chunks_exact_mut(3).enumerate() {
                 let [x, y, z] = keys[i];
@@ -80,26 +83,45 @@ impl Tiles {
 
     /// What `of` gives for each tile, in order, whatever the number of threads.
     pub fn map<R: Send>(&self, of: impl Fn(usize) -> R + Sync + Send) -> Vec<R> {
-        each((0..self.keys.len()).collect(), of)
+        each(self.keys.len(), of)
     }
 
     /// Values of each tile as `of` writes them over zeros.
     pub fn fill(&self, of: impl Fn(usize, &mut Values) + Sync + Send) -> Vec<Values> {
         let mut values = vec![[0.0; LEN]; self.keys.len()];
-        let all = values.iter_mut().enumerate().collect();
-        each(all, |(i, values)| of(i, values));
+        match values.len() < SIDE_BY_SIDE {
+            true => values.iter_mut().enumerate().for_each(|(i, v)| of(i, v)),
+            false => {
+                let all = values.par_iter_mut().with_min_len(4).enumerate();
+                all.for_each(|(i, v)| of(i, v));
+            }
+        }
         values
     }
 
-    /// Two values of each tile as `of` writes them over zeros, and what it gives.
-    pub fn fill_both<R: Send>(
+    /// Two values of each tile as `of` writes them over zeros, and what it gives for each run of tiles along z: what is asked
+    /// for together costs less.
+    pub fn fill_runs<R: Send>(
         &self,
-        of: impl Fn(usize, &mut Values, &mut Values) -> R + Sync + Send,
+        of: impl Fn(&[TileKey], &mut [Values], &mut [Values]) -> R + Sync + Send,
     ) -> (Vec<Values>, Vec<Values>, Vec<R>) {
         let zeros = || vec![[0.0; LEN]; self.keys.len()];
         let (mut a, mut b) = (zeros(), zeros());
-        let all = a.iter_mut().zip(&mut b).enumerate().collect();
-        let found = each(all, |(i, (a, b))| of(i, a, b));
+        let (mut rest_a, mut rest_b) = (a.as_mut_slice(), b.as_mut_slice());
+        let is_next = |k: &TileKey, l: &TileKey| *l == [k[0], k[1], k[2] + 1];
+        let columns = self.keys.chunk_by(is_next).flat_map(|column| column.chunks(RUN));
+        let runs: Vec<_> = columns
+            .map(|run| {
+                let own_a = rest_a.split_off_mut(..run.len()).expect("a value for each tile");
+                let own_b = rest_b.split_off_mut(..run.len()).expect("a value for each tile");
+                (run, own_a, own_b)
+            })
+            .collect();
+        let of = |(run, a, b): (&[TileKey], &mut [Values], &mut [Values])| of(run, a, b);
+        let found = match self.keys.len() < SIDE_BY_SIDE {
+            true => runs.into_iter().map(of).collect(),
+            false => runs.into_par_iter().map(of).collect(),
+        };
         (a, b, found)
     }
 
@@ -268,10 +290,10 @@ pub(super) fn in_pool<R: Send>(tiles: usize, work: impl FnOnce() -> R + Send) ->
     }
 }
 
-/// What `of` gives for each, in order; side by side where there are many.
-fn each<I: Send, R: Send>(all: Vec<I>, of: impl Fn(I) -> R + Sync + Send) -> Vec<R> {
-    if all.len() < SIDE_BY_SIDE {
-        return all.into_iter().map(of).collect();
+/// What `of` gives for each of `count`, in order; side by side where there are many.
+fn each<R: Send>(count: usize, of: impl Fn(usize) -> R + Sync + Send) -> Vec<R> {
+    match count < SIDE_BY_SIDE {
+        true => (0..count).map(of).collect(),
+        false => (0..count).into_par_iter().with_min_len(4).map(of).collect(),
     }
-    all.into_par_iter().with_min_len(4).map(of).collect()
 }

@@ -5,8 +5,8 @@ use rayon::prelude::*;
 
 use super::distance::{Distance, MeshDistance};
 use super::packet::PLACES;
-use crate::points::BASE_DEPTH;
-use crate::points::full_grid::FullGrid;
+use crate::level::BASE_DEPTH;
+use crate::level::full_grid::FullGrid;
 
 /// Signed distances at the knots of the base level and one beyond on every side, z fastest, and the coefficients.
 pub(crate) struct Base {

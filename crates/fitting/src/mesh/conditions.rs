@@ -6,10 +6,10 @@ use rayon::prelude::*;
 
 use super::Plan;
 use super::judge::Quality;
-use super::probes::{Cell, Octants, Probe, cell_of, center, child};
-use crate::points::band::{BRICK, Band, HALO, HALO_LEN, Key, halo_start, key_of, slot_of};
-use crate::points::band_solve::{BandSample, BrickSamples};
-use crate::points::stencil::{Spot, gather, gather_value};
+use super::probes::{Cell, Octants, Probe, cell_of};
+use crate::level::band::{BRICK, Band, HALO, HALO_LEN, Key, halo_start, key_of, slot_of};
+use crate::level::band_problem::{BandSample, BrickSamples};
+use crate::level::stencil::{Spot, gather, gather_value};
 
 /// Weight of a condition that stands for a larger part of space than those of the level at hand, at most.
 const MOST_WEIGHT: f32 = 8.0;
@@ -222,11 +222,6 @@ pub(super) fn base_qualities(
         .zip(octants)
         .map(|(cell, octants)| Quality::of(cell, octants, depth, plan, |at| field(at).0, &field))
         .collect()
-}
-
-/// Signed distance asked for at the centre of part `o` of `cell`, and where that is.
-pub(super) fn part(cell: &Cell, o: usize, depth: usize) -> DVec3 {
-    center(child(cell.at, o), depth + 1)
 }
 
 /// Cells, brick by brick, within two of a refined one: those that its functions reach.

@@ -5,11 +5,13 @@
 //! the cells. So cells at creases are told from others by how the error fell from the cell above, and are split only
 //! while what they leave matters for the whole and they cost no more than the rest.
 
+use std::ops::Range;
+
 use glam::DVec3;
 
 use super::Plan;
-use super::conditions::part;
 use super::probes::{Cell, Octants, cell_of};
+use crate::StopReason;
 
 /// Share of the tolerance that is aimed at: cells beside refined ones move a little after they were judged.
 const AIM: f64 = 0.8;
@@ -48,6 +50,17 @@ impl Misses {
     }
 }
 
+/// A leaf as it was judged.
+pub(super) struct LeafCell {
+    pub depth: usize,
+    pub at: [u32; 3],
+    pub reason: StopReason,
+    /// Area of the surface in it, unit box, about.
+    pub area: f64,
+    /// Feet of its parts that lie in it.
+    pub feet: Range<usize>,
+}
+
 /// Errors of a cell.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Quality {
@@ -75,7 +88,7 @@ impl Quality {
         let mut out = Self::default();
         let h = 0.5f64.powi(depth as i32);
         for (o, found) in octants.iter().enumerate() {
-            let place = part(cell, o, depth);
+            let place = cell.part(o, depth);
             let error = (value(place) - found.value()).abs();
             let allowed = plan.allowed(found.distance, found.in_hole());
             if error > allowed.max(RIDGE * h) {

@@ -7,24 +7,24 @@ use rustc_hash::FxHashSet;
 
 use super::Plan;
 use super::base::{Base, KNOTS, base};
-use super::conditions::{Around, Conditions, base_qualities, part, qualities};
+use super::conditions::{Around, Conditions, base_qualities, qualities};
 use super::distance::MeshDistance;
-use super::judge::{Quality, Verdict, verdict};
+use super::judge::{LeafCell, Quality, Verdict, verdict};
 use super::probes::{Cell, Octants, Probe, around, center, child};
-use super::summary::{LeafCell, summary};
+use super::summary::summary;
 use super::thin::{Sheets, TooThin};
-use crate::points::BASE_DEPTH;
-use crate::points::assemble::assemble_in;
-use crate::points::band::{Band, Coarser, active_count, count_bricks_near, key_of};
-use crate::points::band_solve::{BandProblem, BandSample, Weights};
-use crate::points::cascade::{Level, level_bytes};
-use crate::points::stencil::{Spot, gather};
-use crate::{Control, FitError, FitReport, StopReason};
+use crate::level::BASE_DEPTH;
+use crate::level::assemble::{Level, assemble};
+use crate::level::band::{Band, Coarser, active_count, count_bricks_near, key_of};
+use crate::level::band_problem::{BandProblem, BandSample, Weights};
+use crate::level::stencil::{Spot, gather};
+use crate::points::cascade::level_bytes;
+use crate::{Control, FitError, FitReport, SolverOutcome, StopReason};
 
 /// Weight `β` of the gradient condition, in cells.
 const BETA: f64 = 0.4;
 /// Weight `μ` of the bending energy.
-pub(super) const BENDING: f64 = 1e-5;
+const BENDING: f64 = 1e-5;
 /// Conjugate gradients stop at this relative residual, or after so many iterations.
 const RESIDUAL: f64 = 0.01;
 const ITERATIONS: usize = 6;
@@ -64,6 +64,8 @@ struct Octree<'a> {
     /// Corners of the surface.
     corners: Vec<Probe>,
     leaves: Vec<LeafCell>,
+    /// How each level was solved.
+    solves: Vec<SolverOutcome>,
     /// Points of the surface in leaves, leaf by leaf.
     feet: Vec<DVec3>,
     /// Coefficients on creases and elsewhere, about, and in all.
@@ -91,6 +93,7 @@ pub(crate) fn fit<T: Real>(
         settled: Vec::new(),
         corners: mesh.corners().map(Probe::corner).collect(),
         leaves: Vec::new(),
+        solves: Vec::new(),
         feet: Vec::new(),
         on_creases: 0,
         elsewhere: 0,
@@ -119,8 +122,8 @@ pub(crate) fn fit<T: Real>(
     }
     control.step("measuring", 0.92)?;
     drop(coarser);
-    let field = assemble_in(mesh.origin, mesh.scale, &base.grid, &levels);
-    let report = summary(
+    let field = assemble(mesh.origin, mesh.scale, &base.grid, &levels);
+    let mut report = summary(
         mesh,
         plan,
         &field,
@@ -129,6 +132,8 @@ pub(crate) fn fit<T: Real>(
         &tree.too_thin,
         triangles,
     );
+    report.smoothing = BENDING;
+    report.told_solves(tree.solves);
     Ok((field, report))
 }
 
@@ -301,7 +306,7 @@ impl Octree<'_> {
             if is_split[i] {
                 for (o, d) in octants[i].iter().enumerate() {
                     if !is_refined(self.plan, depth, o, d.distance, &found[i]) {
-                        self.settled.push(Probe::new(part(cell, o, depth), d, 0.5 * h));
+                        self.settled.push(Probe::new(cell.part(o, depth), d, 0.5 * h));
                     }
                 }
                 continue;
@@ -345,7 +350,8 @@ impl Octree<'_> {
                 mu: BENDING,
             },
         );
-        let (x, _) = problem.solve(RESIDUAL, ITERATIONS);
+        let (x, outcome) = problem.solve(RESIDUAL, ITERATIONS);
+        self.solves.push(outcome);
         drop(conditions);
         band.add_active(&x);
         self.coefficients += x.len();

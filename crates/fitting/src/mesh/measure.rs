@@ -8,7 +8,8 @@ use rayon::prelude::*;
 use super::distance::MeshDistance;
 use super::judge::Misses;
 use super::probes::{cell_of, center, child};
-use crate::points::{BASE_DEPTH, LeafError, PointErrors, measure_points};
+use crate::level::BASE_DEPTH;
+use crate::points::{LeafError, PointErrors, measure_points};
 use crate::{Leaf, LeafIndex};
 
 /// Random points of the surface at which the whole field is measured.

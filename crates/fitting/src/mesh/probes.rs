@@ -79,12 +79,17 @@ pub(crate) fn cell_of(at: DVec3, depth: usize) -> [u32; 3] {
 impl Cell {
     /// Centres of its eight parts.
     pub fn places(&self, depth: usize) -> impl Iterator<Item = DVec3> {
-        (0..8).map(move |o| center(child(self.at, o), depth + 1))
+        (0..8).map(move |o| self.part(o, depth))
+    }
+
+    /// Centre of part `o`, where the distance is asked for.
+    pub fn part(&self, o: usize, depth: usize) -> DVec3 {
+        center(child(self.at, o), depth + 1)
     }
 
     pub fn ask(&self, mesh: &MeshDistance, depth: usize) -> Octants {
         let middle = center(self.at, depth);
-        let places = std::array::from_fn(|o| center(child(self.at, o), depth + 1));
+        let places = std::array::from_fn(|o| self.part(o, depth));
         mesh.at_eight(&places, Some((middle, &self.center)))
     }
 

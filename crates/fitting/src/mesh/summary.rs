@@ -1,28 +1,15 @@
 //! What a fit of a mesh says of itself: distances from points of the surface to the zero set, leaf by leaf.
 
-use std::ops::Range;
-
 use bspline::{HierarchicalSpline, Real};
 use glam::DVec3;
 
 use super::Plan;
 use super::distance::MeshDistance;
-use super::levels::BENDING;
+use super::judge::LeafCell;
 use super::measure::measure;
 use super::thin::TooThin;
-use crate::points::BASE_DEPTH;
+use crate::level::BASE_DEPTH;
 use crate::{FitReport, Leaf, StopReason};
-
-/// A leaf as it was judged.
-pub(super) struct LeafCell {
-    pub depth: usize,
-    pub at: [u32; 3],
-    pub reason: StopReason,
-    /// Area of the surface in it, unit box, about.
-    pub area: f64,
-    /// Feet of its parts that lie in it.
-    pub feet: Range<usize>,
-}
 
 /// What stays above the tolerance for one reason; the area in the unit box.
 #[derive(Clone, Copy, Default)]
@@ -91,7 +78,6 @@ pub(super) fn summary<T: Real>(
         coefficients: field.coefficient_count(),
         depth: BASE_DEPTH + field.level_count() - 1,
         tolerance,
-        smoothing: BENDING,
         rms: found.rms,
         p95: found.p95,
         max: found.max,

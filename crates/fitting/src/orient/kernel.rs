@@ -6,7 +6,6 @@
 //! - `−∇w(x) = (1/4π) Σ m/ρ³ − 3 (d·m) d/ρ⁵`, along the outward normal on it,
 //! - `(1/4π) Σ s (x − y)/ρ³`, gathered at `x`, is the adjoint of the first.
 
-use super::tree::Tree;
 use bspline::vectorized;
 
 /// Targets that are summed at once.
@@ -20,15 +19,28 @@ pub(crate) struct Source<S> {
     pub strength: S,
 }
 
+/// What a point carries, and summed what a node of a tree does.
+pub(crate) trait Strength: Copy + Send + Sync {
+    const NONE: Self;
+    fn add(&mut self, other: &Self);
+}
+
+impl<const N: usize> Strength for [f32; N] {
+    const NONE: Self = [0.0; N];
+
+    fn add(&mut self, other: &Self) {
+        for (a, b) in self.iter_mut().zip(other) {
+            *a += b;
+        }
+    }
+}
+
 /// What a point does to a target.
 pub(crate) trait Kernel: Sync {
     /// What a point carries.
-    type Strength: Copy + Send + Sync;
+    type Strength: Strength;
     /// What a target gets.
     type Output: Copy + Default + Send;
-
-    /// Sums of strengths over the nodes of a tree.
-    fn moments(tree: &Tree, strengths: &[Self::Strength]) -> Vec<Self::Strength>;
 
     /// Sums over `sources` at up to [`LANES`] targets.
     fn sum(&self, sources: &[Source<Self::Strength>], targets: &[Target], out: &mut [Self::Output]);
@@ -94,10 +106,6 @@ impl Kernel for Winding {
     type Strength = [f32; 3];
     type Output = f32;
 
-    fn moments(tree: &Tree, strengths: &[[f32; 3]]) -> Vec<[f32; 3]> {
-        tree.vector_moments(strengths)
-    }
-
     fn sum(&self, sources: &[Source<[f32; 3]>], targets: &[Target], out: &mut [f32]) {
         let [w] = lanes(
             sources,
@@ -114,10 +122,6 @@ impl Kernel for Winding {
 impl Kernel for Gradient {
     type Strength = [f32; 3];
     type Output = [f32; 3];
-
-    fn moments(tree: &Tree, strengths: &[[f32; 3]]) -> Vec<[f32; 3]> {
-        tree.vector_moments(strengths)
-    }
 
     fn sum(&self, sources: &[Source<[f32; 3]>], targets: &[Target], out: &mut [[f32; 3]]) {
         let g = lanes(
@@ -139,10 +143,6 @@ impl Kernel for Gradient {
 impl Kernel for Adjoint {
     type Strength = [f32; 1];
     type Output = [f32; 3];
-
-    fn moments(tree: &Tree, strengths: &[[f32; 1]]) -> Vec<[f32; 1]> {
-        tree.scalar_moments(strengths)
-    }
 
     fn sum(&self, sources: &[Source<[f32; 1]>], targets: &[Target], out: &mut [[f32; 3]]) {
         let g = lanes(

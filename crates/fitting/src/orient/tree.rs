@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::kernel::{Kernel, LANES, Source, Target};
+use super::kernel::{Kernel, LANES, Source, Strength, Target};
 
 /// Points in a leaf.
 const LEAF: usize = 24;
@@ -108,12 +108,12 @@ impl Tree {
     }
 
     /// Sums of `strengths` over the points of each node.
-    fn moments<const N: usize>(&self, strengths: &[[f32; N]]) -> Vec<[f32; N]> {
-        let mut out = vec![[0.0; N]; self.nodes.len()];
+    fn moments<S: Strength>(&self, strengths: &[S]) -> Vec<S> {
+        let mut out = vec![S::NONE; self.nodes.len()];
         for at in (0..self.nodes.len()).rev() {
             let node = &self.nodes[at];
-            let mut sum = [0.0; N];
-            let mut add = |s: &[f32; N]| (0..N).for_each(|k| sum[k] += s[k]);
+            let mut sum = S::NONE;
+            let mut add = |s: &S| sum.add(s);
             if node.skip as usize == at + 1 {
                 strengths[node.begin as usize..node.end as usize]
                     .iter()
@@ -139,7 +139,7 @@ impl Tree {
         runs: &[Range<usize>],
     ) -> Vec<K::Output> {
         use rayon::prelude::*;
-        let moments = K::moments(self, strengths);
+        let moments = self.moments(strengths);
         let mut out = vec![K::Output::default(); targets.len()];
         let mut rest = out.as_mut_slice();
         let mut work = Vec::with_capacity(runs.len());
@@ -196,14 +196,6 @@ impl Tree {
                 at += 1;
             }
         }
-    }
-
-    pub(super) fn vector_moments(&self, strengths: &[[f32; 3]]) -> Vec<[f32; 3]> {
-        self.moments(strengths)
-    }
-
-    pub(super) fn scalar_moments(&self, strengths: &[[f32; 1]]) -> Vec<[f32; 1]> {
-        self.moments(strengths)
     }
 }
 

@@ -12,12 +12,12 @@ use glam::{DVec3, Vec3};
 use kiddo::SquaredEuclidean;
 use rayon::prelude::*;
 
-use super::band::{Band, halo_start, key_of};
-use super::band_solve::BandSample;
 use super::cells::Cell;
 use super::samples::Samples;
-use super::stencil::Spot;
 use super::support;
+use crate::level::band::{Band, halo_start, key_of};
+use crate::level::band_problem::BandSample;
+use crate::level::stencil::Spot;
 
 /// Neighbours that a sample is paired with: in a triangulation it has six.
 const NEIGHBOURS: usize = 6;

@@ -4,17 +4,19 @@ use std::ops::Range;
 
 use bspline::Real;
 
-use super::band::{BRICK_LEN, Band, Coarser, HALO_LEN, Key, REACH, count_bricks_near, halo_start, key_of};
-use super::band_solve::{BandProblem, BandSample, BrickSamples, SolveReport};
 use super::between::Neighbours;
 use super::cells::{Cell, LeafCell, cell_quality, children, judge, keep_within, root_cells};
-use super::full_grid::FullGrid;
 use super::plan::Plan;
-use super::samples::{BASE_DEPTH, Samples};
-use super::stencil::Spot;
+use super::samples::Samples;
 use super::still::{StillCell, replace_refined, still_cells_of_base};
 use super::{NormalForm, between};
-use crate::{Control, FitError, StopReason};
+use crate::level::BASE_DEPTH;
+use crate::level::assemble::Level;
+use crate::level::band::{BRICK_LEN, Band, Coarser, HALO_LEN, REACH, count_bricks_near, halo_start, key_of};
+use crate::level::band_problem::{BandProblem, BandSample, BrickSamples};
+use crate::level::full_grid::FullGrid;
+use crate::level::stencil::Spot;
+use crate::{Control, FitError, SolverOutcome, StopReason};
 
 /// Samples of a cell beyond this many are thinned.
 const SAMPLES_PER_CELL: u32 = 8;
@@ -26,16 +28,9 @@ pub(crate) struct Cascade<T> {
     pub levels: Vec<Level<T>>,
     pub leaves: Vec<LeafCell>,
     /// What the solve of each level did.
-    pub solves: Vec<SolveReport>,
+    pub solves: Vec<SolverOutcome>,
     /// Where the field may have an extremum near the surface, if that was asked.
     pub still: Vec<StillCell>,
-}
-
-/// The stored part of a level: the corrections `x` of its active functions, brick by brick.
-pub(crate) struct Level<T> {
-    pub keys: Vec<Key>,
-    pub masks: Vec<u64>,
-    pub x: Vec<T>,
 }
 
 /// Runs the cascade from the full level `base` down. No level is begun that the memory ceiling has no room for, and no

@@ -3,12 +3,13 @@
 use bspline::Real;
 use rustc_hash::FxHashSet;
 
-use super::band::{Band, HALO, HALO_LEN};
-use super::band_solve::{BandSample, BrickSamples};
 use super::plan::Plan;
-use super::samples::{BASE_DEPTH, Samples};
-use super::stencil::gather;
+use super::samples::Samples;
 use crate::StopReason;
+use crate::level::BASE_DEPTH;
+use crate::level::band::{Band, HALO, HALO_LEN};
+use crate::level::band_problem::{BandSample, BrickSamples};
+use crate::level::stencil::gather;
 
 /// A cell is split where the rms of `|∇f + n|` exceeds this, however small `|f|` is: on thin parts opposite
 /// sheets cancel to `f ≈ 0`, `|∇f| ≈ 0`.

@@ -3,19 +3,7 @@
 use glam::DVec3;
 
 use super::samples::Samples;
-
-/// Mean of the samples of one half-cell whose normals share an octant.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Cluster {
-    /// Mean position, unit box.
-    pub position: DVec3,
-    /// Mean of the unit normals, not normalized: short where they disagree.
-    pub normal: DVec3,
-    /// Samples merged.
-    pub count: f64,
-    /// `¼ · count / count of the half-cell`: every occupied half-cell weighs the same, whatever its density.
-    pub weight: f64,
-}
+use crate::level::full_operator::Cluster;
 
 /// Clusters for the grid with `2^depth` cells: half-cells are cells of `depth + 1`.
 pub(crate) fn clusters(samples: &Samples, depth: usize) -> Vec<Cluster> {
@@ -39,22 +27,20 @@ pub(crate) fn coarser(finer: &[Cluster], depth: usize) -> Vec<Cluster> {
 
 /// Weighs clusters by the samples of their half-cell where these are fewer than in the median cluster's.
 pub(crate) fn doubt_the_sparse(clusters: &mut [Cluster]) {
-    let mut counts: Vec<f64> = clusters.iter().map(Cluster::in_half_cell).collect();
+    let mut counts: Vec<f64> = clusters.iter().map(in_half_cell).collect();
     if counts.is_empty() {
         return;
     }
     let middle = counts.len() / 2;
     let usual = *counts.select_nth_unstable_by(middle, f64::total_cmp).1;
     for c in clusters {
-        c.weight *= (c.in_half_cell() / usual).min(1.0);
+        c.weight *= (in_half_cell(c) / usual).min(1.0);
     }
 }
 
-impl Cluster {
-    /// Samples of the half-cell.
-    fn in_half_cell(&self) -> f64 {
-        0.25 * self.count / self.weight
-    }
+/// Samples of the half-cell of a cluster.
+fn in_half_cell(cluster: &Cluster) -> f64 {
+    0.25 * cluster.count / cluster.weight
 }
 
 fn merge(entries: impl Iterator<Item = (DVec3, DVec3, f64)>, depth: usize) -> Vec<Cluster> {

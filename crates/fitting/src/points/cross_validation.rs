@@ -11,12 +11,11 @@
 
 use bspline::{Field, Real};
 
-use super::assemble::assemble;
 use super::cascade;
-use super::full_grid::FullGrid;
 use super::plan::{Plan, Smoothing};
 use super::residual::newton_distance;
 use super::samples::Samples;
+use crate::level::full_grid::FullGrid;
 use crate::{Control, FitError};
 
 /// Fits at most, each with its probe.
@@ -96,7 +95,7 @@ fn score<T: Real>(
         .filter(|&i| samples.weights[i] > 0.0 && samples.is_moved(i) == any_moved)
         .collect();
     let cascade = cascade::run::<T>(samples, base, plan, 0.0..1.0, quiet)?;
-    let field = assemble(samples, base, &cascade.levels);
+    let field = samples.field(base, &cascade.levels);
     let limit = 3.0 * noise * samples.scale;
     let residual = |i: usize| {
         if any_moved {
@@ -115,7 +114,7 @@ fn score<T: Real>(
         ..plan.clone()
     };
     let answer = cascade::run::<T>(samples, &zero, &probe, 0.0..1.0, quiet)?;
-    let field = assemble(samples, &zero, &answer.levels);
+    let field = samples.field(&zero, &answer.levels);
     let answers = |i: usize| signs[i] as f64 * field.value(samples.world_of_conditions(i));
     let trace: f64 = judged.iter().map(|&i| answers(i)).sum::<f64>() / samples.scale;
     let taken_over = (trace / judged.len() as f64).clamp(0.0, 0.8);

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::plan::Plan;
 use super::samples::Samples;
-use super::{assemble, cascade, coarse};
+use super::{cascade, coarse};
 use crate::{Control, FitError};
 
 /// Fits before the last. Of 30 : 1 density: p95 18.7, 16.3, 15.5, 14.9 u after none to three, 15.2 to 15.6 after four to six.
@@ -40,9 +40,9 @@ pub(crate) fn refine<T: Real>(
 ) -> Result<(), FitError> {
     for round in 0..ROUNDS {
         let begin = 0.035 + 0.005 * round as f64;
-        let base = coarse::solve(samples, plan.beta, false);
+        let (base, _) = coarse::solve(samples, plan.beta, false);
         let found = cascade::run::<T>(samples, &base, plan, begin..begin + 0.005, control)?;
-        let field = assemble::assemble(samples, &base, &found.levels);
+        let field = samples.field(&base, &found.levels);
         samples.normals = (0..samples.normals.len())
             .into_par_iter()
             .with_min_len(1024)

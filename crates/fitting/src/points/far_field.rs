@@ -10,9 +10,11 @@
 
 use glam::DVec3;
 
-use super::clusters::{Cluster, clusters};
-use super::full_grid::FullGrid;
-use super::samples::{BASE_DEPTH, Samples};
+use super::clusters::clusters;
+use super::samples::Samples;
+use crate::level::BASE_DEPTH;
+use crate::level::full_grid::FullGrid;
+use crate::level::full_operator::Cluster;
 use crate::orient::kernel::{Target, Winding};
 use crate::orient::tree::Tree;
 

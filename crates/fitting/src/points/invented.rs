@@ -4,8 +4,9 @@ use bspline::{Field, Frame};
 use glam::{DAffine3, DQuat, DVec3};
 use rustc_hash::FxHashSet;
 
-use super::samples::{BASE_DEPTH, Samples};
+use super::samples::Samples;
 use crate::components::mark_inside;
+use crate::level::BASE_DEPTH;
 use crate::{Leaf, StopReason};
 
 /// Finest grid that is looked at: 64 cells along the box.

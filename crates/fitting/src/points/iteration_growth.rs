@@ -20,7 +20,7 @@ fn iterations(samples: &Samples, depths: [usize; 4]) -> [usize; 4] {
             iterations: 300,
             ..Plan::new(samples, &options, 1e-4, None)
         };
-        let base = coarse::solve(samples, plan.beta, false);
+        let (base, _) = coarse::solve(samples, plan.beta, false);
         let cascade =
             cascade::run::<f32>(samples, &base, &plan, 0.0..1.0, &mut Control::default()).expect("no limits");
         let last = cascade.solves.last().expect("levels below the base");

@@ -1,8 +1,5 @@
 //! Fits of oriented point clouds.
 
-pub(crate) mod assemble;
-pub(crate) mod band;
-pub(crate) mod band_solve;
 mod between;
 pub(crate) mod cascade;
 mod cells;
@@ -12,7 +9,6 @@ mod cross_validation;
 mod directions;
 mod far_field;
 mod feet;
-pub(crate) mod full_grid;
 mod invented;
 #[cfg(test)]
 mod iteration_growth;
@@ -27,17 +23,16 @@ pub use residual::newton_distance;
 mod robust;
 pub(crate) mod samples;
 mod specks;
-pub(crate) mod stencil;
 mod still;
 mod support;
 
 use bspline::{HierarchicalSpline, Real};
 
+use crate::level::{BASE_DEPTH, MAX_DEPTH};
 use crate::{Control, FitError, FitReport};
 use plan::{Plan, Smoothing};
 pub use samples::OrientedPoints;
 use samples::Samples;
-pub(crate) use samples::{BASE_DEPTH, MAX_DEPTH};
 
 /// What the caller may choose; `None` is chosen from the data.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -126,7 +121,7 @@ pub fn fit_points<T: Real>(
         directions::refine::<T>(&mut samples, &plan, control)?;
     }
     control.step("fitting coarse levels", 0.05)?;
-    let mut base = if options.robust {
+    let (mut base, mut solves) = if options.robust {
         robust::reweigh::<T>(&mut samples, &plan, control)?
     } else {
         coarse::solve(&samples, plan.beta, false)
@@ -143,7 +138,7 @@ pub fn fit_points<T: Real>(
     }
     if let (Some(sigma), Some(beta)) = (noise, plan.second_beta) {
         let first = cascade::run::<T>(&samples, &base, &plan, 0.09..0.1, control)?;
-        let field = assemble::assemble(&samples, &base, &first.levels);
+        let field = samples.field(&base, &first.levels);
         let on_feet = feet::on_feet(&samples, &field, sigma);
         if on_feet.live_points().count() >= LEAST_POINTS {
             samples = on_feet;
@@ -178,7 +173,7 @@ pub fn fit_points<T: Real>(
         let begin = 0.9 - 0.6 * 0.5f64.powi(rounds);
         let end = 0.9 - 0.3 * 0.5f64.powi(rounds);
         let cascade = cascade::run::<T>(&samples, &base, &plan, begin..end, control)?;
-        let field = assemble::assemble(&samples, &base, &cascade.levels);
+        let field = samples.field(&base, &cascade.levels);
         let conditions = pieces::conditions(&field, &samples);
         if conditions.is_empty() || rounds == REPAIR_ROUNDS {
             break (cascade, field);
@@ -198,6 +193,8 @@ pub fn fit_points<T: Real>(
         ));
     }
     control.step("measuring", 0.95)?;
-    let report = residual::report(&field, &samples, &cascade, cloud.positions, &plan, noise);
+    let mut report = residual::report(&field, &samples, &cascade, cloud.positions, &plan, noise);
+    solves.extend(&cascade.solves);
+    report.told_solves(solves);
     Ok((field, report))
 }

@@ -3,7 +3,8 @@
 use bspline::{Frame, HierarchicalSpline, Real};
 use glam::{DAffine3, DVec3};
 
-use super::samples::{BASE_DEPTH, Samples};
+use super::samples::Samples;
+use crate::level::BASE_DEPTH;
 use crate::unsupported_components;
 
 /// Finest grid on which signs are looked at: 128 cells along the box.

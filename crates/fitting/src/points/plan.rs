@@ -1,9 +1,10 @@
 //! The one rule that turns data and options into depths and weights.
 
-use super::band_solve::Weights;
-use super::samples::{BASE_DEPTH, MAX_DEPTH, Samples};
+use super::samples::Samples;
 use super::{NormalForm, PointOptions};
 use crate::StopReason;
+use crate::level::band_problem::Weights;
+use crate::level::{BASE_DEPTH, MAX_DEPTH};
 
 /// How a cascade runs.
 #[derive(Clone, Debug)]

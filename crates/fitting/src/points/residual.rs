@@ -9,6 +9,7 @@ use super::cascade::Cascade;
 use super::measure::measure_in_order;
 use super::plan::{Plan, Smoothing};
 use super::samples::{ADDED, Samples};
+use crate::level::BASE_DEPTH;
 use crate::{FitReport, Leaf, LeafIndex, StopReason};
 
 /// Steps of the projection.
@@ -62,7 +63,7 @@ pub(crate) fn report<T: Real>(
         .leaves
         .iter()
         .map(|leaf| Leaf {
-            level: (leaf.depth - super::samples::BASE_DEPTH) as u8,
+            level: (leaf.depth - BASE_DEPTH) as u8,
             cell: leaf.at,
             sample_count: 0,
             rms: 0.0,
@@ -96,7 +97,7 @@ pub(crate) fn report<T: Real>(
         input_count: positions.len(),
         used_count: errors.count,
         coefficients: field.coefficient_count(),
-        depth: super::samples::BASE_DEPTH + field.level_count() - 1,
+        depth: BASE_DEPTH + field.level_count() - 1,
         rms: errors.rms,
         p95: errors.p95,
         max: errors.max,
@@ -112,8 +113,8 @@ pub(crate) fn report<T: Real>(
             .map(|i| i as u32)
             .collect(),
         leaves,
-        signs: None,
         notes,
+        ..FitReport::default()
     }
 }
 

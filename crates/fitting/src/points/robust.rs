@@ -10,13 +10,14 @@
 use bspline::{Field, Real};
 use rayon::prelude::*;
 
-use super::full_grid::FullGrid;
 use super::plan::Plan;
 use super::residual::newton_foot;
-use super::samples::{BASE_DEPTH, Samples};
+use super::samples::Samples;
 use super::support::{self, Tree};
-use super::{LEAST_POINTS, assemble, cascade, coarse};
-use crate::{Control, FitError};
+use super::{LEAST_POINTS, cascade, coarse};
+use crate::level::BASE_DEPTH;
+use crate::level::full_grid::FullGrid;
+use crate::{Control, FitError, SolverOutcome};
 
 /// Rounds after the one on the full levels, each one level deeper.
 const ROUNDS: usize = 3;
@@ -49,7 +50,7 @@ fn live_count(weights: &[f32]) -> usize {
     weights.iter().filter(|w| **w > 0.0).count()
 }
 
-/// Re-weighs `samples` by fits of growing depth. Returns the last coarse solution.
+/// Re-weighs `samples` by fits of growing depth. Returns the last coarse solution and how it was solved.
 ///
 /// # Errors
 /// [`FitError::Cancelled`].
@@ -57,9 +58,9 @@ pub(crate) fn reweigh<T: Real>(
     samples: &mut Samples,
     plan: &Plan,
     control: &mut Control,
-) -> Result<FullGrid<f64>, FitError> {
+) -> Result<(FullGrid<f64>, Vec<SolverOutcome>), FitError> {
     let mut base = coarse::solve(samples, plan.beta, true);
-    let field = assemble::assemble::<T>(samples, &base, &[]);
+    let field = samples.field::<T>(&base.0, &[]);
     weigh(samples, &field, 0.5f64.powi(BASE_DEPTH as i32));
     base = coarse::solve(samples, plan.beta, true);
     for round in 0..ROUNDS {
@@ -73,8 +74,8 @@ pub(crate) fn reweigh<T: Real>(
             ..plan.clone()
         };
         let quiet = &mut control.quiet();
-        let fit = cascade::run::<T>(samples, &base, &shallow, 0.0..1.0, quiet)?;
-        let field = assemble::assemble(samples, &base, &fit.levels);
+        let fit = cascade::run::<T>(samples, &base.0, &shallow, 0.0..1.0, quiet)?;
+        let field = samples.field(&base.0, &fit.levels);
         weigh(samples, &field, 0.5f64.powi(depth as i32));
         base = coarse::solve(samples, plan.beta, true);
     }

@@ -1,10 +1,13 @@
 //! Oriented points, made ready: checked, scaled to a unit box, in Morton order.
 
-use bspline::hierarchical::Lattice;
-use glam::{DAffine3, DMat3, DVec3};
+use bspline::{HierarchicalSpline, Real};
+use glam::DVec3;
 
 use super::LEAST_POINTS;
 use crate::FitError;
+use crate::level::MAX_DEPTH;
+use crate::level::assemble::{Level, assemble};
+use crate::level::full_grid::FullGrid;
 
 /// Points with normals, as given. Normals point outward and need no unit length.
 #[derive(Clone, Copy, Debug)]
@@ -37,10 +40,6 @@ impl OrientedPoints<'_> {
 
 /// Margin of the box round the points, as a multiple of their longest side.
 const BOX_SCALE: f64 = 1.15;
-/// Deepest level a Morton key can tell apart.
-pub(crate) const MAX_DEPTH: usize = 16;
-/// Level of the coarsest grid that is stored in the field: 32 cells along the box.
-pub(crate) const BASE_DEPTH: usize = 5;
 /// Share of the points that may lie outside the robust extent before they count as part of the scan.
 const OUTLIER_SHARE: f64 = 1e-3;
 
@@ -94,6 +93,11 @@ pub(crate) struct Samples {
 }
 
 impl Samples {
+    /// The field on the box of the samples whose level 0 is `base`, with the corrections of the `levels` below it.
+    pub fn field<T: Real>(&self, base: &FullGrid<f64>, levels: &[Level<T>]) -> HierarchicalSpline<T> {
+        assemble(self.origin, self.scale, base, levels)
+    }
+
     /// Checks, scales and sorts.
     ///
     /// Left out, with a note: points that are not finite, points without a usable normal, and lone points
@@ -322,18 +326,6 @@ impl Samples {
     pub fn cell(&self, index: usize, depth: usize) -> [u32; 3] {
         let n = (1u64 << depth) as f64;
         (self.positions[index] * n).to_array().map(|x| x as u32)
-    }
-}
-
-/// The grids of a fit in the box of edge `scale` at `origin`: level 0 has 32 cells along it.
-pub(crate) fn lattice(origin: DVec3, scale: f64) -> Lattice {
-    let cells = 1u32 << BASE_DEPTH;
-    Lattice {
-        world_from_lattice: DAffine3 {
-            matrix3: DMat3::from_diagonal(DVec3::splat(scale / cells as f64)),
-            translation: origin,
-        },
-        cells: [cells; 3],
     }
 }
 

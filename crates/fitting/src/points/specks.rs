@@ -16,8 +16,9 @@ use rayon::prelude::*;
 use rustc_hash::FxHashSet;
 
 use super::residual::newton_foot;
-use super::samples::{BASE_DEPTH, Samples};
+use super::samples::Samples;
 use super::still::{FARTHEST, StillCell, may_lead_to_peak, to_maximum};
+use crate::level::BASE_DEPTH;
 
 /// Steps to an extremum.
 const STEPS: usize = 12;
@@ -108,9 +109,12 @@ fn specks<T: Real>(field: &HierarchicalSpline<T>, samples: &Samples, asked: &[St
         .par_iter()
         .with_min_len(64)
         .flat_map_iter(|cell| {
+            let h = field.lattice().spacing(cell.depth - BASE_DEPTH).x;
+            let middle = samples.origin + h * (DVec3::from_array(cell.at.map(f64::from)) + 0.5);
+            let jet = field.jet(middle);
             let ways = [(cell.leads_up, 1.0), (cell.leads_down, -1.0)];
             let ways = ways.into_iter().filter(|way| way.0);
-            ways.filter_map(|(_, sign)| peak(field, samples, cell, sign))
+            ways.filter_map(move |(_, sign)| peak(field, cell.depth - BASE_DEPTH, (middle, jet), sign))
         })
         .collect();
     // An extremum is found from several cells; the finest says by which functions it goes.
@@ -124,26 +128,26 @@ fn specks<T: Real>(field: &HierarchicalSpline<T>, samples: &Samples, asked: &[St
         .collect()
 }
 
-/// The maximum of `sign · f` that the steps from the middle of `cell` lead to, if it is positive and its piece may be small.
+/// The maximum of `sign · f` that the steps from `start` lead to, if it is positive and its piece may be small.
 fn peak<T: Real>(
     field: &HierarchicalSpline<T>,
-    samples: &Samples,
-    cell: &StillCell,
+    level: usize,
+    (start, first): (DVec3, Jet),
     sign: f64,
 ) -> Option<Peak> {
-    let level = cell.depth - BASE_DEPTH;
     let h = field.lattice().spacing(level).x;
-    let start = samples.origin + h * (DVec3::from_array(cell.at.map(f64::from)) + 0.5);
-    let mut x = start;
+    let in_cells = Jet {
+        value: first.value / h,
+        hessian: first.hessian * h,
+        ..first
+    };
+    if !may_lead_to_peak(&in_cells, sign) {
+        return None;
+    }
+    let (mut x, mut jet) = (start, first);
     for step in 0..STEPS {
-        let jet = field.jet(x);
-        let in_cells = Jet {
-            value: jet.value / h,
-            hessian: jet.hessian * h,
-            ..jet
-        };
-        if step == 0 && !may_lead_to_peak(&in_cells, sign) {
-            return None;
+        if step > 0 {
+            jet = field.jet(x);
         }
         let newton = to_maximum(&jet, sign);
         let uphill = || sign * jet.gradient.normalize_or_zero() * (LONGEST_STEP * h);

@@ -4,9 +4,9 @@ use bspline::{Jet, Real};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-use super::band::{BRICK, Band, HALO, HALO_LEN, Key, active_slots, key_of, slot_of};
-use super::full_grid::FullGrid;
-use super::samples::BASE_DEPTH;
+use crate::level::BASE_DEPTH;
+use crate::level::band::{BRICK, Band, HALO, HALO_LEN, Key, active_slots, key_of, slot_of};
+use crate::level::full_grid::FullGrid;
 
 /// Distance from the surface, in cells, within which an extremum is looked for; larger pieces are seen by the grid over the
 /// whole box.

@@ -13,7 +13,7 @@ use super::domain::{Domain, Samples};
 use super::joint::{Fit, Problem, solve_jointly};
 use super::residual::{correlations, residual};
 use super::select::{Cutoff, largest};
-use crate::{Control, FitError};
+use crate::{Control, FitError, SolverOutcome};
 
 /// Iterations of the first joint solve, of that after an exchange, and of the last.
 ///
@@ -39,6 +39,8 @@ pub(crate) struct Adaptive<'a, T> {
     pub fit: Fit<T>,
     /// `d - f` at all samples, padding included.
     pub residual: Vec<T>,
+    /// How the joint solves ended.
+    pub solves: Vec<SolverOutcome>,
     /// As long as `residual`.
     scratch: Vec<T>,
     /// Finest level that may be used.
@@ -76,6 +78,7 @@ impl<'a, T: Real> Adaptive<'a, T> {
             problem,
             fit,
             residual: r,
+            solves: Vec::new(),
             scratch,
             depth,
         };
@@ -120,14 +123,16 @@ impl<'a, T: Real> Adaptive<'a, T> {
         control: &mut Control,
         span: (f64, f64),
     ) -> Result<(), FitError> {
-        solve_jointly(
+        let outcome = solve_jointly(
             &self.problem,
             &mut self.fit,
             &mut self.residual,
             iterations,
             control,
             span,
-        )
+        )?;
+        self.solves.push(outcome);
+        Ok(())
     }
 
     /// Least-squares coefficients of the residual on `level`, all its functions taken.

@@ -124,11 +124,11 @@ fn adapt<T: Real>(
         noise: None,
         outcome: Outcome::Met,
     };
-    let (active, coefficients) = if overview.min == overview.max {
+    let (active, coefficients, solves) = if overview.min == overview.max {
         let fit = super::joint::Fit::new(domain);
         let value = T::from_f64(f64::from(overview.min)) * samples.scale;
         let coefficients = fit.coefficients.iter().map(|l| vec![value; l.len()]).collect();
-        (fit.active, coefficients)
+        (fit.active, coefficients, Vec::new())
     } else {
         let mut fit = Adaptive::new(problem, depth);
         if let (None, Some(_)) = (options.tolerance, options.coefficients) {
@@ -146,7 +146,7 @@ fn adapt<T: Real>(
             }
             goal.outcome = fit.meet(goal.tolerance * scale, budget, floor, control)?;
         }
-        (fit.fit.active, fit.fit.coefficients)
+        (fit.fit.active, fit.fit.coefficients, fit.solves)
     };
     control.step("measuring", 0.9)?;
     let measured = measure(samples, domain, &active, &coefficients);
@@ -181,6 +181,7 @@ fn adapt<T: Real>(
     report.tolerance = goal.tolerance;
     report.noise = goal.noise;
     report.smoothing = problem.ridge;
+    report.told_solves(solves);
     let missed = report
         .leaves
         .iter()

@@ -7,6 +7,8 @@ use super::active::{ActiveSet, Packed};
 use super::domain::{Domain, Samples};
 use super::gram::apply_normal_matrix;
 use super::residual::{correlations, residual};
+use crate::level::SolverOutcome;
+use crate::level::cg::{Stop, System, conjugate_gradients};
 use crate::{Control, FitError};
 
 /// Elements of one term of a dot product; the terms are summed in order, whatever the thread count.
@@ -62,9 +64,7 @@ pub(crate) struct Problem<'a, T> {
 /// Minimizes `Σ_k w_k (f(k) - d_k)² + μ Σ c²‖B‖²` over the coefficients of `fit` by at most `iterations` steps of
 /// conjugate gradients, preconditioned by the diagonal of the generating system (all levels side by side).
 ///
-/// Functions that several levels can express make the system singular but consistent; conjugate gradients do
-/// not mind. The energy falls in every step. `r` holds the residual of the start and, on return, that
-/// of the result. Progress goes from `span.0` to `span.1`.
+/// `r` holds the residual of the start and, on return, that of the result. Progress goes from `span.0` to `span.1`.
 pub(crate) fn solve_jointly<T: Real>(
     problem: &Problem<T>,
     fit: &mut Fit<T>,
@@ -72,66 +72,94 @@ pub(crate) fn solve_jointly<T: Real>(
     iterations: usize,
     control: &mut Control,
     span: (f64, f64),
-) -> Result<(), FitError> {
+) -> Result<SolverOutcome, FitError> {
     let domain = problem.domain;
-    let norms = squared_norms(domain, &fit.active);
-    let ridge = |level: usize| T::from_f64(if level == 0 { 0.0 } else { problem.ridge });
     let finest = domain.finest();
     let dense = correlations(domain, r, &fit.active[finest]);
     let mut gradient: Packed<T> = dense
         .into_iter()
         .enumerate()
-        .map(|(level, g)| {
-            if level == finest {
-                g
-            } else {
-                fit.active[level].gather(&g)
-            }
+        .map(|(level, g)| match level == finest {
+            true => g,
+            false => fit.active[level].gather(&g),
         })
         .collect();
+    let mut system = Generating {
+        problem,
+        active: &fit.active,
+        norms: squared_norms(domain, &fit.active),
+    };
     if problem.ridge > 0.0 {
-        add_ridge(&mut gradient, &norms, &fit.coefficients, |level| -ridge(level));
+        add_ridge(&mut gradient, &system.norms, &fit.coefficients, |l| {
+            -system.ridge(l)
+        });
     }
-    let mut z: Packed<T> = gradient.clone();
-    let scale = |level: usize| T::one() / (T::one() + ridge(level));
-    precondition(&gradient, &norms, &mut z, scale);
-    let mut p = z.clone();
-    let mut q = z.clone();
-    let mut rho = dot(&gradient, &z);
-    let start = rho;
-    for iteration in 0..iterations {
+    let stop = Stop {
+        // Below this the direction is rounding noise of the storage type.
+        residual: T::UNIT_ROUND_OFF,
+        against: None,
+        limit: iterations,
+    };
+    let outcome = conjugate_gradients(&mut system, &mut fit.coefficients, gradient, stop, |iteration| {
         control.step(
             "solving jointly",
             span.0 + (span.1 - span.0) * iteration as f64 / iterations as f64,
-        )?;
-        // Below this the direction is rounding noise of the storage type.
-        if rho <= start * T::UNIT_ROUND_OFF * T::UNIT_ROUND_OFF {
-            break;
+        )
+    })?;
+    residual(domain, &problem.samples, &fit.active, &fit.coefficients, r);
+    // Iterations are fixed on purpose: functions are exchanged long before the residual ends.
+    Ok(SolverOutcome {
+        goal: None,
+        ..outcome
+    })
+}
+
+/// The normal equations of the generating system, all levels side by side, with their diagonal.
+struct Generating<'p, 'a, T> {
+    problem: &'p Problem<'a, T>,
+    active: &'p [ActiveSet],
+    norms: Packed<T>,
+}
+
+impl<T: Real> Generating<'_, '_, T> {
+    fn ridge(&self, level: usize) -> T {
+        T::from_f64(if level == 0 { 0.0 } else { self.problem.ridge })
+    }
+}
+
+impl<T: Real> System for Generating<'_, '_, T> {
+    type Vector = Packed<T>;
+
+    fn apply(&mut self, p: &Packed<T>, image: &mut Packed<T>) {
+        apply_normal_matrix(self.problem.domain, self.active, p, image);
+        if self.problem.ridge > 0.0 {
+            add_ridge(image, &self.norms, p, |level| self.ridge(level));
         }
-        apply_normal_matrix(domain, &fit.active, &p, &mut q);
-        if problem.ridge > 0.0 {
-            add_ridge(&mut q, &norms, &p, ridge);
-        }
-        let curvature = dot(&p, &q);
-        if curvature <= 0.0 {
-            break;
-        }
-        let alpha = T::from_f64(rho / curvature);
-        axpy(&mut fit.coefficients, alpha, &p);
-        axpy(&mut gradient, -alpha, &q);
-        precondition(&gradient, &norms, &mut z, scale);
-        let next = dot(&gradient, &z);
-        let beta = T::from_f64(next / rho);
-        rho = next;
-        for (p, z) in p.iter_mut().zip(&z) {
+    }
+
+    fn precondition(&mut self, r: &Packed<T>, z: &mut Packed<T>) -> f64 {
+        let scale = |level: usize| T::one() / (T::one() + self.ridge(level));
+        precondition(r, &self.norms, z, scale);
+        dot(r, z)
+    }
+
+    fn dot(&self, a: &Packed<T>, b: &Packed<T>) -> f64 {
+        dot(a, b)
+    }
+
+    fn add(&self, y: &mut Packed<T>, a: f64, x: &Packed<T>) {
+        axpy(y, T::from_f64(a), x);
+    }
+
+    fn turn(&self, p: &mut Packed<T>, b: f64, z: &Packed<T>) {
+        let b = T::from_f64(b);
+        for (p, z) in p.iter_mut().zip(z) {
             p.par_iter_mut()
                 .with_min_len(DOT_CHUNK)
                 .zip(z)
-                .for_each(|(p, &z)| *p = z + beta * *p);
+                .for_each(|(p, &z)| *p = z + b * *p);
         }
     }
-    residual(domain, &problem.samples, &fit.active, &fit.coefficients, r);
-    Ok(())
 }
 
 /// `‖B‖²` of every active function.

@@ -27,7 +27,7 @@ use serde::{Deserialize, Serialize};
 pub use block::block;
 pub use detail::{Refine, Simplify};
 pub use formula_solid::FormulaSolid;
-pub use motion::{Motion, Move, reflection};
+pub use motion::{Motion, Move, Origin, reflection};
 pub use paste::{Copy, Cut, Paste};
 pub use shape::Shape;
 pub use smooth::{Inflate, Smooth};
@@ -69,8 +69,7 @@ pub struct Geometric {
     /// Distance from the true surface that may stay off the creases, a world length; a fiftieth of the finest knot interval if
     /// missing.
     pub tolerance: Option<Positive>,
-    /// Levels finer than the field has that may be added; if missing, as many, up to three, as make the tool sixteen
-    /// knot intervals thick.
+    /// Levels finer than the object's detail that may be added; if missing one, and as many more as show the thinnest part.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub finer: Option<u8>,
 }
@@ -187,7 +186,7 @@ impl Geometric {
         let fineness = Fineness {
             tolerance: self.tolerance,
             finer: self.finer,
-            thickness: self.shape.thickness(),
+            feature: Some(self.shape.feature()),
         };
         writer.written(&*target, &within, &fineness, control)
     }

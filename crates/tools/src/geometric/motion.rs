@@ -109,7 +109,7 @@ impl Move {
         let fineness = Fineness {
             tolerance: self.tolerance,
             finer: self.finer,
-            thickness: None,
+            feature: None,
         };
         if let Motion::Mirror { at, normal, blend } = &self.motion {
             return mirrored(&writer, at.0, normal.0, *blend, &fineness, control);
@@ -121,7 +121,62 @@ impl Move {
     }
 }
 
+/// Where what is now at a place came from by a motion.
+#[derive(Clone, Debug)]
+pub enum Origin {
+    /// Through a motion of space.
+    Warp(Warp),
+    /// From the other side of a mirror.
+    Mirror {
+        /// The reflection.
+        map: DAffine3,
+        /// A place on the mirror.
+        at: DVec3,
+        /// To the side that is copied.
+        normal: DVec3,
+    },
+}
+
+impl Origin {
+    /// The place that what is now at `p` came from; `p` to the bit where nothing moved.
+    pub fn back(&self, p: DVec3) -> DVec3 {
+        match self {
+            Self::Warp(warp) => warp.back(p),
+            Self::Mirror { map, at, normal } => match (p - at).dot(*normal) < 0.0 {
+                true => map.transform_point3(p),
+                false => p,
+            },
+        }
+    }
+
+    /// A box outside which nothing moves; infinite where a motion has no end.
+    pub fn reach(&self) -> Aabb {
+        match self {
+            Self::Warp(warp) => warp.reach(),
+            Self::Mirror { .. } => Aabb {
+                min: DVec3::NEG_INFINITY,
+                max: DVec3::INFINITY,
+            },
+        }
+    }
+}
+
 impl Motion {
+    /// Where all that lies in a box comes from.
+    ///
+    /// # Errors
+    /// Any [`GeometricError`] of the motion.
+    pub fn origin(&self, within: &Aabb) -> Result<Origin, GeometricError> {
+        Ok(match self {
+            Self::Mirror { at, normal, .. } => Origin::Mirror {
+                map: reflection(at.0, normal.0)?,
+                at: at.0,
+                normal: normal.0,
+            },
+            _ => Origin::Warp(self.warp(within)?),
+        })
+    }
+
     /// The motion of all that lies in a box.
     ///
     /// # Errors
@@ -173,7 +228,7 @@ fn mirrored<T: Real>(
     let map = reflection(at, normal)?;
     let field = writer.field;
     let other = Csg::affine(Arc::new(field.clone()), map).map_err(GeometricError::shape)?;
-    let width = blend.map_or(2.0 * field.finest_spacing(), |b| b.0);
+    let width = blend.map_or(2.0 * writer.spacing(), |b| b.0);
     let behind = HalfSpace::new(at, normal).map_err(GeometricError::shape)?;
     let weight = Faded::new(Arc::new(behind), -0.5 * width, 0.5 * width);
     let mixed = Mixed {

@@ -132,7 +132,7 @@ impl Paste {
         let fineness = Fineness {
             tolerance: self.tolerance,
             finer: self.finer,
-            thickness: None,
+            feature: None,
         };
         writer.written(&mixed, &within, &fineness, control)
     }

@@ -77,6 +77,20 @@ enum Kind {
 }
 
 impl Shape {
+    /// Radius of the smallest ball that touches opposite sides of it.
+    pub(super) fn feature(&self) -> f64 {
+        match self {
+            Self::Sphere { radius } | Self::Capsule { radius, .. } => radius.0,
+            Self::Box { size } | Self::Formula { size, .. } => {
+                0.5 * size.iter().fold(f64::INFINITY, |least, edge| least.min(edge.0))
+            }
+            Self::Cylinder { radius, height, .. } => radius.0.min(0.5 * height.0),
+            Self::Torus { minor, .. } => minor.0,
+            // Of these nobody knows.
+            Self::Object { .. } => f64::INFINITY,
+        }
+    }
+
     /// The tool on its way from pose to pose, or at each of them alone.
     pub(super) fn solids(&self, poses: &[Pose], is_each: bool, others: &Others) -> Result<Solids, String> {
         let (solid, size) = match self.kind(others)? {
@@ -115,18 +129,6 @@ impl Shape {
         match reach.min.is_finite() && reach.max.is_finite() {
             true => Ok((solids, reach)),
             false => Err("the tool reaches beyond all numbers; make it smaller".into()),
-        }
-    }
-
-    /// Its least thickness, if it is known.
-    pub(super) fn thickness(&self) -> Option<f64> {
-        let least = |all: &[f64]| all.iter().copied().reduce(f64::min);
-        match self {
-            Self::Sphere { radius } | Self::Capsule { radius, .. } => Some(2.0 * radius.0),
-            Self::Box { size } | Self::Formula { size, .. } => least(&size.map(|s| s.0)),
-            Self::Cylinder { radius, height, .. } => least(&[2.0 * radius.0, height.0]),
-            Self::Torus { minor, .. } => Some(2.0 * minor.0),
-            Self::Object { .. } => None,
         }
     }
 

@@ -26,7 +26,7 @@ pub struct Smooth {
     pub along: Vec<Point>,
     /// It acts whole within half of this, and not at all beyond.
     pub radius: Positive,
-    /// 1 to 10: standard deviation of the kernel in finest knot intervals.
+    /// 1 to 10: standard deviation of the kernel in knot intervals of the object's detail.
     pub level: u8,
     /// Whether shapes wider than the kernel keep their volume.
     #[serde(default, rename = "keep-volume")]
@@ -77,7 +77,10 @@ impl Smooth {
         let writer = Writer { field, iso, limits };
         let (weight, reach) = band(&self.along, self.radius.0)?;
         let within = writer.within(&reach)?;
-        let even = averaged(field, &within, self.level, self.keep_volume, control)?;
+        // The kernel is as wide on finer knots.
+        let finest = writer.finest_in(&within).max(writer.detail());
+        let deviation = usize::from(self.level) << (finest - writer.detail());
+        let even = averaged(field, &within, finest, deviation, self.keep_volume, control)?;
         let mixed = Mixed {
             from: field,
             to: &even,
@@ -86,10 +89,10 @@ impl Smooth {
         let fineness = Fineness {
             tolerance: self.tolerance,
             finer: Some(0),
-            thickness: None,
+            feature: None,
         };
         let (smooth, report) = writer.written(&mixed, &within, &fineness, control)?;
-        let tolerance = self.tolerance.map_or(TOLERANCE * field.finest_spacing(), |t| t.0);
+        let tolerance = self.tolerance.map_or(TOLERANCE * writer.spacing(), |t| t.0);
         let slim = simplified(&smooth, &reach, tolerance, limits)?;
         Ok((slim, report))
     }
@@ -125,29 +128,29 @@ impl Inflate {
         let fineness = Fineness {
             tolerance: self.tolerance,
             finer: self.finer,
-            thickness: None,
+            feature: None,
         };
         writer.written(&mixed, &within, &fineness, control)
     }
 }
 
-/// The mean of a field over a Gaussian of `level` finest knot intervals, in a box: `K f`, or `2K f - K K f`, which also keeps
+/// The mean of a field over a Gaussian of `deviation` knot intervals of level `finest`, in a box: `K f`, or `2K f - K K f`, which also keeps
 /// what is quadratic, so that a ball loses none of its volume to first order.
 ///
 /// A mean over knots of a spline is the spline of the same means of its coefficients, so nothing is sampled.
 fn averaged<T: Real>(
     field: &HierarchicalSpline<T>,
     within: &Aabb,
-    level: u8,
+    finest: usize,
+    deviation: usize,
     keep_volume: bool,
     control: &mut Control,
 ) -> Result<TensorSpline<f64>, GeometricError> {
-    let finest = field.level_count() - 1;
     let lattice = field.lattice();
     let scale = (1u64 << finest) as f64;
-    let reach = (REACH * f64::from(level)).ceil() as i64;
+    let reach = (REACH * deviation as f64).ceil() as i64;
     let weights: Vec<f64> = (0..=reach)
-        .map(|k| libm::exp(-0.5 * (k as f64 / f64::from(level)).powi(2)))
+        .map(|k| libm::exp(-0.5 * (k as f64 / deviation as f64).powi(2)))
         .collect();
     let total = weights[0] + 2.0 * weights[1..].iter().sum::<f64>();
     let weights: Vec<f64> = weights.iter().map(|w| w / total).collect();

@@ -1,9 +1,10 @@
 //! How the result of a tool becomes coefficients.
 
-use bspline::hierarchical::MAX_LEVELS;
+use bspline::hierarchical::{Lattice, MAX_LEVELS};
 use bspline::{Aabb, Field, Frame, HierarchicalSpline, Real};
 use fitting::Control;
 use fitting::field::{Aim, FieldFitOptions, FieldFitReport, fit_field_where};
+use glam::DVec3;
 
 use super::GeometricError;
 use crate::limits::Limits;
@@ -18,34 +19,37 @@ pub(super) const MARGIN: f64 = 4.0;
 /// Points across a face of the field's box at which it is asked for what leaves the box.
 const FACE: u32 = 256;
 
-/// Knot intervals that a tool should be thick, and most levels that are added for that.
-const THICK: f64 = 16.0;
-const DEEPER: usize = 3;
-
 /// How closely the result of a tool is followed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Fineness {
     /// Distance from the true surface that may stay off the creases, a world length; a fiftieth of the finest knot interval
     /// if missing.
     pub tolerance: Option<Positive>,
-    /// Levels finer than the field has that may be added.
+    /// Levels finer than the object's detail that may be added. If missing one, and as many more as the feature asks for.
     pub finer: Option<u8>,
-    /// Least thickness of the tool, for which levels are added where `finer` says nothing.
-    pub thickness: Option<f64>,
+    /// Smallest length that the tool shapes, if it has one.
+    pub feature: Option<f64>,
 }
 
+/// Knot intervals across a feature that show it.
+const ACROSS: f64 = 3.0;
+
+/// Levels that are added for a feature, at most.
+const MOST_FINER: usize = 5;
+
 impl Fineness {
-    fn finest<T: Real>(&self, field: &HierarchicalSpline<T>) -> usize {
-        let own = field.level_count() - 1;
-        let deeper = match (self.finer, self.thickness) {
-            (Some(finer), _) => usize::from(finer),
-            (None, None) => 0,
-            (None, Some(thickness)) => {
-                let asked = (THICK * field.finest_spacing() / thickness).log2().ceil();
-                (asked.max(0.0) as usize).min(DEEPER)
-            }
+    /// The finest level that a tool may use on an object of so much detail.
+    fn finest(&self, lattice: &Lattice, detail: usize) -> usize {
+        let shows = |feature: f64| {
+            let spacing = |finer: usize| lattice.spacing(detail + finer).min_element();
+            (1..MOST_FINER).find(|finer| ACROSS * spacing(*finer) <= feature)
         };
-        (own + deeper).min(MAX_LEVELS - 1)
+        let finer = match (self.finer, self.feature) {
+            (Some(finer), _) => usize::from(finer),
+            (None, Some(feature)) => shows(feature).unwrap_or(MOST_FINER),
+            (None, None) => 1,
+        };
+        (detail + finer).min(MAX_LEVELS - 1)
     }
 }
 
@@ -57,12 +61,35 @@ pub(super) struct Writer<'a, T> {
 }
 
 impl<T: Real> Writer<'_, T> {
+    /// Level that the object is shaped to. Places where tools went finer do not count: else every stroke would be finer than the
+    /// one before.
+    pub fn detail(&self) -> usize {
+        self.limits.detail().unwrap_or(self.field.level_count() - 1)
+    }
+
+    /// Least distance of its knots.
+    pub fn spacing(&self) -> f64 {
+        self.field.lattice().spacing(self.detail()).min_element()
+    }
+
+    /// Finest level with functions that reach a world box.
+    pub fn finest_in(&self, b: &Aabb) -> usize {
+        let local = b.transformed(self.field.lattice_from_world());
+        let bricks = self.field.bricks().into_iter();
+        let reached = bricks.filter(|brick| {
+            let scale = 1.0 / (1u64 << brick.level()) as f64;
+            let first = DVec3::from_array(brick.key().0.map(|k| 8.0 * f64::from(k))) * scale;
+            first.cmple(local.max).all() && (first + 8.0 * scale).cmpge(local.min).all()
+        });
+        reached.map(|brick| brick.level()).max().unwrap_or(0)
+    }
+
     /// The box in which a tool that acts in `reach` changes the field.
     ///
     /// # Errors
     /// [`GeometricError::Outside`] if it lies beside the field, or beside what the limits leave.
     pub fn within(&self, reach: &Aabb) -> Result<Aabb, GeometricError> {
-        let margin = MARGIN * self.field.finest_spacing();
+        let margin = MARGIN * self.spacing();
         let whole = self.limits.cut(&self.field.lattice().world_box());
         let own = Aabb {
             min: reach.min - margin,
@@ -89,7 +116,9 @@ impl<T: Real> Writer<'_, T> {
         fineness: &Fineness,
         control: &mut Control,
     ) -> Result<(HierarchicalSpline<T>, FieldFitReport), GeometricError> {
-        let finest = fineness.finest(self.field);
+        let finest = fineness.finest(self.field.lattice(), self.detail());
+        // What is there already must not be left over; and nothing finer than a coarse edit may be.
+        let finest = finest.max(self.finest_in(within));
         let finest = finest.min(self.limits.finest().unwrap_or(finest));
         let spacing = self.field.lattice().spacing(finest).min_element();
         let mixed = self.limits.mixed(self.field, target);
@@ -113,8 +142,8 @@ impl<T: Real> Writer<'_, T> {
         let lattice = self.field.lattice();
         let local = within.transformed(self.field.lattice_from_world());
         let extent = lattice.extent();
-        let step = 1.0 / (1u64 << (self.field.level_count() - 1)) as f64;
-        let rim = self.field.finest_spacing() * self.field.slope();
+        let step = 1.0 / (1u64 << self.detail()) as f64;
+        let rim = self.spacing() * self.field.slope();
         for axis in 0..3 {
             for (face, is_reached) in [
                 (0.0, local.min[axis] <= 0.0),
@@ -123,7 +152,7 @@ impl<T: Real> Writer<'_, T> {
                 if !is_reached {
                     continue;
                 }
-                let mut part = Aabb::new(local.min.max(glam::DVec3::ZERO), local.max.min(extent));
+                let mut part = Aabb::new(local.min.max(DVec3::ZERO), local.max.min(extent));
                 (part.min[axis], part.max[axis]) = (face, face);
                 let steps = (part.size() / step).ceil();
                 let cells = steps.to_array().map(|n| (n as u32).clamp(1, FACE));

@@ -149,7 +149,7 @@ impl Layer {
     pub fn painted<E: From<LayerError>>(
         &self,
         within: &Aabb,
-        paint: impl Fn(DVec3, f64) -> Result<Option<f64>, E>,
+        mut paint: impl FnMut(DVec3, f64) -> Result<Option<f64>, E>,
     ) -> Result<Self, E> {
         let [from, to] = self.nodes(within);
         let count: [usize; 3] = std::array::from_fn(|a| (to[a] + 1).saturating_sub(from[a]) as usize);
@@ -198,6 +198,20 @@ impl Layer {
         }
         let tree = self.tree.edited_blocks(&edits).map_err(LayerError::from)?;
         Ok(Self { tree, ..*self })
+    }
+
+    /// The layer with the numbers in a world box brought from elsewhere: `back` gives the place that a node's number comes from.
+    ///
+    /// # Errors
+    /// [`LayerError`]; none for finite places.
+    pub fn carried(&self, within: &Aabb, back: impl Fn(DVec3) -> DVec3) -> Result<Self, LayerError> {
+        let mut places = Vec::new();
+        self.painted(within, |p, _| {
+            places.push(back(p));
+            Ok::<_, LayerError>(None)
+        })?;
+        let mut values = self.values(&places).into_iter();
+        self.painted(within, |_, _| Ok(values.next()))
     }
 
     /// Numbers of a block of nodes, last axis fastest.

@@ -127,7 +127,8 @@ pub enum PaintError {
 }
 
 impl Paint {
-    /// The layer with the stroke laid on. `field` is the object's, `layers` what was painted before, `within` where it may act.
+    /// The layer with the stroke laid on. `field` is the object's, `layers` what was painted before, `within` where it may act;
+    /// the nodes of a new layer are the knots of level `detail`.
     ///
     /// # Errors
     /// Any [`PaintError`].
@@ -135,11 +136,12 @@ impl Paint {
         &self,
         field: &HierarchicalSpline<f32>,
         layers: &Layers,
+        detail: usize,
         within: &Aabb,
     ) -> Result<Layer, PaintError> {
         let wrong = |why: String| PaintError::Stroke(format!("paint: {why}"));
         let old = layers.get(&self.layer).cloned();
-        let old = old.unwrap_or_else(|| Layer::empty(field.lattice(), field.level_count() - 1));
+        let old = old.unwrap_or_else(|| Layer::empty(field.lattice(), detail));
         let whole = field.lattice().world_box();
         let source = self.source().map_err(wrong)?;
         let reach = match &source {

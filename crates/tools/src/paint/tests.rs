@@ -23,7 +23,7 @@ fn paint(text: &str) -> Paint {
 fn laid(text: &str, field: &HierarchicalSpline<f32>, layers: &Layers) -> Result<Layers, PaintError> {
     let paint = paint(text);
     let mut layers = layers.clone();
-    let layer = paint.apply(field, &layers, &everywhere())?;
+    let layer = paint.apply(field, &layers, 0, &everywhere())?;
     layers.insert(paint.layer, layer);
     Ok(layers)
 }
@@ -205,4 +205,31 @@ fn strokes_that_make_no_sense_say_why() {
     );
     let e = laid("layer = 'mass'\nformula = '2'", &large, &Layers::new()).unwrap_err();
     assert!(e.to_string().contains("smaller box"), "{e}");
+}
+
+#[test]
+fn a_move_carries_what_is_painted() {
+    let canvas = crate::tool::Canvas {
+        field: ball(40),
+        iso: 0.0,
+        detail: 0,
+        layers: laid(
+            &STROKE.replace("[4, 4, 4]", "[10, 10, 10]"),
+            &ball(40),
+            &Layers::new(),
+        )
+        .unwrap(),
+        others: Default::default(),
+        copies: Vec::new(),
+    };
+    let text =
+        "[move.motion.shift]\nregion = { min = [7, 7, 7], max = [13, 13, 13] }\nby = [2, 0, 0]\nblend = 6";
+    let stroke: crate::session::Stroke = toml::from_str(text).unwrap();
+    let before = canvas.layers.clone();
+    let (moved, _) = stroke.apply(canvas, &mut fitting::Control::default()).unwrap();
+    for p in [[12.0, 10.0, 10.0], [12.5, 10.0, 10.5], [11.0, 11.0, 9.0]] {
+        let from = stiffness(&before, [p[0] - 2.0, p[1], p[2]]);
+        assert!((stiffness(&moved.layers, p) - from).abs() < 1e-4, "{p:?}");
+    }
+    assert!(stiffness(&moved.layers, [12.0, 10.0, 10.0]) == 21.0);
 }

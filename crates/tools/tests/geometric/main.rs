@@ -44,6 +44,7 @@ fn canvas(field: &HierarchicalSpline<f32>) -> Canvas {
     Canvas {
         field: field.clone(),
         iso: ISO,
+        detail: field.level_count() - 1,
         layers: Default::default(),
         others: Others::default(),
         copies: Vec::new(),

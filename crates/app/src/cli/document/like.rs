@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use document::{Document, Object, revise_volume};
+use document::{Command, Document, Journey, Object, revise_volume};
 use formats::field::FieldMeta;
 use formats::volumes::{Revision, Volume, save_revised};
 
@@ -49,8 +49,9 @@ impl Like<'_> {
             )));
         }
         let identity = document.state().sha256();
+        let journey = Journey::new(&done(document)?, name, &extent);
         match input {
-            Input::Volume(volume) => self.volume(&fitted, &now, &volume, &identity, output),
+            Input::Volume(volume) => self.volume([&fitted, &now], &journey, &volume, &identity, output),
             Input::Cloud(_) | Input::Mesh(_) => Err(Failure::usage(format!(
                 "{}: only volumes are written back; mesh the object, or export its field",
                 self.source.name()
@@ -60,8 +61,8 @@ impl Like<'_> {
 
     fn volume(
         &self,
-        fitted: &Object,
-        now: &Object,
+        [fitted, now]: [&Object; 2],
+        journey: &Journey,
         volume: &Volume,
         identity: &[u8; 32],
         output: &Path,
@@ -71,7 +72,7 @@ impl Like<'_> {
             .iso
             .ok_or_else(|| Failure::input("the object names no surface"))?;
         let fill = self.fill.unwrap_or_else(|| air(&now.meta, volume));
-        let revision = revise_volume(&fitted.field, &now.field, volume, iso, fill)
+        let revision = revise_volume(&fitted.field, &now.field, volume, iso, fill, journey)
             .map_err(|e| Failure::input(format!("{e}; was the object replaced?")))?;
         let options = self.choice.options(None)?;
         let path = self.source.path();
@@ -83,6 +84,17 @@ impl Like<'_> {
         )?;
         Ok(sentences(&revision, &told, volume, fill))
     }
+}
+
+/// What was done to a document.
+fn done(document: &mut Document) -> Outcome<Vec<Command>> {
+    let count = document.counts().map_err(failure)?.done;
+    let commands = (0..count).map(|n| {
+        let value = document.command(n).map_err(failure)?;
+        // What another version of the program wrote is no move that this one knows.
+        Ok(serde_json::from_value(value).ok())
+    });
+    commands.filter_map(Outcome::transpose).collect()
 }
 
 /// An object as it was before the first edit, and as it is.
@@ -129,7 +141,7 @@ fn sentences(
         human_count(revision.carved),
         human_count(revision.added),
     )];
-    if revision.carved > 0 {
+    if revision.is_filled() {
         notes.push(format!(
             "what was carved has density {} (--fill)",
             human_number(fill)

@@ -1,4 +1,4 @@
-//! Least squares on one surface level, by Jacobi-preconditioned conjugate gradients without a matrix.
+//! Least squares on a level near the surface, without a matrix, preconditioned by its diagonal.
 //!
 //! Energy (unit box): `Σ_k w_k [(f(x_k) - d_k)² + β²|∇f(x_k) + n_k|²] + μ Σ_i (Δ C_i)²`, `Δ` the seven-point Laplacian
 //! of the level's totals, a stencil counted where all its taps exist. Of `|∇f + n|²` the part across `n` counts by the
@@ -9,6 +9,9 @@ use bspline::Real;
 use rayon::prelude::*;
 
 use super::band::{BRICK, BRICK_LEN, Band, HALO, HALO_LEN, NONE};
+use super::cg::{Stop, System, conjugate_gradients};
+use super::laplacian::seven_point;
+use super::outcome::SolverOutcome;
 use super::stencil::{Spot, gather, scatter, scatter_squares};
 
 /// Strides of a brick with halo.
@@ -73,14 +76,6 @@ pub(crate) struct Weights {
     pub mu: f64,
 }
 
-/// What a solve did.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct SolveReport {
-    pub iterations: usize,
-    /// Preconditioned residual against the start's.
-    pub residual: f64,
-}
-
 /// The normal equations of one band.
 pub(crate) struct BandProblem<'a, T> {
     pub band: &'a Band<T>,
@@ -111,44 +106,29 @@ impl<'a, T: Real> BandProblem<'a, T> {
         }
     }
 
-    /// Corrections of the active functions that lower the energy, in band order.
+    /// Corrections of the active functions that lower the energy, in band order, from zero.
     ///
     /// Stops at `tolerance` times the starting preconditioned residual, or after `limit` iterations.
-    pub fn solve(&self, tolerance: f64, limit: usize) -> (Vec<T>, SolveReport) {
+    pub fn solve(&self, tolerance: f64, limit: usize) -> (Vec<T>, SolverOutcome) {
         let mut scratch = Scratch::default();
         let inverse = self.inverse_diagonal(&mut scratch);
-        let mut r = self.descent_direction(&mut scratch);
+        let r = self.descent_direction(&mut scratch);
         let mut x = vec![T::zero(); r.len()];
-        let mut p: Vec<T> = r.iter().zip(&inverse).map(|(r, d)| *r * *d).collect();
-        let mut energy = weighted_square(&r, &inverse);
-        let start = energy;
-        let mut report = SolveReport {
-            iterations: 0,
-            residual: f64::from(start > 0.0),
+        let mut system = Jacobi {
+            problem: self,
+            inverse,
+            dense: vec![T::zero(); self.band.totals.len()],
+            scratch,
         };
-        let mut dense = vec![T::zero(); self.band.totals.len()];
-        while report.iterations < limit && energy > tolerance * tolerance * start {
-            self.expand(&p, &mut dense);
-            let image = self.apply(&dense, &mut scratch);
-            let curvature = dot(&p, &image);
-            if curvature <= 0.0 {
-                break;
-            }
-            let alpha = T::from_f64(energy / curvature);
-            for i in 0..x.len() {
-                x[i] += alpha * p[i];
-                r[i] -= alpha * image[i];
-            }
-            let next = weighted_square(&r, &inverse);
-            let beta = T::from_f64(next / energy);
-            energy = next;
-            for i in 0..p.len() {
-                p[i] = r[i] * inverse[i] + beta * p[i];
-            }
-            report.iterations += 1;
-            report.residual = (energy / start).sqrt();
-        }
-        (x, report)
+        let stop = Stop {
+            residual: tolerance,
+            against: None,
+            limit,
+        };
+        let outcome = conjugate_gradients(&mut system, &mut x, r, stop, |_| Ok(()))
+            .expect("nothing here can be cancelled");
+        let depth = Some(self.band.depth);
+        (x, SolverOutcome { depth, ..outcome })
     }
 
     /// Writes a vector over active functions into an array of bricks.
@@ -163,7 +143,7 @@ impl<'a, T: Real> BandProblem<'a, T> {
     }
 
     /// `Hx` on the active functions, for `x` given in bricks.
-    fn apply(&self, dense: &[T], scratch: &mut Scratch<T>) -> Vec<T> {
+    fn apply(&self, dense: &[T], scratch: &mut Scratch<T>, out: &mut [T]) {
         let gw = self.gradient_weight();
         self.data_halos(dense, &mut scratch.halos, |sample, v, g, out| {
             let slope = sample.gradient_weight * gw;
@@ -171,7 +151,7 @@ impl<'a, T: Real> BandProblem<'a, T> {
             scatter(out, sample.spot, STRIDES, sample.weight * v, g);
         });
         self.laplacians(dense, &mut scratch.laplacians);
-        self.gathered(scratch, T::one())
+        self.gather(scratch, T::one(), out);
     }
 
     /// Half the negative gradient of the energy at the prolonged field.
@@ -191,7 +171,9 @@ impl<'a, T: Real> BandProblem<'a, T> {
             );
         });
         self.laplacians(&self.band.totals, &mut scratch.laplacians);
-        self.gathered(scratch, -T::one())
+        let mut out = vec![T::zero(); self.band.active_count()];
+        self.gather(scratch, -T::one(), &mut out);
+        out
     }
 
     /// For every sample: value and cell gradient of `dense`, handed to `f` with the halo to add to.
@@ -247,10 +229,9 @@ impl<'a, T: Real> BandProblem<'a, T> {
     }
 
     /// `sign · (data + μ Δᵀ Laplacians)` on the active functions.
-    fn gathered(&self, scratch: &Scratch<T>, sign: T) -> Vec<T> {
-        let mut out = vec![T::zero(); self.band.active_count()];
+    fn gather(&self, scratch: &Scratch<T>, sign: T, out: &mut [T]) {
         let mu = T::from_f64(self.weights.mu);
-        let chunks = split_by_offsets(&mut out, &self.band.offsets, CHUNK);
+        let chunks = split_by_offsets(out, &self.band.offsets, CHUNK);
         chunks.into_par_iter().enumerate().for_each(|(chunk, out)| {
             let first = chunk * CHUNK;
             let base = self.band.offsets[first];
@@ -267,7 +248,6 @@ impl<'a, T: Real> BandProblem<'a, T> {
                 });
             }
         });
-        out
     }
 
     fn inverse_diagonal(&self, scratch: &mut Scratch<T>) -> Vec<T> {
@@ -279,7 +259,8 @@ impl<'a, T: Real> BandProblem<'a, T> {
             scatter_squares(out, sample.spot, STRIDES, sample.weight, squares);
         });
         scratch.laplacians.resize(self.band.totals.len(), T::zero());
-        let mut diagonal = self.gathered(scratch, T::one());
+        let mut diagonal = vec![T::zero(); self.band.active_count()];
+        self.gather(scratch, T::one(), &mut diagonal);
         // Δᵀ Δ: 6² from the stencil's own centre, 1 from each of six neighbours'. Where the box cuts some off
         // this is an overestimate, which a preconditioner may be.
         let penalty = T::from_f64(42.0 * self.weights.mu);
@@ -290,66 +271,54 @@ impl<'a, T: Real> BandProblem<'a, T> {
     }
 }
 
+/// A band's problem with the inverse of its diagonal, and what an application needs.
+struct Jacobi<'p, 'a, T> {
+    problem: &'p BandProblem<'a, T>,
+    inverse: Vec<T>,
+    /// A vector written into an array of bricks.
+    dense: Vec<T>,
+    scratch: Scratch<T>,
+}
+
+impl<T: Real> System for Jacobi<'_, '_, T> {
+    type Vector = Vec<T>;
+
+    fn apply(&mut self, p: &Vec<T>, image: &mut Vec<T>) {
+        self.problem.expand(p, &mut self.dense);
+        self.problem.apply(&self.dense, &mut self.scratch, image);
+    }
+
+    fn precondition(&mut self, r: &Vec<T>, z: &mut Vec<T>) -> f64 {
+        for ((z, r), w) in z.iter_mut().zip(r).zip(&self.inverse) {
+            *z = *r * *w;
+        }
+        let w = &self.inverse;
+        lane_sum(r.len(), |i| r[i].as_f64() * r[i].as_f64() * w[i].as_f64())
+    }
+
+    fn dot(&self, a: &Vec<T>, b: &Vec<T>) -> f64 {
+        lane_sum(a.len(), |i| a[i].as_f64() * b[i].as_f64())
+    }
+
+    fn add(&self, y: &mut Vec<T>, a: f64, x: &Vec<T>) {
+        let a = T::from_f64(a);
+        for (y, x) in y.iter_mut().zip(x) {
+            *y += a * *x;
+        }
+    }
+
+    fn turn(&self, p: &mut Vec<T>, b: f64, z: &Vec<T>) {
+        let b = T::from_f64(b);
+        for (p, z) in p.iter_mut().zip(z) {
+            *p = *z + b * *p;
+        }
+    }
+}
+
 #[derive(Default)]
 struct Scratch<T> {
     halos: Vec<T>,
     laplacians: Vec<T>,
-}
-
-/// Seven-point Laplacian (its own transpose) of an array of bricks, at the slots of one brick.
-fn seven_point<T: Real>(band: &Band<T>, dense: &[T], brick: usize, out: &mut [T]) {
-    const W: usize = BRICK + 2;
-    let mut padded = [T::zero(); W * W * W];
-    let own = &dense[brick * BRICK_LEN..(brick + 1) * BRICK_LEN];
-    for x in 0..BRICK {
-        for y in 0..BRICK {
-            let to = ((x + 1) * W + y + 1) * W + 1;
-            padded[to..to + BRICK].copy_from_slice(&own[(x * BRICK + y) * BRICK..][..BRICK]);
-        }
-    }
-    let face = |neighbour: u32| match neighbour {
-        NONE => None,
-        b => Some(&dense[b as usize * BRICK_LEN..(b as usize + 1) * BRICK_LEN]),
-    };
-    const LAST: usize = BRICK - 1;
-    let (behind, ahead) = (band.behind[brick], band.ahead[brick]);
-    for (neighbour, layer, at) in [(behind[4], LAST, 0), (ahead[4], 0, W - 1)] {
-        if let Some(values) = face(neighbour) {
-            for y in 0..BRICK {
-                let to = (at * W + y + 1) * W + 1;
-                padded[to..to + BRICK].copy_from_slice(&values[(layer * BRICK + y) * BRICK..][..BRICK]);
-            }
-        }
-    }
-    for (neighbour, layer, at) in [(behind[2], LAST, 0), (ahead[2], 0, W - 1)] {
-        if let Some(values) = face(neighbour) {
-            for x in 0..BRICK {
-                let to = ((x + 1) * W + at) * W + 1;
-                padded[to..to + BRICK].copy_from_slice(&values[(x * BRICK + layer) * BRICK..][..BRICK]);
-            }
-        }
-    }
-    for (neighbour, layer, at) in [(behind[1], LAST, 0), (ahead[1], 0, W - 1)] {
-        if let Some(values) = face(neighbour) {
-            for x in 0..BRICK {
-                for y in 0..BRICK {
-                    padded[((x + 1) * W + y + 1) * W + at] = values[(x * BRICK + y) * BRICK + layer];
-                }
-            }
-        }
-    }
-    let six = T::from_f64(6.0);
-    for x in 0..BRICK {
-        for y in 0..BRICK {
-            let at = ((x + 1) * W + y + 1) * W + 1;
-            let row = &mut out[(x * BRICK + y) * BRICK..][..BRICK];
-            for z in 0..BRICK {
-                let i = at + z;
-                row[z] = ((padded[i - W * W] + padded[i + W * W]) + (padded[i - W] + padded[i + W]))
-                    + ((padded[i - 1] + padded[i + 1]) - six * padded[i]);
-            }
-        }
-    }
 }
 
 /// The slices of `values` that belong to each chunk of `chunk` bricks.
@@ -377,12 +346,4 @@ fn lane_sum(n: usize, term: impl Fn(usize) -> f64) -> f64 {
     }
     let tail: f64 = (n - n % LANES..n).map(term).sum();
     lanes.iter().sum::<f64>() + tail
-}
-
-fn dot<T: Real>(a: &[T], b: &[T]) -> f64 {
-    lane_sum(a.len(), |i| a[i].as_f64() * b[i].as_f64())
-}
-
-fn weighted_square<T: Real>(a: &[T], w: &[T]) -> f64 {
-    lane_sum(a.len(), |i| a[i].as_f64() * a[i].as_f64() * w[i].as_f64())
 }

@@ -1,28 +1,27 @@
-//! From the levels of a cascade to a field.
+//! From solved levels to a field.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use bspline::hierarchical::Lattice;
 use bspline::hierarchical::{BRICK, BrickKey, DenseCorrections, LevelCorrections};
 use bspline::{HierarchicalSpline, Real};
-use glam::DVec3;
+use glam::{DAffine3, DMat3, DVec3};
 
-use super::band;
-use super::cascade::Level;
+use super::BASE_DEPTH;
+use super::band::{self, Key};
 use super::full_grid::FullGrid;
-use super::samples::{Samples, lattice};
 
-/// The field: level 0 is the full base level, the others what the cascade found, scaled to world units.
-pub(crate) fn assemble<T: Real>(
-    samples: &Samples,
-    base: &FullGrid<f64>,
-    levels: &[Level<T>],
-) -> HierarchicalSpline<T> {
-    assemble_in(samples.origin, samples.scale, base, levels)
+/// The stored part of a level: the corrections `x` of its active functions, brick by brick.
+pub(crate) struct Level<T> {
+    pub keys: Vec<Key>,
+    pub masks: Vec<u64>,
+    pub x: Vec<T>,
 }
 
-/// The same for the box of edge `scale` at `origin`.
-pub(crate) fn assemble_in<T: Real>(
+/// The field in the box of edge `scale` at `origin`: level 0 is the full base level, the others what their solves found,
+/// scaled to world units.
+pub(crate) fn assemble<T: Real>(
     origin: DVec3,
     scale: f64,
     base: &FullGrid<f64>,
@@ -62,4 +61,16 @@ pub(crate) fn assemble_in<T: Real>(
         stored.push(corrections);
     }
     HierarchicalSpline::from_corrections(lattice(origin, scale), 1.0, stored)
+}
+
+/// The grids of a fit in the box of edge `scale` at `origin`: level 0 has 32 cells along it.
+pub(crate) fn lattice(origin: DVec3, scale: f64) -> Lattice {
+    let cells = 1u32 << BASE_DEPTH;
+    Lattice {
+        world_from_lattice: DAffine3 {
+            matrix3: DMat3::from_diagonal(DVec3::splat(scale / cells as f64)),
+            translation: origin,
+        },
+        cells: [cells; 3],
+    }
 }
