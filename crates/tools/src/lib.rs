@@ -3,6 +3,7 @@
 
 pub mod coefficients;
 pub mod fade;
+pub mod force;
 pub mod geometric;
 pub mod limits;
 pub mod mix;

@@ -4,6 +4,7 @@ use bspline::HierarchicalSpline;
 use fitting::Control;
 use serde::{Deserialize, Serialize};
 
+use crate::force::{Chisel, Drill, ForceTool, Pull};
 use crate::geometric::{Copy, Cut, Geometric, Inflate, Move, Paste, Refine, Simplify, Smooth};
 use crate::limits::{Limits, Mask, Region};
 use crate::paint::Paint;
@@ -31,6 +32,21 @@ pub struct Stroke {
     /// Adds a solid.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub add: Option<Geometric>,
+    /// Brings the surface elsewhere.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pull: Option<Pull>,
+    /// Cuts a groove.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub chisel: Option<Chisel>,
+    /// Lays a ridge.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub squirt: Option<Chisel>,
+    /// Makes a hole or a cut.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drill: Option<Drill>,
+    /// Makes a bridge or a seam.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub join: Option<Drill>,
     /// Carries along.
     #[serde(default, rename = "move", skip_serializing_if = "Option::is_none")]
     pub motion: Option<Move>,
@@ -81,6 +97,17 @@ impl Stroke {
         let all = [
             self.carve.as_ref().map(Tool::Carve),
             self.add.as_ref().map(Tool::Add),
+            self.pull.as_ref().map(|tool| Tool::Force(ForceTool::Pull(tool))),
+            self.chisel
+                .as_ref()
+                .map(|tool| Tool::Force(ForceTool::Chisel(tool))),
+            self.squirt
+                .as_ref()
+                .map(|tool| Tool::Force(ForceTool::Squirt(tool))),
+            self.drill
+                .as_ref()
+                .map(|tool| Tool::Force(ForceTool::Drill(tool))),
+            self.join.as_ref().map(|tool| Tool::Force(ForceTool::Join(tool))),
             self.motion.as_ref().map(Tool::Move),
             self.smooth.as_ref().map(Tool::Smooth),
             self.inflate.as_ref().map(Tool::Inflate),

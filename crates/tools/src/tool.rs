@@ -9,6 +9,7 @@ use fitting::field::FieldFitReport;
 use fitting::{Control, FitError};
 use glam::DAffine3;
 
+use crate::force::{ForceError, ForceTool};
 use crate::geometric::{
     Copy, Cut, Geometric, GeometricError, Inflate, Move, Operation, Paste, Refine, Simplify, Smooth,
 };
@@ -92,6 +93,8 @@ pub enum Tool<'a> {
     Carve(&'a Geometric),
     /// Adds a solid.
     Add(&'a Geometric),
+    /// Pushes or pulls.
+    Force(ForceTool<'a>),
     /// Carries along.
     Move(&'a Move),
     /// Evens out.
@@ -118,6 +121,9 @@ pub enum ToolError {
     /// A geometric tool cannot.
     #[error(transparent)]
     Geometric(#[from] GeometricError),
+    /// A force tool cannot.
+    #[error(transparent)]
+    Force(#[from] ForceError),
     /// The stroke names no tool, or several, or limits that make no sense.
     #[error("{0}")]
     Stroke(String),
@@ -129,21 +135,30 @@ pub enum ToolError {
 impl ToolError {
     /// Whether the user said stop.
     pub fn is_cancelled(&self) -> bool {
-        matches!(self, Self::Geometric(GeometricError::Fit(FitError::Cancelled)))
+        match self {
+            Self::Geometric(e) => matches!(e, GeometricError::Fit(FitError::Cancelled)),
+            Self::Force(e) => e.is_cancelled(),
+            Self::Stroke(_) | Self::Paint(_) => false,
+        }
     }
 }
 
 impl Tool<'_> {
     /// Names of all tools, as sessions write them.
-    pub const NAMES: [&'static str; 11] = [
-        "carve", "add", "move", "smooth", "inflate", "copy", "cut", "paste", "refine", "simplify", "paint",
-    ];
+    pub const NAMES: [&'static str; 16] = {
+        let [pull, chisel, squirt, drill, join] = ForceTool::NAMES;
+        [
+            "carve", "add", pull, chisel, squirt, drill, join, "move", "smooth", "inflate", "copy", "cut",
+            "paste", "refine", "simplify", "paint",
+        ]
+    };
 
     /// Its name, as sessions write it.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Carve(_) => "carve",
             Self::Add(_) => "add",
+            Self::Force(tool) => tool.name(),
             Self::Move(_) => "move",
             Self::Smooth(_) => "smooth",
             Self::Inflate(_) => "inflate",
@@ -189,6 +204,11 @@ impl Tool<'_> {
                 let mut canvas = canvas;
                 canvas.layers.insert(paint.layer, layer);
                 return Ok((canvas, Vec::new()));
+            }
+            Self::Force(tool) => {
+                let (field, told) = tool.apply(old, *iso, control)?;
+                let field = limits.kept(old, &field);
+                return Ok((Canvas { field, ..canvas }, told));
             }
             Self::Copy(copy) => {
                 copies.push(copy.to.clone());

@@ -1,0 +1,64 @@
+use bspline::{HierarchicalSpline, Real};
+use serde::{Deserialize, Serialize};
+
+use super::path::Path;
+use super::stroke::{Extent, ForceStroke};
+use super::target::Target;
+use super::{ForceError, How, track};
+use crate::number::{Point, Positive};
+
+/// Radii by which a hole, or a bridge, is made wider than a thread.
+const WIDER: f64 = 0.5;
+
+/// A hole from a point, or a cut along a curve, as far as a vector says; or the other way round a bridge, or a seam. Paths end where they would leave
+/// the solid, or meet the next.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Drill {
+    /// Where it begins, drawn to the nearest surface: one point, or the polyline of a cut.
+    pub along: Vec<Point>,
+    /// Direction and length.
+    pub by: Point,
+    /// Standard deviation of the spread of its force, a world length.
+    pub radius: Positive,
+    /// How it works.
+    #[serde(default)]
+    pub how: How,
+}
+
+impl Drill {
+    /// Sets the tool on a field whose surface lies at `iso`; `grows` if it joins.
+    ///
+    /// # Errors
+    /// Any [`ForceError`].
+    pub fn begin<T: Real>(
+        &self,
+        field: &HierarchicalSpline<T>,
+        iso: f64,
+        grows: bool,
+    ) -> Result<ForceStroke<T>, ForceError> {
+        let points: Vec<_> = self.along.iter().map(|p| p.0).collect();
+        let wider = WIDER * self.radius.0 * field.slope();
+        // Beyond the surface by as much as the hole is to be wide.
+        let goal = if grows { iso + wider } else { iso - wider };
+        let target = |place: &track::Place| {
+            let inward = if grows { -place.normal } else { place.normal };
+            if self.by.0.dot(inward) >= 0.0 {
+                let way = if grows { "out of" } else { "into" };
+                return Err(ForceError::tool(format!(
+                    "by {:?} does not lead {way} the solid at {:?}; turn it round, or begin on the other side",
+                    self.by.0.to_array(),
+                    place.at.to_array(),
+                )));
+            }
+            Ok(Target {
+                weight: place.weight,
+                ends_early: true,
+                ..Target::single(Path::through([place.at, place.at + self.by.0])?, grows)
+            })
+        };
+        let places = track::along(field, iso, &points, self.radius.0)?;
+        let targets: Result<Vec<_>, ForceError> = places.iter().map(target).collect();
+        ForceStroke::new(field, goal, targets?, Extent::Curve, self.radius.0, &self.how)
+    }
+}

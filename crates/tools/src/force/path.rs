@@ -1,0 +1,193 @@
+use bspline::Field;
+use glam::DVec3;
+
+use super::ForceError;
+
+/// Pieces that a parametric curve is cut into. Its length is then off by a third of a millionth for half a circle.
+const PIECES: usize = 1024;
+
+/// A way through space, straight or curved, by arc length; goes on straight beyond both ends.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Path {
+    points: Vec<DVec3>,
+    /// Arc length from the first point to each.
+    lengths: Vec<f64>,
+}
+
+impl Path {
+    /// From point to point.
+    ///
+    /// # Errors
+    /// [`ForceError::Tool`] where a coordinate is not finite or all points are one.
+    pub fn through(points: impl IntoIterator<Item = DVec3>) -> Result<Self, ForceError> {
+        let (mut kept, mut lengths): (Vec<DVec3>, Vec<f64>) = Default::default();
+        for p in points {
+            if !p.is_finite() {
+                return Err(ForceError::tool(format!(
+                    "a path cannot go through {p}; write finite coordinates"
+                )));
+            }
+            let gone = kept.last().map_or(0.0, |last| last.distance(p));
+            if kept.is_empty() || gone > 0.0 {
+                lengths.push(lengths.last().map_or(0.0, |l| l + gone));
+                kept.push(p);
+            }
+        }
+        if kept.len() < 2 {
+            return Err(ForceError::tool(
+                "a path has no length; let it end beside its start",
+            ));
+        }
+        Ok(Self {
+            points: kept,
+            lengths,
+        })
+    }
+
+    /// The curve `at(t)`, `t` from 0 to 1.
+    ///
+    /// # Errors
+    /// As [`through`](Self::through), and what `at` says.
+    pub fn parametric(at: impl Fn(f64) -> Result<DVec3, String>) -> Result<Self, ForceError> {
+        let points: Result<Vec<_>, String> = (0..=PIECES).map(|i| at(i as f64 / PIECES as f64)).collect();
+        Self::through(points.map_err(ForceError::Tool)?)
+    }
+
+    /// The points that it goes through.
+    pub fn points(&self) -> &[DVec3] {
+        &self.points
+    }
+
+    /// Arc length.
+    pub fn length(&self) -> f64 {
+        self.lengths[self.lengths.len() - 1]
+    }
+
+    /// The place at an arc length from the start.
+    pub fn at(&self, s: f64) -> DVec3 {
+        let end = self
+            .lengths
+            .partition_point(|l| *l <= s)
+            .clamp(1, self.points.len() - 1);
+        let (from, to) = (self.points[end - 1], self.points[end]);
+        let share = (s - self.lengths[end - 1]) / (self.lengths[end] - self.lengths[end - 1]);
+        from + share * (to - from)
+    }
+
+    /// Arc lengths of the points between the ends at which it turns by more than an angle of this cosine.
+    pub fn corners(&self, cosine: f64) -> impl Iterator<Item = f64> {
+        let ways: Vec<DVec3> = self
+            .points
+            .windows(2)
+            .map(|w| (w[1] - w[0]).normalize())
+            .collect();
+        let turns = (1..ways.len()).filter(move |i| ways[*i].dot(ways[i - 1]) < cosine);
+        turns.map(|i| self.lengths[i])
+    }
+
+    /// Unit vector of the way at an arc length.
+    pub fn direction(&self, s: f64) -> DVec3 {
+        let end = self
+            .lengths
+            .partition_point(|l| *l <= s)
+            .clamp(1, self.points.len() - 1);
+        (self.points[end] - self.points[end - 1]).normalize()
+    }
+}
+
+/// Where a path first leaves the side on which it starts, by arc length: of `behind`, positive on that side, the first zero
+/// from 0 on towards `ahead`; if the start itself is on the other side, the first on the way back to `-back`. `None` where
+/// that side is nowhere; `ahead` where it does not end.
+///
+/// `step` is the least part of either side that is seen.
+pub fn first_crossing(mut behind: impl FnMut(f64) -> f64, back: f64, ahead: f64, step: f64) -> Option<f64> {
+    let mut inside = (0.0, behind(0.0));
+    if inside.1 > 0.0 {
+        while inside.0 < ahead {
+            let s = (inside.0 + step).min(ahead);
+            let value = behind(s);
+            if value <= 0.0 {
+                return Some(root(behind, inside, (s, value)));
+            }
+            inside = (s, value);
+        }
+        return Some(ahead);
+    }
+    let mut outside = inside;
+    while outside.0 > -back {
+        let s = (outside.0 - step).max(-back);
+        let value = behind(s);
+        if value > 0.0 {
+            return Some(root(behind, (s, value), outside));
+        }
+        outside = (s, value);
+    }
+    None
+}
+
+/// A zero between two places with values of different sign, to rounding: the Illinois method, with bisection where it creeps.
+fn root(mut f: impl FnMut(f64) -> f64, mut a: (f64, f64), mut b: (f64, f64)) -> f64 {
+    let exact = 4.0 * f64::EPSILON * a.0.abs().max(b.0.abs()).max((b.0 - a.0).abs());
+    let [mut wa, mut wb] = [a.1, b.1];
+    let mut kept_before = None;
+    for n in 0..200 {
+        let width = b.0 - a.0;
+        if width.abs() <= exact || b.1 == 0.0 {
+            break;
+        }
+        let share = if n % 8 == 7 { 0.5 } else { wa / (wa - wb) };
+        let s = a.0 + share * width;
+        if s == a.0 || s == b.0 {
+            break;
+        }
+        let value = f(s);
+        let is_b_kept = value > 0.0;
+        // An end that stays twice weighs half.
+        let weigh = if kept_before == Some(is_b_kept) { 0.5 } else { 1.0 };
+        kept_before = Some(is_b_kept);
+        if is_b_kept {
+            a = (s, value);
+            (wa, wb) = (value, weigh * wb);
+        } else {
+            b = (s, value);
+            (wa, wb) = (weigh * wa, value);
+        }
+    }
+    b.0
+}
+
+/// The point of the surface `f = iso` that is nearest to `p`, about: steps along the gradient, each as long as the linear
+/// field asks for.
+///
+/// # Errors
+/// [`ForceError::Nowhere`] where there is none within `reach`.
+pub fn nearest_surface(field: &dyn Field, iso: f64, p: DVec3, reach: f64) -> Result<DVec3, ForceError> {
+    let nowhere = ForceError::Nowhere {
+        at: p.to_array(),
+        reach,
+    };
+    let mut x = p;
+    for _ in 0..64 {
+        let (value, gradient) = field.value_gradient(x);
+        let steep = gradient.length_squared();
+        if !(steep > 0.0 && steep.is_finite()) {
+            return Err(nowhere);
+        }
+        let step = (iso - value) / steep * gradient;
+        // Long steps are not trusted where the field bends.
+        let step = step.clamp_length_max(0.25 * reach);
+        x += step;
+        if x.distance(p) > reach {
+            return Err(nowhere);
+        }
+        if step.length() <= 1e-9 * reach {
+            return Ok(x);
+        }
+    }
+    // Single precision may not settle to that.
+    let (value, gradient) = field.value_gradient(x);
+    match (value - iso).abs() <= 1e-4 * reach * gradient.length() {
+        true => Ok(x),
+        false => Err(nowhere),
+    }
+}

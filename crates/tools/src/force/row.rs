@@ -1,0 +1,106 @@
+use bspline::{Field, HierarchicalSpline, Real};
+use dynamics::region::Region;
+use glam::DVec3;
+
+use super::quadrature::Node;
+
+/// The four cubic B-splines of uniform knots that are not 0 at `t` in their cell.
+fn basis(t: f64) -> [f64; 4] {
+    let s = 1.0 - t;
+    [
+        s * s * s / 6.0,
+        (3.0 * t * t * t - 6.0 * t * t + 4.0) / 6.0,
+        (3.0 * s * s * s - 6.0 * s * s + 4.0) / 6.0,
+        t * t * t / 6.0,
+    ]
+}
+
+/// The free coefficients of a region, as functions of the world.
+pub struct Functions<'a, T> {
+    field: &'a HierarchicalSpline<T>,
+    scale: f64,
+    first: DVec3,
+    dims: [usize; 3],
+}
+
+impl<'a, T: Real> Functions<'a, T> {
+    /// Those of a region that was cut from `field`.
+    pub fn of(field: &'a HierarchicalSpline<T>, region: &Region<T>) -> Self {
+        let cells = region.cells();
+        Self {
+            field,
+            scale: (1u64 << cells.level) as f64,
+            first: DVec3::from_array(cells.first.map(f64::from)),
+            dims: region.patch().lattice().coefficient_dims(),
+        }
+    }
+
+    /// Calls `take` with the number and the weight of each function that is not 0 at `p`.
+    #[inline]
+    fn each(&self, p: DVec3, mut take: impl FnMut(usize, f64)) {
+        let local = self.field.lattice_from_world().transform_point3(p) * self.scale - self.first;
+        let mut first = [0i64; 3];
+        let mut weights = [[0.0; 4]; 3];
+        for a in 0..3 {
+            let cell = local[a].floor();
+            if !(cell >= 0.0 && cell < self.dims[a] as f64 + 3.0) {
+                return;
+            }
+            first[a] = cell as i64 - 3;
+            weights[a] = basis(local[a] - cell);
+        }
+        let at = |a: usize, i: usize| {
+            usize::try_from(first[a] + i as i64)
+                .ok()
+                .filter(|n| *n < self.dims[a])
+        };
+        for (i, wx) in weights[0].iter().enumerate() {
+            let Some(x) = at(0, i) else { continue };
+            for (j, wy) in weights[1].iter().enumerate() {
+                let Some(y) = at(1, j) else { continue };
+                let row = (x * self.dims[1] + y) * self.dims[2];
+                for (k, wz) in weights[2].iter().enumerate() {
+                    if let Some(z) = at(2, k) {
+                        take(row + z, wx * wy * wz);
+                    }
+                }
+            }
+        }
+    }
+
+    /// The field with changes `p` of the free coefficients.
+    pub fn value(&self, p: &[T], at: DVec3) -> f64 {
+        let mut sum = self.field.value(at);
+        self.each(at, |i, w| sum += w * p[i].as_f64());
+        sum
+    }
+}
+
+/// What a change of the free coefficients is worth to the mean of the field over a path: a sparse list of weights.
+#[derive(Clone, Debug, Default)]
+pub struct Row(Vec<(usize, f64)>);
+
+impl Row {
+    /// The mean over the nodes of an integral.
+    pub fn mean<T: Real>(functions: &Functions<T>, nodes: &[Node], at: impl Fn(f64) -> DVec3) -> Self {
+        let whole: f64 = nodes.iter().map(|n| n.weight).sum();
+        let mut all = Vec::with_capacity(64 * nodes.len());
+        for node in nodes {
+            functions.each(at(node.at), |i, w| all.push((i, w * node.weight / whole)));
+        }
+        all.sort_by_key(|(i, _)| *i);
+        all.dedup_by(|next, sum| {
+            let same = next.0 == sum.0;
+            if same {
+                sum.1 += next.1;
+            }
+            same
+        });
+        Self(all)
+    }
+
+    /// `Σ wᵢpᵢ`.
+    pub fn times<T: Real>(&self, p: &[T]) -> f64 {
+        self.0.iter().map(|(i, w)| w * p[*i].as_f64()).sum()
+    }
+}
