@@ -44,7 +44,8 @@ fn canvas(field: &HierarchicalSpline<f32>) -> Canvas {
     Canvas {
         field: field.clone(),
         iso: ISO,
-        detail: field.level_count() - 1,
+        // Of the block itself.
+        detail: 0,
         layers: Default::default(),
         others: Others::default(),
         copies: Vec::new(),
