@@ -43,6 +43,9 @@ pub enum CommandError {
     /// The object has no surface for a tool to work on.
     #[error("object {0:?} names no surface; fit it with an iso-value")]
     NoSurface(String),
+    /// A copy would take the place of an object.
+    #[error("there is an object {0:?} already; give the copy another name")]
+    Taken(String),
     /// A tool cannot be used.
     #[error(transparent)]
     Tool(#[from] ToolError),
@@ -104,6 +107,7 @@ impl Command {
     pub fn apply(&self, state: &State, control: &mut Control) -> Result<(State, Vec<String>), CommandError> {
         let (Self::Scene { object: name, .. } | Self::Stroke { object: name, .. }) = self;
         let mut object = state.object(name)?.clone();
+        let mut next = state.clone();
         let notes;
         match self {
             Self::Scene { script, .. } => {
@@ -122,6 +126,7 @@ impl Command {
                     iso,
                     layers: object.layers,
                     others: others(state, name)?,
+                    copies: Vec::new(),
                 };
                 let (canvas, told) = stroke
                     .apply(canvas, control)
@@ -129,11 +134,17 @@ impl Command {
                         true => CommandError::Cancelled(FitError::Cancelled),
                         false => e.into(),
                     })?;
+                for copy in canvas.copies {
+                    if state.object(&copy).is_ok() {
+                        return Err(CommandError::Taken(copy));
+                    }
+                    next = next.with(&copy, state.object(name)?.clone())?;
+                }
                 (object.field, object.layers) = (canvas.field, canvas.layers);
                 notes = told;
             }
         }
-        Ok((state.with(name, object)?, notes))
+        Ok((next.with(name, object)?, notes))
     }
 }
 

@@ -1,6 +1,7 @@
 //! What a hand can do to a field: scripted [scenes](scene) of forces, matter and constraints, and [geometric] tools that carve,
 //! add and [carry along](warp). A [session] is a row of strokes; each uses one [tool], within [limits]. Haptics are not built yet.
 
+pub mod coefficients;
 pub mod fade;
 pub mod force;
 pub mod geometric;
@@ -10,5 +11,6 @@ pub mod number;
 pub mod paint;
 pub mod scene;
 pub mod session;
+pub mod symmetry;
 pub mod tool;
 pub mod warp;

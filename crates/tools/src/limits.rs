@@ -5,12 +5,12 @@
 
 use std::sync::Arc;
 
-use bspline::hierarchical::{BRICK, BrickChange, Corrections, DenseCorrections};
 use bspline::primitives::Cuboid;
 use bspline::{Aabb, Csg, Field, HierarchicalSpline, Real};
-use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
+use crate::coefficients::{changed, coefficient, support, with_functions};
+use crate::geometric::FormulaSolid;
 use crate::mix::{Faded, Mixed};
 use crate::number::{Point, Positive};
 use crate::tool::Others;
@@ -25,7 +25,7 @@ pub struct Region {
     pub max: Point,
 }
 
-/// Which parts of space a stroke may change; exactly one of `boxes` and `object` is given.
+/// Which parts of space a stroke may change; exactly one of `boxes`, `object` and `formula` is given.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Mask {
@@ -35,6 +35,9 @@ pub struct Mask {
     /// What lies inside another object.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub object: Option<String>,
+    /// Where a formula of `x`, `y` and `z` is above 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub formula: Option<String>,
     /// Turns the mask round: what it names stays as it is.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub outside: bool,
@@ -50,6 +53,8 @@ pub struct Limits {
     region: Option<(Aabb, Cuboid)>,
     mask: Option<Arc<dyn Field>>,
     weight: Option<Faded>,
+    /// Finest level that may change.
+    finest: Option<usize>,
     /// Level that the object is shaped to.
     detail: Option<usize>,
 }
@@ -78,11 +83,17 @@ impl Region {
 }
 
 impl Limits {
-    /// What a region and a mask leave. `others` are the objects that the mask may name.
+    /// What a region and a mask leave. `others` are the objects that the mask may name, `whole` is the
+    /// box of the field.
     ///
     /// # Errors
     /// A sentence.
-    pub fn new(region: Option<&Region>, mask: Option<&Mask>, others: &Others) -> Result<Self, String> {
+    pub fn new(
+        region: Option<&Region>,
+        mask: Option<&Mask>,
+        others: &Others,
+        whole: &Aabb,
+    ) -> Result<Self, String> {
         let region = region.map(Region::solid).transpose()?;
         let Some(mask) = mask else {
             return Ok(Self {
@@ -90,8 +101,8 @@ impl Limits {
                 ..Self::default()
             });
         };
-        let named: Arc<dyn Field> = match (&mask.boxes, &mask.object) {
-            (Some(boxes), None) => {
+        let named: Arc<dyn Field> = match (&mask.boxes, &mask.object, &mask.formula) {
+            (Some(boxes), None, None) => {
                 let solids: Result<Vec<Arc<dyn Field>>, String> = boxes
                     .iter()
                     .map(|b| Ok(Arc::new(b.solid()?.1) as Arc<dyn Field>))
@@ -99,8 +110,9 @@ impl Limits {
                 let union = Csg::union(solids?);
                 Arc::new(union.map_err(|_| "the mask has no box; write at least one".to_string())?)
             }
-            (None, Some(name)) => others.get(name)?,
-            _ => return Err("a mask is given by exactly one of boxes and object".into()),
+            (None, Some(name), None) => others.get(name)?.0,
+            (None, None, Some(text)) => Arc::new(FormulaSolid::new(text, whole)?),
+            _ => return Err("a mask is given by exactly one of boxes, object and formula".into()),
         };
         let named = match mask.outside {
             false => named,
@@ -111,8 +123,17 @@ impl Limits {
             region,
             mask: Some(named),
             weight,
+            finest: None,
             detail: None,
         })
+    }
+
+    /// With no functions finer than those of a level.
+    pub fn up_to(self, finest: usize) -> Self {
+        Self {
+            finest: Some(finest),
+            ..self
+        }
     }
 
     /// With the level of the field that the object is shaped to.
@@ -121,6 +142,11 @@ impl Limits {
             detail: Some(level),
             ..self
         }
+    }
+
+    /// Finest level that may change.
+    pub fn finest(&self) -> Option<usize> {
+        self.finest
     }
 
     /// Level of the field that the object is shaped to, if it is told.
@@ -172,59 +198,16 @@ impl Limits {
         if self.is_none() {
             return new.clone();
         }
-        let mut difference = old.difference(new).expect("versions of one field");
-        for change in &mut difference.bricks {
-            change.new = self.kept_brick(old, change);
-        }
-        old.applied(&difference).expect("the old version is at hand")
-    }
-
-    fn kept_brick<T: Real>(
-        &self,
-        field: &HierarchicalSpline<T>,
-        change: &BrickChange<T>,
-    ) -> Option<Arc<Corrections<T>>> {
-        let value = |side: &Option<Arc<Corrections<T>>>, slot| side.as_ref().and_then(|c| c.get(slot));
-        let mut kept = DenseCorrections::empty();
-        for slot in 0..BRICK * BRICK * BRICK {
-            let at = [slot / BRICK / BRICK, slot / BRICK % BRICK, slot % BRICK];
-            let (old, new) = (value(&change.old, slot), value(&change.new, slot));
-            let function = std::array::from_fn(|a| change.key.0[a] * BRICK as u32 + at[a] as u32);
-            let result = match old == new {
-                true => old,
-                false => {
-                    let (knot, support) = support(field, change.level, function);
-                    match (self.is_free(&support), &self.weight) {
-                        (false, _) => old,
-                        (true, None) => new,
-                        (true, Some(weight)) => {
-                            let zero = T::zero();
-                            let (from, to) = (old.unwrap_or(zero), new.unwrap_or(zero));
-                            Some(from + T::from_f64(weight.value(knot)) * (to - from))
-                        }
-                    }
-                }
-            };
-            if let Some(result) = result {
-                kept.set(at, result);
+        let mut functions = changed(old, new).expect("versions of one field");
+        functions.retain(|(level, function), value| {
+            let (knot, support) = support(old, *level, *function);
+            if let Some(weight) = &self.weight {
+                let [from, to] =
+                    [coefficient(old, *level, *function), *value].map(|c| c.unwrap_or(T::zero()));
+                *value = Some(from + T::from_f64(weight.value(knot)) * (to - from));
             }
-        }
-        let kept = kept.pack();
-        (kept.count() > 0).then(|| Arc::new(kept))
+            self.is_free(&support)
+        });
+        with_functions(old, &functions).expect("functions of the lattice")
     }
-}
-
-/// World place of a function's knot, and a world box about its support in the field's own box.
-pub fn support<T: Real>(field: &HierarchicalSpline<T>, level: usize, function: [u32; 3]) -> (DVec3, Aabb) {
-    let lattice = field.lattice();
-    let spacing = 1.0 / (1u64 << level) as f64;
-    // Function `s` is centred on knot `s - 1`.
-    let knot = (DVec3::from_array(function.map(f64::from)) - 1.0) * spacing;
-    let extent = lattice.extent();
-    let end = |reach: f64| (knot + reach * spacing).clamp(DVec3::ZERO, extent);
-    let map = &lattice.world_from_lattice;
-    (
-        map.transform_point3(knot),
-        Aabb::new(end(-2.0), end(2.0)).transformed(map),
-    )
 }

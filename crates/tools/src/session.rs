@@ -1,12 +1,14 @@
 //! Sessions: what is to be done to a document, stroke after stroke.
 
+use bspline::HierarchicalSpline;
 use fitting::Control;
 use serde::{Deserialize, Serialize};
 
 use crate::force::{Chisel, Drill, ForceTool, Pull};
-use crate::geometric::{Geometric, Move};
+use crate::geometric::{Copy, Cut, Geometric, Inflate, Move, Paste, Refine, Simplify, Smooth};
 use crate::limits::{Limits, Mask, Region};
 use crate::paint::Paint;
+use crate::symmetry::Symmetry;
 use crate::tool::{Canvas, Tool, ToolError};
 
 /// What a session file says.
@@ -48,6 +50,33 @@ pub struct Stroke {
     /// Carries along.
     #[serde(default, rename = "move", skip_serializing_if = "Option::is_none")]
     pub motion: Option<Move>,
+    /// Evens out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub smooth: Option<Smooth>,
+    /// Lifts or lowers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub inflate: Option<Inflate>,
+    /// Keeps a copy.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub copy: Option<Copy>,
+    /// Takes a box out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cut: Option<Cut>,
+    /// Puts a box of an object in.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub paste: Option<Paste>,
+    /// Puts knots in.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub refine: Option<Refine>,
+    /// Takes knots out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub simplify: Option<Simplify>,
+    /// Finest level of the field that the stroke sees and changes; what finer levels add stays where it is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub coarse: Option<usize>,
+    /// A plane on both sides of which the stroke happens.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub symmetry: Option<Symmetry>,
     /// A box that it leaves nothing outside of changed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub within: Option<Region>,
@@ -80,6 +109,13 @@ impl Stroke {
                 .map(|tool| Tool::Force(ForceTool::Drill(tool))),
             self.join.as_ref().map(|tool| Tool::Force(ForceTool::Join(tool))),
             self.motion.as_ref().map(Tool::Move),
+            self.smooth.as_ref().map(Tool::Smooth),
+            self.inflate.as_ref().map(Tool::Inflate),
+            self.copy.as_ref().map(Tool::Copy),
+            self.cut.as_ref().map(Tool::Cut),
+            self.paste.as_ref().map(Tool::Paste),
+            self.refine.as_ref().map(Tool::Refine),
+            self.simplify.as_ref().map(Tool::Simplify),
             self.paint.as_ref().map(Tool::Paint),
         ];
         let given: Vec<_> = all.into_iter().flatten().collect();
@@ -103,10 +139,77 @@ impl Stroke {
     /// Any [`ToolError`].
     pub fn apply(&self, canvas: Canvas, control: &mut Control) -> Result<(Canvas, Vec<String>), ToolError> {
         let tool = self.tool().map_err(ToolError::Stroke)?;
-        let limits = Limits::new(self.within.as_ref(), self.mask.as_ref(), &canvas.others);
+        let whole = canvas.field.lattice().world_box();
+        let limits = Limits::new(self.within.as_ref(), self.mask.as_ref(), &canvas.others, &whole);
         let limits = limits.map_err(ToolError::Stroke)?.at_detail(canvas.detail);
-        tool.apply(canvas, &limits, control)
+        let Some(level) = self.coarse else {
+            return self.on_both_sides(tool, canvas, &limits, control);
+        };
+        let whole = canvas.field.clone();
+        let coarse = Canvas {
+            field: up_to(&whole, level).map_err(ToolError::Stroke)?,
+            ..canvas
+        };
+        let below = coarse.field.clone();
+        let (mut left, notes) = self.on_both_sides(tool, coarse, &limits.up_to(level), control)?;
+        let difference = below.difference(&left.field).expect("versions of one field");
+        left.field = whole.applied(&difference).map_err(|_| {
+            let why = format!(
+                "{} works on finer levels than {level}; leave coarse out",
+                tool.name()
+            );
+            ToolError::Stroke(why)
+        })?;
+        Ok((left, notes))
     }
+
+    /// What the tool leaves if it is used as the stroke's symmetry says.
+    fn on_both_sides(
+        &self,
+        tool: Tool,
+        canvas: Canvas,
+        limits: &Limits,
+        control: &mut Control,
+    ) -> Result<(Canvas, Vec<String>), ToolError> {
+        let Some(symmetry) = &self.symmetry else {
+            return tool.apply(canvas, limits, control);
+        };
+        if matches!(tool, Tool::Paint(_) | Tool::Copy(_)) {
+            let why = format!("{} knows no symmetry; write a stroke for each side", tool.name());
+            return Err(ToolError::Stroke(why));
+        }
+        if matches!(tool, Tool::Move(_)) && canvas.layers.values().any(|layer| !layer.is_empty()) {
+            let why = "a painted object cannot be moved on both sides at once; write a stroke for each side";
+            return Err(ToolError::Stroke(why.into()));
+        }
+        let (mut left, mut notes) = (canvas.clone(), Vec::new());
+        left.field = symmetry.apply(&canvas.field, |field| {
+            let canvas = Canvas {
+                field,
+                ..canvas.clone()
+            };
+            let (canvas, told) = tool.apply(canvas, limits, control)?;
+            (left.copies, notes) = (canvas.copies, told);
+            Ok::<_, ToolError>(canvas.field)
+        })?;
+        Ok((left, notes))
+    }
+}
+
+/// The field without what is finer than a level.
+fn up_to(field: &HierarchicalSpline<f32>, level: usize) -> Result<HierarchicalSpline<f32>, String> {
+    let finest = field.level_count() - 1;
+    if level > finest {
+        return Err(format!(
+            "coarse is {level}; the field has the levels 0 to {finest}"
+        ));
+    }
+    let levels = (0..=level).map(|level| field.corrections(level)).collect();
+    Ok(HierarchicalSpline::from_corrections(
+        *field.lattice(),
+        field.slope(),
+        levels,
+    ))
 }
 
 #[cfg(test)]

@@ -10,7 +10,9 @@ use fitting::{Control, FitError};
 use glam::DAffine3;
 
 use crate::force::{ForceError, ForceTool};
-use crate::geometric::{Geometric, GeometricError, Move, Operation};
+use crate::geometric::{
+    Copy, Cut, Geometric, GeometricError, Inflate, Move, Operation, Paste, Refine, Simplify, Smooth,
+};
 use crate::limits::Limits;
 use crate::paint::{Layer, Layers, Paint, PaintError};
 
@@ -27,11 +29,13 @@ pub struct Canvas {
     pub layers: Layers,
     /// Objects that a tool may name.
     pub others: Others,
+    /// Names under which the object as it was before is to be kept.
+    pub copies: Vec<String>,
 }
 
 /// Objects by name, each about as the distance from its surface, positive inside, in the world of the canvas.
 #[derive(Clone, Default)]
-pub struct Others(BTreeMap<String, Arc<dyn Field>>);
+pub struct Others(BTreeMap<String, (Arc<dyn Field>, Aabb)>);
 
 impl fmt::Debug for Others {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -62,15 +66,16 @@ impl Others {
                 Arc::new(Csg::sum(vec![(stretch, placed)], 0.0)?)
             }
         };
-        self.0.insert(name.into(), placed);
+        let b = field.lattice().world_box().transformed(&canvas_from_object);
+        self.0.insert(name.into(), (placed, b));
         Ok(())
     }
 
-    /// The object of a name.
+    /// The object of a name, and the box of its field.
     ///
     /// # Errors
     /// A sentence.
-    pub fn get(&self, name: &str) -> Result<Arc<dyn Field>, String> {
+    pub fn get(&self, name: &str) -> Result<(Arc<dyn Field>, Aabb), String> {
         self.0.get(name).cloned().ok_or_else(|| {
             let known: Vec<_> = self.0.keys().map(String::as_str).collect();
             match known.is_empty() {
@@ -92,6 +97,20 @@ pub enum Tool<'a> {
     Force(ForceTool<'a>),
     /// Carries along.
     Move(&'a Move),
+    /// Evens out.
+    Smooth(&'a Smooth),
+    /// Lifts or lowers.
+    Inflate(&'a Inflate),
+    /// Keeps a copy.
+    Copy(&'a Copy),
+    /// Takes a box out.
+    Cut(&'a Cut),
+    /// Puts a box of an object in.
+    Paste(&'a Paste),
+    /// Puts knots in.
+    Refine(&'a Refine),
+    /// Takes knots out.
+    Simplify(&'a Simplify),
     /// Paints matter or touch.
     Paint(&'a Paint),
 }
@@ -126,9 +145,12 @@ impl ToolError {
 
 impl Tool<'_> {
     /// Names of all tools, as sessions write them.
-    pub const NAMES: [&'static str; 9] = {
+    pub const NAMES: [&'static str; 16] = {
         let [pull, chisel, squirt, drill, join] = ForceTool::NAMES;
-        ["carve", "add", pull, chisel, squirt, drill, join, "move", "paint"]
+        [
+            "carve", "add", pull, chisel, squirt, drill, join, "move", "smooth", "inflate", "copy", "cut",
+            "paste", "refine", "simplify", "paint",
+        ]
     };
 
     /// Its name, as sessions write it.
@@ -138,6 +160,13 @@ impl Tool<'_> {
             Self::Add(_) => "add",
             Self::Force(tool) => tool.name(),
             Self::Move(_) => "move",
+            Self::Smooth(_) => "smooth",
+            Self::Inflate(_) => "inflate",
+            Self::Copy(_) => "copy",
+            Self::Cut(_) => "cut",
+            Self::Paste(_) => "paste",
+            Self::Refine(_) => "refine",
+            Self::Simplify(_) => "simplify",
             Self::Paint(_) => "paint",
         }
     }
@@ -152,10 +181,14 @@ impl Tool<'_> {
         limits: &Limits,
         control: &mut Control,
     ) -> Result<(Canvas, Vec<String>), ToolError> {
-        let Canvas { field: old, iso, .. } = &canvas;
+        let Canvas {
+            field: old,
+            iso,
+            others,
+            ..
+        } = &canvas;
+        let mut copies = canvas.copies.clone();
         let (field, report) = match self {
-            Self::Carve(tool) => tool.apply(Operation::Carve, old, *iso, limits, control)?,
-            Self::Add(tool) => tool.apply(Operation::Add, old, *iso, limits, control)?,
             Self::Move(tool) => {
                 let (field, report) = tool.apply(old, *iso, limits, control)?;
                 let layers = carried(tool, &canvas, limits)?;
@@ -177,8 +210,28 @@ impl Tool<'_> {
                 let field = limits.kept(old, &field);
                 return Ok((Canvas { field, ..canvas }, told));
             }
+            Self::Copy(copy) => {
+                copies.push(copy.to.clone());
+                return Ok((Canvas { copies, ..canvas }, Vec::new()));
+            }
+            Self::Refine(tool) => (tool.apply(old, limits)?, FieldFitReport::default()),
+            Self::Simplify(tool) => (tool.apply(old, limits)?, FieldFitReport::default()),
+            Self::Carve(tool) => tool.apply(Operation::Carve, old, *iso, others, limits, control)?,
+            Self::Add(tool) => tool.apply(Operation::Add, old, *iso, others, limits, control)?,
+            Self::Smooth(tool) => tool.apply(old, *iso, limits, control)?,
+            Self::Inflate(tool) => tool.apply(old, *iso, limits, control)?,
+            Self::Cut(tool) => {
+                copies.extend(tool.to.clone());
+                tool.apply(old, *iso, limits, control)?
+            }
+            Self::Paste(tool) => tool.apply(old, *iso, others, limits, control)?,
         };
-        Ok((Canvas { field, ..canvas }, thin_parts(&report)))
+        let canvas = Canvas {
+            field,
+            copies,
+            ..canvas
+        };
+        Ok((canvas, thin_parts(&report)))
     }
 }
 

@@ -154,6 +154,28 @@ impl<T: Real> HierarchicalSpline<T> {
         &self.place.local_from_world
     }
 
+    /// The field with another map from its lattice to the world: the very same coefficients elsewhere, turned or mirrored.
+    ///
+    /// # Panics
+    /// If the map cannot be inverted.
+    pub fn placed(&self, world_from_lattice: DAffine3) -> Self {
+        let lattice_from_world = world_from_lattice.inverse();
+        assert!(
+            lattice_from_world.is_finite(),
+            "the map from lattice to world can be inverted"
+        );
+        let mut field = self.clone();
+        field.lattice.world_from_lattice = world_from_lattice;
+        field.place.world_from_local = world_from_lattice;
+        field.place.local_from_world = lattice_from_world;
+        field
+    }
+
+    /// The active functions of a brick, if there are any.
+    pub fn brick_corrections(&self, level: usize, key: BrickKey) -> Option<&Arc<Corrections<T>>> {
+        self.find(level, key)?.corrections.as_ref()
+    }
+
     /// Fall of the field per world length outside the box, `> 0`.
     pub fn slope(&self) -> f64 {
         self.place.slope

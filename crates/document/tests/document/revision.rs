@@ -10,6 +10,7 @@ use formats::volumes::{Orientation, Volume, VolumeHeader, VoxelType};
 use glam::{DAffine3, DMat3, DVec3};
 use tools::geometric::{Geometric, Operation};
 use tools::limits::Limits;
+use tools::tool::Others;
 
 use super::common::Draw;
 
@@ -77,6 +78,7 @@ fn edited(operation: Operation, tool: &Geometric) -> (HierarchicalSpline<f32>, V
             operation,
             &before,
             ISO,
+            &Others::default(),
             &Limits::default(),
             &mut Control::default(),
         )

@@ -4,9 +4,14 @@
 //! is written back into the coefficients that it touches by [`fit_field`]. A distance `d` of the tool counts as `c + d·|∇f|`, so
 //! that depths and blends are lengths on any field.
 
+mod band;
 mod block;
+mod detail;
+mod formula_solid;
 mod motion;
+mod paste;
 mod shape;
+mod smooth;
 mod swept;
 mod write;
 
@@ -20,13 +25,18 @@ use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
 pub use block::block;
+pub use detail::{Refine, Simplify};
+pub use formula_solid::FormulaSolid;
 pub use motion::{Motion, Move, Origin, reflection};
+pub use paste::{Copy, Cut, Paste};
 pub use shape::Shape;
+pub use smooth::{Inflate, Smooth};
 use swept::Pose;
 use write::{Fineness, TOLERANCE, Writer};
 
 use crate::limits::Limits;
 use crate::number::{NonNegative, Point, Positive};
+use crate::tool::Others;
 use crate::warp::WarpError;
 
 /// What a geometric tool does.
@@ -112,21 +122,16 @@ impl Geometric {
             ));
         }
         let turn = |n: usize| {
-            let turn = self
-                .turn
+            self.turn
                 .get(n)
                 .or(self.turn.first())
-                .map_or(DVec3::ZERO, |t| t.0);
-            let angle = turn.length().to_radians();
-            let axis = turn.normalize_or_zero();
-            let (sine, cosine) = (libm::sin(0.5 * angle), libm::cos(0.5 * angle));
-            DQuat::from_xyzw(axis.x * sine, axis.y * sine, axis.z * sine, cosine)
+                .map_or(DVec3::ZERO, |t| t.0)
         };
         let places = self.along.iter().enumerate();
         Ok(places
             .map(|(n, at)| Pose {
                 at: at.0,
-                turn: turn(n),
+                turn: rotation_of(turn(n)),
             })
             .collect())
     }
@@ -142,11 +147,12 @@ impl Geometric {
         operation: Operation,
         field: &HierarchicalSpline<T>,
         iso: f64,
+        others: &Others,
         limits: &Limits,
         control: &mut Control,
     ) -> Result<(HierarchicalSpline<T>, FieldFitReport), GeometricError> {
         let poses = self.poses().map_err(GeometricError::Shape)?;
-        let solids = self.shape.solids(&poses, self.each);
+        let solids = self.shape.solids(&poses, self.each, others);
         let (solids, mut reach) = solids.map_err(GeometricError::Shape)?;
         reach.min -= self.blend.0;
         reach.max += self.blend.0;
@@ -184,4 +190,12 @@ impl Geometric {
         };
         writer.written(&*target, &within, &fineness, control)
     }
+}
+
+/// A turn given by its axis, as long as the angle in degrees.
+fn rotation_of(turn: DVec3) -> DQuat {
+    let angle = turn.length().to_radians();
+    let axis = turn.normalize_or_zero();
+    let (sine, cosine) = (libm::sin(0.5 * angle), libm::cos(0.5 * angle));
+    DQuat::from_xyzw(axis.x * sine, axis.y * sine, axis.z * sine, cosine)
 }

@@ -5,8 +5,10 @@ use bspline::{Aabb, Csg, Field};
 use glam::{DAffine3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
+use super::formula_solid::FormulaSolid;
 use super::swept::{Pose, Swept};
 use crate::number::{Point, Positive};
+use crate::tool::Others;
 
 /// A solid about its centre. Lengths are those of the world.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -49,25 +51,52 @@ pub enum Shape {
         /// Radius of the tube.
         minor: Positive,
     },
+    /// Where a formula of `x`, `y` and `z`, 0 in its middle, is above 0.
+    Formula {
+        /// As scenes write them.
+        text: String,
+        /// Edges of the box about the middle in which it counts.
+        size: [Positive; 3],
+    },
+    /// Another object; its middle is that of its field's box.
+    Object {
+        /// Its name.
+        name: String,
+    },
 }
 
 /// Distances, positive inside, that together make a tool on its way, and a box about them.
 pub(super) type Solids = (Vec<Arc<dyn Field>>, Aabb);
+
+/// A shape about the origin.
+enum Kind {
+    /// One whose distance is known, so that it can sweep; within this of the origin.
+    Known(Primitive, f64),
+    /// Any field, in a box.
+    Any(Arc<dyn Field>, Aabb),
+}
 
 impl Shape {
     /// Radius of the smallest ball that touches opposite sides of it.
     pub(super) fn feature(&self) -> f64 {
         match self {
             Self::Sphere { radius } | Self::Capsule { radius, .. } => radius.0,
-            Self::Box { size } => 0.5 * size.iter().fold(f64::INFINITY, |least, edge| least.min(edge.0)),
+            Self::Box { size } | Self::Formula { size, .. } => {
+                0.5 * size.iter().fold(f64::INFINITY, |least, edge| least.min(edge.0))
+            }
             Self::Cylinder { radius, height, .. } => radius.0.min(0.5 * height.0),
             Self::Torus { minor, .. } => minor.0,
+            // Of these nobody knows.
+            Self::Object { .. } => f64::INFINITY,
         }
     }
 
     /// The tool on its way from pose to pose, or at each of them alone.
-    pub(super) fn solids(&self, poses: &[Pose], is_each: bool) -> Result<Solids, String> {
-        let (solid, size) = self.solid().map_err(|e| e.to_string())?;
+    pub(super) fn solids(&self, poses: &[Pose], is_each: bool, others: &Others) -> Result<Solids, String> {
+        let (solid, size) = match self.kind(others)? {
+            Kind::Known(solid, size) => (solid, size),
+            Kind::Any(field, b) => return at_places(&field, &b, poses, is_each),
+        };
         let (Some(first), Some(last)) = (poses.first(), poses.last()) else {
             return Err("along has no place; write at least one point".into());
         };
@@ -103,8 +132,35 @@ impl Shape {
         }
     }
 
+    fn kind(&self, others: &Others) -> Result<Kind, String> {
+        match self {
+            Self::Formula { text, size } => {
+                let half = 0.5 * DVec3::from_array(size.map(|s| s.0));
+                let b = Aabb::new(-half, half);
+                let limit = Cuboid::new(DVec3::ZERO, half).map_err(|e| e.to_string())?;
+                let formula = FormulaSolid::new(text, &b)?;
+                let both = Csg::intersection(vec![Arc::new(formula), Arc::new(limit)]);
+                Ok(Kind::Any(Arc::new(both.map_err(|e| e.to_string())?), b))
+            }
+            Self::Object { name } => {
+                let (field, b) = others.get(name)?;
+                let center = b.center();
+                let moved = Csg::affine(field, DAffine3::from_translation(-center));
+                let own = Aabb::new(b.min - center, b.max - center);
+                Ok(Kind::Any(Arc::new(moved.map_err(|e| e.to_string())?), own))
+            }
+            _ => {
+                let (solid, size) = self.known().map_err(|e| e.to_string())?;
+                Ok(Kind::Known(solid, size))
+            }
+        }
+    }
+
     /// The solid about the origin, and the radius of a ball that holds it.
-    fn solid(&self) -> Result<(Primitive, f64), PrimitiveError> {
+    ///
+    /// # Panics
+    /// For formulas and objects.
+    fn known(&self) -> Result<(Primitive, f64), PrimitiveError> {
         let ends = |axis: &Point, height: &Positive| {
             let half = direction(axis)? * (0.5 * height.0);
             Ok((-half, half))
@@ -131,14 +187,31 @@ impl Shape {
                 let ring = Torus::new(DVec3::ZERO, axis.0, major.0, minor.0)?;
                 (ring.into(), major.0 + minor.0)
             }
+            Self::Formula { .. } | Self::Object { .. } => unreachable!("they are no primitives"),
         })
     }
 }
 
 fn placed(solid: &Primitive, pose: &Pose) -> Result<Arc<dyn Field>, String> {
-    let map = DAffine3::from_rotation_translation(pose.turn, pose.at);
-    let placed = Csg::affine(Arc::new(solid.clone()), map).map_err(|e| e.to_string())?;
+    let placed = Csg::affine(Arc::new(solid.clone()), pose.map()).map_err(|e| e.to_string())?;
     Ok(Arc::new(placed))
+}
+
+/// Any field at places, each alone.
+fn at_places(field: &Arc<dyn Field>, b: &Aabb, poses: &[Pose], is_each: bool) -> Result<Solids, String> {
+    if poses.len() > 1 && !is_each {
+        return Err("formulas and objects do not sweep; write each = true, or one place".into());
+    }
+    let mut reach: Option<Aabb> = None;
+    let mut solids: Vec<Arc<dyn Field>> = Vec::new();
+    for pose in poses {
+        let placed = Csg::affine(field.clone(), pose.map()).map_err(|e| e.to_string())?;
+        solids.push(Arc::new(placed));
+        let own = b.transformed(&pose.map());
+        reach = Some(reach.map_or(own, |r| Aabb::new(r.min.min(own.min), r.max.max(own.max))));
+    }
+    let reach = reach.ok_or("along has no place; write at least one point")?;
+    Ok((solids, reach))
 }
 
 fn direction(axis: &Point) -> Result<DVec3, PrimitiveError> {

@@ -1,6 +1,6 @@
 use bspline::primitives::Primitive;
 use bspline::{Aabb, Field, Interval, Jet};
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DAffine3, DMat3, DQuat, DVec3};
 
 /// Share of the solid's size to which the nearest pose is told from others that are as near.
 const APART: f64 = 1e-3;
@@ -13,6 +13,13 @@ const SECTIONS: usize = 30;
 pub(super) struct Pose {
     pub at: DVec3,
     pub turn: DQuat,
+}
+
+impl Pose {
+    /// World from solid.
+    pub fn map(&self) -> DAffine3 {
+        DAffine3::from_rotation_translation(self.turn, self.at)
+    }
 }
 
 /// The union of all poses of a solid on its way from one pose to another: straight, and turning evenly.

@@ -4,6 +4,7 @@ use bspline::hierarchical::{Lattice, MAX_LEVELS};
 use bspline::{Aabb, Field, Frame, HierarchicalSpline, Real};
 use fitting::Control;
 use fitting::field::{Aim, FieldFitOptions, FieldFitReport, fit_field_where};
+use glam::DVec3;
 
 use super::GeometricError;
 use crate::limits::Limits;
@@ -20,7 +21,7 @@ const FACE: u32 = 256;
 
 /// How closely the result of a tool is followed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Fineness {
+pub(super) struct Fineness {
     /// Distance from the true surface that may stay off the creases, a world length; a fiftieth of the finest knot interval
     /// if missing.
     pub tolerance: Option<Positive>,
@@ -62,13 +63,25 @@ pub(super) struct Writer<'a, T> {
 impl<T: Real> Writer<'_, T> {
     /// Level that the object is shaped to. Places where tools went finer do not count: else every stroke would be finer than the
     /// one before.
-    fn detail(&self) -> usize {
+    pub fn detail(&self) -> usize {
         self.limits.detail().unwrap_or(self.field.level_count() - 1)
     }
 
     /// Least distance of its knots.
     pub fn spacing(&self) -> f64 {
         self.field.lattice().spacing(self.detail()).min_element()
+    }
+
+    /// Finest level with functions that reach a world box.
+    pub fn finest_in(&self, b: &Aabb) -> usize {
+        let local = b.transformed(self.field.lattice_from_world());
+        let bricks = self.field.bricks().into_iter();
+        let reached = bricks.filter(|brick| {
+            let scale = 1.0 / (1u64 << brick.level()) as f64;
+            let first = DVec3::from_array(brick.key().0.map(|k| 8.0 * f64::from(k))) * scale;
+            first.cmple(local.max).all() && (first + 8.0 * scale).cmpge(local.min).all()
+        });
+        reached.map(|brick| brick.level()).max().unwrap_or(0)
     }
 
     /// The box in which a tool that acts in `reach` changes the field.
@@ -104,6 +117,9 @@ impl<T: Real> Writer<'_, T> {
         control: &mut Control,
     ) -> Result<(HierarchicalSpline<T>, FieldFitReport), GeometricError> {
         let finest = fineness.finest(self.field.lattice(), self.detail());
+        // What is there already must not be left over; and nothing finer than a coarse edit may be.
+        let finest = finest.max(self.finest_in(within));
+        let finest = finest.min(self.limits.finest().unwrap_or(finest));
         let spacing = self.field.lattice().spacing(finest).min_element();
         let mixed = self.limits.mixed(self.field, target);
         let target: &dyn Field = mixed.as_ref().map_or(target, |mixed| mixed);
@@ -136,7 +152,7 @@ impl<T: Real> Writer<'_, T> {
                 if !is_reached {
                     continue;
                 }
-                let mut part = Aabb::new(local.min.max(glam::DVec3::ZERO), local.max.min(extent));
+                let mut part = Aabb::new(local.min.max(DVec3::ZERO), local.max.min(extent));
                 (part.min[axis], part.max[axis]) = (face, face);
                 let steps = (part.size() / step).ceil();
                 let cells = steps.to_array().map(|n| (n as u32).clamp(1, FACE));

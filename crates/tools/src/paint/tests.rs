@@ -220,6 +220,7 @@ fn a_move_carries_what_is_painted() {
         )
         .unwrap(),
         others: Default::default(),
+        copies: Vec::new(),
     };
     let text =
         "[move.motion.shift]\nregion = { min = [7, 7, 7], max = [13, 13, 13] }\nby = [2, 0, 0]\nblend = 6";

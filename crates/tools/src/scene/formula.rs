@@ -5,6 +5,8 @@
 
 use glam::DVec3;
 
+use super::operations::{Binary, Number, Unary};
+
 /// Longest formula, in bytes, and deepest nesting.
 const LONGEST: usize = 1000;
 const DEEPEST: usize = 50;
@@ -21,25 +23,25 @@ enum Node {
     Number(f64),
     /// Place in `[x, y, z, d]`.
     Variable(usize),
-    Unary(fn(f64) -> f64, Box<Node>),
-    Binary(fn(f64, f64) -> f64, Box<[Node; 2]>),
+    Unary(Unary, Box<Node>),
+    Binary(Binary, Box<[Node; 2]>),
 }
 
 enum Function {
-    One(fn(f64) -> f64),
-    Two(fn(f64, f64) -> f64),
+    One(Unary),
+    Two(Binary),
 }
 
 fn function(name: &str) -> Option<Function> {
     Some(match name {
-        "min" => Function::Two(f64::min),
-        "max" => Function::Two(f64::max),
-        "abs" => Function::One(f64::abs),
-        "sqrt" => Function::One(f64::sqrt),
-        "exp" => Function::One(libm::exp),
-        "ln" => Function::One(libm::log),
-        "sin" => Function::One(libm::sin),
-        "cos" => Function::One(libm::cos),
+        "min" => Function::Two(Binary::Min),
+        "max" => Function::Two(Binary::Max),
+        "abs" => Function::One(Unary::Abs),
+        "sqrt" => Function::One(Unary::Sqrt),
+        "exp" => Function::One(Unary::Exp),
+        "ln" => Function::One(Unary::Ln),
+        "sin" => Function::One(Unary::Sin),
+        "cos" => Function::One(Unary::Cos),
         _ => return None,
     })
 }
@@ -75,6 +77,16 @@ impl Formula {
         })
     }
 
+    /// Its value for numbers of any kind in place of `x`, `y` and `z`; the density counts as 0.
+    pub(crate) fn of<N: Number>(&self, [x, y, z]: [N; 3]) -> N {
+        self.root.value(&[x, y, z, N::of(0.0)])
+    }
+
+    /// Whether the density is in it.
+    pub fn reads_density(&self) -> bool {
+        self.root.reads(3)
+    }
+
     /// Its value where the field has the density `d`.
     ///
     /// # Errors
@@ -93,17 +105,26 @@ impl Formula {
 }
 
 impl Node {
-    fn value(&self, of: &[f64; 4]) -> f64 {
+    fn value<N: Number>(&self, of: &[N; 4]) -> N {
         match self {
-            Self::Number(v) => *v,
+            Self::Number(v) => N::of(*v),
             Self::Variable(i) => of[*i],
-            Self::Unary(f, a) => f(a.value(of)),
-            Self::Binary(f, ab) => f(ab[0].value(of), ab[1].value(of)),
+            Self::Unary(f, a) => N::unary(*f, a.value(of)),
+            Self::Binary(f, ab) => N::binary(*f, ab[0].value(of), ab[1].value(of)),
         }
     }
 
-    fn binary(f: fn(f64, f64) -> f64, a: Self, b: Self) -> Self {
+    fn binary(f: Binary, a: Self, b: Self) -> Self {
         Self::Binary(f, Box::new([a, b]))
+    }
+
+    fn reads(&self, variable: usize) -> bool {
+        match self {
+            Self::Number(_) => false,
+            Self::Variable(i) => *i == variable,
+            Self::Unary(_, a) => a.reads(variable),
+            Self::Binary(_, ab) => ab.iter().any(|n| n.reads(variable)),
+        }
     }
 }
 
@@ -137,10 +158,10 @@ impl Parser<'_> {
         }
         let left = self.sum(depth)?;
         if self.take('<') {
-            return Ok(Node::binary(|a, b| f64::from(a < b), left, self.sum(depth)?));
+            return Ok(Node::binary(Binary::Less, left, self.sum(depth)?));
         }
         if self.take('>') {
-            return Ok(Node::binary(|a, b| f64::from(a > b), left, self.sum(depth)?));
+            return Ok(Node::binary(Binary::Greater, left, self.sum(depth)?));
         }
         Ok(left)
     }
@@ -148,9 +169,9 @@ impl Parser<'_> {
     fn sum(&mut self, depth: usize) -> Result<Node, String> {
         let mut left = self.product(depth)?;
         loop {
-            let f: fn(f64, f64) -> f64 = match () {
-                () if self.take('+') => |a, b| a + b,
-                () if self.take('-') => |a, b| a - b,
+            let f = match () {
+                () if self.take('+') => Binary::Add,
+                () if self.take('-') => Binary::Subtract,
                 () => return Ok(left),
             };
             left = Node::binary(f, left, self.product(depth)?);
@@ -160,9 +181,9 @@ impl Parser<'_> {
     fn product(&mut self, depth: usize) -> Result<Node, String> {
         let mut left = self.signed(depth)?;
         loop {
-            let f: fn(f64, f64) -> f64 = match () {
-                () if self.take('*') => |a, b| a * b,
-                () if self.take('/') => |a, b| a / b,
+            let f = match () {
+                () if self.take('*') => Binary::Multiply,
+                () if self.take('/') => Binary::Divide,
                 () => return Ok(left),
             };
             left = Node::binary(f, left, self.signed(depth)?);
@@ -175,12 +196,12 @@ impl Parser<'_> {
             return Err(format!("it is nested more than {DEEPEST} deep"));
         }
         if self.take('-') {
-            return Ok(Node::Unary(|a| -a, Box::new(self.signed(depth + 1)?)));
+            return Ok(Node::Unary(Unary::Negate, Box::new(self.signed(depth + 1)?)));
         }
         let base = self.atom(depth)?;
         if self.take('^') {
             // From the right: 2^3^2 is 2^9.
-            return Ok(Node::binary(libm::pow, base, self.signed(depth + 1)?));
+            return Ok(Node::binary(Binary::Power, base, self.signed(depth + 1)?));
         }
         Ok(base)
     }

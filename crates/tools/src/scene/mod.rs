@@ -4,12 +4,12 @@
 //! Nothing here reads a file, a clock or prints.
 
 mod error;
-mod formula;
+pub(crate) mod formula;
 mod holds;
 mod load;
 mod matter;
 mod motion;
-
+pub(crate) mod operations;
 mod place;
 mod script;
 mod when;

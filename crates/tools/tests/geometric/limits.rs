@@ -2,11 +2,9 @@
 
 use bspline::Field;
 use bspline::hierarchical::{BRICK, HierarchicalSpline};
-use fitting::Control;
-use tools::limits::support;
-use tools::tool::{Canvas, Others};
+use tools::coefficients::support;
 
-use super::{ISO, block, random, stroke};
+use super::{block, done, random, refused, stroke};
 
 /// Strokes of every tool at random in regions and masks at random: no function whose support meets what is masked out
 /// changes, and something else does.
@@ -14,7 +12,7 @@ use super::{ISO, block, random, stroke};
 fn no_tool_changes_what_is_masked_out() {
     let field = block();
     let mut changes = 0;
-    for seed in 0..20 {
+    for seed in 0..21 {
         let mut draw = random(seed);
         let mut place = |from: f64, to: f64| [draw(8.0, 16.0), draw(8.0, 16.0), draw(from, to)];
         let (a, b, low) = (place(11.5, 12.5), place(11.5, 12.5), place(7.0, 9.0));
@@ -27,6 +25,10 @@ fn no_tool_changes_what_is_masked_out() {
             ),
             format!("add = {{ shape = {{ box = {{ size = [4.0, 3.0, 2.0] }} }}, along = [{a:?}] }}"),
             format!("move = {{ motion = {{ grab = {{ along = [{a:?}, {b:?}], radius = 4.0 }} }} }}"),
+            format!("inflate = {{ along = [{a:?}, {b:?}], radius = 3.0, by = 0.6 }}"),
+            format!("refine = {{ along = [{a:?}, {b:?}], radius = 1.5 }}"),
+            "cut = { region = { min = [9, 9, 10], max = [15, 15, 13] } }".into(),
+            format!("simplify = {{ along = [{a:?}, {b:?}], radius = 3.0, tolerance = 0.2 }}"),
         ];
         let tool = &tools[seed as usize % tools.len()];
         let box_of = format!("{{ min = {min:?}, max = {max:?} }}");
@@ -37,24 +39,14 @@ fn no_tool_changes_what_is_masked_out() {
         ];
         for (n, limit) in limits.iter().enumerate() {
             let text = format!("{limit}\n{tool}");
-            let canvas = Canvas {
-                detail: 0,
-                field: field.clone(),
-                iso: ISO,
-                layers: Default::default(),
-                others: Others::default(),
-            };
-            let (changed, _) = stroke(&text)
-                .apply(canvas, &mut Control::default())
-                .unwrap_or_else(|e| panic!("{text}: {e}"));
-            let count = assert_kept(&field, &changed.field, |lo, hi| match n {
+            let count = assert_kept(&field, &done(&field, &text), |lo, hi| match n {
                 2 => (0..3).any(|i| hi[i] < min[i] || lo[i] > max[i]),
                 _ => (0..3).all(|i| min[i] < lo[i] && hi[i] < max[i]),
             });
             changes += usize::from(count > 0);
         }
     }
-    assert!(changes > 45, "{changes} of 60 strokes changed something");
+    assert!(changes > 40, "{changes} of 63 strokes changed something");
 }
 
 /// Asserts that functions whose supports are not free kept their coefficients; gives the number of those that changed.
@@ -87,24 +79,35 @@ fn assert_kept(
     count
 }
 
+/// Paint keeps to a mask as the field does.
+#[test]
+fn paint_keeps_to_the_mask() {
+    let text = "mask = { boxes = [{ min = [6, 6, 6], max = [12, 18, 18] }] }
+        paint = { layer = \"mass\", brush = { value = 3.0, along = [[12, 12, 12]], radius = 5.0, fade = 0.0 } }";
+    let (left, _) = stroke(text)
+        .apply(super::canvas(&block()), &mut fitting::Control::default())
+        .unwrap();
+    let layer = left.layers.values().next().unwrap();
+    let at = |x: f64| layer.at(glam::DVec3::new(x, 12.0, 12.0));
+    assert_eq!([at(12.0), at(14.0), at(16.5)], [0.0; 3]);
+    assert_eq!(at(9.0), 2.0);
+}
+
 /// With a soft mask the effect grows from nothing at the border to all of it.
 #[test]
 fn a_soft_mask_fades() {
     let field = block();
     let limit = "mask = { boxes = [{ min = [6, 2, 2], max = [22, 22, 22] }], soft = 8.0 }";
     let tool = "add = { shape = { box = { size = [18.0, 8.0, 2.0] } }, along = [[12, 12, 12.5]], finer = 2 }";
-    let canvas = Canvas {
-        detail: 0,
-        field: field.clone(),
-        iso: ISO,
-        layers: Default::default(),
-        others: Others::default(),
-    };
-    let (changed, _) = stroke(&format!("{limit}\n{tool}"))
-        .apply(canvas, &mut Control::default())
-        .unwrap();
+    let changed = done(
+        &field,
+        &format!(
+            "{limit}
+{tool}"
+        ),
+    );
     let rise = |x: f64| {
-        changed.field.value(glam::DVec3::new(x, 12.0, 13.0)) - field.value(glam::DVec3::new(x, 12.0, 13.0))
+        changed.value(glam::DVec3::new(x, 12.0, 13.0)) - field.value(glam::DVec3::new(x, 12.0, 13.0))
     };
     assert_eq!(rise(5.9), 0.0);
     let all: Vec<f64> = [7.0, 9.0, 10.0, 11.0, 13.5].map(rise).to_vec();
@@ -126,17 +129,13 @@ fn limits_that_make_no_sense_are_refused() {
         ),
         ("mask = { object = \"none\" }", "none"),
     ] {
-        let canvas = Canvas {
-            detail: 0,
-            field: block(),
-            iso: ISO,
-            layers: Default::default(),
-            others: Others::default(),
-        };
-        let error = stroke(&format!("{limit}\n{tool}"))
-            .apply(canvas, &mut Control::default())
-            .unwrap_err()
-            .to_string();
+        let error = refused(
+            &block(),
+            &format!(
+                "{limit}
+{tool}"
+            ),
+        );
         assert!(error.contains(why), "{limit}: {error}");
     }
 }

@@ -1,7 +1,10 @@
 //! Geometric tools: volumes, what stays, and what is refused.
 
+mod brushes;
 mod limits;
 mod moves;
+mod parts;
+mod symmetry;
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -14,6 +17,7 @@ use glam::{DAffine3, DVec3};
 use tools::geometric::{Geometric, GeometricError, Operation, block as block_of};
 use tools::limits::Limits;
 use tools::session::{Session, Stroke};
+use tools::tool::{Canvas, Others};
 
 /// Cells of the block's box, half a world length each.
 const CELLS: u32 = 48;
@@ -35,6 +39,31 @@ fn stroke(text: &str) -> Stroke {
     toml::from_str(text).unwrap_or_else(|e| panic!("{text}: {e}"))
 }
 
+/// A canvas with nothing beside it.
+fn canvas(field: &HierarchicalSpline<f32>) -> Canvas {
+    Canvas {
+        field: field.clone(),
+        iso: ISO,
+        // Of the block itself.
+        detail: 0,
+        layers: Default::default(),
+        others: Others::default(),
+        copies: Vec::new(),
+    }
+}
+
+/// What a stroke leaves.
+fn done(field: &HierarchicalSpline<f32>, text: &str) -> HierarchicalSpline<f32> {
+    let left = stroke(text).apply(canvas(field), &mut Control::default());
+    left.unwrap_or_else(|e| panic!("{text}: {e}")).0.field
+}
+
+/// Why a stroke is refused.
+fn refused(field: &HierarchicalSpline<f32>, text: &str) -> String {
+    let left = stroke(text).apply(canvas(field), &mut Control::default());
+    left.expect_err(text).to_string()
+}
+
 /// Numbers at random between two bounds, the same for the same seed.
 fn random(seed: u64) -> impl FnMut(f64, f64) -> f64 {
     let mut state = seed.wrapping_mul(2).wrapping_add(1);
@@ -51,7 +80,14 @@ fn tool(text: &str) -> Geometric {
 }
 
 fn apply(field: &HierarchicalSpline<f32>, operation: Operation, text: &str) -> HierarchicalSpline<f32> {
-    let done = tool(text).apply(operation, field, ISO, &Limits::default(), &mut Control::default());
+    let done = tool(text).apply(
+        operation,
+        field,
+        ISO,
+        &Others::default(),
+        &Limits::default(),
+        &mut Control::default(),
+    );
     let (field, report) = done.unwrap();
     assert_eq!(report.left.unwrap().wrong_signs, 0, "{text}");
     field
@@ -283,6 +319,57 @@ fn no_coefficient_changes_beyond_the_tool() {
     }
 }
 
+/// A formula and an object take what a shape of their form takes; a formula masks too.
+#[test]
+fn formulas_and_objects_are_tools() {
+    let block = block();
+    let before = volume(&block);
+    let half_ball = 2.0 / 3.0 * PI * 27.0;
+    let formula = "shape = { formula = { text = \"9 - x^2 - y^2 - z^2\", size = [7, 7, 7] } }";
+    let taken = before
+        - volume(&apply(
+            &block,
+            Operation::Carve,
+            &format!("{formula}, along = [[12, 12, 12]], finer = 2"),
+        ));
+    assert!((taken / half_ball - 1.0).abs() < 0.005, "{taken} of {half_ball}");
+    // The ball on the block, laid into another block as a tool.
+    let ball = done(
+        &block,
+        "add = { shape = { sphere = { radius = 3.0 } }, along = [[12, 12, 12]], finer = 2 }",
+    );
+    let mut canvas = canvas(&block);
+    canvas.others.put("ball", &ball, ISO, DAffine3::IDENTITY).unwrap();
+    let text = "within = { min = [6, 6, 12.5], max = [18, 18, 20] }
+        add = { shape = { object = { name = \"ball\" } }, along = [[12, 12, 13]], finer = 2 }";
+    let (left, _) = stroke(text).apply(canvas, &mut Control::default()).unwrap();
+    let top = left.field.value(DVec3::new(12.0, 12.0, 16.0)) - ISO;
+    assert!(top.abs() < 0.03 * SLOPE, "{top}");
+    let masked = done(
+        &block,
+        &format!(
+            "mask = {{ formula = \"x - 12\" }}\ncarve = {{ {formula}, along = [[12, 12, 12]], finer = 2 }}"
+        ),
+    );
+    let taken = before - volume(&masked);
+    assert!((0.3..0.52).contains(&(taken / half_ball)), "{taken}");
+    for (text, why) in [
+        ("formula = { text = \"1/x\", size = [2, 2, 2] }", "x = 0"),
+        ("formula = { text = \"1 - x +\", size = [2, 2, 2] }", "too early"),
+        (
+            "formula = { text = \"1 - x y\", size = [2, 2, 2] }",
+            "before \"y\"",
+        ),
+        ("formula = { text = \"1 - d\", size = [2, 2, 2] }", "reads d"),
+        ("object = { name = \"cow\" }", "cow"),
+    ] {
+        let text = format!("carve = {{ shape = {{ {text} }}, along = [[12, 12, 12]] }}");
+        assert!(refused(&block, &text).contains(why), "{text}");
+    }
+    let two = format!("carve = {{ {formula}, along = [[12, 12, 12], [13, 12, 12]] }}");
+    assert!(refused(&block, &two).contains("each = true"));
+}
+
 #[test]
 fn a_blend_rounds_the_crease_within_its_width() {
     let block = block();
@@ -323,6 +410,7 @@ fn tools_that_make_no_sense_are_refused() {
                 Operation::Carve,
                 &block,
                 ISO,
+                &Others::default(),
                 &Limits::default(),
                 &mut Control::default(),
             )

@@ -160,7 +160,7 @@ fn a_move_equals_the_mesh_pushed_through_it() {
             .apply(&field, ISO, &Limits::default(), &mut Control::default())
             .unwrap();
         let warp = tool.motion.warp(&whole).unwrap();
-        let tolerance = 0.02 * spacing / 2.0;
+        let tolerance = 0.02 * spacing;
         let (mut offs, mut angles) = (Vec::new(), Vec::new());
         for p in &mesh.positions {
             let p = *p;

@@ -1,0 +1,155 @@
+//! Strokes that happen on both sides of a plane.
+
+use std::collections::BTreeSet;
+
+use bspline::HierarchicalSpline;
+use glam::{DAffine3, DVec3};
+use serde::{Deserialize, Serialize};
+
+use crate::coefficients::{Functions, changed, coefficient, with_functions};
+use crate::geometric::{GeometricError, reflection};
+use crate::number::Point;
+
+/// A plane on both sides of which a stroke happens.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Symmetry {
+    /// A place on it.
+    pub at: Point,
+    /// Across it; of a stroke over the plane itself, the side it points to is the one that counts.
+    pub normal: Point,
+}
+
+/// A plane of the lattice: knots on one side have partners on the other.
+struct Plane {
+    axis: usize,
+    /// Twice its place on the axis, in cells of level 0.
+    twice: i64,
+    /// Side of the normal: the numbers of its functions are larger (1) or smaller (-1).
+    side: i64,
+}
+
+impl Symmetry {
+    /// What a stroke, given as `tool`, leaves of a field if it happens on both sides.
+    ///
+    /// The other side is that of the mirrored field, which is the same coefficients on a mirrored lattice, so any tool can be used. Where the
+    /// plane is one of the lattice's and the field is even about it, the coefficients of one side are those of the other to the bit: they
+    /// are copied.
+    ///
+    /// # Errors
+    /// Those of the tool; [`GeometricError`] for a normal without direction.
+    pub fn apply<E: From<GeometricError>>(
+        &self,
+        field: &HierarchicalSpline<f32>,
+        mut tool: impl FnMut(HierarchicalSpline<f32>) -> Result<HierarchicalSpline<f32>, E>,
+    ) -> Result<HierarchicalSpline<f32>, E> {
+        let mirror = reflection(self.at.0, self.normal.0)?;
+        let once = tool(field.clone())?;
+        let plane = Plane::of(field, &mirror, self.normal.0);
+        if let Some(plane) = &plane
+            && let Some(both) = plane.copied(field, &once)
+        {
+            return Ok(both);
+        }
+        let lattice = field.lattice().world_from_lattice;
+        let other = once.placed(mirror * lattice);
+        let both = tool(other)?.placed(lattice);
+        let even = plane.and_then(|plane| plane.evened(field, &both));
+        Ok(even.unwrap_or(both))
+    }
+}
+
+impl Plane {
+    /// The mirror as a plane of the lattice, if it is one.
+    fn of(field: &HierarchicalSpline<f32>, mirror: &DAffine3, normal: DVec3) -> Option<Self> {
+        let local = *field.lattice_from_world() * *mirror * field.lattice().world_from_lattice;
+        let axis = (0..3).find(|a| local.matrix3.col(*a)[*a] < 0.0)?;
+        let mut expected = DAffine3::IDENTITY;
+        expected.matrix3.col_mut(axis)[axis] = -1.0;
+        let twice = local.translation[axis].round();
+        expected.translation[axis] = twice;
+        let along = field.lattice_from_world().transform_vector3(normal)[axis];
+        local.abs_diff_eq(expected, 1e-9).then_some(Self {
+            axis,
+            twice: twice as i64,
+            side: if along > 0.0 { 1 } else { -1 },
+        })
+    }
+
+    /// The function on the other side, and on which side this one is: 1, -1 or 0.
+    fn partner(&self, level: usize, function: [u32; 3]) -> (i64, Option<[u32; 3]>) {
+        let own = i64::from(function[self.axis]);
+        // Function `s` is centred on knot `s - 1`.
+        let other = (self.twice << level) + 2 - own;
+        let mut partner = function;
+        let found = u32::try_from(other).ok().map(|other| {
+            partner[self.axis] = other;
+            partner
+        });
+        ((own - other).signum() * self.side, found)
+    }
+
+    /// Whether `field` is even in all functions of a list; none if one of them has no partner in the lattice.
+    fn is_even(&self, field: &HierarchicalSpline<f32>, functions: &Functions<f32>) -> bool {
+        functions.keys().all(|(level, function)| {
+            let count = field.lattice().cells_at(*level)[self.axis] + 3;
+            match self.partner(*level, *function).1 {
+                Some(other) if other[self.axis] < count => {
+                    coefficient(field, *level, *function) == coefficient(field, *level, other)
+                }
+                _ => false,
+            }
+        })
+    }
+
+    /// A change on one side of an even field, on both.
+    fn copied(
+        &self,
+        old: &HierarchicalSpline<f32>,
+        new: &HierarchicalSpline<f32>,
+    ) -> Option<HierarchicalSpline<f32>> {
+        let functions = changed(old, new).ok()?;
+        // Supports that reach over the plane count for both sides.
+        let side = |(level, function): &(usize, [u32; 3])| {
+            let reach = |by: i64| {
+                let mut end = *function;
+                end[self.axis] = (i64::from(end[self.axis]) + by).max(0) as u32;
+                self.partner(*level, end).0
+            };
+            if reach(-1) == reach(1) { reach(1) } else { 0 }
+        };
+        let sides: BTreeSet<i64> = functions.keys().map(side).collect();
+        if sides.len() > 1 || sides.contains(&0) || !self.is_even(old, &functions) {
+            return None;
+        }
+        let mirrored = functions.iter().map(|((level, function), value)| {
+            let (_, partner) = self.partner(*level, *function);
+            ((*level, partner.expect("checked before")), *value)
+        });
+        with_functions(new, &mirrored.collect()).ok()
+    }
+
+    /// A change on both sides of an even field, the weaker side replaced by the other.
+    fn evened(
+        &self,
+        old: &HierarchicalSpline<f32>,
+        new: &HierarchicalSpline<f32>,
+    ) -> Option<HierarchicalSpline<f32>> {
+        let functions = changed(old, new).ok()?;
+        if !self.is_even(old, &functions) {
+            return None;
+        }
+        let mut even = Functions::new();
+        for (level, function) in functions.keys() {
+            let (side, partner) = self.partner(*level, *function);
+            let partner = partner.expect("checked before");
+            let (first, second) = if side < 0 {
+                (partner, *function)
+            } else {
+                (*function, partner)
+            };
+            even.insert((*level, second), coefficient(new, *level, first));
+        }
+        with_functions(new, &even).ok()
+    }
+}

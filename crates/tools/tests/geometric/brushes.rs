@@ -1,0 +1,193 @@
+//! Brushes: smoothing, swelling, and knots put in and taken out.
+
+use bspline::Field;
+use bspline::hierarchical::HierarchicalSpline;
+use glam::DVec3;
+
+use super::{ISO, SLOPE, block, done, random, refused, volume};
+
+const WAY: &str = "along = [[8, 12, 12], [16, 12, 12]]";
+
+/// A block with bumps and dents, some of them on finer knots.
+fn rough() -> HierarchicalSpline<f32> {
+    let mut draw = random(5);
+    let mut field = block();
+    for n in 0..6 {
+        let at = [draw(7.0, 17.0), draw(9.0, 15.0), draw(11.7, 12.3)];
+        let verb = if n % 2 == 0 { "carve" } else { "add" };
+        field = done(
+            &field,
+            &format!("{verb} = {{ shape = {{ sphere = {{ radius = 0.8 }} }}, along = [{at:?}] }}"),
+        );
+    }
+    field
+}
+
+/// Mean square height of the surface about `z = 12` along the middle of the brush's way.
+fn roughness(field: &HierarchicalSpline<f32>) -> f64 {
+    let heights: Vec<f64> = (0..80)
+        .map(|i| {
+            let p = DVec3::new(9.0 + 6.0 * f64::from(i) / 79.0, 12.0, 12.0);
+            (field.value(p) - ISO) / SLOPE
+        })
+        .collect();
+    let mean = heights.iter().sum::<f64>() / 80.0;
+    heights.iter().map(|h| (h - mean).powi(2)).sum::<f64>() / 80.0
+}
+
+#[test]
+fn smoothing_evens_out_and_leaves_what_is_linear() {
+    let flat = block();
+    for level in [1, 4, 10] {
+        for keep in [false, true] {
+            let text = format!("smooth = {{ {WAY}, radius = 3.0, level = {level}, keep-volume = {keep} }}");
+            assert_eq!(done(&flat, &text).sha256(), flat.sha256(), "{text}");
+        }
+    }
+    let rough = rough();
+    let mut last = roughness(&rough);
+    for level in [1, 3, 8] {
+        let text = format!("smooth = {{ {WAY}, radius = 4.0, level = {level} }}");
+        let smooth = done(&rough, &text);
+        let now = roughness(&smooth);
+        assert!(now < last, "level {level}: {now} of {last}");
+        // The detail is gone, and so are its functions.
+        assert!(
+            smooth.coefficient_count() < rough.coefficient_count(),
+            "level {level}"
+        );
+        last = now;
+    }
+    assert!(last < 0.2 * roughness(&rough), "{last}");
+}
+
+/// A mean draws a bump in; the kernel that keeps what is quadratic hardly does.
+#[test]
+fn smoothing_can_keep_the_volume() {
+    let flat = block();
+    let bump = done(
+        &flat,
+        "add = { shape = { sphere = { radius = 4.0 } }, along = [[12, 12, 12]] }",
+    );
+    let lost = |keep: bool| {
+        let text =
+            format!("smooth = {{ along = [[12, 12, 14]], radius = 12.0, level = 2, keep-volume = {keep} }}");
+        let top = done(&bump, &text);
+        (top.value(DVec3::new(12.0, 12.0, 16.0)) - ISO) / -SLOPE
+    };
+    let (mean, kept) = (lost(false), lost(true));
+    // The density of a ball falls evenly, so its mean is lower by σ²/R: σ is 1, R 4.
+    assert!((0.2..0.35).contains(&mean), "{mean}");
+    assert!(kept.abs() < 0.2 * mean, "{kept} of {mean}");
+}
+
+#[test]
+fn inflating_adds_and_deflating_takes() {
+    let field = rough();
+    let mut last = f64::NEG_INFINITY;
+    for by in [-1.0, -0.5, -0.1, 0.0, 0.1, 0.5, 1.0] {
+        let left = done(&field, &format!("inflate = {{ {WAY}, radius = 3.0, by = {by} }}"));
+        let now = volume(&left);
+        assert!(now > last, "{by}: {now} after {last}");
+        last = now;
+    }
+    // A plane goes up by what was asked.
+    let left = done(
+        &block(),
+        &format!("inflate = {{ {WAY}, radius = 3.0, by = 0.7 }}"),
+    );
+    let top = left.value(DVec3::new(12.0, 12.0, 12.7)) - ISO;
+    assert!(top.abs() < 0.02 * SLOPE, "{top}");
+}
+
+/// Knots put in change nothing; with the tolerance of rounding they go again.
+#[test]
+fn knots_come_and_go_without_a_change() {
+    let field = rough();
+    let fine = done(&field, &format!("refine = {{ {WAY}, radius = 1.5, finer = 1 }}"));
+    assert_eq!(fine.level_count(), field.level_count() + 1);
+    assert!(fine.coefficient_count() > field.coefficient_count() + 10_000);
+    let mut draw = random(6);
+    let largest = 12.0 * SLOPE + ISO;
+    for _ in 0..3000 {
+        let p = DVec3::new(draw(5.0, 19.0), draw(9.0, 15.0), draw(9.0, 15.0));
+        let off = (fine.value(p) - field.value(p)).abs() / largest;
+        assert!(off <= 1e-6, "{p}: {off}");
+    }
+    let slim = done(
+        &fine,
+        &format!("simplify = {{ {WAY}, radius = 4.0, tolerance = 1e-6 }}"),
+    );
+    assert!(slim.coefficient_count() <= field.coefficient_count());
+    for _ in 0..3000 {
+        let p = DVec3::new(draw(5.0, 19.0), draw(9.0, 15.0), draw(9.0, 15.0));
+        assert!((slim.value(p) - field.value(p)).abs() / largest <= 1e-6, "{p}");
+    }
+    // A coarser field within the tolerance asked for.
+    let coarse = done(
+        &field,
+        &format!("simplify = {{ {WAY}, radius = 6.0, tolerance = 0.05 }}"),
+    );
+    assert!(coarse.coefficient_count() < slim.coefficient_count());
+    for _ in 0..3000 {
+        let p = DVec3::new(draw(5.0, 19.0), draw(9.0, 15.0), draw(9.0, 15.0));
+        assert!((coarse.value(p) - field.value(p)).abs() <= 0.05 * SLOPE, "{p}");
+    }
+}
+
+/// Edits of the coarse levels leave what the finer ones add.
+#[test]
+fn coarse_edits_keep_the_fine_detail() {
+    let field = rough();
+    let left = done(
+        &field,
+        "coarse = 0\nmove = { motion = { grab = { along = [[12, 12, 12], [12, 12, 14]], radius = 6.0 } } }",
+    );
+    for level in 1..field.level_count() {
+        assert_eq!(left.corrections(level), field.corrections(level));
+    }
+    let lifted = block();
+    let lifted = done(
+        &lifted,
+        "coarse = 0\nmove = { motion = { grab = { along = [[12, 12, 12], [12, 12, 14]], radius = 6.0 } } }",
+    );
+    let p = DVec3::new(12.0, 12.0, 13.5);
+    let (fine, plain) = (left.value(p) - field.value(p), lifted.value(p) - block().value(p));
+    assert!((fine - plain).abs() < 0.3 * plain, "{fine} for {plain}");
+}
+
+#[test]
+fn brushes_that_make_no_sense_are_refused() {
+    let field = block();
+    for (text, why) in [
+        ("smooth = { along = [], radius = 1, level = 1 }", "no place"),
+        (
+            "smooth = { along = [[9, 9, 9]], radius = 1, level = 11 }",
+            "1 to 10",
+        ),
+        (
+            "smooth = { along = [[99, 9, 9]], radius = 1, level = 1 }",
+            "the field from",
+        ),
+        (
+            "inflate = { along = [[9, 9, 9]], radius = 1, by = 2 }",
+            "wider brush",
+        ),
+        (
+            "refine = { along = [[9, 9, 9]], radius = 1, finer = 0 }",
+            "write 1 to",
+        ),
+        (
+            "refine = { along = [[9, 9, 9]], radius = 9, finer = 9 }",
+            "smaller",
+        ),
+        ("refine = { along = [[-9, 9, 9]], radius = 1 }", "the field from"),
+        (
+            "coarse = 9\nsmooth = { along = [[9, 9, 9]], radius = 1, level = 1 }",
+            "levels 0 to 0",
+        ),
+    ] {
+        let error = refused(&field, text);
+        assert!(error.contains(why), "{text}: {error}");
+    }
+}
