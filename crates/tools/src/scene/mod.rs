@@ -7,6 +7,7 @@ mod error;
 mod formula;
 mod holds;
 mod load;
+mod mask;
 mod matter;
 mod motion;
 
