@@ -112,6 +112,39 @@ fn a_pull_moves_the_surface_towards_it_and_nothing_beside_the_region() {
 }
 
 #[test]
+fn only_the_inside_of_a_mask_moves() {
+    let ball = Ball::new();
+    let masks = [
+        "inside = \"x - 0.04\"",
+        "boxes = [{ min = [0.04, -1, 0], max = [0.3, 1, 2] }, { min = [0.2, -1, 0], max = [1, 1, 2] }]",
+        "inside = \"min(x - 0.04, 0.3 - abs(d))\"\nrim = \"free\"",
+    ];
+    let held = [[-0.1, 0.0, 1.0], [-0.3, 0.1, 0.9], [-0.1, 0.2, 0.8]];
+    for mask in masks {
+        let scene = SCENE.replace("level = 0", &format!("level = 0\n[region.mask]\n{mask}"));
+        let (_, last) = ball.play(&scene, "");
+        assert!(number(&last, "max_change") > 0.0, "{mask}");
+        let of_both = |points: &[[f64; 3]]| {
+            [
+                ball.values("ball.iclay", points),
+                ball.values("moved.iclay", points),
+            ]
+        };
+        let [before, after] = of_both(&OUTSIDE);
+        assert_eq!(before, after, "{mask}");
+        // A free border lets functions move that reach over it.
+        if !mask.contains("free") {
+            let [before, after] = of_both(&held);
+            assert_eq!(before, after, "{mask}");
+        }
+        let [before, after] = of_both(&[[0.25, 0.0, 0.97]]);
+        assert_ne!(before, after, "{mask}");
+        let hash = last["field_sha256"].clone();
+        assert_eq!(ball.play(&scene, "--threads 1").1["field_sha256"], hash, "{mask}");
+    }
+}
+
+#[test]
 fn a_pushed_ball_is_dented() {
     let ball = Ball::new();
     ball.play(&SCENE.replace("strength = 0.4", "strength = -0.4"), "");
@@ -256,6 +289,31 @@ fn what_cannot_be_is_refused_by_line_or_table_with_a_remedy_and_writes_nothing()
             ["[region]", "below max"],
         ),
         ("max = [0.5, 0.5, 1.14]", "", ["[region]", "first and count"]),
+        (
+            "level = 0",
+            "level = 0\n[region.mask]\ninside = \"z > 50\"",
+            ["[region.mask]", "no sample"],
+        ),
+        (
+            "level = 0",
+            "level = 0\n[region.mask]\ninside = \"1/(z - z)\"",
+            ["[region.mask] inside", "finite"],
+        ),
+        (
+            "level = 0",
+            "level = 0\n[region.mask]\ninside = 3",
+            ["[region.mask] inside", "positive inside"],
+        ),
+        (
+            "level = 0",
+            "level = 0\n[region.mask]\nrim = \"free\"",
+            ["[region.mask]", "boxes"],
+        ),
+        (
+            "level = 0",
+            "level = 0\n[region.mask]\nboxes = [{ min = [0, 0, 0], max = [1, 0, 1] }]",
+            ["[region.mask] boxes, number 1", "below max"],
+        ),
         ("level = 0", "level = 60", ["[region]", "60"]),
         (
             "level = 0",

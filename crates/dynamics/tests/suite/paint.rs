@@ -3,7 +3,7 @@
 use bspline::Real;
 use dynamics::integrators::Integrator;
 use dynamics::lattice::{Lattice, OnBox, Rim, SampleBox};
-use dynamics::matter::Matter;
+use dynamics::matter::{Matter, Quantity};
 use dynamics::paint::Substance;
 use dynamics::patch::{Patch, PatchError};
 use dynamics::solve::SolverOptions;
@@ -171,6 +171,73 @@ fn dabs_at_24_32_cost_no_factor_and_few_iterations() {
         // That of the first dab on constant material.
         assert_eq!(made, 1, "{contrast}");
     }
+}
+
+/// What moves steadily will move on: a solve that begins there has little left to find. From nothing these take two iterations.
+#[test]
+fn under_the_brush_what_moves_steadily_takes_one_iteration() {
+    let (m, edge) = (27, 26.0);
+    let lattice = Lattice::<f32>::cube(20, m, Rim::Fixed, 1.0).unwrap();
+    let mut matter = Matter {
+        damping: Quantity::Constant(0.2),
+        ..Matter::default()
+    };
+    for (i, k) in matter.stiffness.paint(m * m * m).iter_mut().enumerate() {
+        let p = [i / m / m, i / m % m, i % m].map(|c| (c as f64 - 0.5 * edge).powi(2));
+        if p.iter().sum::<f64>() < 64.0 {
+            *k = 10.0;
+        }
+    }
+    let mut stiffness = match &matter.stiffness {
+        Quantity::PerSample(list) => list.clone(),
+        Quantity::Constant(_) => unreachable!("painted"),
+    };
+    let d: Vec<f32> = (0..m * m * m).map(|i| 0.4 * (i / m / m) as f32).collect();
+    let law = Law::Linear { scale: 1.0 };
+    let mut p = Patch::new(
+        lattice,
+        matter,
+        law,
+        Neighbours::Six,
+        &d,
+        SolverOptions::default(),
+    )
+    .unwrap();
+    let push = |p: &mut Patch<f32>, t: f64| {
+        let (at, kernel) = p.lattice().gaussian([t * edge, 0.5 * edge, 0.5 * edge], 2.0);
+        let values: Vec<f32> = kernel.iter().map(|k| 3.0 * *k as f32).collect();
+        p.set_force_on(OnBox { at, values: &values }).unwrap();
+    };
+    // Thirty times the explicit limit of the soft matter.
+    let dt = 30.0 * 2.0 / 12.0_f64.sqrt();
+    push(&mut p, 0.5);
+    for _ in 0..60 {
+        p.step(Integrator::Paper, dt).unwrap();
+    }
+    let dabs = 40;
+    let mut iterations = 0;
+    for dab in 0..dabs {
+        let t = dab as f64 / 60.0;
+        push(&mut p, 0.35 + 0.3 * t);
+        let centre = [0.3 + 0.4 * t, 0.5, 0.6].map(|c| c * edge);
+        let at = p.lattice().samples_near(centre, 4.0);
+        let values: Vec<f64> = at
+            .indices([m; 3])
+            .map(|i| {
+                let q = [i / m / m, i / m % m, i % m].map(|c| c as f64);
+                let apart = (0..3).map(|a| (q[a] - centre[a]).powi(2)).sum::<f64>().sqrt();
+                stiffness[i] = stiffness[i].max(1.0 + 9.0 * (1.0 - apart / 4.0).max(0.0));
+                stiffness[i]
+            })
+            .collect();
+        p.paint(Substance::Stiffness, OnBox { at, values: &values })
+            .unwrap();
+        iterations += p.step(Integrator::Paper, dt).unwrap().solve.iteration.iterations;
+    }
+    assert!(
+        2 * iterations <= 3 * dabs,
+        "{iterations} iterations for {dabs} dabs"
+    );
 }
 
 /// A patch and what is restored from its snapshot end with the same bits.

@@ -7,6 +7,7 @@ mod error;
 pub(crate) mod formula;
 mod holds;
 mod load;
+mod mask;
 mod matter;
 mod motion;
 pub(crate) mod operations;

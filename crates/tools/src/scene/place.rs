@@ -105,7 +105,17 @@ pub fn cut<T: Real>(
         speed: scene.sleep.speed.map_or(speed, |s| s.0),
         acceleration: scene.sleep.acceleration.map_or(acceleration, |a| a.0),
     };
-    Region::new(field, cells, Matter::default(), &options).map_err(|e| wrong("[region]", e))
+    let Some(mask) = &scene.region.mask else {
+        return Region::new(field, cells, Matter::default(), &options).map_err(|e| wrong("[region]", e));
+    };
+    let region = mask.cut(field, cells, &options)?;
+    let parts = region.mask_parts().len();
+    if parts > 1 {
+        notes.push(format!(
+            "the mask falls into {parts} parts, each of which moves on its own"
+        ));
+    }
+    Ok(region)
 }
 
 /// The level asked for, or the coarsest that resolves the smallest pull.

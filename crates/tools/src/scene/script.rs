@@ -7,6 +7,7 @@ use serde::Deserialize;
 use serde::de::{self, Deserializer, Visitor};
 
 use super::formula::Formula;
+use super::mask::MaskTable;
 use super::when::When;
 use crate::number::{Finite, NonNegative, Point, Positive};
 
@@ -66,6 +67,8 @@ pub struct RegionTable {
     pub level: Option<u8>,
     /// Samples per cell.
     pub samples_per_cell: Option<PerAxis>,
+    /// What of the box takes part; all if missing.
+    pub mask: Option<MaskTable>,
 }
 
 /// A number for all axes or one for each.
