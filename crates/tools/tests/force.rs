@@ -293,6 +293,7 @@ fn painted_matter_shows() {
     let paint = "[[stroke]]\npaint = { layer = 'stiffness', formula = '1 + 9 * (x < 12)' }";
     let session: Session = toml::from_str(paint).unwrap();
     let canvas = Canvas {
+        copies: Vec::new(),
         field: field.clone(),
         iso: ISO,
         layers: Default::default(),
@@ -381,6 +382,7 @@ fn grooves_and_ridges_have_their_depth() {
 fn topology(field: &HierarchicalSpline<f32>, script: &str) -> (u64, i64) {
     let session: Session = toml::from_str(script).unwrap_or_else(|e| panic!("{e}"));
     let mut canvas = Canvas {
+        copies: Vec::new(),
         field: field.clone(),
         iso: ISO,
         layers: Default::default(),
@@ -443,6 +445,7 @@ fn what_makes_no_sense_is_refused() {
             Err(e) => e.to_string(),
             Ok(session) => {
                 let canvas = Canvas {
+                    copies: Vec::new(),
                     field: field.clone(),
                     iso: ISO,
                     layers: Default::default(),

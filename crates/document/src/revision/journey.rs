@@ -17,7 +17,12 @@ impl Journey {
             Command::Stroke { object, stroke } if object == name => {
                 let origin = stroke.motion.as_ref()?.motion.origin(within).ok()?;
                 // Masks by other objects are left out: these may have changed since.
-                let limits = Limits::new(stroke.within.as_ref(), stroke.mask.as_ref(), &Others::default(), within);
+                let limits = Limits::new(
+                    stroke.within.as_ref(),
+                    stroke.mask.as_ref(),
+                    &Others::default(),
+                    within,
+                );
                 Some((origin, limits.unwrap_or_default()))
             }
             _ => None,

@@ -53,17 +53,32 @@ fn points_follow_their_surface_go_with_it_and_cover_what_is_new() {
         let Command::Stroke { stroke, .. } = &commands[0] else {
             unreachable!()
         };
+        let others = tools::tool::Others::default();
         let (before, limits, control) = (large(), Limits::default(), &mut Control::default());
         let now = match stroke.tool().unwrap() {
             tools::tool::Tool::Carve(t) => {
-                t.apply(tools::geometric::Operation::Carve, &before, 0.0, &limits, control)
-                    .unwrap()
-                    .0
+                t.apply(
+                    tools::geometric::Operation::Carve,
+                    &before,
+                    0.0,
+                    &others,
+                    &limits,
+                    control,
+                )
+                .unwrap()
+                .0
             }
             tools::tool::Tool::Add(t) => {
-                t.apply(tools::geometric::Operation::Add, &before, 0.0, &limits, control)
-                    .unwrap()
-                    .0
+                t.apply(
+                    tools::geometric::Operation::Add,
+                    &before,
+                    0.0,
+                    &others,
+                    &limits,
+                    control,
+                )
+                .unwrap()
+                .0
             }
             tools::tool::Tool::Move(t) => t.apply(&before, 0.0, &limits, control).unwrap().0,
             _ => unreachable!(),

@@ -1,7 +1,7 @@
 //! Solids that carve a field or are added to it.
 //!
 //! The tool and the field become one by CSG \[Hua04 eqs. 3, 4\], `max(f, g)` to add and `min(f, 2c − g)` to carve, and the result
-//! is written back into the coefficients that it touches by [`fit_field`]. A distance `d` of the tool counts as `c + d·|∇f|`, so
+//! is written back into the coefficients that it touches by [`fitting::field::fit_field`]. A distance `d` of the tool counts as `c + d·|∇f|`, so
 //! that depths and blends are lengths on any field.
 
 mod band;
