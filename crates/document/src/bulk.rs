@@ -4,7 +4,6 @@ use formats::ReadLimits;
 use formats::field::decode;
 
 use crate::error::{damaged, fault};
-use crate::layers::{self, LayerHead};
 use crate::{DocumentError, Object, Properties};
 
 /// The second part of a record, read from its start in pieces that the first part tells the lengths of.
@@ -26,18 +25,12 @@ impl<'a> Bulk<'a> {
         Ok(own)
     }
 
-    /// The object whose field takes so many bytes, and the layers after it.
-    pub fn object(
-        &mut self,
-        count: u64,
-        properties: &Properties,
-        layers: &[LayerHead],
-    ) -> Result<Object, DocumentError> {
+    /// The object whose field takes so many bytes, without its layers.
+    pub fn object(&mut self, count: u64, properties: &Properties) -> Result<Object, DocumentError> {
         let loaded = decode(self.take(count)?, self.limits).map_err(|f| fault(self.path, f))?;
         let object =
             Object::new(&loaded.field, loaded.meta).map_err(|e| damaged(self.path, e.to_string()))?;
         Ok(Object {
-            layers: layers::read(layers, self, object.field.lattice())?,
             properties: properties.clone(),
             ..object
         })

@@ -256,7 +256,7 @@ impl Change {
                 layers,
             } => Self::Added {
                 object: object.clone(),
-                new: bulk.object(*bytes, properties, layers)?,
+                new: layers::read(bulk.object(*bytes, properties)?, layers, bulk)?,
             },
             ChangeHead::Removed {
                 object,
@@ -265,7 +265,7 @@ impl Change {
                 layers,
             } => Self::Removed {
                 object: object.clone(),
-                old: bulk.object(*bytes, properties, layers)?,
+                old: layers::read(bulk.object(*bytes, properties)?, layers, bulk)?,
             },
             ChangeHead::Field { object, bytes } => {
                 let known = beside

@@ -7,9 +7,9 @@ use formats::field::{decode_difference, encode_difference};
 use serde::{Deserialize, Serialize};
 use tools::paint::{Layer, Layers, Substance};
 
-use crate::DocumentError;
 use crate::bulk::Bulk;
 use crate::error::{damaged, fault};
+use crate::{DocumentError, Object};
 
 /// A layer, or a difference of two, in JSON; its bytes follow elsewhere.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -51,15 +51,19 @@ pub(crate) fn write_difference(
     Ok(LayerHead { layer, level, bytes })
 }
 
-/// Reads layers of an object on `lattice`.
-pub(crate) fn read(heads: &[LayerHead], bulk: &mut Bulk, lattice: &Lattice) -> Result<Layers, DocumentError> {
+/// Reads the layers of an object that was read before.
+pub(crate) fn read(object: Object, heads: &[LayerHead], bulk: &mut Bulk) -> Result<Object, DocumentError> {
+    let lattice = object.field.lattice();
     let layers = heads.iter().map(|head| {
         let difference = read_difference(head, bulk, lattice)?;
         let empty = Layer::empty(lattice, head.level);
         let layer = followed(&empty, &difference).map_err(|why| damaged(bulk.path, why))?;
-        Ok((head.layer, layer))
+        Ok::<_, DocumentError>((head.layer, layer))
     });
-    layers.collect()
+    Ok(Object {
+        layers: layers.collect::<Result<_, _>>()?,
+        ..object
+    })
 }
 
 pub(crate) fn read_difference(

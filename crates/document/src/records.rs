@@ -52,10 +52,8 @@ pub(crate) fn restored(
     };
     let mut state = State::new();
     for object in head.objects {
-        state.set(
-            &object.name,
-            Some(bulk.object(object.bytes, &object.properties, &object.layers)?),
-        );
+        let bare = bulk.object(object.bytes, &object.properties)?;
+        state.set(&object.name, Some(layers::read(bare, &object.layers, &mut bulk)?));
     }
     checked(path, state, &head.sha256)
 }

@@ -35,7 +35,10 @@ mod open;
 mod options;
 mod part;
 mod raw;
+#[cfg(feature = "medical")]
 mod revise;
+#[cfg(feature = "medical")]
+mod revision;
 mod save;
 mod several;
 mod slices;
@@ -58,7 +61,10 @@ pub use nifti::{parse_nifti, write_nifti};
 pub use nrrd::parse_nrrd;
 pub use options::{DicomOptions, Tilt, Uneven, VolumeOptions};
 pub use raw::{RawLayout, parse_raw};
-pub use revise::{Change, Revision, save_revised};
+#[cfg(feature = "medical")]
+pub use revise::save_revised;
+#[cfg(feature = "medical")]
+pub use revision::{Change, Revision};
 pub use save::{save, save_slices};
 pub use tiff::parse_tiff;
 pub use volume::{Orientation, ValueRange, Volume, VolumeHeader};

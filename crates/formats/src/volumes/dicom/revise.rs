@@ -23,8 +23,7 @@ use crate::atomic::{PassingDirectory, whole};
 use crate::input::io_fault;
 use crate::limits::Budget;
 use crate::volumes::VolumeOptions;
-use crate::volumes::revise::number::Scale;
-use crate::volumes::revise::{Change, Revision};
+use crate::volumes::revision::{Change, Revision, Scale};
 use crate::{Fault, guard};
 
 const IMAGE_TYPE: Tag = Tag(0x0008, 0x0008);

@@ -1,38 +1,16 @@
 //! A volume written again with new densities at some voxels: all else of the file stays as it is, to the bit.
 
-#[cfg(feature = "medical")]
 mod nifti;
-pub(super) mod number;
 
 use std::path::Path;
 
-#[cfg(feature = "medical")]
 use super::dicom;
 use super::open::format_of;
 use super::options::VolumeOptions;
+use super::revision::{Change, Revision};
 use crate::kind::{Kind, VolumeFormat};
 use crate::limits::Budget;
 use crate::{Fault, FormatError, ReadLimits};
-
-/// New density of a voxel.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Change {
-    /// `x + nx·(y + ny·z)` in the whole volume.
-    pub voxel: usize,
-    /// After rescaling.
-    pub density: f64,
-}
-
-/// What was written.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Revision {
-    /// Voxels that hold another number than before.
-    pub changed: usize,
-    /// Largest difference between a density asked for and the one that is stored, but for those beyond the type.
-    pub rounding: f64,
-    /// Densities beyond what the type of the voxels can hold; the nearest that it can was taken.
-    pub clamped: usize,
-}
 
 /// Writes the volume `like` to `output` with `changes`, which are in ascending order of their voxels.
 ///
@@ -69,9 +47,7 @@ pub fn save_revised(
         };
         let mut budget = Budget::new(limits);
         match format {
-            #[cfg(feature = "medical")]
             VolumeFormat::Nifti => nifti::revise(like, options.volume, changes, output, &mut budget),
-            #[cfg(feature = "medical")]
             VolumeFormat::Dicom => {
                 dicom::revise::revise(like, options, changes, identity, output, &mut budget)
             }

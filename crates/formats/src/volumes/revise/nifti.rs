@@ -6,12 +6,11 @@ use std::path::Path;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 
-use super::number::{Scale, put};
-use super::{Change, Revision};
 use crate::file_name::{extension, is_gz_name};
 use crate::limits::Budget;
 use crate::volumes::encode::LEVEL;
 use crate::volumes::nifti::places;
+use crate::volumes::revision::{Change, Revision, Scale, put};
 use crate::{Fault, atomic, input};
 
 pub(super) fn revise(

@@ -1,10 +1,29 @@
-//! Densities as the numbers that stand for them in a file.
+//! What changes when a volume is written again: densities, and the numbers that stand for them in a file.
 
-use super::Revision;
-use crate::volumes::voxel::VoxelType;
+use super::voxel::VoxelType;
+
+/// New density of a voxel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Change {
+    /// `x + nx·(y + ny·z)` in the whole volume.
+    pub voxel: usize,
+    /// After rescaling.
+    pub density: f64,
+}
+
+/// What was written.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Revision {
+    /// Voxels that hold another number than before.
+    pub changed: usize,
+    /// Largest difference between a density asked for and the one that is stored, but for those beyond the type.
+    pub rounding: f64,
+    /// Densities beyond what the type of the voxels can hold; the nearest that it can was taken.
+    pub clamped: usize,
+}
 
 /// How a density becomes a number: `density = slope · number + intercept`.
-pub(in crate::volumes) struct Scale {
+pub(super) struct Scale {
     pub rescale: Option<[f64; 2]>,
     /// Least and largest number.
     pub range: (f64, f64),
@@ -38,7 +57,7 @@ impl Scale {
 }
 
 /// Puts a number of a type in place of the bytes of another; whether these changed.
-pub(in crate::volumes) fn put(bytes: &mut [u8], stored: VoxelType, big_endian: bool, number: f64) -> bool {
+pub(super) fn put(bytes: &mut [u8], stored: VoxelType, big_endian: bool, number: f64) -> bool {
     macro_rules! bytes_of {
         ($t:ty) => {{
             let number = number as $t;
