@@ -189,9 +189,7 @@ impl<T: Real> DenseCorrections<T> {
 
     /// The active functions alone.
     pub fn pack(&self) -> Corrections<T> {
-        let count: u32 = self.mask.iter().map(|w| w.count_ones()).sum();
-        let mut values = Vec::with_capacity(count as usize);
-        values.extend(active_slots(&self.mask).map(|slot| self.values[slot]));
+        let values = active_slots(&self.mask).map(|slot| self.values[slot]).collect();
         Corrections::new(self.mask, values)
     }
 }
