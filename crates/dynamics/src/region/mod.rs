@@ -233,6 +233,19 @@ impl<T: Real> Region<T> {
         self.patch.respond(integrator, dt, loads)
     }
 
+    /// As [`Patch::respond_as_step`]; does not wake the region.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn respond_as_step(
+        &mut self,
+        integrator: Integrator,
+        dt: f64,
+        load: &OnBox<T>,
+    ) -> Result<Response<T>, PatchError> {
+        self.patch.respond_as_step(integrator, dt, load)
+    }
+
     /// As [`Patch::static_response`]; does not wake the region.
     ///
     /// # Errors

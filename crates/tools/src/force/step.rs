@@ -92,8 +92,7 @@ impl<T: Real> ForceStroke<T> {
         let solved = system::solve(&right, &soft, &diagonal, most, 1e-4, |z| {
             let of = live.iter().zip(z).map(|(&i, z)| (&bearing(i).spread, *z));
             let load = Load::<T>::of(of);
-            let mut found = region.respond(Integrator::Paper, dt, &[load.on_box()])?;
-            let p = found.pop().map(|r| r.p).unwrap_or_default();
+            let p = region.respond_as_step(Integrator::Paper, dt, &load.on_box())?.p;
             let felt = live.iter().map(|&i| bearing(i).row.times(&p)).collect();
             Ok::<_, ForceError>((p, felt))
         })?;
@@ -203,8 +202,8 @@ impl<T: Real> ForceStroke<T> {
         let targets = &self.targets;
         let weights = self.acting.iter().map(|a| targets[a.index].weight);
         let load = Load::<T>::of(pairs(bearings, weights));
-        let mut found = self.region.respond(Integrator::Paper, dt, &[load.on_box()])?;
-        let p = found.pop().map(|r| r.p).unwrap_or_default();
+        let found = self.region.respond_as_step(Integrator::Paper, dt, &load.on_box())?;
+        let p = found.p;
         let each = |b: &Option<Bearing>| b.as_ref().map_or(0.0, |b| b.row.times(&p));
         let moved: Vec<f64> = bearings.iter().map(each).collect();
         let most = moved.iter().copied().fold(0.0, f64::max);
