@@ -4,10 +4,11 @@ use bspline::HierarchicalSpline;
 use fitting::{Control, FitError};
 use glam::DAffine3;
 use serde::{Deserialize, Serialize};
+use tools::others::Others;
 use tools::paint::Layers;
 use tools::scene::{Scene, SimulateError, Simulation};
 use tools::session::{Session, Stroke};
-use tools::tool::{Canvas, Others, ToolError};
+use tools::tool::{Canvas, ToolError};
 
 use crate::{DocumentError, State};
 
