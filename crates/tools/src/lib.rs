@@ -4,10 +4,12 @@
 pub mod coefficients;
 pub mod fade;
 pub mod force;
+mod formula_solid;
 pub mod geometric;
 pub mod limits;
 pub mod mix;
 pub mod number;
+pub mod others;
 pub mod paint;
 pub mod scene;
 pub mod session;
