@@ -115,7 +115,7 @@ fn tools_arrive_by_default_whatever_the_sampling_and_the_number_of_paths() {
     let bench = Bench::new();
     let points = common::sphere_text([0.0; 3], 1.0, 3000);
     bench.write("ball.xyz", points);
-    bench.json("fit ball.xyz -o ball.iclay --max-depth 5");
+    bench.json("fit ball.xyz -o ball.iclay --max-depth 6");
     let run = bench.run("charts tools ball.iclay --quick --json -o charts");
     assert_eq!(run.code, 0, "{}", run.stderr);
     let lines = run.stdout.lines().map(|l| serde_json::from_str(l).unwrap());
@@ -136,7 +136,9 @@ fn tools_arrive_by_default_whatever_the_sampling_and_the_number_of_paths() {
     assert!({ default }.all(|l| number(l, "profile_error") < 2e-4));
     assert!(integrals.iter().any(|l| number(l, "profile_error") > 1e-3));
     // Clay that has to arrive does, however finely it is sampled and by however many paths it is held.
-    let strokes = lines.iter().filter(|l| !l["arrival"].is_null() && l["printed_ms"].is_null());
+    let strokes = lines
+        .iter()
+        .filter(|l| !l["arrival"].is_null() && l["printed_ms"].is_null());
     let (mut arrived, mut raw) = (0, 0);
     for line in strokes {
         let (arrival, error) = (number(line, "arrival"), number(line, "profile_error"));
@@ -144,7 +146,10 @@ fn tools_arrive_by_default_whatever_the_sampling_and_the_number_of_paths() {
             "clay, arrive" => {
                 arrived += 1;
                 assert!((arrival - 1.0).abs() < 0.01 && error < 0.02, "{line}");
-                assert!(number(line, "overshoot") < 0.015 && number(line, "steps_to_99") <= 15.0, "{line}");
+                assert!(
+                    number(line, "overshoot") < 0.015 && number(line, "steps_to_99") <= 15.0,
+                    "{line}"
+                );
             }
             "elastic, arrive" => assert!((arrival - 0.8).abs() < 0.02 && error < 0.03, "{line}"),
             law if law.contains("raw") => {
@@ -162,9 +167,19 @@ fn tools_arrive_by_default_whatever_the_sampling_and_the_number_of_paths() {
         assert!((number(line, "arrival") - 1.0).abs() < 0.01, "{line}");
     }
     // Four tools of two sizes, even and painted.
-    let loops = lines.iter().filter(|l| l["tool"].as_str().unwrap().contains(" ball "));
+    let loops = lines
+        .iter()
+        .filter(|l| l["tool"].as_str().unwrap().contains(" ball "));
     assert_eq!(loops.count(), 16);
-    for name in ["quadrature", "sampling", "paths", "paths-cost", "brush", "table2", "loops"] {
+    for name in [
+        "quadrature",
+        "sampling",
+        "paths",
+        "paths-cost",
+        "brush",
+        "table2",
+        "loops",
+    ] {
         let svg = std::fs::read_to_string(bench.path(&format!("charts/tools-{name}.svg"))).unwrap();
         assert!(svg.starts_with("<svg") && svg.contains("<circle"), "{name}");
     }

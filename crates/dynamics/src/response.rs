@@ -75,6 +75,31 @@ impl<T: Real> Patch<T> {
         self.respond_to(integrator, dt, load, f64::INFINITY)
     }
 
+    /// Makes responses, each with its share, part of the step of `dt` that was taken last.
+    ///
+    /// # Errors
+    /// [`PatchError::Overflow`]; the state is then the one before.
+    pub fn add_responses(&mut self, parts: &[(f64, Response<T>)], dt: f64) -> Result<(), PatchError> {
+        self.cache.work.before.copy_from(&self.motion.state);
+        let state = &mut self.motion.state;
+        let add = |to: &mut [T], rates: &mut [T], of: fn(&Response<T>) -> &[T]| {
+            let mut sums = vec![0.0; to.len()];
+            for (share, response) in parts {
+                let change = of(response).iter();
+                sums.iter_mut()
+                    .zip(change)
+                    .for_each(|(s, c)| *s += share * c.as_f64());
+            }
+            for ((to, rate), sum) in to.iter_mut().zip(rates).zip(&sums) {
+                *to = T::from_f64(to.as_f64() + sum);
+                *rate = T::from_f64(rate.as_f64() + sum / dt);
+            }
+        };
+        add(&mut state.p, &mut state.v, |r| &r.p);
+        add(&mut state.d, &mut state.w, |r| &r.d);
+        self.keep_if_finite()
+    }
+
     fn respond_to(
         &mut self,
         integrator: Integrator,

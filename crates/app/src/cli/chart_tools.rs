@@ -44,7 +44,11 @@ pub fn run(args: &Args, cancel: &Cancel) -> Outcome {
                 )));
             }
         };
-        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let name = path
+            .file_stem()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned();
         Ok(Sculpture { name, field, iso })
     };
     let sculptures: Vec<Sculpture> = args.fields.iter().map(open).collect::<Outcome<_>>()?;

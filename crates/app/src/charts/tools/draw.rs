@@ -79,7 +79,11 @@ impl ToolCosts {
             let word = marked(line.default, String::new());
             add(&mut series, &format!("{}: tip", line.law), (x, *error, word));
             let profile = line.profile_error.unwrap_or(0.0);
-            add(&mut series, &format!("{}: profile", line.law), (x, profile, String::new()));
+            add(
+                &mut series,
+                &format!("{}: profile", line.law),
+                (x, profile, String::new()),
+            );
         }
         chart(
             "a point tool: arrival against sampling",
@@ -108,8 +112,14 @@ impl ToolCosts {
             }
         }
         let (title, y) = match arrival {
-            true => ("a curve of 6 r: arrival against the number of paths", "error over the drag"),
-            false => ("a curve of 6 r: cost against the number of paths", "time of force and step, ms"),
+            true => (
+                "a curve of 6 r: arrival against the number of paths",
+                "error over the drag",
+            ),
+            false => (
+                "a curve of 6 r: cost against the number of paths",
+                "time of force and step, ms",
+            ),
         };
         chart(title, "paths", y, true, series)
     }
@@ -117,7 +127,11 @@ impl ToolCosts {
     fn brush(&self) -> Chart {
         let mut series = Vec::new();
         for line in &self.lines {
-            if let Place::Brush { intervals, series: name } = &line.place {
+            if let Place::Brush {
+                intervals,
+                series: name,
+            } = &line.place
+            {
                 let point = (*intervals, line.loop_ms.unwrap_or(0.0), String::new());
                 add(&mut series, name, point);
             }
@@ -140,11 +154,19 @@ impl ToolCosts {
             };
             let row = line.tool.split(' ').find(|w| w.contains('/')).unwrap_or("");
             let row = row.trim_end_matches(',');
-            let word = if line.default { row.to_owned() } else { String::new() };
+            let word = if line.default {
+                row.to_owned()
+            } else {
+                String::new()
+            };
             add(&mut series, name, (samples, line.loop_ms.unwrap_or(0.0), word));
             if line.default {
                 let printed = line.printed_ms.unwrap_or(0.0);
-                add(&mut series, "[Hua04] table 2, 2004", (samples, printed, String::new()));
+                add(
+                    &mut series,
+                    "[Hua04] table 2, 2004",
+                    (samples, printed, String::new()),
+                );
             }
         }
         chart(
@@ -160,7 +182,11 @@ impl ToolCosts {
         let mut series = Vec::new();
         for (line, samples, name) in self.placed().filter(|(l, ..)| l.printed_ms.is_none()) {
             let object = line.tool.split([',', ' ']).nth(2).unwrap_or("");
-            add(&mut series, name, (samples, line.loop_ms.unwrap_or(0.0), object.into()));
+            add(
+                &mut series,
+                name,
+                (samples, line.loop_ms.unwrap_or(0.0), object.into()),
+            );
         }
         chart(
             "loops of force tools on fitted fields, region of about 15/20 and 24/32 (all defaults)",

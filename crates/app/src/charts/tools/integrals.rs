@@ -69,25 +69,26 @@ pub fn quadratures(clock: fn() -> f64) -> Vec<Quadrature> {
     let plate_exact = along.z * 0.5 * (crease.powi(2) + (to - crease).powi(2)) - thick * (to - from);
     let mut out = Vec::new();
     let mut all = |name: &str, exact: f64, f: &dyn Fn(f64) -> f64| {
-        let mut add = |series: String, word: String, default, rule: &dyn Fn(&mut dyn FnMut(f64) -> f64) -> f64| {
-            let mut values = 0;
-            let found = rule(&mut |s| {
-                values += 1;
-                f(s)
-            });
-            let start = clock();
-            for _ in 0..AGAIN {
-                black_box(rule(&mut |s| f(black_box(s))));
-            }
-            out.push(Quadrature {
-                series,
-                word,
-                values,
-                error: (found / exact - 1.0).abs(),
-                milliseconds: 1e3 * (clock() - start) / AGAIN as f64,
-                default,
-            });
-        };
+        let mut add =
+            |series: String, word: String, default, rule: &dyn Fn(&mut dyn FnMut(f64) -> f64) -> f64| {
+                let mut values = 0;
+                let found = rule(&mut |s| {
+                    values += 1;
+                    f(s)
+                });
+                let start = clock();
+                for _ in 0..AGAIN {
+                    black_box(rule(&mut |s| f(black_box(s))));
+                }
+                out.push(Quadrature {
+                    series,
+                    word,
+                    values,
+                    error: (found / exact - 1.0).abs(),
+                    milliseconds: 1e3 * (clock() - start) / AGAIN as f64,
+                    default,
+                });
+            };
         for relative in ASKED {
             let tolerance = Tolerance {
                 relative,

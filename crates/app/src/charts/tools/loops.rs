@@ -281,7 +281,14 @@ pub fn on_sculpture(sculpture: &Sculpture, run: &mut ToolRun, add: &mut Add) -> 
 fn place(sculpture: &Sculpture) -> Result<DVec3, ToolsError> {
     let whole = sculpture.field.lattice().world_box();
     let (middle, half) = (0.5 * (whole.min + whole.max), 0.5 * (whole.max - whole.min));
-    let ways = [DVec3::Z, DVec3::Y, DVec3::X, DVec3::NEG_Z, DVec3::NEG_Y, DVec3::NEG_X];
+    let ways = [
+        DVec3::Z,
+        DVec3::Y,
+        DVec3::X,
+        DVec3::NEG_Z,
+        DVec3::NEG_Y,
+        DVec3::NEG_X,
+    ];
     let found = ways.into_iter().filter_map(|way| {
         let length = half.dot(way.abs());
         let outer = (0..64).map(|i| middle + (1.0 - f64::from(i) / 64.0) * length * way);

@@ -6,6 +6,8 @@ mod loops;
 mod strokes;
 mod table2;
 
+use ::tools::force::ForceError;
+use ::tools::paint::PaintError;
 use bspline::HierarchicalSpline;
 use bspline::hierarchical::EditError;
 use bspline::polygonize::PolygonizeError;
@@ -13,8 +15,6 @@ use dynamics::lattice::LatticeError;
 use dynamics::patch::PatchError;
 use dynamics::region::RegionError;
 use serde::Serialize;
-use ::tools::force::ForceError;
-use ::tools::paint::PaintError;
 
 pub use integrals::Quadrature;
 
@@ -178,7 +178,9 @@ fn summary(mut seconds: Vec<f64>) -> (Option<f64>, Option<f64>) {
     seconds.sort_by(f64::total_cmp);
     let at = |share: f64| {
         let place = (share * seconds.len() as f64) as usize;
-        seconds.get(place.min(seconds.len().saturating_sub(1))).map(|s| 1e3 * s)
+        seconds
+            .get(place.min(seconds.len().saturating_sub(1)))
+            .map(|s| 1e3 * s)
     };
     (at(0.5), at(0.99))
 }

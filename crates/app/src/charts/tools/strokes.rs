@@ -196,7 +196,10 @@ pub fn numbers_of_paths(run: &mut ToolRun, add: &mut Add) -> Result<(), ToolsErr
         for count in counts {
             let m = made::<f32>(CELLS, targets(*count)?, Extent::Curve, &how, &looks, run.clock)?;
             let worst = m.heights[..on.len()].iter().copied();
-            let worst = worst.fold(1.0, |w: f64, h| if (h - 1.0).abs() > (w - 1.0).abs() { h } else { w });
+            let worst = worst.fold(
+                1.0,
+                |w: f64, h| if (h - 1.0).abs() > (w - 1.0).abs() { h } else { w },
+            );
             let line = ToolLine {
                 tool: "curve".into(),
                 law: name.clone(),

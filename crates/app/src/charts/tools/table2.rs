@@ -115,7 +115,9 @@ impl Pull {
         };
         if painted {
             let stiffness = matter.stiffness.paint(m * m * m).iter_mut().enumerate();
-            stiffness.filter(|(i, _)| i / (m * m) < m / 2).for_each(|(_, k)| *k = 10.0);
+            stiffness
+                .filter(|(i, _)| i / (m * m) < m / 2)
+                .for_each(|(_, k)| *k = 10.0);
         }
         let options = TensorOptions {
             samples: [m; 3],
@@ -153,7 +155,10 @@ impl Pull {
         let length = self.target.path.length();
         let goal = length * (self.steps as f64 * 0.3 * RADIUS / length).min(1.0);
         let least = 1e-6 * RADIUS;
-        let (from, to) = (self.crossing.min(goal), self.crossing.max(goal).max(self.crossing.min(goal) + least));
+        let (from, to) = (
+            self.crossing.min(goal),
+            self.crossing.max(goal).max(self.crossing.min(goal) + least),
+        );
         let exact = Tolerance {
             relative: 1e-4,
             mean: 1e-5 * RADIUS,
@@ -167,7 +172,10 @@ impl Pull {
         let mean = |field: &TensorSpline<f32>, change: &[f32]| {
             let change = field.with_coefficients(change.to_vec()).expect("finite changes");
             let nodes = integral.nodes.iter();
-            nodes.map(|n| n.weight * change.value(self.target.path.at(n.at))).sum::<f64>() / (to - from)
+            nodes
+                .map(|n| n.weight * change.value(self.target.path.at(n.at)))
+                .sum::<f64>()
+                / (to - from)
         };
         self.force *= libm::exp(-FLOW);
         let before = self.region.patch().state().p.clone();
@@ -179,11 +187,13 @@ impl Pull {
         let values = load(1.0);
         let answer = patch.respond(Integrator::Paper, FLOW, &[OnBox { at, values: &values }])?;
         let stiffness = mean(&self.field, &answer[0].p);
-        let more = (short - mean(&self.field, &moved) - SOFT * stiffness * self.force) / (stiffness * (1.0 + SOFT));
+        let more =
+            (short - mean(&self.field, &moved) - SOFT * stiffness * self.force) / (stiffness * (1.0 + SOFT));
         self.force += more;
         let add = |to: &[f32], factor: f64| -> Vec<f32> {
             let sums = to.iter().zip(&answer[0].p);
-            sums.map(|(a, c)| (f64::from(*a) + factor * more * f64::from(*c)) as f32).collect()
+            sums.map(|(a, c)| (f64::from(*a) + factor * more * f64::from(*c)) as f32)
+                .collect()
         };
         let state = patch.state();
         let (p, v) = (add(&state.p, 1.0), add(&state.v, 1.0 / FLOW));
@@ -209,13 +219,16 @@ impl Pull {
             let p = self.target.path.at(from + share * (to - from));
             (lattice.gaussian(p.to_array(), RADIUS), weight)
         });
-        let at = places.iter().fold(Default::default(), |all: dynamics::lattice::SampleBox, ((b, _), _)| {
-            all.joined(*b)
-        });
+        let at = places.iter().fold(
+            Default::default(),
+            |all: dynamics::lattice::SampleBox, ((b, _), _)| all.joined(*b),
+        );
         let mut sums = vec![0.0; lattice.sample_count()];
         let dims = lattice.sample_dims();
         for ((b, shares), weight) in &places {
-            b.indices(dims).zip(shares).for_each(|(i, s)| sums[i] += weight * s);
+            b.indices(dims)
+                .zip(shares)
+                .for_each(|(i, s)| sums[i] += weight * s);
         }
         let kernel = at.indices(dims).map(|i| sums[i]).collect();
         (at, kernel)
