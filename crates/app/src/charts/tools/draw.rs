@@ -4,7 +4,10 @@ use super::{Place, ToolCosts, ToolLine};
 use crate::charts::{Chart, Series};
 
 /// Lowest value drawn, relative to the largest.
-const DEPTH: f64 = 1e-9;
+const DEPTH: f64 = 1e-11;
+
+/// Error of an integral that is drawn for any that is smaller.
+const LEAST: f64 = 1e-10;
 
 /// Adds a point to the series of a name, which is made when it comes first.
 fn add(series: &mut Vec<Series>, name: &str, point: (f64, f64, String)) {
@@ -58,13 +61,14 @@ impl ToolCosts {
     fn quadrature(&self) -> Chart {
         let mut series = Vec::new();
         for q in &self.quadratures {
-            let point = (q.values as f64, q.error, marked(q.default, q.word()));
+            let error = q.error.max(LEAST);
+            let point = (q.values as f64, error, marked(q.default, q.word()));
             add(&mut series, &q.series, point);
         }
         chart(
             "force along a path: error against cost, by the exactness asked for",
             "values of the density",
-            "error of the force over the force",
+            "error of the force over the force; 1e-10 stands for less",
             true,
             series,
         )
