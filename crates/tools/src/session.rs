@@ -71,6 +71,10 @@ pub struct Stroke {
     /// Takes knots out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub simplify: Option<Simplify>,
+    /// Whether the places of its way are those of a hand, one a step, and it is done step by step: see
+    /// [`LiveStroke`](crate::live::LiveStroke).
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub paced: bool,
     /// Finest level of the field that the stroke sees and changes; what finer levels add stays where it is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coarse: Option<usize>,
@@ -139,40 +143,57 @@ impl Stroke {
     /// Any [`ToolError`].
     pub fn apply(&self, canvas: Canvas, control: &mut Control) -> Result<(Canvas, Vec<String>), ToolError> {
         let tool = self.tool().map_err(ToolError::Stroke)?;
+        let (coarse, limits) = self.prepared(&canvas)?;
+        let (left, notes) = self.on_both_sides(tool, coarse, &limits, None, control)?;
+        Ok((self.completed(&canvas, left)?, notes))
+    }
+
+    /// What the tool sees of a canvas, and what it may change.
+    pub(crate) fn prepared(&self, canvas: &Canvas) -> Result<(Canvas, Limits), ToolError> {
         let whole = canvas.field.lattice().world_box();
         let limits = Limits::new(self.within.as_ref(), self.mask.as_ref(), &canvas.others, &whole);
         let limits = limits.map_err(ToolError::Stroke)?.at_detail(canvas.detail);
         let Some(level) = self.coarse else {
-            return self.on_both_sides(tool, canvas, &limits, control);
+            return Ok((canvas.clone(), limits));
         };
-        let whole = canvas.field.clone();
         let coarse = Canvas {
-            field: up_to(&whole, level).map_err(ToolError::Stroke)?,
-            ..canvas
+            field: up_to(&canvas.field, level).map_err(ToolError::Stroke)?,
+            ..canvas.clone()
         };
-        let below = coarse.field.clone();
-        let (mut left, notes) = self.on_both_sides(tool, coarse, &limits.up_to(level), control)?;
-        let difference = below.difference(&left.field).expect("versions of one field");
-        left.field = whole.applied(&difference).map_err(|_| {
-            let why = format!(
-                "{} works on finer levels than {level}; leave coarse out",
-                tool.name()
-            );
-            ToolError::Stroke(why)
-        })?;
-        Ok((left, notes))
+        Ok((coarse, limits.up_to(level)))
     }
 
-    /// What the tool leaves if it is used as the stroke's symmetry says.
-    fn on_both_sides(
+    /// What the tool left of what it saw of a canvas, with all that it did not see.
+    pub(crate) fn completed(&self, whole: &Canvas, mut left: Canvas) -> Result<Canvas, ToolError> {
+        let Some(level) = self.coarse else { return Ok(left) };
+        let below = up_to(&whole.field, level).map_err(ToolError::Stroke)?;
+        let difference = below.difference(&left.field).expect("versions of one field");
+        left.field = whole.field.applied(&difference).map_err(|_| {
+            let name = self.tool().map_or("the tool", |tool| tool.name());
+            ToolError::Stroke(format!(
+                "{name} works on finer levels than {level}; leave coarse out"
+            ))
+        })?;
+        Ok(left)
+    }
+
+    /// What the tool leaves if it is used as the stroke's symmetry says; `done` is what it left on its own side, if that is
+    /// known.
+    pub(crate) fn on_both_sides(
         &self,
         tool: Tool,
         canvas: Canvas,
         limits: &Limits,
+        mut done: Option<(Canvas, Vec<String>)>,
         control: &mut Control,
     ) -> Result<(Canvas, Vec<String>), ToolError> {
+        let mut once = |canvas: Canvas| match (done.take(), self.paced) {
+            (Some(done), _) => Ok(done),
+            (None, true) => self.worked(tool, canvas, limits, control),
+            (None, false) => tool.apply(canvas, limits, control),
+        };
         let Some(symmetry) = &self.symmetry else {
-            return tool.apply(canvas, limits, control);
+            return once(canvas);
         };
         if matches!(tool, Tool::Paint(_) | Tool::Copy(_)) {
             let why = format!("{} knows no symmetry; write a stroke for each side", tool.name());
@@ -188,7 +209,7 @@ impl Stroke {
                 field,
                 ..canvas.clone()
             };
-            let (canvas, told) = tool.apply(canvas, limits, control)?;
+            let (canvas, told) = once(canvas)?;
             (left.copies, notes) = (canvas.copies, told);
             Ok::<_, ToolError>(canvas.field)
         })?;

@@ -2,6 +2,7 @@
 
 mod cloud;
 mod common;
+mod live;
 mod revision;
 
 use std::collections::BTreeSet;
