@@ -156,7 +156,10 @@ impl From<ToolError> for CommandError {
 
 /// Strokes in JSON, one a line; empty lines count for the numbers alone.
 fn strokes_of_lines(text: &str) -> Result<Vec<Stroke>, CommandError> {
-    let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
+    let lines = text
+        .lines()
+        .enumerate()
+        .filter(|(_, line)| !line.trim().is_empty());
     let stroke = |(n, line): (usize, &str)| {
         serde_json::from_str(line).map_err(|e| {
             let (told, column) = (e.to_string(), e.column());

@@ -11,12 +11,12 @@ use bspline::{Aabb, Field, HierarchicalSpline};
 use fitting::Control;
 use glam::DVec3;
 
-use crate::force::{ForceError, ForceStroke, ForceTool, finished};
+use crate::force::{ForceError, ForceStroke, ForceTool, released};
 use crate::geometric::{Geometric, GeometricError, Motion};
 use crate::limits::Limits;
 use crate::number::Point;
-use crate::paint::PaintError;
-use crate::session::Stroke;
+use crate::paint::{Paint, PaintError};
+use crate::session::{During, Stroke};
 use crate::tool::{Canvas, Tool, ToolError};
 
 /// Where a tool is.
@@ -58,6 +58,10 @@ impl LiveStroke {
     /// Any [`ToolError`].
     pub fn begin(mut stroke: Stroke, canvas: Canvas) -> Result<Self, ToolError> {
         let told = stroke.poses()?;
+        if !stroke.during.is_empty() {
+            let why = "a stroke in a hand gets its paint as it goes; none is given before it begins";
+            return Err(ToolError::Stroke(why.into()));
+        }
         if !told.is_empty() {
             return Err(ToolError::Stroke(format!(
                 "a stroke in a hand gets its places one by one; {} of them are given before it begins",
@@ -122,6 +126,26 @@ impl LiveStroke {
         Ok(force)
     }
 
+    /// Lays paint on, here and now, while a force tool works.
+    ///
+    /// # Errors
+    /// [`ToolError`]; the stroke goes on as if it had not been told.
+    pub fn paint(&mut self, paint: &Paint, control: &mut Control) -> Result<(), ToolError> {
+        let tool = self.stroke.tool().map_err(ToolError::Stroke)?;
+        check_during(tool, std::slice::from_ref(&self.during(paint)))?;
+        self.work.lay_on(paint, control)?;
+        let during = self.during(paint);
+        self.stroke.during.push(during);
+        Ok(())
+    }
+
+    fn during(&self, paint: &Paint) -> During {
+        During {
+            step: self.work.steps,
+            paint: paint.clone(),
+        }
+    }
+
     /// The canvas as it is now, and the boxes outside of which its field is as at the last look. Of strokes with a symmetry
     /// the side of the hand alone.
     ///
@@ -147,13 +171,10 @@ impl LiveStroke {
     /// [`ToolError`], also where there was nothing to work on in any step.
     pub fn end(self, control: &mut Control) -> Result<(Canvas, Stroke, Vec<String>), ToolError> {
         let Self {
-            stroke,
-            before,
-            work,
-            ..
+            stroke, before, work, ..
         } = self;
         let (coarse, limits) = (work.before.clone(), work.limits.clone());
-        let done = work.finish(control)?;
+        let done = work.finish(&[], control)?;
         let tool = stroke.tool().map_err(ToolError::Stroke)?;
         let (left, notes) = stroke.on_both_sides(tool, coarse, &limits, Some(done), control)?;
         let left = stroke.completed(&before, left)?;
@@ -185,14 +206,29 @@ impl Work {
             _ => None,
         };
         Ok(Self {
+            force,
+            ..Self::on(canvas, limits)
+        })
+    }
+
+    /// A force tool that knows its way.
+    fn of_force(force: ForceStroke<f32>, canvas: Canvas, limits: &Limits) -> Result<Self, ToolError> {
+        Ok(Self {
+            force: Some(force.painted(&canvas.layers)?),
+            ..Self::on(canvas, limits.clone())
+        })
+    }
+
+    fn on(canvas: Canvas, limits: Limits) -> Self {
+        Self {
             before: canvas.clone(),
             limits,
             canvas,
-            force,
+            force: None,
             last: None,
             steps: 0,
             missed: None,
-        })
+        }
     }
 
     /// One step; gives the force on the solid.
@@ -252,19 +288,62 @@ impl Work {
         })
     }
 
-    /// Lets the tool go: what it leaves, and what is left to say.
-    pub fn finish(self, control: &mut Control) -> Result<(Canvas, Vec<String>), ToolError> {
-        let (mut canvas, mut notes) = (self.canvas, Vec::new());
-        if let Some(mut force) = self.force {
+    /// Lays paint on the canvas, and under the tool.
+    fn lay_on(&mut self, paint: &Paint, control: &mut Control) -> Result<(), ToolError> {
+        (self.canvas, _) = Tool::Paint(paint).apply(self.canvas.clone(), &self.limits, control)?;
+        if let Some(force) = &mut self.force {
+            force.repaint(&self.canvas.layers)?;
+        }
+        Ok(())
+    }
+
+    /// Lays on the paint whose step has come; gives the rest.
+    fn lay_due<'a>(
+        &mut self,
+        mut during: &'a [During],
+        control: &mut Control,
+    ) -> Result<&'a [During], ToolError> {
+        while let [first, rest @ ..] = during
+            && first.step <= self.steps
+        {
+            self.lay_on(&first.paint, control)?;
+            during = rest;
+        }
+        Ok(during)
+    }
+
+    /// Lets the tool go: what it leaves, and what is left to say. Paint that is still to come goes on in its steps.
+    pub fn finish(
+        mut self,
+        mut during: &[During],
+        control: &mut Control,
+    ) -> Result<(Canvas, Vec<String>), ToolError> {
+        let mut notes = Vec::new();
+        if let Some(mut force) = self.force.take() {
             force.let_go();
             if let Some((count, why)) = force.missed() {
                 notes.push(format!(
                     "at {count} places of its way it had nothing to work on, first: {why}"
                 ));
             }
-            let (field, told) = finished(force, control)?;
-            canvas.field = self.limits.kept(&self.before.field, &field);
+            let poses = self.steps;
+            while !force.is_over() {
+                control
+                    .step("pulling", force.progress())
+                    .map_err(ForceError::Cancelled)?;
+                self.force = Some(force);
+                during = self.lay_due(during, control)?;
+                force = self.force.take().expect("put there above");
+                force.step()?;
+                self.steps += 1;
+            }
+            self.steps = poses;
+            let (field, told) = released(force)?;
+            self.canvas.field = self.limits.kept(&self.before.field, &field);
             notes.extend(told);
+        }
+        for late in during {
+            self.lay_on(&late.paint, control)?;
         }
         match self.missed {
             Some((count, why)) if count == self.steps => return Err(why),
@@ -274,7 +353,7 @@ impl Work {
             )),
             None => {}
         }
-        Ok((canvas, notes))
+        Ok((self.canvas, notes))
     }
 
     /// Counts a step in which the tool was beside the object; any other error stays one.
@@ -360,9 +439,19 @@ impl Stroke {
         let places = |along: &[Point]| along.iter().map(|p| Pose::at(p.0)).collect();
         Ok(match tool {
             Tool::Carve(tool) | Tool::Add(tool) => {
-                let turn = |n: usize| tool.turn.get(n).or(tool.turn.first()).map_or(DVec3::ZERO, |t| t.0);
+                let turn = |n: usize| {
+                    tool.turn
+                        .get(n)
+                        .or(tool.turn.first())
+                        .map_or(DVec3::ZERO, |t| t.0)
+                };
                 let along = tool.along.iter().enumerate();
-                along.map(|(n, at)| Pose { at: at.0, turn: turn(n) }).collect()
+                along
+                    .map(|(n, at)| Pose {
+                        at: at.0,
+                        turn: turn(n),
+                    })
+                    .collect()
             }
             Tool::Force(ForceTool::Chisel(tool) | ForceTool::Squirt(tool)) => places(&tool.along),
             Tool::Force(ForceTool::Drill(tool) | ForceTool::Join(tool)) => places(&tool.along),
@@ -427,7 +516,7 @@ impl Stroke {
         }
     }
 
-    /// What the steps of a stroke by hand leave.
+    /// What the steps of a stroke leave that is led by a hand, or painted on meanwhile.
     pub(crate) fn worked(
         &self,
         tool: Tool,
@@ -435,23 +524,48 @@ impl Stroke {
         limits: &Limits,
         control: &mut Control,
     ) -> Result<(Canvas, Vec<String>), ToolError> {
-        let poses = self.poses()?;
-        if matches!(tool, Tool::Move(_)) {
-            let why = "a move by hand is a move; leave paced out";
-            return Err(ToolError::Stroke(why.into()));
+        check_during(tool, &self.during)?;
+        let mut during = &self.during[..];
+        let mut work;
+        if let (Tool::Force(tool), false) = (tool, self.paced) {
+            work = Work::of_force(tool.begin(&canvas.field, canvas.iso)?, canvas, limits)?;
+        } else {
+            let poses = self.poses()?;
+            if matches!(tool, Tool::Move(_)) {
+                let why = "a move by hand is a move; leave paced out";
+                return Err(ToolError::Stroke(why.into()));
+            }
+            if poses.is_empty() {
+                let why = "a stroke by hand has no pose; write at least one, or leave paced out";
+                return Err(ToolError::Stroke(why.into()));
+            }
+            work = Work::new(tool, canvas, limits.clone())?;
+            let count = poses.len() as f64;
+            for (n, pose) in poses.into_iter().enumerate() {
+                control
+                    .step("sculpting", n as f64 / count)
+                    .map_err(ForceError::Cancelled)?;
+                during = work.lay_due(during, control)?;
+                work.step(tool, pose, control)?;
+            }
         }
-        if poses.is_empty() {
-            let why = "a stroke by hand has no pose; write at least one, or leave paced out";
-            return Err(ToolError::Stroke(why.into()));
-        }
-        let mut work = Work::new(tool, canvas, limits.clone())?;
-        let count = poses.len() as f64;
-        for (n, pose) in poses.into_iter().enumerate() {
-            control
-                .step("sculpting", n as f64 / count)
-                .map_err(|e| ToolError::Force(ForceError::Cancelled(e)))?;
-            work.step(tool, pose, control)?;
-        }
-        work.finish(control)
+        work.finish(during, control)
+    }
+}
+
+/// Refuses paint beside tools that take no time, and paint out of order.
+fn check_during(tool: Tool, during: &[During]) -> Result<(), ToolError> {
+    if !during.is_empty() && !matches!(tool, Tool::Force(_)) {
+        return Err(ToolError::Stroke(format!(
+            "{} takes no time in which to paint; paint in a stroke of its own, or during a force tool",
+            tool.name()
+        )));
+    }
+    match during.windows(2).find(|pair| pair[0].step > pair[1].step) {
+        Some(pair) => Err(ToolError::Stroke(format!(
+            "paint of step {} stands behind that of step {}; write them in their order",
+            pair[1].step, pair[0].step
+        ))),
+        None => Ok(()),
     }
 }

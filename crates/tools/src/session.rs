@@ -19,6 +19,16 @@ pub struct Session {
     pub stroke: Vec<Stroke>,
 }
 
+/// Paint that is laid on while a force tool works.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct During {
+    /// Steps that the tool has made by then; after its last one paint goes on the shape that is left.
+    pub step: usize,
+    /// What is painted.
+    pub paint: Paint,
+}
+
 /// One use of a tool: exactly one of the tools is given.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -75,6 +85,9 @@ pub struct Stroke {
     /// [`LiveStroke`](crate::live::LiveStroke).
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub paced: bool,
+    /// Paint laid on while a force tool works, in the order of steps.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub during: Vec<During>,
     /// Finest level of the field that the stroke sees and changes; what finer levels add stays where it is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coarse: Option<usize>,
@@ -187,7 +200,8 @@ impl Stroke {
         mut done: Option<(Canvas, Vec<String>)>,
         control: &mut Control,
     ) -> Result<(Canvas, Vec<String>), ToolError> {
-        let mut once = |canvas: Canvas| match (done.take(), self.paced) {
+        let is_stepped = self.paced || !self.during.is_empty();
+        let mut once = |canvas: Canvas| match (done.take(), is_stepped) {
             (Some(done), _) => Ok(done),
             (None, true) => self.worked(tool, canvas, limits, control),
             (None, false) => tool.apply(canvas, limits, control),
@@ -195,8 +209,13 @@ impl Stroke {
         let Some(symmetry) = &self.symmetry else {
             return once(canvas);
         };
-        if matches!(tool, Tool::Paint(_) | Tool::Copy(_)) {
-            let why = format!("{} knows no symmetry; write a stroke for each side", tool.name());
+        if matches!(tool, Tool::Paint(_) | Tool::Copy(_)) || !self.during.is_empty() {
+            let paints = if self.during.is_empty() {
+                tool.name()
+            } else {
+                "paint"
+            };
+            let why = format!("{paints} knows no symmetry; write a stroke for each side");
             return Err(ToolError::Stroke(why));
         }
         if matches!(tool, Tool::Move(_)) && canvas.layers.values().any(|layer| !layer.is_empty()) {

@@ -2,49 +2,16 @@
 
 use std::path::Path;
 
-use bspline::hierarchical::{HierarchicalSpline, Lattice};
-use bspline::{AnyField, Field};
-use document::{Command, CommandError, Document, Live, Object, Options, State};
+use bspline::Field;
+use document::{Command, CommandError, Document, Live, Options, State};
 use fitting::Control;
-use formats::field::FieldMeta;
-use glam::{DAffine3, DVec3};
-use serde_json::Value;
+use glam::DVec3;
 use tempfile::tempdir;
 use tools::live::Pose;
 use tools::session::Stroke;
 
+use super::clay::{ISO, again, block, height, state_of};
 use super::common::Draw;
-
-const ISO: f64 = 300.0;
-const SLOPE: f64 = 40.0;
-
-fn state_of(distance: impl Fn(DVec3) -> f64) -> State {
-    let lattice = Lattice {
-        world_from_lattice: DAffine3::IDENTITY,
-        cells: [24; 3],
-    };
-    let field: HierarchicalSpline<f32> =
-        HierarchicalSpline::schoenberg(lattice, SLOPE, |p| SLOPE * distance(p) + ISO).unwrap();
-    let meta = FieldMeta {
-        iso: Some(ISO),
-        ..FieldMeta::default()
-    };
-    let object = Object::new(&AnyField::F32(field), meta).unwrap();
-    State::new().with("clay", object).unwrap()
-}
-
-/// What lies below `z = 12`.
-fn block() -> State {
-    state_of(|p| 12.0 - p.z)
-}
-
-/// A plate of 1.6 below and above `z = 12`.
-fn plate() -> State {
-    state_of(|p| {
-        let q = (p - 12.0).abs() - DVec3::new(9.0, 9.0, 1.6);
-        -(q.max(DVec3::ZERO).length() + q.max_element().min(0.0))
-    })
-}
 
 fn document(directory: &Path, state: &State) -> Document {
     Document::create(&directory.join("live.isoclay"), state.clone(), Options::default()).unwrap()
@@ -63,23 +30,14 @@ fn made(document: &mut Document, text: &str, poses: &[Pose]) -> Vec<String> {
     let control = &mut Control::default();
     let mut live = begun(document.state(), text);
     for pose in poses {
-        live.step(*pose, control).unwrap_or_else(|e| panic!("{text}: {e}"));
+        live.step(*pose, control)
+            .unwrap_or_else(|e| panic!("{text}: {e}"));
     }
-    let (is_changed, notes) = live.end(document, control).unwrap_or_else(|e| panic!("{text}: {e}"));
+    let (is_changed, notes) = live
+        .end(document, control)
+        .unwrap_or_else(|e| panic!("{text}: {e}"));
     assert!(is_changed, "{text}");
     notes
-}
-
-/// Height of the surface over `(x, y)`, from 12 up.
-fn height(state: &State, x: f64, y: f64) -> f64 {
-    let field = &state.object("clay").unwrap().field;
-    let (mut low, mut high) = (3.0, 21.0);
-    for _ in 0..60 {
-        let z = 0.5 * (low + high);
-        let is_in = field.value(DVec3::new(x, y, z)) > ISO;
-        *(if is_in { &mut low } else { &mut high }) = z;
-    }
-    low - 12.0
 }
 
 /// A hand that wanders over the plane `z`, now fast, now standing.
@@ -96,21 +54,6 @@ fn wandering(seed: u64, z: f64, count: usize) -> Vec<Pose> {
             Pose::at(at)
         })
         .collect()
-}
-
-/// The edits of a document done again on its first state, by as many threads.
-fn again(document: &mut Document, threads: usize) -> State {
-    let commands: Vec<Value> = (0..document.counts().unwrap().done)
-        .map(|n| document.command(n).unwrap())
-        .collect();
-    let first = document.first_state().unwrap();
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    pool.install(|| {
-        commands.into_iter().fold(first, |state, value| {
-            let command: Command = serde_json::from_value(value).unwrap();
-            command.apply(&state, &mut Control::default()).unwrap().0
-        })
-    })
 }
 
 #[test]
@@ -141,7 +84,11 @@ fn strokes_by_hand_and_their_scripts_leave_the_same() {
         made(&mut document, text, &poses);
         let left = document.state().sha256();
         for threads in [1, 8] {
-            assert_eq!(again(&mut document, threads).sha256(), left, "{text}, {threads} threads");
+            assert_eq!(
+                again(&mut document, threads).sha256(),
+                left,
+                "{text}, {threads} threads"
+            );
         }
         // The stroke as a line of a session.
         let command = document.command(0).unwrap();
@@ -157,57 +104,13 @@ fn strokes_by_hand_and_their_scripts_leave_the_same() {
     }
 }
 
-#[test]
-fn force_tools_are_replayed_alike_by_one_two_and_eight_threads() {
-    let directory = tempdir().unwrap();
-    let mut document = document(directory.path(), &plate());
-    let script = r#"
-[[stroke]]
-paint = { layer = "stiffness", formula = "1 + 4 * (x < 12)" }
-[[stroke]]
-pull = { along = [[8, 12, 13.6]], lift = 1.2, radius = 1 }
-[[stroke]]
-pull = { along = [[14, 9, 13.6], [17, 9, 13.6]], by = [0, 0.2, -0.8], radius = 1, how = { rule = "compliance" } }
-[[stroke]]
-chisel = { along = [[6, 15, 13.6], [11, 15, 13.6]], depth = 0.4, radius = 0.6 }
-[[stroke]]
-squirt = { along = [[15, 15, 13.6]], depth = 0.4, radius = 0.8 }
-[[stroke]]
-drill = { along = [[12, 12, 13.6]], by = [0, 0, -6], radius = 1.0 }
-[[stroke]]
-join = { along = [[11.4, 12, 12]], by = [1.2, 0, 0], radius = 0.9 }
-[[stroke]]
-paint = { layer = "mass", brush = { along = [[8, 12, 13]], radius = 3, value = 3 } }
-[[stroke]]
-paced = true
-chisel = { along = [[6, 6, 13.6], [6.1, 6, 13.6], [9, 6, 13.6]], depth = 0.3, radius = 0.7 }
-[[stroke]]
-paced = true
-pull = { along = [[8, 12, 14.5]], way = [[0, 0, 0.2], [0.2, 0, 0.9], [0.5, 0, 1.4]], radius = 1 }
-"#;
-    let commands = Command::of_script(script, |_| Ok::<_, CommandError>("clay".into())).unwrap();
-    assert_eq!(commands.len(), 10);
-    for command in &commands {
-        let (next, _) = command
-            .apply(document.state(), &mut Control::default())
-            .unwrap_or_else(|e| panic!("{}: {e}", command.title()));
-        assert!(document.commit(&command.title(), command.to_value(), next).unwrap());
-    }
-    for threads in [1, 2, 8] {
-        let again = again(&mut document, threads);
-        assert_eq!(again.sha256(), document.state().sha256(), "{threads} threads");
-    }
-    let history = document.history().unwrap();
-    assert_eq!(history[8].title, "chisel on clay by hand, 3 steps");
-}
-
 /// Slow, fast, and in one leap; standing still, and across its own track.
 #[test]
 fn a_moving_tool_leaves_its_depth_at_any_speed() {
-    let (depth, r) = (0.5, 0.9);
-    let track = [[6.0, 10.0], [15.0, 10.0], [15.0, 13.0], [11.0, 7.0]].map(|[x, y]| DVec3::new(x, y, 12.0));
-    for (tool, sign) in [("chisel", -1.0), ("squirt", 1.0)] {
-        for pace in [0.04, 0.3, 2.0, 100.0] {
+    let (depth, r) = (0.6, 1.2);
+    let track = [[6.0, 10.0], [15.0, 10.0], [15.0, 14.0], [11.0, 6.0]].map(|[x, y]| DVec3::new(x, y, 12.0));
+    for (tool, sign, paces) in [("chisel", -1.0, &[0.05, 0.4, 3.0][..]), ("squirt", 1.0, &[100.0])] {
+        for &pace in paces {
             let mut poses = vec![Pose::at(track[0]); 3];
             for leg in track.windows(2) {
                 let count = (leg[0].distance(leg[1]) / (pace * r)).ceil();
@@ -235,9 +138,14 @@ fn a_moving_tool_leaves_its_depth_at_any_speed() {
 /// Wherever the hand goes, the surface ends where it is; the region follows it.
 #[test]
 fn the_surface_follows_a_hand_that_pulls() {
-    for (n, end) in [[0.0, 0.0, 3.0], [2.0, 1.0, 6.0], [0.3, -0.4, -3.0], [0.0, 0.0, -0.6]]
-        .into_iter()
-        .enumerate()
+    for (n, end) in [
+        [0.0, 0.0, 3.0],
+        [2.0, 1.0, 6.0],
+        [0.3, -0.4, -3.0],
+        [0.0, 0.0, -0.6],
+    ]
+    .into_iter()
+    .enumerate()
     {
         let (from, end) = (DVec3::new(11.0, 12.0, 12.0), DVec3::from_array(end));
         // There by a detour, in leaps and steps.
@@ -255,14 +163,24 @@ fn the_surface_follows_a_hand_that_pulls() {
         // Along the way of the hand the surface is at its end.
         let field = &document.state().object("clay").unwrap().field;
         let [before, behind] = [0.97, 1.03].map(|t| field.value(from + t * end) > ISO);
-        assert_eq!([before, behind], if end.z > 0.0 { [true, false] } else { [false, true] }, "{end}");
+        assert_eq!(
+            [before, behind],
+            if end.z > 0.0 { [true, false] } else { [false, true] },
+            "{end}"
+        );
     }
     // A hand that comes back leaves next to nothing.
     let there = (0..=20).map(|i| 2.0 * libm::sin(f64::from(i) * 0.05 * std::f64::consts::PI));
-    let poses: Vec<Pose> = there.map(|z| Pose::at(DVec3::new(11.0, 12.0, 12.0 + z))).collect();
+    let poses: Vec<Pose> = there
+        .map(|z| Pose::at(DVec3::new(11.0, 12.0, 12.0 + z)))
+        .collect();
     let directory = tempdir().unwrap();
     let mut document = document(directory.path(), &block());
-    made(&mut document, "pull = { along = [[11, 12, 12]], radius = 1.2 }", &poses);
+    made(
+        &mut document,
+        "pull = { along = [[11, 12, 12]], radius = 1.2 }",
+        &poses,
+    );
     let left = height(document.state(), 11.0, 12.0);
     assert!(left.abs() < 0.02, "{left}");
 }
@@ -286,7 +204,11 @@ fn a_stroke_that_is_not_ended_leaves_the_document_as_it_was() {
             let [old, new] = [&seen, &now].map(|s| &s.object("clay").unwrap().field);
             assert!(!boxes.is_empty());
             for i in 0..2000 {
-                let p = DVec3::new(f64::from(i % 20), f64::from(i / 20 % 10) * 2.0, f64::from(i / 200)) + 2.1;
+                let p = DVec3::new(
+                    f64::from(i % 20),
+                    f64::from(i / 20 % 10) * 2.0,
+                    f64::from(i / 200),
+                ) + 2.1;
                 let is_told = boxes.iter().any(|b| p.cmpge(b.min).all() && p.cmple(b.max).all());
                 assert!(is_told || old.value(p) == new.value(p), "{p}");
             }
@@ -296,11 +218,14 @@ fn a_stroke_that_is_not_ended_leaves_the_document_as_it_was() {
     assert!(height(&seen, 8.0, 12.0) > 0.4);
     assert_eq!(bytes(), before);
     // Poses that make no sense are refused one by one.
-    let nan = live.step(Pose::at(DVec3::new(f64::NAN, 0.0, 0.0)), control).unwrap_err();
+    let nan = live
+        .step(Pose::at(DVec3::new(f64::NAN, 0.0, 0.0)), control)
+        .unwrap_err();
     assert!(nan.to_string().contains("finite"), "{nan}");
     let far = live.step(Pose::at(DVec3::splat(1e300)), control).unwrap_err();
     assert!(far.to_string().contains("paths"), "{far}");
-    live.step(Pose::at(DVec3::new(15.0, 12.0, 12.0)), control).unwrap();
+    live.step(Pose::at(DVec3::new(15.0, 12.0, 12.0)), control)
+        .unwrap();
     drop(live);
     assert_eq!((bytes(), document.state().sha256()), (before, hash));
     // A document that goes on meanwhile refuses it.
@@ -334,25 +259,48 @@ fn a_hand_beside_the_object_does_nothing_and_says_so() {
         "chisel = { along = [], depth = 0.4, radius = 0.8 }",
     ];
     // From the air onto the surface, off it, and on again.
-    let way = [[12.0, 5.0, 60.0], [12.0, 5.0, 40.0], [8.0, 12.0, 12.0], [14.0, 12.0, 12.0]];
+    let way = [
+        [12.0, 5.0, 60.0],
+        [12.0, 5.0, 40.0],
+        [8.0, 12.0, 12.0],
+        [14.0, 12.0, 12.0],
+    ];
     let notes = made(&mut document, ball, &places(&way));
     assert_eq!(notes.len(), 1, "{notes:?}");
     assert!(notes[0].contains("in 2 of 4 steps"), "{notes:?}");
-    let way = [[5.0, 5.0, 20.0], [5.0, 6.0, 12.0], [5.0, 9.0, 12.0], [5.0, 12.0, 20.0], [5.0, 18.0, 12.0]];
+    let way = [
+        [5.0, 5.0, 20.0],
+        [5.0, 6.0, 12.0],
+        [5.0, 9.0, 12.0],
+        [5.0, 12.0, 20.0],
+        [5.0, 18.0, 12.0],
+    ];
     let notes = made(&mut document, groove, &places(&way));
-    assert!(notes.iter().any(|n| n.contains("nothing to work on")), "{notes:?}");
+    assert!(
+        notes.iter().any(|n| n.contains("nothing to work on")),
+        "{notes:?}"
+    );
     let hash = document.state().sha256();
     let control = &mut Control::default();
     for text in [ball, groove] {
         let mut live = begun(document.state(), text);
         live.step(Pose::at(DVec3::new(5.0, 5.0, 90.0)), control).unwrap();
         let nothing = live.end(&mut document, control).unwrap_err().to_string();
-        assert!(nothing.contains("field reaches") || nothing.contains("the field"), "{nothing}");
+        assert!(
+            nothing.contains("field reaches") || nothing.contains("the field"),
+            "{nothing}"
+        );
     }
     for (text, word) in [
         ("pull = { along = [[12, 12, 20]], radius = 1 }", "no surface"),
-        ("pull = { along = [[12, 12, 12]], lift = 1, radius = 1 }", "by hand"),
-        ("chisel = { along = [[1, 2, 3]], depth = 1, radius = 1 }", "one by one"),
+        (
+            "pull = { along = [[12, 12, 12]], lift = 1, radius = 1 }",
+            "by hand",
+        ),
+        (
+            "chisel = { along = [[1, 2, 3]], depth = 1, radius = 1 }",
+            "one by one",
+        ),
         ("copy = { to = 'b' }", "by hand"),
         ("paint = { layer = 'mass', formula = 'x' }", "by hand"),
     ] {

@@ -1,6 +1,7 @@
 use bspline::{HierarchicalSpline, Real};
 use dynamics::matter::{Matter, Quantity};
 use dynamics::region::{Cells, Region, RegionOptions};
+use dynamics::springs::Weights;
 use glam::DVec3;
 
 use super::ForceError;
@@ -70,8 +71,8 @@ impl<T: Real> Ground<'_, T> {
         })
     }
 
-    /// Lays on a region at rest what is painted.
-    fn paint(&self, region: &mut Region<T>) -> Result<(), ForceError> {
+    /// Gives a region the matter that is painted. Springs whose rest lengths are painted pull from then on.
+    pub fn paint(&self, region: &mut Region<T>) -> Result<(), ForceError> {
         let mut matter = matter(self.field, self.radius);
         let [nx, ny, nz] = region.patch().lattice().sample_dims();
         let mut places = Vec::new();
@@ -79,24 +80,28 @@ impl<T: Real> Ground<'_, T> {
             let at = |i: usize| region.sample_position([i / nz / ny, i / nz % ny, i % nz]);
             places.extend((0..nx * ny * nz).map(at));
         }
-        let mut is_painted = false;
+        let mut rest = Quantity::Constant(1.0);
         for (substance, quantity) in [
             (Substance::Stiffness, &mut matter.stiffness),
             (Substance::Mass, &mut matter.mass),
             (Substance::Damping, &mut matter.damping),
+            (Substance::RestLength, &mut rest),
         ] {
             let factors = paint::values(self.layers, substance, &places);
             // Where there is no paint matter stays uniform, and its solver fast.
-            let Some(factors) = factors.filter(|f| f.iter().any(|f| *f != 1.0)) else {
-                continue;
-            };
-            let values = quantity.paint(factors.len()).iter_mut();
-            values.zip(factors).for_each(|(value, factor)| *value *= factor);
-            is_painted = true;
+            if let Some(factors) = factors.filter(|f| f.iter().any(|f| *f != 1.0)) {
+                let values = quantity.paint(factors.len()).iter_mut();
+                values.zip(factors).for_each(|(value, factor)| *value *= factor);
+            }
         }
-        if is_painted {
+        if *region.patch().matter() != matter {
             region.patch_mut().set_matter(matter)?;
         }
+        let scale = match rest {
+            Quantity::Constant(_) => Weights::Constant(T::one()),
+            Quantity::PerSample(all) => Weights::Each(all.into_iter().map(T::from_f64).collect()),
+        };
+        region.patch_mut().springs_mut().rest_mut().scale = scale;
         Ok(())
     }
 

@@ -36,7 +36,7 @@ pub use report::{Arrival, ForceReport, Told};
 pub use stroke::{Extent, ForceStroke};
 pub use target::Target;
 pub use tool::ForceTool;
-pub(crate) use tool::finished;
+pub(crate) use tool::released;
 
 use dynamics::patch::PatchError;
 use dynamics::region::RegionError;

@@ -85,24 +85,24 @@ impl ForceTool<'_> {
         layers: &Layers,
         control: &mut Control,
     ) -> Result<(HierarchicalSpline<T>, Vec<String>), ForceError> {
-        finished(self.begin(field, iso)?.painted(layers)?, control)
+        let mut stroke = self.begin(field, iso)?.painted(layers)?;
+        while !stroke.is_over() {
+            control
+                .step("pulling", stroke.progress())
+                .map_err(ForceError::Cancelled)?;
+            stroke.step()?;
+        }
+        released(stroke)
     }
 }
 
-/// What a stroke leaves when it has done all that it is to do, and what is left to say of it, in sentences.
+/// What a stroke leaves, and what is left to say of it, in sentences.
 ///
 /// # Errors
 /// Any [`ForceError`].
-pub(crate) fn finished<T: Real>(
-    mut stroke: ForceStroke<T>,
-    control: &mut Control,
+pub(crate) fn released<T: Real>(
+    stroke: ForceStroke<T>,
 ) -> Result<(HierarchicalSpline<T>, Vec<String>), ForceError> {
-    while !stroke.is_over() {
-        control
-            .step("pulling", stroke.progress())
-            .map_err(ForceError::Cancelled)?;
-        stroke.step()?;
-    }
     let is_elastic = stroke.is_elastic();
     let (field, report) = stroke.release()?;
     let notes = if is_elastic {
