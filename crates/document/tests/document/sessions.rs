@@ -37,7 +37,7 @@ squirt = { along = [[15, 15, 13.6]], depth = 0.4, radius = 1.2 }
 [[stroke]]
 drill = { along = [[12, 12, 13.6]], by = [0, 0, -6], radius = 1.2 }
 [[stroke]]
-join = { along = [[11.4, 12, 12]], by = [1.2, 0, 0], radius = 1.2 }
+join = { along = [[17, 7, 13.6]], by = [0, 0, 2], radius = 1.2 }
 [[stroke]]
 paint = { layer = "mass", brush = { along = [[8, 12, 13]], radius = 3, value = 3 } }
 [[stroke]]
@@ -56,7 +56,9 @@ pull = { along = [[8, 12, 14.5]], way = [[0, 0, 0.2], [0.2, 0, 0.9], [0.5, 0, 1.
         assert!(
             document
                 .commit(&command.title(), command.to_value(), next)
-                .unwrap()
+                .unwrap(),
+            "{}",
+            command.title()
         );
     }
     for threads in [1, 2, 8] {
@@ -77,7 +79,7 @@ fn painted_rest_lengths_move_what_a_stroke_moves() {
              [[stroke]]\npull = {{ along = [[12, 12, 18]], lift = 0.6, radius = 1.2 }}"
         );
         let left = done(&ball, &script).unwrap();
-        let tip = height(&left, 12.0, 12.0) - 6.0;
+        let tip = height(&left, 12.0, 12.0) - height(&ball, 12.0, 12.0);
         assert!((tip / 0.6 - 1.0).abs() < 0.02, "{value}: {tip}");
         height(&left, 9.5, 12.0) - height(&left, 14.5, 12.0)
     };
