@@ -150,14 +150,15 @@ impl Command {
 
 /// All objects that have a surface, as they lie to the one of a name.
 fn others(state: &State, name: &str) -> Result<Others, CommandError> {
-    let own = state.placement(name)?.inverse();
+    let own = state.placement(name)?;
     let mut others = Others::default();
     for (other, object) in state.objects() {
         if let Some(iso) = object.meta.iso {
-            // Of the object itself no rounding.
-            let map = match other == name {
+            // Of what lies alike no rounding.
+            let placement = state.placement(other)?;
+            let map = match placement == own {
                 true => DAffine3::IDENTITY,
-                false => own * state.placement(other)?,
+                false => own.inverse() * placement,
             };
             let put = others.put(other, &object.field, iso, map);
             put.map_err(|e| CommandError::Script(format!("object {other:?} cannot be used: {e}")))?;
