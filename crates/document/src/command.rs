@@ -122,9 +122,9 @@ impl Command {
                     .ok_or_else(|| CommandError::NoSurface(name.clone()))?;
                 let canvas = Canvas {
                     detail: object.detail(),
-                    field: object.field,
+                    field: object.field.clone(),
                     iso,
-                    layers: object.layers,
+                    layers: object.layers.clone(),
                     others: others(state, name)?,
                     copies: Vec::new(),
                 };
@@ -140,7 +140,7 @@ impl Command {
                     }
                     next = next.with(&copy, state.object(name)?.clone())?;
                 }
-                (object.field, object.layers) = (canvas.field, canvas.layers);
+                object = object.with_shape(canvas.field, canvas.layers);
                 notes = told;
             }
         }

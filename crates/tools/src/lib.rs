@@ -9,6 +9,7 @@ pub mod limits;
 pub mod mix;
 pub mod number;
 pub mod paint;
+pub mod room;
 pub mod scene;
 pub mod session;
 pub mod symmetry;

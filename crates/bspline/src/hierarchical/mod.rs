@@ -22,6 +22,7 @@ mod edit;
 mod evaluate;
 mod functions;
 mod graft;
+mod grown;
 mod grid;
 mod kernel;
 mod lattice;
@@ -43,6 +44,7 @@ pub use brick::{
 pub use difference::{BrickChange, BrickDiff, DiffError};
 pub use edit::{BlockEdit, BrickEdit, Change, LevelEdit};
 pub use functions::{EditError, MAX_LEVELS};
+pub use grown::shifted;
 pub use lattice::Lattice;
 pub use local::{LocalField, LocalFields};
 pub use motion::Motion;

@@ -36,6 +36,7 @@ use write::{Fineness, TOLERANCE, Writer};
 
 use crate::limits::Limits;
 use crate::number::{NonNegative, Point, Positive};
+use crate::room::Face;
 use crate::tool::Others;
 use crate::warp::WarpError;
 
@@ -92,12 +93,14 @@ pub enum GeometricError {
     },
     /// The solid would be cut off.
     #[error(
-        "the solid would leave the box of its field at {at:?}; let the tool end before, or start with more room about the \
-         object"
+        "the solid would leave the box of its field at {at:?}, which cannot grow there: the solid is cut off at that face, or the \
+         box would become too large; let the tool end before"
     )]
     Leaves {
         /// Where.
         at: [f64; 3],
+        /// Through which face.
+        face: Face,
     },
     /// A motion makes no sense.
     #[error(transparent)]

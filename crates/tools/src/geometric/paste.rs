@@ -115,9 +115,10 @@ impl Paste {
         let (clip, _) = others.get(&self.from).map_err(GeometricError::Shape)?;
         let (map, scale) = self.map(b.center());
         let solid = Cuboid::new(b.center(), 0.5 * b.size()).map_err(GeometricError::shape)?;
-        // What a cut rounds off lies a few knots beside the box.
-        let margin = MARGIN * writer.spacing();
-        let blend = self.blend.map_or(margin, |blend| blend.0);
+        let around = MARGIN * writer.spacing();
+        let blend = self.blend.map_or(around, |blend| blend.0);
+        // What a cut rounds off lies a few knots beside the box; elsewhere that would be a moat about what is pasted.
+        let margin = if map == DAffine3::IDENTITY { around } else { 0.0 };
         let to = b.transformed(&map);
         let [kept, reach] =
             [margin, margin + blend].map(|by| Aabb::new(to.min - by, to.max + by));
