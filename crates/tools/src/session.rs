@@ -4,11 +4,11 @@ use bspline::HierarchicalSpline;
 use fitting::Control;
 use serde::{Deserialize, Serialize};
 
+use crate::face::Face;
 use crate::force::{Chisel, Drill, ForceError, ForceTool, Pull};
 use crate::geometric::{Copy, Cut, Geometric, GeometricError, Inflate, Move, Paste, Refine, Simplify, Smooth};
 use crate::limits::{Limits, Mask, Region};
 use crate::paint::Paint;
-use crate::room::Face;
 use crate::symmetry::Symmetry;
 use crate::tool::{Canvas, Tool, ToolError};
 

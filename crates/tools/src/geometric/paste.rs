@@ -15,7 +15,7 @@ use crate::coefficients::{changed, support, with_functions};
 use crate::limits::{Limits, Region};
 use crate::mix::{Faded, Mixed};
 use crate::number::{NonNegative, Point, Positive};
-use crate::tool::Others;
+use crate::others::Others;
 
 /// Keeps a copy of the object, as it is now, under another name. It shares all that does not change.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

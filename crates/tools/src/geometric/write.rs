@@ -7,9 +7,9 @@ use fitting::field::{Aim, FieldFitOptions, FieldFitReport, fit_field_where};
 use glam::DVec3;
 
 use super::GeometricError;
+use crate::face::Face;
 use crate::limits::Limits;
 use crate::number::Positive;
-use crate::room::Face;
 
 /// Tolerance over the finest knot interval where none is asked for.
 pub(super) const TOLERANCE: f64 = 0.02;
