@@ -2,7 +2,7 @@
 //! add and [carry along](warp). A [session] is a row of strokes; each uses one [tool], within [limits]. Haptics are not built yet.
 
 pub mod coefficients;
-pub mod face;
+mod face;
 pub mod fade;
 pub mod force;
 mod formula_solid;
@@ -12,7 +12,7 @@ pub mod mix;
 pub mod number;
 pub mod others;
 pub mod paint;
-pub mod room;
+mod room;
 pub mod scene;
 pub mod session;
 pub mod symmetry;

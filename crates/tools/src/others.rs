@@ -68,7 +68,10 @@ impl Others {
     /// # Errors
     /// A sentence.
     pub fn get(&self, name: &str) -> Result<(Arc<dyn Field>, Aabb), String> {
-        let found = self.0.get(name).map(|other| (other.distance.clone(), other.reach));
+        let found = self
+            .0
+            .get(name)
+            .map(|other| (other.distance.clone(), other.reach));
         found.ok_or_else(|| {
             let known: Vec<_> = self.0.keys().map(String::as_str).collect();
             match known.is_empty() {

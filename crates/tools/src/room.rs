@@ -31,7 +31,8 @@ impl Canvas {
         let [before, behind] = ends;
         let field = self.field.grown(before, behind).ok()?;
         let layers = self.layers.iter();
-        let layers = layers.map(|(substance, layer)| Some((*substance, layer.grown(lattice, before, behind)?)));
+        let layers =
+            layers.map(|(substance, layer)| Some((*substance, layer.grown(lattice, before, behind)?)));
         Some(Self {
             layers: layers.collect::<Option<_>>()?,
             field,
@@ -46,7 +47,9 @@ fn is_cut(field: &HierarchicalSpline<f32>, iso: f64, face: Face) -> bool {
     let mut part = Aabb::new(DVec3::ZERO, lattice.extent());
     let at = if face.is_last { part.max } else { part.min }[face.axis];
     (part.min[face.axis], part.max[face.axis]) = (at, at);
-    let cells = lattice.cells_at(field.level_count() - 1).map(|n| n.clamp(1, ACROSS));
+    let cells = lattice
+        .cells_at(field.level_count() - 1)
+        .map(|n| n.clamp(1, ACROSS));
     let mut frame = Frame::over(&part, cells);
     frame.world_from_grid = lattice.world_from_lattice * frame.world_from_grid;
     let count = std::array::from_fn(|a| if a == face.axis { 1 } else { cells[a] as usize + 1 });

@@ -6,7 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::face::Face;
 use crate::force::{Chisel, Drill, ForceError, ForceTool, Pull};
-use crate::geometric::{Copy, Cut, Geometric, GeometricError, Inflate, Move, Paste, Refine, Simplify, Smooth};
+use crate::geometric::{
+    Copy, Cut, Geometric, GeometricError, Inflate, Move, Paste, Refine, Simplify, Smooth,
+};
 use crate::limits::{Limits, Mask, Region};
 use crate::paint::Paint;
 use crate::symmetry::Symmetry;

@@ -27,13 +27,6 @@ impl Clay {
             .json("sculpt clay.isoclay --script session.toml --object block")
     }
 
-    fn hash(&self, object: &str) -> String {
-        let told = self.bench.json("history clay.isoclay");
-        let edits = self.bench.json("replay clay.isoclay");
-        assert!(told.is_object());
-        edits["field_sha256"][object].as_str().unwrap().to_string()
-    }
-
     fn export(&self, object: &str) {
         let export = format!("export clay.isoclay --object {object} -o now.iclay");
         std::fs::remove_file(self.bench.path("now.iclay")).ok();
@@ -43,22 +36,33 @@ impl Clay {
     /// Values of the object `block` at places.
     fn values(&self, places: &[DVec3]) -> Vec<f64> {
         self.export("block");
-        let lines: String = places.iter().map(|p| format!("{} {} {}\n", p.x, p.y, p.z)).collect();
+        let lines: String = places
+            .iter()
+            .map(|p| format!("{} {} {}\n", p.x, p.y, p.z))
+            .collect();
         self.bench.write("places.xyz", lines);
         let told = self.bench.run("eval now.iclay --points places.xyz").stdout;
         let rows = told.lines().skip(1);
-        rows.map(|row| row.split(',').nth(3).unwrap().parse().unwrap()).collect()
+        rows.map(|row| row.split(',').nth(3).unwrap().parse().unwrap())
+            .collect()
     }
 
     /// Heights at which the solid ends above places, between z = 1 and 5.
     fn heights(&self, places: &[[f64; 2]]) -> Vec<f64> {
         const STEPS: usize = 400;
         let z = |n: usize| 1.0 + 4.0 * n as f64 / STEPS as f64;
-        let column = |[x, y]: &[f64; 2]| (0..=STEPS).map(move |n| DVec3::new(*x, *y, z(n))).collect::<Vec<_>>();
+        let column = |[x, y]: &[f64; 2]| {
+            (0..=STEPS)
+                .map(move |n| DVec3::new(*x, *y, z(n)))
+                .collect::<Vec<_>>()
+        };
         let all: Vec<DVec3> = places.iter().flat_map(column).collect();
         let values = self.values(&all);
         let end = |column: &[f64]| {
-            let n = column.windows(2).position(|v| v[0] > 0.0 && v[1] <= 0.0).expect("a surface");
+            let n = column
+                .windows(2)
+                .position(|v| v[0] > 0.0 && v[1] <= 0.0)
+                .expect("a surface");
             z(n) + (z(1) - z(0)) * column[n] / (column[n] - column[n + 1])
         };
         values.chunks_exact(STEPS + 1).map(end).collect()
@@ -73,7 +77,8 @@ impl Clay {
     /// All edits give the same again, and undone they leave the first state.
     fn ends(&self) {
         for threads in [1, 8] {
-            self.bench.json(&format!("replay clay.isoclay --threads {threads}"));
+            self.bench
+                .json(&format!("replay clay.isoclay --threads {threads}"));
         }
         let undone = self.bench.json("undo clay.isoclay 99");
         assert_eq!(undone["state_sha256"].as_str().unwrap(), self.first);
@@ -92,19 +97,37 @@ fn volume(mesh: &Mesh) -> f64 {
 fn brushes_inflate_and_smooth_what_they_pass_over() {
     let clay = Clay::new();
     clay.sculpt(&["inflate = { along = [[0, 0, 3]], radius = 4, by = 0.5 }"]);
-    let [middle, beside] = clay.heights(&[[0.0, 0.0], [4.6, 0.0]])[..] else { unreachable!() };
-    assert!((middle - 3.5).abs() < 0.01 && (beside - 3.0).abs() < 0.01, "{middle}, {beside}");
+    let [middle, beside] = clay.heights(&[[0.0, 0.0], [4.6, 0.0]])[..] else {
+        unreachable!()
+    };
+    assert!(
+        (middle - 3.5).abs() < 0.01 && (beside - 3.0).abs() < 0.01,
+        "{middle}, {beside}"
+    );
     let lifted = volume(&clay.mesh());
     clay.sculpt(&["inflate = { along = [[0, 0, 3.5]], radius = 4, by = -0.5 }"]);
-    let [middle] = clay.heights(&[[0.0, 0.0]])[..] else { unreachable!() };
-    assert!((middle - 3.0).abs() < 0.03 && volume(&clay.mesh()) < lifted - 1.0, "{middle}");
+    let [middle] = clay.heights(&[[0.0, 0.0]])[..] else {
+        unreachable!()
+    };
+    assert!(
+        (middle - 3.0).abs() < 0.03 && volume(&clay.mesh()) < lifted - 1.0,
+        "{middle}"
+    );
     // Bumps are evened out, and a flat place beside them stays flat.
-    let bump = "add = { shape = { sphere = { radius = 0.8 } }, along = [[-3, -2, 3], [-3, 2, 3]], each = true }";
+    let bump =
+        "add = { shape = { sphere = { radius = 0.8 } }, along = [[-3, -2, 3], [-3, 2, 3]], each = true }";
     clay.sculpt(&[bump]);
-    let [before] = clay.heights(&[[-3.0, 2.0]])[..] else { unreachable!() };
+    let [before] = clay.heights(&[[-3.0, 2.0]])[..] else {
+        unreachable!()
+    };
     let done = clay.sculpt(&["smooth = { along = [[-3, -3, 3], [-3, 3, 3]], radius = 4, level = 2 }"]);
-    let [bump, flat] = clay.heights(&[[-3.0, 2.0], [3.0, -3.0]])[..] else { unreachable!() };
-    assert!((before - 3.8).abs() < 0.02 && bump < 3.4 && (flat - 3.0).abs() < 0.01, "{before}, {bump}, {flat}");
+    let [bump, flat] = clay.heights(&[[-3.0, 2.0], [3.0, -3.0]])[..] else {
+        unreachable!()
+    };
+    assert!(
+        (before - 3.8).abs() < 0.02 && bump < 3.4 && (flat - 3.0).abs() < 0.01,
+        "{before}, {bump}, {flat}"
+    );
     assert_eq!(number(&done, "done"), 4.0);
     clay.ends();
 }
@@ -121,14 +144,25 @@ fn parts_are_copied_cut_and_pasted() {
     clay.sculpt(&[&format!("cut = {{ {region}, to = \"clip\" }}")]);
     let left = volume(&clay.mesh());
     // The block ends at z = 3.
-    assert!((full - left - 4.0 * 6.0 * 3.0).abs() < 0.01 * 72.0, "{full} less {left}");
+    assert!(
+        (full - left - 4.0 * 6.0 * 3.0).abs() < 0.01 * 72.0,
+        "{full} less {left}"
+    );
     let back = clay.sculpt(&[&format!("paste = {{ from = \"clip\", {region} }}")]);
-    assert_eq!(back["field_sha256"]["block"], whole, "pasted where it was, it is as it was");
+    assert_eq!(
+        back["field_sha256"]["block"], whole,
+        "pasted where it was, it is as it was"
+    );
     // The ball with what is about it, elsewhere.
     let there = "paste = { from = \"spare\", region = { min = [-4, -2, 2], max = [0, 2, 5] }, by = [5, 0, 0], blend = 0.5 }";
     clay.sculpt(&[there]);
-    let [here, there] = clay.heights(&[[-2.0, 0.0], [3.0, 0.0]])[..] else { unreachable!() };
-    assert!((here - 4.5).abs() < 0.02 && (there - here).abs() < 0.01, "{here}, {there}");
+    let [here, there] = clay.heights(&[[-2.0, 0.0], [3.0, 0.0]])[..] else {
+        unreachable!()
+    };
+    assert!(
+        (here - 4.5).abs() < 0.02 && (there - here).abs() < 0.01,
+        "{here}, {there}"
+    );
     clay.ends();
 }
 
@@ -145,11 +179,23 @@ fn knots_come_and_go_without_a_move_of_the_surface() {
     let (before, few) = (clay.values(&places), count(&clay));
     clay.sculpt(&["refine = { along = [[0, 0, 3]], radius = 2 }"]);
     let (finer, many) = (clay.values(&places), count(&clay));
-    let off = |a: &[f64], b: &[f64]| a.iter().zip(b).fold(0.0f64, |most, (a, b)| most.max((a - b).abs()));
-    assert!(many > few + 100.0 && off(&before, &finer) < 1e-5, "{few}, {many}, {}", off(&before, &finer));
+    let off = |a: &[f64], b: &[f64]| {
+        a.iter()
+            .zip(b)
+            .fold(0.0f64, |most, (a, b)| most.max((a - b).abs()))
+    };
+    assert!(
+        many > few + 100.0 && off(&before, &finer) < 1e-5,
+        "{few}, {many}, {}",
+        off(&before, &finer)
+    );
     clay.sculpt(&["simplify = { along = [[0, 0, 3]], radius = 3, tolerance = 0.01 }"]);
     let (slim, least) = (clay.values(&places), count(&clay));
-    assert!(least <= few && off(&before, &slim) < 0.01, "{few}, {least}, {}", off(&before, &slim));
+    assert!(
+        least <= few && off(&before, &slim) < 0.01,
+        "{few}, {least}, {}",
+        off(&before, &slim)
+    );
     clay.ends();
 }
 
@@ -162,7 +208,13 @@ fn strokes_happen_on_both_sides_and_on_coarse_levels_alone() {
         &format!("{both}\ninflate = {{ along = [[-4, -4, 3]], radius = 2, by = -0.4 }}"),
     ]);
     let places: Vec<DVec3> = (0..400)
-        .map(|n| DVec3::new(0.5 + 0.0125 * f64::from(n), -4.5 + 0.02 * f64::from(n), 2.0 + 0.005 * f64::from(n)))
+        .map(|n| {
+            DVec3::new(
+                0.5 + 0.0125 * f64::from(n),
+                -4.5 + 0.02 * f64::from(n),
+                2.0 + 0.005 * f64::from(n),
+            )
+        })
         .collect();
     let mirrored: Vec<DVec3> = places.iter().map(|p| *p * DVec3::new(-1.0, 1.0, 1.0)).collect();
     let [here, there] = [&places, &mirrored].map(|p| clay.values(p));
@@ -172,9 +224,13 @@ fn strokes_happen_on_both_sides_and_on_coarse_levels_alone() {
     // A fine groove stays while what it lies on is lifted by less than its depth.
     let groove = "carve = { shape = { sphere = { radius = 0.4 } }, along = [[-1.5, -3, 3], [-1.5, 3, 3]] }";
     clay.sculpt(&[groove]);
-    let [groove, beside] = clay.heights(&[[-1.5, 0.0], [0.0, 0.0]])[..] else { unreachable!() };
+    let [groove, beside] = clay.heights(&[[-1.5, 0.0], [0.0, 0.0]])[..] else {
+        unreachable!()
+    };
     clay.sculpt(&["coarse = 0\ninflate = { along = [[-1, 0, 3]], radius = 4, by = 0.15 }"]);
-    let [lifted, level] = clay.heights(&[[-1.5, 0.0], [0.0, 0.0]])[..] else { unreachable!() };
+    let [lifted, level] = clay.heights(&[[-1.5, 0.0], [0.0, 0.0]])[..] else {
+        unreachable!()
+    };
     assert!((level - beside - 0.15).abs() < 0.02, "{beside} to {level}");
     assert!((level - lifted) > 0.8 * (beside - groove), "{groove} to {lifted}");
     clay.ends();
@@ -193,7 +249,13 @@ fn a_box_grows_where_a_stroke_needs_more_room() {
     let (small, before) = (box_of(&clay), volume(&clay.mesh()));
     let long = "add = { shape = { capsule = { axis = [1, 0, 0], radius = 1.5, height = 4 } }, along = [[4, 0, 0], [16, 0, 0]] }";
     let done = clay.sculpt(&[long, "pull = { along = [[6, 3, 0]], lift = 0.5, radius = 0.6 }"]);
-    assert!(done["notes"][0].as_str().unwrap().contains("box of the field has grown"), "{done}");
+    assert!(
+        done["notes"][0]
+            .as_str()
+            .unwrap()
+            .contains("box of the field has grown"),
+        "{done}"
+    );
     assert_ne!(box_of(&clay), small);
     let mesh = clay.mesh();
     let end = mesh.positions.iter().fold(0.0f64, |most, p| most.max(p.x));
@@ -207,7 +269,14 @@ fn a_box_grows_where_a_stroke_needs_more_room() {
         "symmetry = { at = [0, 0, 0], normal = [0, 1, 0] }\nadd = { shape = { sphere = { radius = 2 } }, along = [[0, 4, 0], [0, 13, 0]] }",
         "move = { motion = { grab = { along = [[-6, 0, 0], [-16, 0, 0]], radius = 6, rigid = 1 } } }",
     ]);
-    let (low, high) = clay.mesh().positions.iter().fold((DVec3::ZERO, DVec3::ZERO), |(a, b), p| (a.min(*p), b.max(*p)));
-    assert!((high.y - 15.0).abs() < 0.02 && (low.y + 15.0).abs() < 0.02 && (low.x + 16.0).abs() < 0.1, "{low} {high}");
+    let (low, high) = clay
+        .mesh()
+        .positions
+        .iter()
+        .fold((DVec3::ZERO, DVec3::ZERO), |(a, b), p| (a.min(*p), b.max(*p)));
+    assert!(
+        (high.y - 15.0).abs() < 0.02 && (low.y + 15.0).abs() < 0.02 && (low.x + 16.0).abs() < 0.1,
+        "{low} {high}"
+    );
     clay.ends();
 }

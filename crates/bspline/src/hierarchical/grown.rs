@@ -19,7 +19,10 @@ impl Lattice {
 
     /// Cells before and behind this lattice by which `larger` is the same one [grown](Self::grown).
     pub fn growth_to(&self, larger: &Self) -> Option<[[u32; 3]; 2]> {
-        let start = larger.world_from_lattice.inverse().transform_point3(self.world_from_lattice.translation);
+        let start = larger
+            .world_from_lattice
+            .inverse()
+            .transform_point3(self.world_from_lattice.translation);
         let before = start.round();
         let room = DVec3::from_array(larger.cells.map(f64::from)) - before - self.extent();
         let is_grown = self.world_from_lattice.matrix3 == larger.world_from_lattice.matrix3
@@ -88,5 +91,7 @@ fn put<T: Real>(level: &mut BTreeMap<BrickKey, DenseCorrections<T>>, function: [
 
 fn packed<T: Real>(level: BTreeMap<BrickKey, DenseCorrections<T>>) -> LevelCorrections<T> {
     let bricks = level.into_iter();
-    bricks.map(|(key, functions)| (key, Arc::new(functions.pack()))).collect()
+    bricks
+        .map(|(key, functions)| (key, Arc::new(functions.pack())))
+        .collect()
 }

@@ -55,7 +55,8 @@ pub fn block(
     let cells = (outer / step).ceil().max(DVec3::ONE);
     let edge = (EDGE * spacing).min(MOST_EDGE * size.min_element());
     let inner = Cuboid::new(DVec3::ZERO, 0.5 * size - edge).map_err(GeometricError::shape)?;
-    let solid = Csg::sum(vec![(1.0, Arc::new(inner) as Arc<dyn Field>)], edge).map_err(GeometricError::shape)?;
+    let solid =
+        Csg::sum(vec![(1.0, Arc::new(inner) as Arc<dyn Field>)], edge).map_err(GeometricError::shape)?;
     let lattice = Lattice {
         world_from_lattice: DAffine3::from_scale_rotation_translation(
             DVec3::splat(step),

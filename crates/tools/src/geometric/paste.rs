@@ -120,8 +120,7 @@ impl Paste {
         // What a cut rounds off lies a few knots beside the box; elsewhere that would be a moat about what is pasted.
         let margin = if map == DAffine3::IDENTITY { around } else { 0.0 };
         let to = b.transformed(&map);
-        let [kept, reach] =
-            [margin, margin + blend].map(|by| Aabb::new(to.min - by, to.max + by));
+        let [kept, reach] = [margin, margin + blend].map(|by| Aabb::new(to.min - by, to.max + by));
         let within = writer.within(&reach)?;
         let twin = others.own(&self.from);
         let twin = twin.filter(|(_, twin_iso)| map == DAffine3::IDENTITY && *twin_iso == iso);

@@ -1,6 +1,4 @@
-use bspline::hierarchical::{
-    BlockEdit, Change, EditError, Lattice, LevelCorrections, MAX_LEVELS, shifted,
-};
+use bspline::hierarchical::{BlockEdit, Change, EditError, Lattice, LevelCorrections, MAX_LEVELS, shifted};
 use bspline::{Aabb, HierarchicalSpline};
 use glam::{DAffine3, DMat3, DVec3};
 

@@ -177,7 +177,10 @@ fn a_block_is_as_large_as_asked() {
         let round = PI * r * r * inner.element_sum() + 4.0 / 3.0 * PI * r.powi(3);
         let (found, whole) = (check.volume, inner.element_product() + faces + round);
         assert!((found - whole).abs() < 0.01 * whole, "{size}: {found} of {whole}");
-        let out = mesh.positions.iter().map(|p| (p.abs() - 0.5 * size).max_element());
+        let out = mesh
+            .positions
+            .iter()
+            .map(|p| (p.abs() - 0.5 * size).max_element());
         let lip = out.fold(0.0, f64::max);
         assert!(lip < 0.06 * spacing, "{size}: a lip of {lip}");
     }

@@ -56,7 +56,11 @@ fn cut_and_pasted_in_place_nothing_has_changed() {
         &format!("paste = {{ from = \"clip\", {region} }}"),
     );
     assert_ne!(left.field.sha256(), field.sha256());
-    assert_eq!(back.sha256(), field.sha256(), "the coefficients themselves come back");
+    assert_eq!(
+        back.sha256(),
+        field.sha256(),
+        "the coefficients themselves come back"
+    );
     // What was done beside it in between stays, and so does what a mask keeps.
     let ball = "add = { shape = { sphere = { radius = 1.5 } }, along = [[17, 12, 12]] }";
     let (more, _) = stroke(ball)

@@ -292,19 +292,48 @@ mod tests {
         };
         let tag = |n: usize| 10 + n as u8;
         let text: String = (rows.iter().enumerate())
-            .map(|(n, r)| format!("{} {} {} {} {} {} {}\n", r[0], r[1], r[2], r[3], r[4], r[5], tag(n)))
+            .map(|(n, r)| {
+                format!(
+                    "{} {} {} {} {} {} {}\n",
+                    r[0],
+                    r[1],
+                    r[2],
+                    r[3],
+                    r[4],
+                    r[5],
+                    tag(n)
+                )
+            })
             .collect();
         let binary: Vec<u8> = (rows.iter().enumerate())
-            .flat_map(|(n, r)| r.iter().flat_map(|v| v.to_le_bytes()).chain([tag(n)]).collect::<Vec<_>>())
+            .flat_map(|(n, r)| {
+                r.iter()
+                    .flat_map(|v| v.to_le_bytes())
+                    .chain([tag(n)])
+                    .collect::<Vec<_>>()
+            })
             .collect();
         let columns: Vec<u8> = (0..6)
             .flat_map(|c| rows.iter().flat_map(move |r| r[c].to_le_bytes()))
             .chain((0..3).map(tag))
             .collect();
         let packed = crate::points::pcd::lzf::stored(&columns);
-        let sizes = [packed.len() as u32, columns.len() as u32].map(u32::to_le_bytes).concat();
+        let sizes = [packed.len() as u32, columns.len() as u32]
+            .map(u32::to_le_bytes)
+            .concat();
         let obj: String = (rows.iter().enumerate())
-            .map(|(n, r)| format!("v {} {} {} {}\nvn {} {} {}\n", r[0], r[1], r[2], tag(n), r[3], r[4], r[5]))
+            .map(|(n, r)| {
+                format!(
+                    "v {} {} {} {}\nvn {} {} {}\n",
+                    r[0],
+                    r[1],
+                    r[2],
+                    tag(n),
+                    r[3],
+                    r[4],
+                    r[5]
+                )
+            })
             .collect();
         vec![
             ("ascii.pcd", pcd("ascii", text.into_bytes())),
@@ -322,7 +351,11 @@ mod tests {
             let places: Vec<_> = cloud.positions.iter().map(|p| p.to_array()).collect();
             let expected = [[7.0, 0.25, -1.5], [7.0, 8.0, 9.5], [9.0, 0.25, -1.5]];
             assert_eq!(places, expected, "{name}");
-            assert_eq!(cloud.normals.unwrap(), [DVec3::Z, DVec3::NEG_Z, DVec3::Z], "{name}");
+            assert_eq!(
+                cloud.normals.unwrap(),
+                [DVec3::Z, DVec3::NEG_Z, DVec3::Z],
+                "{name}"
+            );
             assert!(new.windows(4).any(|w| w == b"kept"), "{name}");
             let tags: Vec<u8> = match name {
                 "ascii.pcd" | "cloud.obj" => String::from_utf8(new)
@@ -336,16 +369,32 @@ mod tests {
                     .take(3)
                     .rev()
                     .collect(),
-                "binary.pcd" => new[new.len() - 75..].iter().skip(24).step_by(25).copied().collect(),
+                "binary.pcd" => new[new.len() - 75..]
+                    .iter()
+                    .skip(24)
+                    .step_by(25)
+                    .copied()
+                    .collect(),
                 _ => new[new.len() - 3..].to_vec(),
             };
             assert_eq!(tags, [11, 12, 12], "{name}");
         }
         // A raster keeps its shape, or is refused.
         let (_, raster) = &others()[1];
-        let raster = String::from_utf8_lossy(&raster[..raster.len() - 75]).replace("WIDTH 3\nHEIGHT 1", "WIDTH 1\nHEIGHT 3");
-        let rows = [raster.into_bytes(), others()[1].1[others()[1].1.len() - 75..].to_vec()].concat();
-        let e = super::pcd::revised(&rows, &CloudChanges { removed: vec![0], ..CloudChanges::default() });
+        let raster = String::from_utf8_lossy(&raster[..raster.len() - 75])
+            .replace("WIDTH 3\nHEIGHT 1", "WIDTH 1\nHEIGHT 3");
+        let rows = [
+            raster.into_bytes(),
+            others()[1].1[others()[1].1.len() - 75..].to_vec(),
+        ]
+        .concat();
+        let e = super::pcd::revised(
+            &rows,
+            &CloudChanges {
+                removed: vec![0],
+                ..CloudChanges::default()
+            },
+        );
         assert!(e.unwrap_err().to_string().contains("raster"));
     }
 
@@ -354,7 +403,12 @@ mod tests {
     #[test]
     fn las_keeps_records_attributes_and_what_is_withheld() {
         let cloud = points::PointCloud {
-            positions: vec![DVec3::new(1.5, 2.0, 3.0), DVec3::new(4.0, 5.0, 6.0), DVec3::new(7.0, 8.0, 9.5), DVec3::ONE],
+            positions: vec![
+                DVec3::new(1.5, 2.0, 3.0),
+                DVec3::new(4.0, 5.0, 6.0),
+                DVec3::new(7.0, 8.0, 9.5),
+                DVec3::ONE,
+            ],
             ..Default::default()
         };
         let directory = tempfile::tempdir().unwrap();
@@ -371,11 +425,20 @@ mod tests {
         fs::write(&path, &bytes).unwrap();
         assert_eq!(revised("a.las", &bytes, &CloudChanges::default()).0, bytes);
         let (new, cloud) = revised("a.las", &bytes, &changes());
-        for (found, expected) in cloud.positions.iter().zip([[7.0, 0.25, -1.5], [7.0, 8.0, 9.5], [9.0, 0.25, -1.5]]) {
+        for (found, expected) in
+            cloud
+                .positions
+                .iter()
+                .zip([[7.0, 0.25, -1.5], [7.0, 8.0, 9.5], [9.0, 0.25, -1.5]])
+        {
             assert!(found.distance(expected.into()) < 1e-6, "{found}");
         }
         let points: Vec<&[u8]> = new[at..].chunks_exact(20).take(4).collect();
-        assert_eq!(points[1], &bytes[at + 40..at + 60], "what was not edited stays to the bit");
+        assert_eq!(
+            points[1],
+            &bytes[at + 40..at + 60],
+            "what was not edited stays to the bit"
+        );
         assert_eq!(points[2], &bytes[at + 60..at + 80], "what is withheld stays");
         let told: Vec<u8> = points.iter().map(|p| p[12]).collect();
         assert_eq!(told, [51, 52, 53, 52]);
@@ -385,7 +448,12 @@ mod tests {
         assert!((high - 9.0).abs() < 1e-6 && new.ends_with(b"what follows the points"));
         // Compressed points are refused.
         points::save(&directory.path().join("a.laz"), &cloud).unwrap();
-        let e = save_revised(&directory.path().join("a.laz"), &changes(), &directory.path().join("b.laz"), &ReadLimits::default());
+        let e = save_revised(
+            &directory.path().join("a.laz"),
+            &changes(),
+            &directory.path().join("b.laz"),
+            &ReadLimits::default(),
+        );
         assert!(e.unwrap_err().to_string().contains("unpack the scan to .las"));
     }
 

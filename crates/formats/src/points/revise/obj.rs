@@ -17,13 +17,27 @@ pub fn revised(bytes: &[u8], changes: &CloudChanges) -> Result<Vec<u8>, Fault> {
         let mut words = line.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty());
         words.next().unwrap_or_default().to_vec()
     };
-    let of = |name: &[u8]| lines.iter().copied().filter(|line| key(line) == name).collect::<Vec<_>>();
+    let of = |name: &[u8]| {
+        lines
+            .iter()
+            .copied()
+            .filter(|line| key(line) == name)
+            .collect::<Vec<_>>()
+    };
     let (points, normals) = (of(b"v"), of(b"vn"));
     if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
-        return not("the text of the scan", "UTF-16", "write it as UTF-8, or convert the scan by isoclay convert, and fit that");
+        return not(
+            "the text of the scan",
+            "UTF-16",
+            "write it as UTF-8, or convert the scan by isoclay convert, and fit that",
+        );
     }
     if lines.iter().any(|line| line.trim_ascii_end().ends_with(b"\\")) {
-        return not("a line of the scan", "one that goes on after \\", "convert the scan by isoclay convert and fit that");
+        return not(
+            "a line of the scan",
+            "one that goes on after \\",
+            "convert the scan by isoclay convert and fit that",
+        );
     }
     let counts_change = !changes.removed.is_empty() || !changes.added.is_empty();
     let names_points = |line: &[u8]| matches!(&key(line)[..], b"f" | b"p" | b"l");

@@ -7,7 +7,11 @@ use crate::{Fault, ReadLimits};
 /// The bytes of the file with its changes.
 pub fn revised(bytes: &[u8], changes: &CloudChanges) -> Result<Vec<u8>, Fault> {
     let header = header::read(bytes)?;
-    if header.columns.iter().any(|c| !matches!(c.kind, Scalar::F4 | Scalar::F8)) {
+    if header
+        .columns
+        .iter()
+        .any(|c| !matches!(c.kind, Scalar::F4 | Scalar::F8))
+    {
         return Err(Fault::Value {
             what: "the type of the coordinates",
             value: "a whole number".into(),
@@ -33,7 +37,12 @@ pub fn revised(bytes: &[u8], changes: &CloudChanges) -> Result<Vec<u8>, Fault> {
         Encoding::Compressed => {
             let whole = unpack(body, &header, &mut Budget::new(&ReadLimits::default()))?;
             let mut new = Vec::with_capacity(whole.len());
-            rows(&turned(&whole, &header, header.points as usize, false), &header, changes, &mut new);
+            rows(
+                &turned(&whole, &header, header.points as usize, false),
+                &header,
+                changes,
+                &mut new,
+            );
             let packed = lzf::stored(&turned(&new, &header, count, true));
             for size in [packed.len(), new.len()] {
                 out.extend_from_slice(&(size as u32).to_le_bytes());
