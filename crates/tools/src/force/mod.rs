@@ -13,6 +13,7 @@ mod chisel;
 mod drill;
 mod filter;
 mod ground;
+mod hand;
 mod path;
 mod pull;
 pub mod quadrature;
@@ -35,6 +36,7 @@ pub use report::{Arrival, ForceReport, Told};
 pub use stroke::{Extent, ForceStroke};
 pub use target::{Span, Target};
 pub use tool::ForceTool;
+pub(crate) use tool::released;
 
 use dynamics::patch::PatchError;
 use dynamics::region::RegionError;

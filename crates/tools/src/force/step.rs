@@ -15,7 +15,7 @@ use super::target::Span;
 use super::{ForceError, Rule, Solid, system};
 
 /// Radii that the goal of the longest path advances in a step.
-const ADVANCE: f64 = 0.3;
+pub(super) const ADVANCE: f64 = 0.3;
 /// Share of what is missing by which rest lengths follow in a step of clay, as an exponent: `λΔt`.
 const FLOW: f64 = 0.1;
 /// Steps, in `1/λ`, of elastic solids.
@@ -43,6 +43,7 @@ impl<T: Real> ForceStroke<T> {
     /// # Errors
     /// [`ForceError`]; the stroke cannot go on then.
     pub fn step(&mut self) -> Result<Told, ForceError> {
+        self.chase()?;
         self.advance()?;
         let goals = self.goals();
         let bearings = self.bearings(&goals)?;
@@ -125,7 +126,14 @@ impl<T: Real> ForceStroke<T> {
     /// Arc lengths to which the surface is to go in this step.
     fn goals(&mut self) -> Vec<f64> {
         let share = self.share();
-        let (mut all, steps) = (true, self.longest / (ADVANCE * self.radius));
+        let mut steps = self.longest / (ADVANCE * self.radius);
+        let mut all = true;
+        if let Some(hand) = &self.hand
+            && let Some(is_there) = hand.drags()
+        {
+            // Its paths themselves grow no faster.
+            (steps, all) = (0.0, is_there);
+        }
         let goals = self.acting.iter_mut().map(|a| {
             a.age += 1;
             let part = (a.age as f64 / steps).min(1.0);
@@ -243,7 +251,7 @@ impl<T: Real> ForceStroke<T> {
         for acting in &self.acting {
             let target = &self.targets[acting.index];
             force += acting.force;
-            let share = acting.crossing.map_or(1.0, |s| s / target.path.length());
+            let share = acting.crossing.map_or(1.0, |s| 1.0 + self.ahead(target, s));
             (least, most) = (least.min(share), most.max(share));
             if !target.ends_early {
                 self.report.overshoot = self.report.overshoot.max(share - 1.0);
