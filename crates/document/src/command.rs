@@ -125,6 +125,7 @@ impl Command {
                     field: object.field,
                     iso,
                     layers: object.layers,
+                    holds: object.properties.holds,
                     others: others(state, name)?,
                     copies: Vec::new(),
                 };
@@ -141,6 +142,7 @@ impl Command {
                     next = next.with(&copy, state.object(name)?.clone())?;
                 }
                 (object.field, object.layers) = (canvas.field, canvas.layers);
+                object.properties.holds = canvas.holds;
                 notes = told;
             }
         }

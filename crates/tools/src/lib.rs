@@ -2,9 +2,11 @@
 //! add and [carry along](warp). A [session] is a row of strokes; each uses one [tool], within [limits]. Haptics are not built yet.
 
 pub mod coefficients;
+pub mod curve;
 pub mod fade;
 pub mod force;
 pub mod geometric;
+pub mod hold;
 pub mod limits;
 pub mod mix;
 pub mod number;

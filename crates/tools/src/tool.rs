@@ -9,10 +9,11 @@ use fitting::field::FieldFitReport;
 use fitting::{Control, FitError};
 use glam::DAffine3;
 
-use crate::force::{ForceError, ForceTool};
+use crate::force::{ForceError, ForceTool, Holding};
 use crate::geometric::{
     Copy, Cut, Geometric, GeometricError, Inflate, Move, Operation, Paste, Refine, Simplify, Smooth,
 };
+use crate::hold::{Free, Held, Hold};
 use crate::limits::Limits;
 use crate::paint::{Layer, Layers, Paint, PaintError};
 
@@ -27,6 +28,8 @@ pub struct Canvas {
     pub detail: usize,
     /// What is painted on it.
     pub layers: Layers,
+    /// Its constraints.
+    pub holds: Vec<Held>,
     /// Objects that a tool may name.
     pub others: Others,
     /// Names under which the object as it was before is to be kept.
@@ -113,6 +116,10 @@ pub enum Tool<'a> {
     Simplify(&'a Simplify),
     /// Paints matter or touch.
     Paint(&'a Paint),
+    /// Constrains.
+    Hold(&'a Hold),
+    /// Takes constraints off.
+    Free(&'a Free),
 }
 
 /// Why a tool cannot be used.
@@ -145,11 +152,11 @@ impl ToolError {
 
 impl Tool<'_> {
     /// Names of all tools, as sessions write them.
-    pub const NAMES: [&'static str; 16] = {
+    pub const NAMES: [&'static str; 18] = {
         let [pull, chisel, squirt, drill, join] = ForceTool::NAMES;
         [
             "carve", "add", pull, chisel, squirt, drill, join, "move", "smooth", "inflate", "copy", "cut",
-            "paste", "refine", "simplify", "paint",
+            "paste", "refine", "simplify", "paint", "hold", "free",
         ]
     };
 
@@ -168,6 +175,8 @@ impl Tool<'_> {
             Self::Refine(_) => "refine",
             Self::Simplify(_) => "simplify",
             Self::Paint(_) => "paint",
+            Self::Hold(_) => "hold",
+            Self::Free(_) => "free",
         }
     }
 
@@ -206,9 +215,22 @@ impl Tool<'_> {
                 return Ok((canvas, Vec::new()));
             }
             Self::Force(tool) => {
-                let (field, told) = tool.apply(old, *iso, &canvas.layers, control)?;
+                let holding = Holding {
+                    iso: *iso,
+                    holds: canvas.holds.clone(),
+                    limits: limits.clone(),
+                };
+                let (field, told) = tool.apply(old, *iso, &canvas.layers, &holding, control)?;
                 let field = limits.kept(old, &field);
                 return Ok((Canvas { field, ..canvas }, told));
+            }
+            Self::Hold(hold) => {
+                let holds = hold.joined(old, *iso, &canvas.holds).map_err(ToolError::Stroke)?;
+                return Ok((Canvas { holds, ..canvas }, Vec::new()));
+            }
+            Self::Free(free) => {
+                let holds = free.left(&canvas.holds).map_err(ToolError::Stroke)?;
+                return Ok((Canvas { holds, ..canvas }, Vec::new()));
             }
             Self::Copy(copy) => {
                 copies.push(copy.to.clone());

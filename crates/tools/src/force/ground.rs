@@ -4,6 +4,7 @@ use dynamics::region::{Cells, Region, RegionOptions};
 use glam::DVec3;
 
 use super::ForceError;
+use super::holding::Holding;
 use super::target::Target;
 use crate::paint::{self, Layers, Substance};
 
@@ -15,6 +16,8 @@ const SAMPLES_PER_CELL: f64 = 4.0 / 3.0;
 const ROOM: f64 = 4.0;
 /// Knot intervals that the rim takes from a region.
 const RIM: f64 = 0.58;
+/// Levels by which a region may be finer than its tool asks for, where limits leave little room.
+const FINER: usize = 2;
 /// Mass and damping over `K/(λr)²` and `K/(λr²)`.
 const MASS: f64 = 0.1;
 const DAMPING: f64 = 1.0;
@@ -25,17 +28,30 @@ pub struct Ground<'a, T> {
     pub field: &'a HierarchicalSpline<T>,
     /// What is painted on it.
     pub layers: &'a Layers,
+    /// What may not move.
+    pub holding: &'a Holding,
     pub radius: f64,
 }
 
 impl<T: Real> Ground<'_, T> {
     /// A region about paths, at rest, of matter that moves as wide as the tool is.
     pub fn cut(&self, targets: &[&Target]) -> Result<Region<T>, ForceError> {
-        let level = level(self.field, self.radius)?;
-        let cells = about(self.field, level, targets, self.radius)?;
-        let options = RegionOptions::of(self.field, level);
         let mut matter = matter(self.field, self.radius);
-        let mut region = Region::new(self.field, cells, matter.clone(), &options)?;
+        let mut level = level(self.field, self.radius)?;
+        let cut = |level: usize| -> Result<Region<T>, ForceError> {
+            let cells = about(self.field, level, targets, self.radius)?;
+            let options = RegionOptions::of(self.field, level);
+            Ok(self.holding.cut(self.field, cells, matter.clone(), &options)?)
+        };
+        let mut region = cut(level)?;
+        // Narrow places move by narrow functions alone.
+        for _ in 0..FINER {
+            if self.holding.gives_way(self.field, &region, targets) {
+                break;
+            }
+            level += 1;
+            region = cut(level)?;
+        }
         let [nx, ny, nz] = region.patch().lattice().sample_dims();
         let mut places = Vec::new();
         if !self.layers.is_empty() {

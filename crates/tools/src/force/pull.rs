@@ -4,16 +4,21 @@ use serde::{Deserialize, Serialize};
 use super::path::Path;
 use super::stroke::{Extent, ForceStroke};
 use super::target::Target;
-use super::{ForceError, How, track};
+use super::{ForceError, How, area, track};
+use crate::curve::Along;
 use crate::number::{Finite, Point, Positive};
 
-/// Takes hold of the surface at a point, along a curve or over a disc, and brings it elsewhere. Exactly one of `by`, `way` and
+/// Takes hold of the surface at a point, along a curve or over an area, and brings it elsewhere. Exactly one of `by`, `way` and
 /// `lift` is given.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Pull {
-    /// Where it takes hold, drawn to the nearest surface: one point, or a polyline.
-    pub along: Vec<Point>,
+    /// Where it takes hold, drawn to the nearest surface: one point, or a curve.
+    #[serde(default, skip_serializing_if = "Along::is_empty")]
+    pub along: Along,
+    /// Outline of an area, in place of `along`: the area within a closed curve.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub area: Option<Along>,
     /// Radius of a disc about the point, if it takes hold of an area.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub disc: Option<Positive>,
@@ -44,15 +49,21 @@ impl Pull {
         iso: f64,
     ) -> Result<ForceStroke<T>, ForceError> {
         let radius = self.radius.0;
-        let points: Vec<_> = self.along.iter().map(|p| p.0).collect();
-        let places = match (self.disc, &points[..]) {
-            (None, _) => track::along(field, iso, &points, radius)?,
-            (Some(disc), [middle]) => track::disc(field, iso, *middle, disc.0, radius)?,
-            (Some(_), _) => {
-                return Err(ForceError::tool(format!(
-                    "a disc has one middle, and along has {} points; write one, or leave disc out",
-                    points.len()
-                )));
+        let places = match (&self.area, self.disc, &self.along) {
+            (Some(outline), None, along) if along.is_empty() => area::within(field, iso, outline, radius)?,
+            (Some(_), ..) => {
+                return Err(ForceError::tool(
+                    "an area is all there is; leave along and disc out",
+                ));
+            }
+            (None, None, along) => track::along(field, iso, along, radius)?,
+            (None, Some(disc), Along::Points(points)) if points.len() == 1 => {
+                track::disc(field, iso, points[0].0, disc.0, radius)?
+            }
+            (None, Some(_), _) => {
+                return Err(ForceError::tool(
+                    "a disc has one middle; write one point for along, or leave disc out",
+                ));
             }
         };
         let target = |place: &track::Place| {
@@ -69,7 +80,7 @@ impl Pull {
                 ..Target::single(path, true)
             })
         };
-        let extent = if self.disc.is_some() {
+        let extent = if self.disc.is_some() || self.area.is_some() {
             Extent::Area
         } else {
             Extent::Curve

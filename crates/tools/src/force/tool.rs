@@ -1,7 +1,7 @@
 use bspline::{HierarchicalSpline, Real};
 use fitting::Control;
 
-use super::{Chisel, Drill, ForceError, ForceReport, ForceStroke, Pull};
+use super::{Chisel, Drill, ForceError, ForceReport, ForceStroke, Holding, Pull};
 use crate::paint::Layers;
 
 /// A force tool with all that it is told.
@@ -52,7 +52,8 @@ impl ForceTool<'_> {
         }
     }
 
-    /// What it leaves of the field with the matter that is painted on it, and what is left to say of it, in sentences.
+    /// What it leaves of the field with the matter that is painted on it and what is held, and what is left to say of it, in
+    /// sentences.
     ///
     /// # Errors
     /// Any [`ForceError`].
@@ -61,9 +62,10 @@ impl ForceTool<'_> {
         field: &HierarchicalSpline<T>,
         iso: f64,
         layers: &Layers,
+        holding: &Holding,
         control: &mut Control,
     ) -> Result<(HierarchicalSpline<T>, Vec<String>), ForceError> {
-        let mut stroke = self.begin(field, iso)?.painted(layers)?;
+        let mut stroke = self.begin(field, iso)?.painted(layers)?.held(holding)?;
         while !stroke.is_over() {
             control
                 .step("pulling", stroke.progress())
