@@ -1,13 +1,16 @@
 //! What was asked for: enough to do it, and to do it again.
 
+use std::collections::BTreeSet;
+
 use bspline::HierarchicalSpline;
 use fitting::{Control, FitError};
 use glam::DAffine3;
 use serde::{Deserialize, Serialize};
+use tools::others::Others;
 use tools::paint::Layers;
 use tools::scene::{Scene, SimulateError, Simulation};
 use tools::session::{Session, Stroke};
-use tools::tool::{Canvas, Others, ToolError};
+use tools::tool::{Canvas, Tool, ToolError};
 
 use crate::{DocumentError, State};
 
@@ -78,11 +81,22 @@ impl Command {
         }
         let session: Session = parsed(text)?;
         let strokes = session.stroke.into_iter().enumerate();
+        let mut made = BTreeSet::new();
         let commands = strokes.map(|(n, stroke)| {
             let wrong = |why| CommandError::Script(format!("stroke {}: {why}", n + 1));
-            stroke.tool().map_err(wrong)?;
+            let copy = match stroke.tool().map_err(wrong)? {
+                Tool::Copy(copy) => Some(copy.to.clone()),
+                Tool::Cut(cut) => cut.to.clone(),
+                _ => None,
+            };
+            // Objects that are made on the way are not known yet.
+            let object = match &stroke.object {
+                Some(name) if made.contains(name) => name.clone(),
+                own => object(own.as_deref())?,
+            };
+            made.extend(copy);
             Ok(Self::Stroke {
-                object: object(stroke.object.as_deref())?,
+                object,
                 stroke: Box::new(stroke),
             })
         });

@@ -5,12 +5,12 @@ use bspline::Real;
 use crate::integrators::Integrator;
 use crate::lattice::{Lattice, OnBox, Rim, SampleBox};
 use crate::matter::{Matter, Quantity};
+pub use crate::patch::Against;
+use crate::patch::StaticSolver;
 use crate::patch::{Patch, PatchError, finite};
 use crate::solve::{SolveReport, SolverOptions, StepSolver, VCycleOptions};
 use crate::sparse::Mask;
 use crate::springs::{Law, SpringWeights, StepMatrix, Weights};
-pub use crate::statics::Against;
-use crate::statics::StaticSolver;
 use crate::units::{binary_unit, largest};
 
 /// Residual at which static solves stop. Their errors are smooth and may be some hundred times as large.

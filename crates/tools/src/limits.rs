@@ -10,10 +10,10 @@ use bspline::{Aabb, Csg, Field, HierarchicalSpline, Real};
 use serde::{Deserialize, Serialize};
 
 use crate::coefficients::{changed, coefficient, support, with_functions};
-use crate::geometric::FormulaSolid;
+use crate::formula_solid::FormulaSolid;
 use crate::mix::{Faded, Mixed};
 use crate::number::{Point, Positive};
-use crate::tool::Others;
+use crate::others::Others;
 
 /// A box along the axes of the world.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -2,7 +2,7 @@ use bspline::Aabb;
 use glam::DVec3;
 use tools::geometric::Origin;
 use tools::limits::Limits;
-use tools::tool::Others;
+use tools::others::Others;
 
 use crate::Command;
 

@@ -10,7 +10,7 @@ use formats::volumes::{Orientation, Volume, VolumeHeader, VoxelType};
 use glam::{DAffine3, DMat3, DVec3};
 use tools::geometric::{Geometric, Operation};
 use tools::limits::Limits;
-use tools::tool::Others;
+use tools::others::Others;
 
 use super::common::Draw;
 

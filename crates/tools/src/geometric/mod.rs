@@ -7,7 +7,6 @@
 mod band;
 mod block;
 mod detail;
-mod formula_solid;
 mod motion;
 mod paste;
 mod shape;
@@ -26,7 +25,6 @@ use serde::{Deserialize, Serialize};
 
 pub use block::block;
 pub use detail::{Refine, Simplify};
-pub use formula_solid::FormulaSolid;
 pub use motion::{Motion, Move, Origin, reflection};
 pub use paste::{Copy, Cut, Paste};
 pub use shape::Shape;
@@ -36,7 +34,7 @@ use write::{Fineness, TOLERANCE, Writer};
 
 use crate::limits::Limits;
 use crate::number::{NonNegative, Point, Positive};
-use crate::tool::Others;
+use crate::others::Others;
 use crate::warp::WarpError;
 
 /// What a geometric tool does.

@@ -14,7 +14,7 @@ use super::{Geometric, GeometricError, Operation, Shape, rotation_of};
 use crate::limits::{Limits, Region};
 use crate::mix::{Faded, Mixed};
 use crate::number::{NonNegative, Point, Positive};
-use crate::tool::Others;
+use crate::others::Others;
 
 /// Keeps a copy of the object, as it is now, under another name. It shares all that does not change.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -5,10 +5,10 @@ use bspline::{Aabb, Csg, Field};
 use glam::{DAffine3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
-use super::formula_solid::FormulaSolid;
 use super::swept::{Pose, Swept};
+use crate::formula_solid::FormulaSolid;
 use crate::number::{Point, Positive};
-use crate::tool::Others;
+use crate::others::Others;
 
 /// A solid about its centre. Lengths are those of the world.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -16,8 +16,9 @@ use fitting::Control;
 use glam::{DAffine3, DVec3};
 use tools::geometric::{Geometric, GeometricError, Operation, block as block_of};
 use tools::limits::Limits;
+use tools::others::Others;
 use tools::session::{Session, Stroke};
-use tools::tool::{Canvas, Others};
+use tools::tool::Canvas;
 
 /// Cells of the block's box, half a world length each.
 const CELLS: u32 = 48;
