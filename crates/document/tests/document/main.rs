@@ -10,8 +10,8 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use bspline::AnyField;
 use bspline::hierarchical::{BlockEdit, Change as BlockChange, HierarchicalSpline, LevelEdit};
+use bspline::{AnyField, Field};
 use common::{Draw, ball, dented, object, random_edit};
 use document::{Change, Document, DocumentError, Options, Properties, State};
 use formats::field::FieldMeta;
@@ -621,7 +621,7 @@ fn holds_are_kept_with_the_object_and_undone() {
         ..object(&ball()).meta.as_ref().clone()
     };
     let first = State::new()
-        .with("a", document::Object::new(&AnyField::from(block), meta).unwrap())
+        .with("a", document::Object::new(&AnyField::F32(block), meta).unwrap())
         .unwrap();
     let mut document = Document::create(&path, first.clone(), Options::default()).unwrap();
     let session = "[[stroke]]\nhold = { name = 'rim', sketch = { meet = { formulas = ['(x - 12)^2 + (y - 12)^2 - 9', 'z - 12'] } } }\n\
