@@ -11,7 +11,7 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use bspline::hierarchical::{BlockEdit, Change as BlockChange, HierarchicalSpline, LevelEdit};
-use bspline::{AnyField, Field};
+use bspline::AnyField;
 use common::{Draw, ball, dented, object, random_edit};
 use document::{Change, Document, DocumentError, Options, Properties, State};
 use formats::field::FieldMeta;
@@ -647,12 +647,8 @@ fn holds_are_kept_with_the_object_and_undone() {
         document.state().object("a").unwrap().properties.holds[0].name,
         "rim"
     );
-    let on_curve = document
-        .state()
-        .object("a")
-        .unwrap()
-        .field
-        .value(DVec3::new(15.0, 12.0, 12.0));
+    let held = &document.state().object("a").unwrap().field;
+    let on_curve = bspline::Field::value(held, DVec3::new(15.0, 12.0, 12.0));
     assert!(on_curve.abs() < 0.01, "{on_curve}");
     assert_eq!(document.undo(2).unwrap(), 2);
     assert_eq!(document.state().sha256(), hashes[0]);
