@@ -3,16 +3,19 @@
 
 pub mod coefficients;
 pub mod curve;
+mod face;
 pub mod fade;
 pub mod force;
 mod formula_solid;
 pub mod geometric;
 pub mod hold;
 pub mod limits;
+pub mod live;
 pub mod mix;
 pub mod number;
 pub mod others;
 pub mod paint;
+mod room;
 pub mod scene;
 pub mod session;
 pub mod symmetry;

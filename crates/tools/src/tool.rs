@@ -32,6 +32,17 @@ pub struct Canvas {
     pub copies: Vec<String>,
 }
 
+impl Canvas {
+    /// What force tools may not move.
+    pub(crate) fn holding(&self, limits: &Limits) -> Holding {
+        Holding {
+            iso: self.iso,
+            holds: self.holds.clone(),
+            limits: limits.clone(),
+        }
+    }
+}
+
 /// A tool with all that it is told.
 #[derive(Clone, Copy, Debug)]
 pub enum Tool<'a> {
@@ -158,11 +169,7 @@ impl Tool<'_> {
                 return Ok((canvas, Vec::new()));
             }
             Self::Force(tool) => {
-                let holding = Holding {
-                    iso: *iso,
-                    holds: canvas.holds.clone(),
-                    limits: limits.clone(),
-                };
+                let holding = canvas.holding(limits);
                 let (field, told) = tool.apply(old, *iso, &canvas.layers, &holding, control)?;
                 let field = limits.kept(old, &field);
                 return Ok((Canvas { field, ..canvas }, told));

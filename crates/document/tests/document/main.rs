@@ -1,8 +1,11 @@
 //! Documents: edits, undo, and files that crashes and faults have cut.
 
+mod clay;
 mod cloud;
 mod common;
+mod live;
 mod revision;
+mod sessions;
 
 use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader, Seek, SeekFrom, Write};
@@ -10,8 +13,8 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use bspline::hierarchical::{BlockEdit, Change as BlockChange, HierarchicalSpline, LevelEdit};
 use bspline::AnyField;
+use bspline::hierarchical::{BlockEdit, Change as BlockChange, HierarchicalSpline, LevelEdit};
 use common::{Draw, ball, dented, object, random_edit};
 use document::{Change, Document, DocumentError, Options, Properties, State};
 use formats::field::FieldMeta;

@@ -83,6 +83,22 @@ impl Along {
         matches!(self, Self::Points(points) if points.is_empty())
     }
 
+    /// The points, if it is given by them.
+    pub fn points(&self) -> &[Point] {
+        match self {
+            Self::Points(points) => points,
+            Self::Curve(_) => &[],
+        }
+    }
+
+    /// Goes on to a point; of a curve that is no polyline nothing is left.
+    pub fn push(&mut self, p: Point) {
+        match self {
+            Self::Points(points) => points.push(p),
+            Self::Curve(_) => *self = Self::Points(vec![p]),
+        }
+    }
+
     /// Polylines of all parts; of a closed part the last point is the first. Curves of formulas of place are looked for in `whole`
     /// where they name no box.
     ///

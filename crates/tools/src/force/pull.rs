@@ -48,24 +48,6 @@ impl Pull {
         field: &HierarchicalSpline<T>,
         iso: f64,
     ) -> Result<ForceStroke<T>, ForceError> {
-        let radius = self.radius.0;
-        let places = match (&self.area, self.disc, &self.along) {
-            (Some(outline), None, along) if along.is_empty() => area::within(field, iso, outline, radius)?,
-            (Some(_), ..) => {
-                return Err(ForceError::tool(
-                    "an area is all there is; leave along and disc out",
-                ));
-            }
-            (None, None, along) => track::along(field, iso, along, radius)?,
-            (None, Some(disc), Along::Points(points)) if points.len() == 1 => {
-                track::disc(field, iso, points[0].0, disc.0, radius)?
-            }
-            (None, Some(_), _) => {
-                return Err(ForceError::tool(
-                    "a disc has one middle; write one point for along, or leave disc out",
-                ));
-            }
-        };
         let target = |place: &track::Place| {
             let way: Vec<_> = match (&self.by, &self.way, &self.lift) {
                 (Some(by), None, None) => vec![by.0],
@@ -80,12 +62,48 @@ impl Pull {
                 ..Target::single(path, true)
             })
         };
-        let extent = if self.disc.is_some() || self.area.is_some() {
-            Extent::Area
-        } else {
-            Extent::Curve
-        };
+        let places = self.places(field, iso)?;
         let targets: Result<Vec<_>, _> = places.iter().map(target).collect();
-        ForceStroke::new(field, iso, targets?, extent, radius, &self.how)
+        ForceStroke::new(field, iso, targets?, self.extent(), self.radius.0, &self.how)
+    }
+
+    /// Takes hold of a field for a hand that will say the way, its ends from the place of the surface.
+    ///
+    /// # Errors
+    /// Any [`ForceError`].
+    pub fn hold<T: Real>(
+        &self,
+        field: &HierarchicalSpline<T>,
+        iso: f64,
+    ) -> Result<ForceStroke<T>, ForceError> {
+        let places = self.places(field, iso)?;
+        ForceStroke::dragging(field, iso, places, self.extent(), self.radius.0, &self.how)
+    }
+
+    fn extent(&self) -> Extent {
+        match (&self.area, self.disc) {
+            (None, None) => Extent::Curve,
+            _ => Extent::Area,
+        }
+    }
+
+    /// Where it takes hold.
+    fn places<T: Real>(
+        &self,
+        field: &HierarchicalSpline<T>,
+        iso: f64,
+    ) -> Result<Vec<track::Place>, ForceError> {
+        let radius = self.radius.0;
+        match (&self.area, self.disc, self.along.points()) {
+            (Some(outline), None, []) => area::within(field, iso, outline, radius),
+            (Some(_), ..) => Err(ForceError::tool(
+                "an area is all there is; leave along and disc out",
+            )),
+            (None, None, _) => track::along(field, iso, &self.along, radius),
+            (None, Some(disc), [middle]) => track::disc(field, iso, middle.0, disc.0, radius),
+            (None, Some(_), _) => Err(ForceError::tool(
+                "a disc has one middle; write one point for along, or leave disc out",
+            )),
+        }
     }
 }

@@ -14,7 +14,7 @@ pub const OPEN: f64 = 0.5;
 /// Cosine of the turn from which on a curve has a corner.
 const CORNER: f64 = 0.9;
 /// Most paths of a tool.
-const MOST: f64 = 20_000.0;
+pub(super) const MOST: f64 = 20_000.0;
 
 /// A place of a tool on the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]

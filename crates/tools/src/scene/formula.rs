@@ -64,9 +64,10 @@ impl Formula {
     }
 
     fn parse_of(names: &'static [&'static str], told: &str, text: &str) -> Result<Self, String> {
-        let wrong = |why: String| {
+        let wrong = |why: String, rest: &str| {
+            let at = text[..text.len() - rest.len()].chars().count() + 1;
             format!(
-                "the formula {text:?} cannot be read: {why}; it may hold numbers, {told}, PI, + - * / ^ < > \
+                "the formula {text:?} cannot be read at character {at}: {why}; it may hold numbers, {told}, PI, + - * / ^ < > \
                  ( ), min(a, b), max(a, b), abs, sqrt, exp, ln, sin, cos"
             )
         };
@@ -80,9 +81,12 @@ impl Formula {
             rest: text.trim_start(),
             names,
         };
-        let root = parser.comparison(0).map_err(wrong)?;
+        let root = parser.comparison(0).map_err(|why| wrong(why, parser.rest))?;
         if !parser.rest.is_empty() {
-            return Err(wrong(format!("it should end before {:?}", parser.rest)));
+            return Err(wrong(
+                format!("it should end before {:?}", parser.rest),
+                parser.rest,
+            ));
         }
         Ok(Self {
             text: text.into(),
@@ -256,15 +260,17 @@ impl Parser<'_> {
                 rest => format!("{rest:?} is neither a number nor a variable nor a function"),
             });
         }
-        self.rest = rest.trim_start();
+        let before = std::mem::replace(&mut self.rest, rest.trim_start());
         if let Some(i) = self.names.iter().position(|n| *n == name) {
             return Ok(Node::Variable(i));
         }
         if name == "PI" {
             return Ok(Node::Number(std::f64::consts::PI));
         }
-        let function =
-            function(name).ok_or_else(|| format!("there is no variable or function called {name}"))?;
+        let Some(function) = function(name) else {
+            self.rest = before;
+            return Err(format!("there is no variable or function called {name}"));
+        };
         self.expect('(')?;
         let first = self.comparison(depth + 1)?;
         let node = match function {
