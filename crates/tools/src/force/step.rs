@@ -2,7 +2,8 @@
 
 use bspline::Real;
 use dynamics::integrators::Integrator;
-use dynamics::response::Against;
+use dynamics::region::Region;
+use dynamics::response::{Against, Response};
 use glam::DVec3;
 
 use super::quadrature::Tolerance;
@@ -94,11 +95,11 @@ impl<T: Real> ForceStroke<T> {
             .map(|(&i, soft)| self.acting[i].stiffness / self.targets[self.acting[i].index].weight + soft)
             .collect();
         let most = self.extent.solves();
-        let region = &mut self.region;
+        let (region, solid) = (&mut self.region, self.how.solid);
         let solved = system::solve(&right, &soft, &diagonal, most, 1e-4, |z| {
             let of = live.iter().zip(z).map(|(&i, z)| (&bearing(i).spread, *z));
             let load = Load::<T>::of(of);
-            let found = region.respond_as_step(Integrator::Paper, dt, &load.on_box())?;
+            let found = answer(region, solid, dt, &load)?;
             let felt = live.iter().map(|&i| bearing(i).row.times(&found.p)).collect();
             Ok::<_, ForceError>((found, felt))
         })?;
@@ -109,7 +110,11 @@ impl<T: Real> ForceStroke<T> {
         self.load = Load::of(pairs(&bearings, self.acting.iter().map(|a| a.force)));
         let patch = self.region.patch_mut();
         patch.add_responses(&solved.parts, dt)?;
-        if self.how.solid == Solid::Clay {
+        if self.how.solid == Solid::Elastic {
+            // Densities are sampled anew: they have to balance in the end.
+            let (p, v) = (patch.state().p.clone(), patch.state().v.clone());
+            patch.set_state(&p, &v)?;
+        } else {
             let d = patch.state().d.clone();
             patch.springs_mut().relax(&d, -libm::expm1(-FLOW));
         }
@@ -271,6 +276,20 @@ impl<T: Real> ForceStroke<T> {
             residual,
         }
     }
+}
+
+/// What a load adds to a step. That of clay is as exact as the step; elastic solids have to come to rest in balance.
+fn answer<T: Real>(
+    region: &mut Region<T>,
+    solid: Solid,
+    dt: f64,
+    load: &Load<T>,
+) -> Result<Response<T>, ForceError> {
+    let load = load.on_box();
+    Ok(match solid {
+        Solid::Clay => region.respond_as_step(Integrator::Paper, dt, &load)?,
+        Solid::Elastic => region.respond(Integrator::Paper, dt, &[load])?.remove(0),
+    })
 }
 
 /// Spreads of the paths that ask for something, with a factor each.
