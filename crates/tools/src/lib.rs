@@ -8,6 +8,7 @@ pub mod force;
 mod formula_solid;
 pub mod geometric;
 pub mod limits;
+pub mod live;
 pub mod mix;
 pub mod number;
 pub mod others;

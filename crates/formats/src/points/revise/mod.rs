@@ -317,7 +317,7 @@ mod tests {
             .flat_map(|c| rows.iter().flat_map(move |r| r[c].to_le_bytes()))
             .chain((0..3).map(tag))
             .collect();
-        let packed = crate::points::pcd::lzf::stored(&columns);
+        let packed = points::pcd::lzf::stored(&columns);
         let sizes = [packed.len() as u32, columns.len() as u32]
             .map(u32::to_le_bytes)
             .concat();
@@ -388,7 +388,7 @@ mod tests {
             others()[1].1[others()[1].1.len() - 75..].to_vec(),
         ]
         .concat();
-        let e = super::pcd::revised(
+        let e = pcd::revised(
             &rows,
             &CloudChanges {
                 removed: vec![0],
