@@ -144,7 +144,7 @@ impl<T: Real> Corrections<T> {
                 return 0;
             }
             let (mut a, mut b) = (a.iter(), b.iter());
-            let mut next = |values: &mut std::slice::Iter<T>, word: u64, slot: usize| {
+            let next = |values: &mut std::slice::Iter<T>, word: u64, slot: usize| {
                 let is_active = word >> slot & 1 == 1;
                 is_active.then(|| *values.next().expect("a value for each function"))
             };
