@@ -1,14 +1,16 @@
 //! What was asked for: enough to do it, and to do it again.
 
+use std::collections::BTreeSet;
+
 use bspline::HierarchicalSpline;
 use fitting::{Control, FitError};
-use glam::DAffine3;
 use serde::{Deserialize, Serialize};
 use tools::paint::Layers;
 use tools::scene::{Scene, SimulateError, Simulation};
 use tools::session::{Session, Stroke};
-use tools::tool::{Canvas, Others, ToolError};
+use tools::tool::{Tool, ToolError};
 
+use crate::canvas::{canvas, left};
 use crate::{DocumentError, State};
 
 /// What makes an edit. The journal keeps it beside the difference that it made.
@@ -48,7 +50,10 @@ pub enum CommandError {
     Taken(String),
     /// A tool cannot be used.
     #[error(transparent)]
-    Tool(#[from] ToolError),
+    Tool(ToolError),
+    /// The document went on beside a stroke in a hand.
+    #[error("object {0:?} or another one was changed since the stroke began; begin the stroke anew")]
+    Changed(String),
     /// A scene cannot be played.
     #[error(transparent)]
     Scene(#[from] SimulateError),
@@ -59,7 +64,8 @@ pub enum CommandError {
 
 impl Command {
     /// What a script asks for, in its order: a scene is one command, of a session every stroke is one. `object` names the
-    /// object where a script names none.
+    /// object where a script names none. A text whose first sign is a brace is a session in JSON, one stroke a line; any other
+    /// is TOML.
     ///
     /// # Errors
     /// [`CommandError::Script`] with the line, and what `object` says.
@@ -67,6 +73,9 @@ impl Command {
         text: &str,
         object: impl Fn(Option<&str>) -> Result<String, E>,
     ) -> Result<Vec<Self>, E> {
+        if text.trim_start().starts_with('{') {
+            return Self::of_strokes(strokes_of_lines(text)?, object);
+        }
         let table: toml::Table = parsed(text)?;
         if !table.contains_key("stroke") {
             let _: Scene = parsed(text)?;
@@ -77,12 +86,29 @@ impl Command {
             }]);
         }
         let session: Session = parsed(text)?;
-        let strokes = session.stroke.into_iter().enumerate();
-        let commands = strokes.map(|(n, stroke)| {
+        Self::of_strokes(session.stroke, object)
+    }
+
+    fn of_strokes<E: From<CommandError>>(
+        strokes: Vec<Stroke>,
+        object: impl Fn(Option<&str>) -> Result<String, E>,
+    ) -> Result<Vec<Self>, E> {
+        let mut made = BTreeSet::new();
+        let commands = strokes.into_iter().enumerate().map(|(n, stroke)| {
             let wrong = |why| CommandError::Script(format!("stroke {}: {why}", n + 1));
-            stroke.tool().map_err(wrong)?;
+            let copy = match stroke.tool().map_err(wrong)? {
+                Tool::Copy(copy) => Some(copy.to.clone()),
+                Tool::Cut(cut) => cut.to.clone(),
+                _ => None,
+            };
+            // Objects that are made on the way are not known yet.
+            let object = match &stroke.object {
+                Some(name) if made.contains(name) => name.clone(),
+                own => object(own.as_deref())?,
+            };
+            made.extend(copy);
             Ok(Self::Stroke {
-                object: object(stroke.object.as_deref())?,
+                object,
                 stroke: Box::new(stroke),
             })
         });
@@ -95,9 +121,18 @@ impl Command {
             Self::Scene { object, .. } => format!("scene on {object}"),
             Self::Stroke { object, stroke } => {
                 let name = stroke.tool().map_or("stroke", |tool| tool.name());
-                format!("{name} on {object}")
+                match stroke.step_count() {
+                    Some(1) => format!("{name} on {object} by hand, 1 step"),
+                    Some(count) => format!("{name} on {object} by hand, {count} steps"),
+                    None => format!("{name} on {object}"),
+                }
             }
         }
+    }
+
+    /// As the journal keeps it.
+    pub fn to_value(&self) -> serde_json::Value {
+        serde_json::to_value(self).expect("a command is plain values with text for keys")
     }
 
     /// Does it, and says in sentences what is left to say.
@@ -106,64 +141,46 @@ impl Command {
     /// Any [`CommandError`].
     pub fn apply(&self, state: &State, control: &mut Control) -> Result<(State, Vec<String>), CommandError> {
         let (Self::Scene { object: name, .. } | Self::Stroke { object: name, .. }) = self;
-        let mut object = state.object(name)?.clone();
-        let mut next = state.clone();
-        let notes;
         match self {
             Self::Scene { script, .. } => {
+                let mut object = state.object(name)?.clone();
                 let scene: Scene = parsed(script)?;
                 let iso = scene.iso.map(|i| i.0).or(object.meta.iso);
+                let notes;
                 (object.field, notes) = played(&scene, object.field, iso, &object.layers, control)?;
+                Ok((state.with(name, object)?, notes))
             }
             Self::Stroke { stroke, .. } => {
-                let iso = object
-                    .meta
-                    .iso
-                    .ok_or_else(|| CommandError::NoSurface(name.clone()))?;
-                let canvas = Canvas {
-                    detail: object.detail(),
-                    field: object.field,
-                    iso,
-                    layers: object.layers,
-                    others: others(state, name)?,
-                    copies: Vec::new(),
-                };
-                let (canvas, told) = stroke
-                    .apply(canvas, control)
-                    .map_err(|e| match e.is_cancelled() {
-                        true => CommandError::Cancelled(FitError::Cancelled),
-                        false => e.into(),
-                    })?;
-                for copy in canvas.copies {
-                    if state.object(&copy).is_ok() {
-                        return Err(CommandError::Taken(copy));
-                    }
-                    next = next.with(&copy, state.object(name)?.clone())?;
-                }
-                (object.field, object.layers) = (canvas.field, canvas.layers);
-                notes = told;
+                let (canvas, notes) = stroke.apply(canvas(state, name)?, control)?;
+                Ok((left(state, name, canvas)?, notes))
             }
         }
-        Ok((next.with(name, object)?, notes))
     }
 }
 
-/// All objects that have a surface, as they lie to the one of a name.
-fn others(state: &State, name: &str) -> Result<Others, CommandError> {
-    let own = state.placement(name)?.inverse();
-    let mut others = Others::default();
-    for (other, object) in state.objects() {
-        if let Some(iso) = object.meta.iso {
-            // Of the object itself no rounding.
-            let map = match other == name {
-                true => DAffine3::IDENTITY,
-                false => own * state.placement(other)?,
-            };
-            let put = others.put(other, &object.field, iso, map);
-            put.map_err(|e| CommandError::Script(format!("object {other:?} cannot be used: {e}")))?;
+impl From<ToolError> for CommandError {
+    fn from(error: ToolError) -> Self {
+        match error.is_cancelled() {
+            true => Self::Cancelled(FitError::Cancelled),
+            false => Self::Tool(error),
         }
     }
-    Ok(others)
+}
+
+/// Strokes in JSON, one a line; empty lines count for the numbers alone.
+fn strokes_of_lines(text: &str) -> Result<Vec<Stroke>, CommandError> {
+    let lines = text
+        .lines()
+        .enumerate()
+        .filter(|(_, line)| !line.trim().is_empty());
+    let stroke = |(n, line): (usize, &str)| {
+        serde_json::from_str(line).map_err(|e| {
+            let (told, column) = (e.to_string(), e.column());
+            let why = told.rsplit_once(" at line ").map_or(&told[..], |(why, _)| why);
+            CommandError::Script(format!("line {}, column {column}: {why}", n + 1))
+        })
+    };
+    lines.map(stroke).collect()
 }
 
 fn parsed<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, CommandError> {

@@ -7,8 +7,10 @@
 //!
 //! A [`State`] is a value: cheap to copy, and copies share all that is equal. An edit makes a new one;
 //! [`Document::commit`] finds out what differs. A [`Command`] is what was asked for; the journal keeps it beside the edit.
+//! A [`Live`] stroke is made step by step, by a hand, and becomes a command at its end.
 
 mod bulk;
+mod canvas;
 mod change;
 mod command;
 mod document;
@@ -17,6 +19,7 @@ mod error;
 mod journal;
 mod layers;
 mod layout;
+mod live;
 mod object;
 mod records;
 mod revision;
@@ -28,6 +31,7 @@ pub use document::{Document, Lost, Opened, Options};
 pub use entry::{EditCounts, EditInfo};
 pub use error::DocumentError;
 pub use journal::is_document;
+pub use live::Live;
 pub use object::{Object, Properties};
 pub use revision::{CloudError, Journey, VolumeRevision, revise_cloud, revise_volume};
 pub use state::State;

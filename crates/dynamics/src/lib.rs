@@ -49,7 +49,6 @@ pub mod snapshot;
 pub mod solve;
 pub mod sparse;
 pub mod springs;
-mod statics;
 #[cfg(feature = "study")]
 pub mod study;
 mod units;

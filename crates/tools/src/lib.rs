@@ -2,13 +2,18 @@
 //! add and [carry along](warp). A [session] is a row of strokes; each uses one [tool], within [limits]. Haptics are not built yet.
 
 pub mod coefficients;
+mod face;
 pub mod fade;
 pub mod force;
+mod formula_solid;
 pub mod geometric;
 pub mod limits;
+pub mod live;
 pub mod mix;
 pub mod number;
+pub mod others;
 pub mod paint;
+mod room;
 pub mod scene;
 pub mod session;
 pub mod symmetry;

@@ -10,10 +10,10 @@ use bspline::{Aabb, Csg, Field, HierarchicalSpline, Real};
 use serde::{Deserialize, Serialize};
 
 use crate::coefficients::{changed, coefficient, support, with_functions};
-use crate::geometric::FormulaSolid;
+use crate::formula_solid::FormulaSolid;
 use crate::mix::{Faded, Mixed};
 use crate::number::{Point, Positive};
-use crate::tool::Others;
+use crate::others::Others;
 
 /// A box along the axes of the world.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -157,6 +157,11 @@ impl Limits {
     /// Whether all is free.
     pub fn is_none(&self) -> bool {
         self.region.is_none() && self.mask.is_none()
+    }
+
+    /// Whether the mask fades.
+    pub fn is_soft(&self) -> bool {
+        self.weight.is_some()
     }
 
     /// The part of a box in the region; where they share nothing, a box beside both.

@@ -4,12 +4,18 @@ use bspline::HierarchicalSpline;
 use fitting::Control;
 use serde::{Deserialize, Serialize};
 
-use crate::force::{Chisel, Drill, ForceTool, Pull};
-use crate::geometric::{Copy, Cut, Geometric, Inflate, Move, Paste, Refine, Simplify, Smooth};
+use crate::face::Face;
+use crate::force::{Chisel, Drill, ForceError, ForceTool, Pull};
+use crate::geometric::{
+    Copy, Cut, Geometric, GeometricError, Inflate, Move, Paste, Refine, Simplify, Smooth,
+};
 use crate::limits::{Limits, Mask, Region};
 use crate::paint::Paint;
 use crate::symmetry::Symmetry;
 use crate::tool::{Canvas, Tool, ToolError};
+
+/// How often a box grows for one stroke, an eighth at a time: to about seven times its length.
+const MOST_GROWTHS: usize = 16;
 
 /// What a session file says.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -17,6 +23,16 @@ use crate::tool::{Canvas, Tool, ToolError};
 pub struct Session {
     /// In their order.
     pub stroke: Vec<Stroke>,
+}
+
+/// Paint that is laid on while a force tool works.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct During {
+    /// Steps that the tool has made by then; after its last one paint goes on the shape that is left.
+    pub step: usize,
+    /// What is painted.
+    pub paint: Paint,
 }
 
 /// One use of a tool: exactly one of the tools is given.
@@ -71,6 +87,13 @@ pub struct Stroke {
     /// Takes knots out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub simplify: Option<Simplify>,
+    /// Whether the places of its way are those of a hand, one a step, and it is done step by step: see
+    /// [`LiveStroke`](crate::live::LiveStroke).
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub paced: bool,
+    /// Paint laid on while a force tool works, in the order of steps.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub during: Vec<During>,
     /// Finest level of the field that the stroke sees and changes; what finer levels add stays where it is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coarse: Option<usize>,
@@ -133,49 +156,100 @@ impl Stroke {
         }
     }
 
-    /// What the stroke leaves of a canvas, and what is left to say of it, in sentences.
+    /// What the stroke leaves of a canvas, and what is left to say of it, in sentences. Where the solid needs more room than the box of its
+    /// field has, the box grows.
     ///
     /// # Errors
     /// Any [`ToolError`].
     pub fn apply(&self, canvas: Canvas, control: &mut Control) -> Result<(Canvas, Vec<String>), ToolError> {
+        let before = *canvas.field.lattice();
+        let mut canvas = canvas;
+        for _ in 0..MOST_GROWTHS {
+            match self.in_box(canvas.clone(), control) {
+                Err(ToolError::Geometric(GeometricError::Leaves { at, face })) => {
+                    let leaves = GeometricError::Leaves { at, face };
+                    canvas = canvas.grown(face).ok_or(leaves)?;
+                }
+                Err(ToolError::Force(ForceError::Outside { at, field })) => {
+                    let leaves = ForceError::Outside { at, field };
+                    let face = Face::beyond(&canvas.field, at.into());
+                    canvas = face.and_then(|face| canvas.grown(face)).ok_or(leaves)?;
+                }
+                Ok((left, mut notes)) if left.field.lattice() != &before => {
+                    let b = left.field.lattice().world_box();
+                    let [min, max] = [b.min, b.max].map(|p| p.to_array());
+                    notes.push(format!("the box of the field has grown: {min:?} to {max:?}"));
+                    return Ok((left, notes));
+                }
+                done => return done,
+            }
+        }
+        self.in_box(canvas, control)
+    }
+
+    /// What the stroke leaves if the box of the field has room enough.
+    fn in_box(&self, canvas: Canvas, control: &mut Control) -> Result<(Canvas, Vec<String>), ToolError> {
         let tool = self.tool().map_err(ToolError::Stroke)?;
+        let (coarse, limits) = self.prepared(&canvas)?;
+        let (left, notes) = self.on_both_sides(tool, coarse, &limits, None, control)?;
+        Ok((self.completed(&canvas, left)?, notes))
+    }
+
+    /// What the tool sees of a canvas, and what it may change.
+    pub(crate) fn prepared(&self, canvas: &Canvas) -> Result<(Canvas, Limits), ToolError> {
         let whole = canvas.field.lattice().world_box();
         let limits = Limits::new(self.within.as_ref(), self.mask.as_ref(), &canvas.others, &whole);
         let limits = limits.map_err(ToolError::Stroke)?.at_detail(canvas.detail);
         let Some(level) = self.coarse else {
-            return self.on_both_sides(tool, canvas, &limits, control);
+            return Ok((canvas.clone(), limits));
         };
-        let whole = canvas.field.clone();
         let coarse = Canvas {
-            field: up_to(&whole, level).map_err(ToolError::Stroke)?,
-            ..canvas
+            field: up_to(&canvas.field, level).map_err(ToolError::Stroke)?,
+            ..canvas.clone()
         };
-        let below = coarse.field.clone();
-        let (mut left, notes) = self.on_both_sides(tool, coarse, &limits.up_to(level), control)?;
-        let difference = below.difference(&left.field).expect("versions of one field");
-        left.field = whole.applied(&difference).map_err(|_| {
-            let why = format!(
-                "{} works on finer levels than {level}; leave coarse out",
-                tool.name()
-            );
-            ToolError::Stroke(why)
-        })?;
-        Ok((left, notes))
+        Ok((coarse, limits.up_to(level)))
     }
 
-    /// What the tool leaves if it is used as the stroke's symmetry says.
-    fn on_both_sides(
+    /// What the tool left of what it saw of a canvas, with all that it did not see.
+    pub(crate) fn completed(&self, whole: &Canvas, mut left: Canvas) -> Result<Canvas, ToolError> {
+        let Some(level) = self.coarse else { return Ok(left) };
+        let below = up_to(&whole.field, level).map_err(ToolError::Stroke)?;
+        let difference = below.difference(&left.field).expect("versions of one field");
+        left.field = whole.field.applied(&difference).map_err(|_| {
+            let name = self.tool().map_or("the tool", |tool| tool.name());
+            ToolError::Stroke(format!(
+                "{name} works on finer levels than {level}; leave coarse out"
+            ))
+        })?;
+        Ok(left)
+    }
+
+    /// What the tool leaves if it is used as the stroke's symmetry says; `done` is what it left on its own side, if that is
+    /// known.
+    pub(crate) fn on_both_sides(
         &self,
         tool: Tool,
         canvas: Canvas,
         limits: &Limits,
+        mut done: Option<(Canvas, Vec<String>)>,
         control: &mut Control,
     ) -> Result<(Canvas, Vec<String>), ToolError> {
-        let Some(symmetry) = &self.symmetry else {
-            return tool.apply(canvas, limits, control);
+        let is_stepped = self.paced || !self.during.is_empty();
+        let mut once = |canvas: Canvas| match (done.take(), is_stepped) {
+            (Some(done), _) => Ok(done),
+            (None, true) => self.worked(tool, canvas, limits, control),
+            (None, false) => tool.apply(canvas, limits, control),
         };
-        if matches!(tool, Tool::Paint(_) | Tool::Copy(_)) {
-            let why = format!("{} knows no symmetry; write a stroke for each side", tool.name());
+        let Some(symmetry) = &self.symmetry else {
+            return once(canvas);
+        };
+        if matches!(tool, Tool::Paint(_) | Tool::Copy(_)) || !self.during.is_empty() {
+            let paints = if self.during.is_empty() {
+                tool.name()
+            } else {
+                "paint"
+            };
+            let why = format!("{paints} knows no symmetry; write a stroke for each side");
             return Err(ToolError::Stroke(why));
         }
         if matches!(tool, Tool::Move(_)) && canvas.layers.values().any(|layer| !layer.is_empty()) {
@@ -188,7 +262,7 @@ impl Stroke {
                 field,
                 ..canvas.clone()
             };
-            let (canvas, told) = tool.apply(canvas, limits, control)?;
+            let (canvas, told) = once(canvas)?;
             (left.copies, notes) = (canvas.copies, told);
             Ok::<_, ToolError>(canvas.field)
         })?;

@@ -1,19 +1,15 @@
 //! All tools behind one door: what they work on, and what they leave.
 
-use std::collections::BTreeMap;
-use std::fmt;
-use std::sync::Arc;
-
-use bspline::{Aabb, Csg, CsgError, Field, HierarchicalSpline};
+use bspline::{Aabb, HierarchicalSpline};
 use fitting::field::FieldFitReport;
 use fitting::{Control, FitError};
-use glam::DAffine3;
 
 use crate::force::{ForceError, ForceTool};
 use crate::geometric::{
     Copy, Cut, Geometric, GeometricError, Inflate, Move, Operation, Paste, Refine, Simplify, Smooth,
 };
 use crate::limits::Limits;
+use crate::others::Others;
 use crate::paint::{Layer, Layers, Paint, PaintError};
 
 /// What a tool works on. Cheap to copy.
@@ -31,59 +27,6 @@ pub struct Canvas {
     pub others: Others,
     /// Names under which the object as it was before is to be kept.
     pub copies: Vec<String>,
-}
-
-/// Objects by name, each about as the distance from its surface, positive inside, in the world of the canvas.
-#[derive(Clone, Default)]
-pub struct Others(BTreeMap<String, (Arc<dyn Field>, Aabb)>);
-
-impl fmt::Debug for Others {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_set().entries(self.0.keys()).finish()
-    }
-}
-
-impl Others {
-    /// Puts an object in; `canvas_from_object` maps its world to that of the canvas.
-    ///
-    /// # Errors
-    /// [`CsgError`] for an iso-value that is not finite, or a map that flattens.
-    pub fn put(
-        &mut self,
-        name: &str,
-        field: &HierarchicalSpline<f32>,
-        iso: f64,
-        canvas_from_object: DAffine3,
-    ) -> Result<(), CsgError> {
-        let steep = 1.0 / field.slope();
-        let distance = Csg::sum(vec![(steep, Arc::new(field.clone()))], -iso * steep)?;
-        let placed: Arc<dyn Field> = match canvas_from_object == DAffine3::IDENTITY {
-            true => Arc::new(distance),
-            false => {
-                // A distance of the object, in lengths of the canvas.
-                let stretch = canvas_from_object.matrix3.determinant().abs().cbrt();
-                let placed = Arc::new(Csg::affine(Arc::new(distance), canvas_from_object)?);
-                Arc::new(Csg::sum(vec![(stretch, placed)], 0.0)?)
-            }
-        };
-        let b = field.lattice().world_box().transformed(&canvas_from_object);
-        self.0.insert(name.into(), (placed, b));
-        Ok(())
-    }
-
-    /// The object of a name, and the box of its field.
-    ///
-    /// # Errors
-    /// A sentence.
-    pub fn get(&self, name: &str) -> Result<(Arc<dyn Field>, Aabb), String> {
-        self.0.get(name).cloned().ok_or_else(|| {
-            let known: Vec<_> = self.0.keys().map(String::as_str).collect();
-            match known.is_empty() {
-                true => format!("there is no object {name:?}, nor any other"),
-                false => format!("there is no object {name:?}; there are {}", known.join(", ")),
-            }
-        })
-    }
 }
 
 /// A tool with all that it is told.

@@ -5,6 +5,7 @@
 
 use std::sync::OnceLock;
 
+use fitting::{Control, FitError};
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 
 use super::cost::{data_bytes, rss_bytes};
@@ -93,5 +94,23 @@ pub fn is_exceeded() -> bool {
     match (limit(), rss_bytes()) {
         (Some(Memory(limit)), Some(resident)) => resident > limit,
         _ => false,
+    }
+}
+
+/// A memory limit in terms of the whole process, which is what the user gave.
+pub fn explain(e: FitError, control: &Control) -> Failure {
+    match (&e, control.memory_limit, limit()) {
+        (FitError::MemoryLimit { needed, limit }, Some(_), Some(Memory(given))) => {
+            // Rounded up, so that what is advised suffices.
+            let enough = (given + needed.saturating_sub(*limit)).div_ceil(1 << 20);
+            Failure::limit(format!(
+                "the fit needs about {}, and --memory {} leaves it {} beside the program and the input; raise --memory to \
+                 {enough}MiB or lower --max-depth",
+                human_bytes(*needed),
+                human_bytes(given),
+                human_bytes(*limit),
+            ))
+        }
+        _ => e.into(),
     }
 }

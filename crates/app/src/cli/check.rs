@@ -13,11 +13,11 @@ use serde_json::json;
 
 use super::cost::Cost;
 use super::failure::{Failure, Outcome};
-use super::field::{OpenField, either};
+use super::field::{FieldArgs, OpenField, either};
 use super::input::{self, Input, Shape};
 use super::quantity::{human_number, threads};
 use super::sample::voxel_frame;
-use super::source::{FIELDS, SAMPLES, Source, input_formats};
+use super::source::{SAMPLES, Source, input_formats};
 use super::staged::StagedFiles;
 use super::summary::Summary;
 use super::volume_choice::VolumeChoice;
@@ -30,8 +30,8 @@ use crate::check::{
 /// Arguments of `isoclay check`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Field (.iclay); - reads standard input
-    field: PathBuf,
+    #[command(flatten)]
+    field: FieldArgs,
     /// What it was fitted to; - reads standard input
     input: PathBuf,
     /// What to take a file with faces for [default: cloud for PLY and OBJ, mesh for files that hold nothing else]
@@ -86,9 +86,9 @@ pub fn run(args: &Args) -> Outcome {
     let report = (args.output.as_ref())
         .map(|directory| StagedFiles::new("-o", directory))
         .transpose()?;
-    let field = Source::open(&args.field, None, FIELDS, &cancel)?;
+    let field = args.field.source(&cancel)?;
     let source = Source::open(&args.input, args.format.as_deref(), SAMPLES, &cancel)?;
-    let open = OpenField::load(&field)?;
+    let open = args.field.load(&field)?;
     let leaves = &open.report().leaves;
     let input = input::read(&source, args.shape, &args.volume, None, None)?;
     let own = belongs::check(&open, field.name(), &input, source.name());

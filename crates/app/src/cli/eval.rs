@@ -7,17 +7,17 @@ use formats::points::PointCloud;
 use rayon::prelude::*;
 
 use super::failure::{Failure, OrFail, Outcome};
-use super::field::OpenField;
+use super::field::FieldArgs;
 use super::input::limits;
 use super::quantity::threads;
 use super::set_threads;
-use super::source::{FIELDS, POINTS, Source, point_formats};
+use super::source::{POINTS, Source, point_formats};
 
 /// Arguments of `isoclay eval`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Field (.iclay); - reads standard input
-    field: PathBuf,
+    #[command(flatten)]
+    field: FieldArgs,
     /// Points: lines of x y z, or a point cloud; - reads standard input
     #[arg(long, value_name = "F")]
     points: PathBuf,
@@ -38,7 +38,7 @@ const PART: usize = 1 << 12;
 pub fn run(args: &Args) -> Outcome {
     set_threads(args.threads)?;
     let cancel = Cancel::new();
-    let open = OpenField::load(&Source::open(&args.field, None, FIELDS, &cancel)?)?;
+    let open = args.field.load(&args.field.source(&cancel)?)?;
     // Lines of numbers are what people type.
     let lines = (args.points == Path::new("-")).then_some("xyz");
     let format = args.format.as_deref().or(lines);

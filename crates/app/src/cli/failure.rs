@@ -1,11 +1,9 @@
 use std::fmt;
 use std::io;
 
-use fitting::{Control, FitError};
+use fitting::FitError;
 
-use super::ceiling;
 use super::flags;
-use super::quantity::{Memory, human_bytes};
 
 /// What a subcommand gives back.
 pub type Outcome<T = ()> = Result<T, Failure>;
@@ -145,24 +143,6 @@ impl From<FitError> for Failure {
             cause,
             error: anyhow::anyhow!(flags::named(&e.to_string())),
         }
-    }
-}
-
-/// A memory limit in terms of the whole process, which is what the user gave.
-pub fn explain(e: FitError, control: &Control) -> Failure {
-    match (&e, control.memory_limit, ceiling::limit()) {
-        (FitError::MemoryLimit { needed, limit }, Some(_), Some(Memory(given))) => {
-            // Rounded up, so that what is advised suffices.
-            let enough = (given + needed.saturating_sub(*limit)).div_ceil(1 << 20);
-            Failure::limit(format!(
-                "the fit needs about {}, and --memory {} leaves it {} beside the program and the input; raise --memory to \
-                 {enough}MiB or lower --max-depth",
-                human_bytes(*needed),
-                human_bytes(given),
-                human_bytes(*limit),
-            ))
-        }
-        _ => e.into(),
     }
 }
 

@@ -1,9 +1,10 @@
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use bspline::hierarchical::Lattice;
 use bspline::{Field, Frame, HierarchicalSpline, Real};
 use fitting::orient::Route;
-use fitting::{FitReport, Leaf, SignReport, StopReason};
+use fitting::{Cancel, FitReport, Leaf, SignReport, StopReason};
 use formats::field::{AnyField, FieldMeta, LeafRecord, LoadedField, SourceKind};
 use formats::{Fault, FormatError, Kind, Unit};
 use serde::{Deserialize, Serialize};
@@ -12,8 +13,30 @@ use super::failure::{Failure, Outcome};
 use super::input::limits;
 use super::output::Output;
 use super::solves::Solve;
-use super::source::Source;
+use super::source::{FIELDS, Source};
 use super::summary::hex;
+
+/// Where a field is read from.
+#[derive(clap::Args)]
+pub struct FieldArgs {
+    /// Field (.iclay) or document (.isoclay); - reads standard input
+    field: PathBuf,
+    /// Object of the document, if it has several
+    #[arg(long, value_name = "NAME")]
+    object: Option<String>,
+}
+
+impl FieldArgs {
+    /// The file.
+    pub fn source(&self, cancel: &Cancel) -> Outcome<Source> {
+        Source::open(&self.field, None, FIELDS, cancel)
+    }
+
+    /// Reads the field from the file.
+    pub fn load(&self, source: &Source) -> Outcome<OpenField> {
+        OpenField::load_object(source, self.object.as_deref())
+    }
+}
 
 /// A field file that was read.
 pub struct OpenField {
@@ -65,9 +88,22 @@ pub(super) use either;
 impl OpenField {
     /// Reads a field file, or the only object of a document.
     pub fn load(source: &Source) -> Outcome<Self> {
-        let loaded = match document::is_document(source.path()) {
-            true => only_object(source)?,
-            false => formats::field::load(source.path(), &limits(None)).map_err(|e| not_loaded(source, e))?,
+        Self::load_object(source, None)
+    }
+
+    /// Reads a field file, or an object of a document: the only one, or that of a name.
+    pub fn load_object(source: &Source, named: Option<&str>) -> Outcome<Self> {
+        let loaded = match (document::is_document(source.path()), named) {
+            (true, named) => of_document(source, named)?,
+            (false, None) => {
+                formats::field::load(source.path(), &limits(None)).map_err(|e| not_loaded(source, e))?
+            }
+            (false, Some(name)) => {
+                return Err(Failure::usage(format!(
+                    "--object {name}: {} is no document, and has no objects; leave it out",
+                    source.name()
+                )));
+            }
         };
         let stored: StoredReport = serde_json::from_str(&loaded.meta.report).map_err(|e| {
             Failure::input(format!(
@@ -250,18 +286,27 @@ impl OpenField {
     }
 }
 
-/// The field of a document that has one object, in the object's own place.
-fn only_object(source: &Source) -> Outcome<LoadedField> {
+/// The field of an object of a document, in the object's own place.
+fn of_document(source: &Source, named: Option<&str>) -> Outcome<LoadedField> {
     let document = super::document::open(source.path(), &mut Vec::new())?;
-    let objects = document.state().objects();
-    let mut all = objects.values();
-    let (Some(object), None) = (all.next(), all.next()) else {
-        return Err(Failure::input(format!(
-            "{0}: has {1} objects; write one as a field first: isoclay export {0} --object NAME -o FIELD.iclay",
-            source.name(),
-            objects.len()
-        )));
+    let state = document.state();
+    let names: Vec<_> = state.objects().keys().map(String::as_str).collect();
+    let name = match (named, &names[..]) {
+        (Some(name), _) => name,
+        (None, [only]) => only,
+        _ => {
+            return Err(Failure::usage(format!(
+                "{0}: has {1} objects ({2}); name one by --object where the command knows it, or write it as a field: \
+                 isoclay export {0} --object NAME -o FIELD.iclay",
+                source.name(),
+                names.len(),
+                names.join(", ")
+            )));
+        }
     };
+    let object = state
+        .object(name)
+        .map_err(|e| Failure::usage(format!("--object: {e}")))?;
     Ok(LoadedField {
         field: AnyField::F32(object.field.clone()),
         meta: super::document::edited_meta(object),

@@ -12,8 +12,9 @@ use formats::meshes::TriangleMesh;
 use formats::points::PointCloud;
 use formats::volumes::Volume;
 
+use super::ceiling::explain;
 use super::cost::Cost;
-use super::failure::{Failure, Outcome, explain};
+use super::failure::{Failure, Outcome};
 use super::field::{self, either};
 use super::input::{self, Input, Shape, bounding_box};
 use super::output::Output;

@@ -29,6 +29,9 @@ pub struct Args {
     /// Memory that the process may hold, such as 2GiB
     #[arg(long, value_name = "SIZE")]
     memory: Option<Memory>,
+    /// Object of a document: tell what its field is like
+    #[arg(long, value_name = "NAME")]
+    object: Option<String>,
     /// Print one JSON object instead of a table
     #[arg(long)]
     pub json: bool,
@@ -61,6 +64,20 @@ fn count(key: &'static str, label: &'static str, n: usize) -> Entry {
 pub fn run(args: &Args) -> Outcome {
     let part = args.volume.options(None)?;
     let source = Source::open(&args.file, args.format.as_deref(), ANYTHING, &Cancel::new())?;
+    let is_document = document::is_document(source.path());
+    if is_document && args.object.is_none() {
+        return super::document::info::run(&source, args.json);
+    }
+    if is_document || args.object.is_some() {
+        let open = OpenField::load_object(&source, args.object.as_deref())?;
+        return print(
+            args,
+            &source,
+            "object",
+            of_field(&open),
+            open.report().notes.clone(),
+        );
+    }
     let kind = input::kind(&source, &args.volume, &part)?;
     let (entries, notes) = match kind {
         Kind::Cloud(_) | Kind::Mesh(_) => {
@@ -74,11 +91,15 @@ pub fn run(args: &Args) -> Outcome {
             (of_field(&open), open.report().notes.clone())
         }
     };
+    print(args, &source, &kind.to_string(), entries, notes)
+}
+
+fn print(args: &Args, source: &Source, kind: &str, entries: Vec<Entry>, notes: Vec<String>) -> Outcome {
     let mut out = io::stdout().lock();
     if args.json {
         let mut object = Map::new();
         object.insert("file".into(), source.name().into());
-        object.insert("kind".into(), kind.to_string().into());
+        object.insert("kind".into(), kind.into());
         object.extend(entries.into_iter().map(|e| (e.key.to_string(), e.value)));
         object.insert("notes".into(), notes.into());
         writeln!(out, "{}", Value::Object(object)).or_limit()

@@ -8,14 +8,13 @@ use formats::field::SourceKind;
 
 use super::cost::Cost;
 use super::failure::{Failure, Outcome};
-use super::field::OpenField;
+use super::field::{FieldArgs, OpenField};
 use super::fineness::{Adaptive, Fineness, failed, watch};
 use super::mesh_check::MeshQuality;
 use super::mesh_output::{MESHES, MeshOutput};
 use super::output::Output;
 use super::progress::Bar;
 use super::quantity::{Tolerance, between, finite, human_number, threads};
-use super::source::{FIELDS, Source};
 use super::summary::Summary;
 use super::trim::{self, Sampled, drop_marked};
 use super::{interrupt, set_threads};
@@ -24,8 +23,8 @@ use crate::pieces::of_narrow_parts;
 /// Arguments of `isoclay mesh`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Field (.iclay); - reads standard input
-    field: PathBuf,
+    #[command(flatten)]
+    field: FieldArgs,
     /// Mesh to write: .ply, .stl, .obj, .glb, .gltf, .3mf or .wrl; - writes to standard output
     #[arg(short, long, value_name = "OUT")]
     pub output: PathBuf,
@@ -85,10 +84,10 @@ pub fn run(args: &Args) -> Outcome {
     let cost = Cost::start();
     let cancel = interrupt::cancel();
     let format = args.written.format.as_deref();
-    let field = Source::open(&args.field, None, FIELDS, &cancel)?;
+    let field = args.field.source(&cancel)?;
     let output = Output::check("-o", &args.output, &MESHES, format, &[&field])?;
     set_threads(args.threads)?;
-    let open = OpenField::load(&field)?;
+    let open = args.field.load(&field)?;
     let options = PolygonizeOptions {
         iso: open.iso_or(args.iso, &field)?,
         open: args.open,

@@ -7,12 +7,11 @@ use glam::DVec3;
 
 use super::cost::Cost;
 use super::failure::{Failure, OrFail, Outcome};
-use super::field::OpenField;
+use super::field::{FieldArgs, OpenField};
 use super::mesh::Mesher;
 use super::output::Output;
 use super::progress::Bar;
 use super::quantity::{between, finite, human_number, positive, threads};
-use super::source::{FIELDS, Source};
 use super::summary::Summary;
 use super::{interrupt, set_threads};
 use crate::picture::{Part, Scene, Surface, View, draw};
@@ -20,8 +19,8 @@ use crate::picture::{Part, Scene, Surface, View, draw};
 /// Arguments of `isoclay picture`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Field (.iclay); - reads standard input
-    field: PathBuf,
+    #[command(flatten)]
+    field: FieldArgs,
     /// Picture to write (.png); - writes to standard output
     #[arg(short, long, value_name = "OUT")]
     pub output: PathBuf,
@@ -97,10 +96,10 @@ fn point(s: &str) -> Result<DVec3, String> {
 pub fn run(args: &Args) -> Outcome {
     let cost = Cost::start();
     let cancel = interrupt::cancel();
-    let source = Source::open(&args.field, None, FIELDS, &cancel)?;
+    let source = args.field.source(&cancel)?;
     let output = Output::check("-o", &args.output, &["png"], None, &[&source])?;
     set_threads(args.threads)?;
-    let open = OpenField::load(&source)?;
+    let open = args.field.load(&source)?;
     let bar = Bar::new();
     let options = PolygonizeOptions {
         iso: open.iso_or(args.iso, &source)?,

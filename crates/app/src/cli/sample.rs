@@ -12,12 +12,12 @@ use glam::{DAffine3, DVec3};
 use super::convert::VOLUMES;
 use super::cost::Cost;
 use super::failure::Outcome;
-use super::field::OpenField;
+use super::field::FieldArgs;
 use super::input::{self, limits, remaining};
 use super::output::Output;
 use super::progress::Bar;
 use super::quantity::{Memory, human_bytes, human_number, threads};
-use super::source::{self, FIELDS, Source};
+use super::source::{self, Source};
 use super::store::{self, Clipped};
 use super::summary::Summary;
 use super::volume_choice::VolumeChoice;
@@ -26,8 +26,8 @@ use super::{Failure, interrupt, set_threads};
 /// Arguments of `isoclay sample`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Field (.iclay); - reads standard input
-    field: PathBuf,
+    #[command(flatten)]
+    field: FieldArgs,
     /// Volume whose grid is taken, or with --spacing its box; its densities are not read; - reads standard input
     #[arg(long, value_name = "VOLUME")]
     like: PathBuf,
@@ -63,7 +63,7 @@ pub fn run(args: &Args) -> Outcome {
     let cost = Cost::start();
     let cancel = interrupt::cancel();
     let like = Source::open(&args.like, None, source::VOLUMES, &cancel)?.under("--like");
-    let field = Source::open(&args.field, None, FIELDS, &cancel)?;
+    let field = args.field.source(&cancel)?;
     let output = Output::check(
         "-o",
         &args.output,
@@ -85,7 +85,7 @@ pub fn run(args: &Args) -> Outcome {
     if let Some(spacing) = spacing {
         notes.extend(resample(&mut header, spacing)?);
     }
-    let open = OpenField::load(&field)?;
+    let open = args.field.load(&field)?;
     let [nx, ny, nz] = header.dims;
     let depth = SLAB.min(nz);
     let needed = (nx as u64 * ny as u64)

@@ -49,7 +49,7 @@ pub const SAMPLES: &str = "point clouds .ply .obj .pcd .las .laz .e57 .xyz .xyzn
 /// What `info` accepts.
 pub const ANYTHING: &str = "point clouds .ply .obj .pcd .las .laz .e57 .xyz .xyzn .txt .asc .csv .pts, meshes .ply \
     .obj .stl .gltf .glb .3mf .wrl, volumes .nii .hdr .nrrd .nhdr .mha .mhd .tif (each also .gz), directories of DICOM \
-    or .tif slices, voxels without a header by --shape and --voxel, and fields .iclay";
+    or .tif slices, voxels without a header by --shape and --voxel, fields .iclay and documents .isoclay";
 /// What `eval --points` accepts.
 pub const POINTS: &str =
     "point clouds .ply .obj .pcd .las .laz .e57 .xyz .xyzn .txt .asc .csv .pts, each also .gz";
@@ -57,7 +57,7 @@ pub const POINTS: &str =
 pub const VOLUMES: &str = "volumes .nii .hdr .nrrd .nhdr .mha .mhd .tif (each also .gz), directories of DICOM or .tif \
     slices, and voxels without a header by --shape and --voxel";
 /// What is made by `isoclay fit`.
-pub const FIELDS: &str = "fields .iclay, as isoclay fit writes them, and documents .isoclay of one object";
+pub const FIELDS: &str = "fields .iclay, as isoclay fit writes them, and documents .isoclay";
 
 impl Source {
     /// The file `given`, or standard input for `-`; `format` names the format of a content that does not tell it.

@@ -5,7 +5,8 @@ use fitting::{Control, FitReport, SignReport};
 use formats::points::PointCloud;
 use glam::DVec3;
 
-use super::failure::{Failure, Outcome, explain};
+use super::ceiling::explain;
+use super::failure::{Failure, Outcome};
 
 /// How to tell inside from outside where a cloud has no normals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

@@ -82,6 +82,40 @@ fn a_document_is_edited_undone_done_again_and_replayed() {
 }
 
 #[test]
+fn an_object_of_several_is_named() {
+    let bench = ball();
+    bench.write(
+        "copy.toml",
+        "[[stroke]]\ncopy = { to = \"twin\" }\n\n[[stroke]]\nobject = \"twin\"\ncarve = { shape = { sphere = { radius = 0.4 } }, along = \
+         [[0.0, 0.0, 1.0]] }\n",
+    );
+    bench.json("new clay.isoclay ball.iclay");
+    let made = bench.json("sculpt clay.isoclay --script copy.toml");
+    let listed = bench.json("info clay.isoclay");
+    assert_eq!(listed["done"], 2);
+    for (object, name) in listed["objects"].as_array().unwrap().iter().zip(["ball", "twin"]) {
+        assert_eq!(object["name"], name);
+        assert_eq!(object["field_sha256"], made["field_sha256"][name]);
+        assert_eq!(
+            bench.json(&format!("info clay.isoclay --object {name}"))["field_sha256"],
+            object["field_sha256"]
+        );
+    }
+    let volume = |name: &str| {
+        let mesh = format!("mesh clay.isoclay --object {name} -o {name}.stl --check");
+        number(&bench.json(&mesh)["quality"], "volume")
+    };
+    assert!(volume("twin") < 0.99 * volume("ball"));
+    let unnamed = bench.run("picture clay.isoclay -o a.png");
+    assert_eq!(unnamed.code, 2);
+    assert!(
+        unnamed.stderr.contains("(ball, twin); name one by --object"),
+        "{}",
+        unnamed.stderr
+    );
+}
+
+#[test]
 fn documents_that_cannot_be_used_say_why_and_stay_as_they_are() {
     let bench = ball();
     std::fs::copy(bench.path("ball.iclay"), bench.path("cow.iclay")).unwrap();
@@ -107,7 +141,7 @@ fn documents_that_cannot_be_used_say_why_and_stay_as_they_are() {
             3,
             "strenght",
         ),
-        ("mesh two.isoclay -o out.ply", 3, "isoclay export"),
+        ("mesh two.isoclay -o out.ply", 2, "isoclay export"),
         ("export two.isoclay -o out.iclay", 2, "--object"),
     ] {
         let run = bench.run(arguments);
@@ -197,7 +231,8 @@ fn a_block_is_made_from_nothing_and_shaped() {
     bench.json("new block.isoclay --box 10,6,4 --spacing 0.4 --unit mm");
     let mesh = bench.json("mesh block.isoclay -o block.ply --check");
     let volume = number(&mesh["quality"], "volume");
-    assert!((volume - 240.0).abs() < 2.0, "{mesh}");
+    // 240, less what the rounding of the edges takes: 0.6 mm.
+    assert!((volume - 234.2).abs() < 1.0, "{mesh}");
     bench.write(
         "drill.toml",
         "[[stroke]]\nobject = \"block\"\ncarve = { shape = { cylinder = { axis = [0, 0, 1], radius = 1.0, height = 9.0 } }, along = [[1, 0, 0]] }\n",

@@ -53,7 +53,7 @@ fn points_follow_their_surface_go_with_it_and_cover_what_is_new() {
         let Command::Stroke { stroke, .. } = &commands[0] else {
             unreachable!()
         };
-        let others = tools::tool::Others::default();
+        let others = tools::others::Others::default();
         let (before, limits, control) = (large(), Limits::default(), &mut Control::default());
         let now = match stroke.tool().unwrap() {
             tools::tool::Tool::Carve(t) => {

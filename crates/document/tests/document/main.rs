@@ -1,8 +1,11 @@
 //! Documents: edits, undo, and files that crashes and faults have cut.
 
+mod clay;
 mod cloud;
 mod common;
+mod live;
 mod revision;
+mod sessions;
 
 use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader, Seek, SeekFrom, Write};

@@ -3,11 +3,11 @@
 use bspline::Real;
 
 use super::motion::State;
+use super::statics::StaticSolver;
 use super::version::{Prepared, Version};
 use crate::lattice::{SampleBox, TensorWorkspace};
 use crate::solve::StepSolver;
 use crate::springs::StepMatrix;
-use crate::statics::StaticSolver;
 
 /// Solvers and matrices of a patch.
 #[derive(Clone, Debug)]

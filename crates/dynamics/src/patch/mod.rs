@@ -5,6 +5,7 @@ mod energy;
 mod error;
 mod material;
 mod motion;
+mod statics;
 mod version;
 
 use bspline::Real;
@@ -21,6 +22,8 @@ use material::Material;
 use motion::Motion;
 pub use motion::State;
 pub(crate) use motion::finite;
+pub use statics::Against;
+pub(crate) use statics::StaticSolver;
 pub(crate) use version::{Prepared, Version};
 
 /// A region of a field that moves.

@@ -8,7 +8,6 @@ use super::pcg::{CoefficientSystem, PcgReport};
 use super::report::{ITERATED, Method, SolveReport};
 use super::step_solver::StepSolver;
 use super::systems::{SampleSystem, Sampled};
-use crate::lattice::{Lattice, TensorProduct, TensorWorkspace};
 use crate::sparse::Projected;
 use crate::springs::StepMatrix;
 use crate::units::{binary_unit, largest};
@@ -26,38 +25,6 @@ const MOST_ITERATIONS: usize = 64;
 
 /// Impulses whose squares, and those of their residuals, are far from the ends of the range of single precision.
 const ORDINARY: std::ops::Range<f64> = 1e-6..1e12;
-
-/// `A⁻¹` in double precision.
-#[derive(Clone, Debug)]
-pub(super) struct SampleInverse {
-    product: TensorProduct<f64>,
-    d: Vec<f64>,
-    p: Vec<f64>,
-    workspace: TensorWorkspace<f64>,
-}
-
-impl SampleInverse {
-    pub fn new<T: Real>(lattice: &Lattice<T>) -> Self {
-        let m = lattice.sample_count();
-        Self {
-            product: lattice.inverse(),
-            d: vec![0.0; m],
-            p: vec![0.0; m],
-            workspace: TensorWorkspace::new(),
-        }
-    }
-
-    /// `x = A⁻¹ dx`.
-    fn apply<T: Real>(&mut self, dx: &[T], x: &mut [T]) {
-        for (d, dx) in self.d.iter_mut().zip(dx) {
-            *d = dx.as_f64();
-        }
-        self.product.apply(&self.d, &mut self.p, &mut self.workspace);
-        for (x, p) in x.iter_mut().zip(&self.p) {
-            *x = T::from_f64(*p);
-        }
-    }
-}
 
 impl<T: Real> StepSolver<T> {
     /// The increment `x` of the coefficients and `dx = A x` of the densities under the impulses `g` on the samples, for

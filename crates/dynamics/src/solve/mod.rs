@@ -17,6 +17,7 @@ mod painted;
 pub(crate) mod pcg;
 mod renewal;
 mod report;
+mod sample_inverse;
 mod sample_multigrid;
 mod schwarz;
 pub(crate) mod step_solver;

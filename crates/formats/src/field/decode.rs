@@ -6,22 +6,13 @@ use glam::DAffine3;
 
 use super::chunk::Chunk;
 use super::cursor::Cursor;
-use super::encode::{END, HEADER, LEAVES, LEVEL, NOTES, PROVENANCE, REPORT, SIGNS};
+use super::kinds::{END, HEADER, LEAVES, LEVEL, NOTES, PROVENANCE, REPORT, SIGNS};
 use super::levels::{self, Level};
-use super::valid::{self, Wrong};
+use super::valid::{self, Wrong, written_wrongly};
 use super::{AnyField, FieldMeta, LeafRecord, LoadedField, MAGIC, SourceKind, Stored, VERSION};
 use crate::error::excerpt;
 use crate::limits::Budget;
 use crate::{Fault, ReadLimits, Unit};
-
-/// What a file says that no field has.
-pub(super) fn written_wrongly(Wrong { what, value }: Wrong) -> Fault {
-    Fault::Value {
-        what,
-        value,
-        remedy: "no field has this; the file was written wrongly",
-    }
-}
 
 /// Reads the bytes of a field file.
 ///

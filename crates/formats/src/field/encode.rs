@@ -5,19 +5,11 @@ use std::io::{self, Write};
 use bspline::HierarchicalSpline;
 
 use super::chunk::{self, Kind};
+use super::kinds::{END, HEADER, LEAVES, LEVEL, NOTES, PROVENANCE, REPORT, SIGNS};
 use super::levels::to_bytes;
 use super::valid::{self, Wrong};
 use super::{FieldMeta, MAGIC, Stored, VERSION};
 use crate::Fault;
-
-pub(super) const HEADER: Kind = *b"HEAD";
-pub(super) const LEVEL: Kind = *b"CORR";
-pub(super) const LEAVES: Kind = *b"LEAF";
-pub(super) const SIGNS: Kind = *b"SIGN";
-pub(super) const REPORT: Kind = *b"REPT";
-pub(super) const NOTES: Kind = *b"NOTE";
-pub(super) const PROVENANCE: Kind = *b"PROV";
-pub(super) const END: Kind = *b"DONE";
 
 /// The bytes of a field file.
 ///

@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use bspline::hierarchical::{BRICK, BrickKey, Corrections, Lattice};
 
+use super::Stored;
 use super::cursor::Cursor;
-use super::decode::written_wrongly;
-use super::{Stored, valid};
+use super::valid::{self, written_wrongly};
 use crate::Fault;
 use crate::limits::Budget;
 

@@ -5,6 +5,7 @@ mod cursor;
 mod decode;
 mod difference;
 mod encode;
+mod kinds;
 mod levels;
 mod stored;
 mod valid;

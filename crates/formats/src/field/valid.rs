@@ -3,6 +3,7 @@
 use bspline::hierarchical::{BRICK, BrickKey, Corrections, Lattice, active_slots};
 
 use super::{FieldMeta, LeafRecord, MAX_LEVELS, Stored};
+use crate::Fault;
 use crate::volumes::geometry::is_usable;
 
 /// Most cells of the finest level along an axis; bricks and slots are counted in 32 bits.
@@ -13,6 +14,15 @@ const MAX_CELLS: u64 = 1 << 30;
 pub(super) struct Wrong {
     pub what: &'static str,
     pub value: String,
+}
+
+/// What a file says that no field has.
+pub(super) fn written_wrongly(Wrong { what, value }: Wrong) -> Fault {
+    Fault::Value {
+        what,
+        value,
+        remedy: "no field has this; the file was written wrongly",
+    }
 }
 
 fn wrong(what: &'static str, value: String) -> Result<(), Wrong> {

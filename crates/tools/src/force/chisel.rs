@@ -1,4 +1,5 @@
 use bspline::{HierarchicalSpline, Real};
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::path::Path;
@@ -35,16 +36,33 @@ impl Chisel {
         grows: bool,
     ) -> Result<ForceStroke<T>, ForceError> {
         let points: Vec<_> = self.along.iter().map(|p| p.0).collect();
-        let way = if grows { self.depth.0 } else { -self.depth.0 };
-        let target = |place: &track::Place| {
-            Ok(Target {
-                weight: place.weight,
-                begins: place.along,
-                ..Target::single(Path::through([place.at, place.at + way * place.normal])?, grows)
-            })
-        };
         let places = track::along(field, iso, &points, self.radius.0)?;
-        let targets: Result<Vec<_>, ForceError> = places.iter().map(target).collect();
+        let targets: Result<Vec<_>, _> = places.iter().map(|place| self.target(place, grows)).collect();
         ForceStroke::new(field, iso, targets?, Extent::Track, self.radius.0, &self.how)
+    }
+
+    /// Takes the tool in hand at a place, the first of its track.
+    ///
+    /// # Errors
+    /// Any [`ForceError`].
+    pub fn hold<T: Real>(
+        &self,
+        field: &HierarchicalSpline<T>,
+        iso: f64,
+        grows: bool,
+        at: DVec3,
+    ) -> Result<ForceStroke<T>, ForceError> {
+        let tool = self.clone();
+        let make = Box::new(move |place: &track::Place| tool.target(place, grows));
+        ForceStroke::walking(field, [iso, iso], make, at, self.radius.0, &self.how)
+    }
+
+    fn target(&self, place: &track::Place, grows: bool) -> Result<Target, ForceError> {
+        let way = if grows { self.depth.0 } else { -self.depth.0 };
+        Ok(Target {
+            weight: place.weight,
+            begins: place.along,
+            ..Target::single(Path::through([place.at, place.at + way * place.normal])?, grows)
+        })
     }
 }

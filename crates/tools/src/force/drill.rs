@@ -1,4 +1,5 @@
 use bspline::{HierarchicalSpline, Real};
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::path::Path;
@@ -38,27 +39,54 @@ impl Drill {
         grows: bool,
     ) -> Result<ForceStroke<T>, ForceError> {
         let points: Vec<_> = self.along.iter().map(|p| p.0).collect();
-        let wider = WIDER * self.radius.0 * field.slope();
-        // Beyond the surface by as much as the hole is to be wide.
-        let goal = if grows { iso + wider } else { iso - wider };
-        let target = |place: &track::Place| {
-            let inward = if grows { -place.normal } else { place.normal };
-            if self.by.0.dot(inward) >= 0.0 {
-                let way = if grows { "out of" } else { "into" };
-                return Err(ForceError::tool(format!(
-                    "by {:?} does not lead {way} the solid at {:?}; turn it round, or begin on the other side",
-                    self.by.0.to_array(),
-                    place.at.to_array(),
-                )));
-            }
-            Ok(Target {
-                weight: place.weight,
-                ends_early: true,
-                ..Target::single(Path::through([place.at, place.at + self.by.0])?, grows)
-            })
-        };
         let places = track::along(field, iso, &points, self.radius.0)?;
-        let targets: Result<Vec<_>, ForceError> = places.iter().map(target).collect();
+        let targets: Result<Vec<_>, _> = places.iter().map(|place| self.target(place, grows)).collect();
+        let goal = self.goal(field, iso, grows);
         ForceStroke::new(field, goal, targets?, Extent::Curve, self.radius.0, &self.how)
+    }
+
+    /// Takes the tool in hand at a place, the first of its track.
+    ///
+    /// # Errors
+    /// Any [`ForceError`].
+    pub fn hold<T: Real>(
+        &self,
+        field: &HierarchicalSpline<T>,
+        iso: f64,
+        grows: bool,
+        at: DVec3,
+    ) -> Result<ForceStroke<T>, ForceError> {
+        let (tool, goal) = (self.clone(), self.goal(field, iso, grows));
+        let make = Box::new(move |place: &track::Place| {
+            let begins = place.along;
+            Ok(Target {
+                begins,
+                ..tool.target(place, grows)?
+            })
+        });
+        ForceStroke::walking(field, [iso, goal], make, at, self.radius.0, &self.how)
+    }
+
+    /// Density beyond the surface by as much as the hole is to be wide.
+    fn goal<T: Real>(&self, field: &HierarchicalSpline<T>, iso: f64, grows: bool) -> f64 {
+        let wider = WIDER * self.radius.0 * field.slope();
+        if grows { iso + wider } else { iso - wider }
+    }
+
+    fn target(&self, place: &track::Place, grows: bool) -> Result<Target, ForceError> {
+        let inward = if grows { -place.normal } else { place.normal };
+        if self.by.0.dot(inward) >= 0.0 {
+            let way = if grows { "out of" } else { "into" };
+            return Err(ForceError::tool(format!(
+                "by {:?} does not lead {way} the solid at {:?}; turn it round, or begin on the other side",
+                self.by.0.to_array(),
+                place.at.to_array(),
+            )));
+        }
+        Ok(Target {
+            weight: place.weight,
+            ends_early: true,
+            ..Target::single(Path::through([place.at, place.at + self.by.0])?, grows)
+        })
     }
 }

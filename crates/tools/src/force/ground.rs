@@ -1,6 +1,7 @@
 use bspline::{HierarchicalSpline, Real};
 use dynamics::matter::{Matter, Quantity};
 use dynamics::region::{Cells, Region, RegionOptions};
+use dynamics::springs::Weights;
 use glam::DVec3;
 
 use super::ForceError;
@@ -26,41 +27,93 @@ pub struct Ground<'a, T> {
     /// What is painted on it.
     pub layers: &'a Layers,
     pub radius: f64,
+    /// Radii that a tool in a hand may go before the region is too small.
+    pub roam: f64,
 }
 
 impl<T: Real> Ground<'_, T> {
     /// A region about paths, at rest, of matter that moves as wide as the tool is.
     pub fn cut(&self, targets: &[&Target]) -> Result<Region<T>, ForceError> {
-        let level = level(self.field, self.radius)?;
-        let cells = about(self.field, level, targets, self.radius)?;
-        let options = RegionOptions::of(self.field, level);
+        let cells = self.cells(targets)?;
+        let options = RegionOptions::of(self.field, cells.level);
+        let matter = matter(self.field, self.radius);
+        let mut region = Region::new(self.field, cells, matter, &options)?;
+        self.paint(&mut region)?;
+        Ok(region)
+    }
+
+    /// The field with the change of a region, and one about other paths that goes on where it was.
+    pub fn follow(
+        &self,
+        region: &Region<T>,
+        targets: &[&Target],
+    ) -> Result<(HierarchicalSpline<T>, Region<T>), ForceError> {
+        let matter = matter(self.field, self.radius);
+        let (field, mut region) = region.moved(self.field, self.cells(targets)?, matter)?;
+        self.paint(&mut region)?;
+        Ok((field, region))
+    }
+
+    /// Whether a region reaches as far beside a path as it has to, or to the border of the field.
+    pub fn has_room(&self, region: &Region<T>, target: &Target) -> bool {
+        let cells = region.cells();
+        let lattice = self.field.lattice();
+        let (spacing, limit) = (lattice.spacing(cells.level), lattice.cells_at(cells.level));
+        let scale = (1u64 << cells.level) as f64;
+        target.path.points().iter().all(|p| {
+            let p = self.field.lattice_from_world().transform_point3(*p) * scale;
+            (0..3).all(|a| {
+                let (low, end) = (cells.first[a], cells.first[a] + cells.count[a]);
+                let room = 0.999 * ROOM * self.radius / spacing[a] + RIM;
+                (low == 0 || p[a] - f64::from(low) >= room)
+                    && (end == limit[a] || f64::from(end) - p[a] >= room)
+            })
+        })
+    }
+
+    /// Gives a region the matter that is painted. Springs whose rest lengths are painted pull from then on.
+    pub fn paint(&self, region: &mut Region<T>) -> Result<(), ForceError> {
         let mut matter = matter(self.field, self.radius);
-        let mut region = Region::new(self.field, cells, matter.clone(), &options)?;
         let [nx, ny, nz] = region.patch().lattice().sample_dims();
         let mut places = Vec::new();
         if !self.layers.is_empty() {
             let at = |i: usize| region.sample_position([i / nz / ny, i / nz % ny, i % nz]);
             places.extend((0..nx * ny * nz).map(at));
         }
-        let mut is_painted = false;
+        let mut rest = Quantity::Constant(1.0);
         for (substance, quantity) in [
             (Substance::Stiffness, &mut matter.stiffness),
             (Substance::Mass, &mut matter.mass),
             (Substance::Damping, &mut matter.damping),
+            (Substance::RestLength, &mut rest),
         ] {
             let factors = paint::values(self.layers, substance, &places);
             // Where there is no paint matter stays uniform, and its solver fast.
-            let Some(factors) = factors.filter(|f| f.iter().any(|f| *f != 1.0)) else {
-                continue;
-            };
-            let values = quantity.paint(factors.len()).iter_mut();
-            values.zip(factors).for_each(|(value, factor)| *value *= factor);
-            is_painted = true;
+            if let Some(factors) = factors.filter(|f| f.iter().any(|f| *f != 1.0)) {
+                let values = quantity.paint(factors.len()).iter_mut();
+                values.zip(factors).for_each(|(value, factor)| *value *= factor);
+            }
         }
-        if is_painted {
+        if *region.patch().matter() != matter {
             region.patch_mut().set_matter(matter)?;
         }
-        Ok(region)
+        let scale = match rest {
+            Quantity::Constant(_) => Weights::Constant(T::one()),
+            Quantity::PerSample(all) => Weights::Each(all.into_iter().map(T::from_f64).collect()),
+        };
+        region.patch_mut().springs_mut().rest_mut().scale = scale;
+        Ok(())
+    }
+
+    /// Cells about paths, with room on all sides.
+    fn cells(&self, targets: &[&Target]) -> Result<Cells, ForceError> {
+        let level = level(self.field, self.radius)?;
+        let [low, high] = bounds(self.field, targets);
+        let lattice = self.field.lattice();
+        let room = (ROOM + self.roam) * self.radius + RIM * lattice.spacing(level).max_element();
+        let middle = lattice.world_from_lattice.transform_point3(0.5 * (low + high));
+        let half = 0.5 * (high - low) * lattice.spacing(0) + room;
+        Ok(Cells::around(self.field, level, middle, half)?.widened(self.field)?)
     }
 }
 
@@ -94,22 +147,4 @@ fn bounds<T: Real>(field: &HierarchicalSpline<T>, targets: &[&Target]) -> [DVec3
     local.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], p| {
         [low.min(p), high.max(p)]
     })
-}
-
-/// Cells about paths, with room on all sides.
-fn about<T: Real>(
-    field: &HierarchicalSpline<T>,
-    level: usize,
-    targets: &[&Target],
-    radius: f64,
-) -> Result<Cells, ForceError> {
-    let [low, high] = bounds(field, targets);
-    let spacing = field.lattice().spacing(0);
-    let room = ROOM * radius + RIM * field.lattice().spacing(level).max_element();
-    let middle = field
-        .lattice()
-        .world_from_lattice
-        .transform_point3(0.5 * (low + high));
-    let half = 0.5 * (high - low) * spacing + room;
-    Ok(Cells::around(field, level, middle, half)?.widened(field)?)
 }

@@ -13,6 +13,7 @@ mod chisel;
 mod drill;
 mod filter;
 mod ground;
+mod hand;
 mod path;
 mod pull;
 pub mod quadrature;
@@ -33,8 +34,9 @@ pub use path::{Path, first_crossing, nearest_surface};
 pub use pull::Pull;
 pub use report::{Arrival, ForceReport, Told};
 pub use stroke::{Extent, ForceStroke};
-pub use target::Target;
+pub use target::{Span, Target};
 pub use tool::ForceTool;
+pub(crate) use tool::released;
 
 use dynamics::patch::PatchError;
 use dynamics::region::RegionError;

@@ -43,18 +43,6 @@ impl Pull {
         field: &HierarchicalSpline<T>,
         iso: f64,
     ) -> Result<ForceStroke<T>, ForceError> {
-        let radius = self.radius.0;
-        let points: Vec<_> = self.along.iter().map(|p| p.0).collect();
-        let places = match (self.disc, &points[..]) {
-            (None, _) => track::along(field, iso, &points, radius)?,
-            (Some(disc), [middle]) => track::disc(field, iso, *middle, disc.0, radius)?,
-            (Some(_), _) => {
-                return Err(ForceError::tool(format!(
-                    "a disc has one middle, and along has {} points; write one, or leave disc out",
-                    points.len()
-                )));
-            }
-        };
         let target = |place: &track::Place| {
             let way: Vec<_> = match (&self.by, &self.way, &self.lift) {
                 (Some(by), None, None) => vec![by.0],
@@ -69,12 +57,46 @@ impl Pull {
                 ..Target::single(path, true)
             })
         };
-        let extent = if self.disc.is_some() {
-            Extent::Area
-        } else {
-            Extent::Curve
-        };
+        let places = self.places(field, iso)?;
         let targets: Result<Vec<_>, _> = places.iter().map(target).collect();
-        ForceStroke::new(field, iso, targets?, extent, radius, &self.how)
+        ForceStroke::new(field, iso, targets?, self.extent(), self.radius.0, &self.how)
+    }
+
+    /// Takes hold of a field for a hand that will say the way, its ends from the place of the surface.
+    ///
+    /// # Errors
+    /// Any [`ForceError`].
+    pub fn hold<T: Real>(
+        &self,
+        field: &HierarchicalSpline<T>,
+        iso: f64,
+    ) -> Result<ForceStroke<T>, ForceError> {
+        let places = self.places(field, iso)?;
+        ForceStroke::dragging(field, iso, places, self.extent(), self.radius.0, &self.how)
+    }
+
+    fn extent(&self) -> Extent {
+        match self.disc {
+            Some(_) => Extent::Area,
+            None => Extent::Curve,
+        }
+    }
+
+    /// Where it takes hold.
+    fn places<T: Real>(
+        &self,
+        field: &HierarchicalSpline<T>,
+        iso: f64,
+    ) -> Result<Vec<track::Place>, ForceError> {
+        let radius = self.radius.0;
+        let points: Vec<_> = self.along.iter().map(|p| p.0).collect();
+        match (self.disc, &points[..]) {
+            (None, _) => track::along(field, iso, &points, radius),
+            (Some(disc), [middle]) => track::disc(field, iso, *middle, disc.0, radius),
+            (Some(_), _) => Err(ForceError::tool(format!(
+                "a disc has one middle, and along has {} points; write one, or leave disc out",
+                points.len()
+            ))),
+        }
     }
 }

@@ -1,3 +1,5 @@
+use std::collections::BTreeSet;
+
 use bspline::{Field, HierarchicalSpline, Real};
 use dynamics::lattice::OnBox;
 use dynamics::region::Region;
@@ -5,6 +7,7 @@ use glam::DVec3;
 
 use super::filter::Shape;
 use super::ground::Ground;
+use super::hand::Hand;
 use super::report::{Arrival, ForceReport};
 use super::row::Functions;
 use super::spread::Load;
@@ -17,6 +20,8 @@ const TRAIL: f64 = 5.0;
 /// Radii of track that a tool goes on at once. Each time the shape so far becomes the one at rest: what is left behind
 /// would else spring back by what its springs have not yet followed.
 const STAGE: f64 = 6.0;
+/// Radii that a region leaves a tool in a hand to go on.
+const ROAM: f64 = 3.0;
 /// Share of its length that a path that has arrived may be off; after some steps with goals that stand still more is
 /// allowed, between neighbours it may not become less.
 const ARRIVED: f64 = 0.002;
@@ -99,6 +104,10 @@ pub struct ForceStroke<T> {
     /// Steps of the stage with all goals at the ends.
     pub(super) settled: usize,
     pub(super) scales: bool,
+    /// Whether the paths move other matter from now on.
+    is_repainted: bool,
+    /// What leads it, if its way is not known beforehand.
+    pub(super) hand: Option<Hand>,
     /// Forces of the last step.
     pub(super) load: Load<T>,
     pub(super) report: ForceReport,
@@ -155,6 +164,7 @@ impl<T: Real> ForceStroke<T> {
             field,
             layers: &layers,
             radius,
+            roam: 0.0,
         };
         let region = ground.cut(&first)?;
         let samples = region.patch().lattice().sample_count();
@@ -179,6 +189,8 @@ impl<T: Real> ForceStroke<T> {
             longest,
             settled: 0,
             scales: false,
+            is_repainted: false,
+            hand: None,
             load: Load::of(std::iter::empty()),
             report: ForceReport {
                 paths: targets.len(),
@@ -195,25 +207,54 @@ impl<T: Real> ForceStroke<T> {
         })
     }
 
-    /// The same on painted matter: stiffness, mass and damping. To be called before the first step.
+    /// The same on painted matter: stiffness, mass, damping and rest lengths. To be called before the first step.
     ///
     /// # Errors
     /// [`ForceError::Region`], [`ForceError::Step`].
     pub fn painted(mut self, layers: &Layers) -> Result<Self, ForceError> {
         self.layers = layers.clone();
         let first: Vec<&Target> = self.targets.iter().filter(|t| t.begins <= self.gone).collect();
+        self.region = self.ground().cut(&first)?;
+        Ok(self)
+    }
+
+    /// Goes on with other paint.
+    ///
+    /// # Errors
+    /// [`ForceError::Step`].
+    pub fn repaint(&mut self, layers: &Layers) -> Result<(), ForceError> {
+        self.layers = layers.clone();
         let ground = Ground {
             field: &self.field,
             layers: &self.layers,
             radius: self.radius,
+            roam: ROAM,
         };
-        self.region = ground.cut(&first)?;
-        Ok(self)
+        ground.paint(&mut self.region)?;
+        self.is_repainted = true;
+        Ok(())
+    }
+
+    pub(super) fn ground(&self) -> Ground<'_, T> {
+        Ground {
+            field: &self.field,
+            layers: &self.layers,
+            radius: self.radius,
+            roam: if self.hand.is_some() { ROAM } else { 0.0 },
+        }
     }
 
     /// The region that moves.
     pub fn region(&self) -> &Region<T> {
         &self.region
+    }
+
+    /// The field as it is now, which shares with the one before what did not change.
+    ///
+    /// # Errors
+    /// [`ForceError::Region`].
+    pub fn baked(&self) -> Result<HierarchicalSpline<T>, ForceError> {
+        Ok(self.region.bake(&self.field)?)
     }
 
     /// What it has done so far.
@@ -242,9 +283,22 @@ impl<T: Real> ForceStroke<T> {
         (self.begun as f64 - (1.0 - stage) * self.acting.len() as f64).max(0.0) / self.targets.len() as f64
     }
 
-    /// Whether all paths have arrived, or have had their time.
+    /// Whether all paths have arrived, or have had their time. A tool in a hand has to be let go before.
     pub fn is_over(&self) -> bool {
-        self.begun == self.targets.len() && self.is_stage_over()
+        let is_led = self.hand.as_ref().is_some_and(Hand::leads);
+        !is_led && self.begun == self.targets.len() && self.is_stage_over()
+    }
+
+    /// How far the surface at an arc length is beyond the end of a path, as a share of what it has to go.
+    pub(super) fn ahead(&self, target: &Target, crossing: f64) -> f64 {
+        let length = target.path.length();
+        // A hand may end where it began.
+        let whole = if self.hand.is_some() {
+            length.max(self.radius)
+        } else {
+            length
+        };
+        (crossing - length) / whole
     }
 
     fn is_stage_over(&self) -> bool {
@@ -257,7 +311,7 @@ impl<T: Real> ForceStroke<T> {
             let Some(crossing) = a.crossing else { return true };
             let target = &self.targets[a.index];
             let length = target.path.length();
-            let ahead = (crossing - length) / length;
+            let ahead = self.ahead(target, crossing);
             if target.ends_early && ahead > 0.0 {
                 return true;
             }
@@ -313,7 +367,7 @@ impl<T: Real> ForceStroke<T> {
 
     /// Of all paths, by where the surface is on each; those without one have arrived.
     fn arrival(&self, crossing: impl Fn(&Target) -> Option<f64>) -> Arrival {
-        let share = |t: &Target| crossing(t).map_or(1.0, |s| s / t.path.length());
+        let share = |t: &Target| crossing(t).map_or(1.0, |s| 1.0 + self.ahead(t, s));
         let none = Arrival {
             least: f64::INFINITY,
             most: f64::NEG_INFINITY,
@@ -329,7 +383,11 @@ impl<T: Real> ForceStroke<T> {
     pub(super) fn advance(&mut self) -> Result<(), ForceError> {
         if self.report.steps > 0 && self.begun < self.targets.len() && self.is_stage_over() {
             self.field = self.region.release_clay(&self.field)?;
-            self.gone += STAGE * self.radius;
+            let from = match self.hand {
+                Some(_) => self.targets[self.begun].begins,
+                None => self.gone,
+            };
+            self.gone = from + STAGE * self.radius;
             let targets = &self.targets;
             let next = targets[self.begun..].partition_point(|t| t.begins <= self.gone);
             let next = &targets[self.begun..][..next];
@@ -347,34 +405,50 @@ impl<T: Real> ForceStroke<T> {
                 .map(|a| &targets[a.index])
                 .chain(next)
                 .collect();
-            let ground = Ground {
-                field: &self.field,
-                layers: &self.layers,
-                radius: self.radius,
-            };
-            self.region = ground.cut(&paths)?;
-            self.settled = 0;
-            self.report.cuts += 1;
-            self.report.samples = self
-                .report
-                .samples
-                .max(self.region.patch().lattice().sample_count());
+            self.region = self.ground().cut(&paths)?;
+            self.count_cut();
         }
         self.report.steps += 1;
-        self.scales = false;
+        self.scales = std::mem::take(&mut self.is_repainted);
         while self
             .targets
             .get(self.begun)
-            .is_some_and(|t| t.begins <= self.gone)
+            .is_some_and(|t| t.begins <= self.gone && self.is_in_reach(t))
         {
             self.acting.push(Acting::new(self.begun, 0));
             self.begun += 1;
             self.scales = true;
         }
+        if self.scales && self.hand.is_some() {
+            self.settled = 0;
+            self.remember();
+        }
         if self.scales {
             self.look_up();
         }
         Ok(())
+    }
+
+    /// Begins to count the steps of a region anew.
+    pub(super) fn count_cut(&mut self) {
+        self.settled = 0;
+        self.report.cuts += 1;
+        let samples = self.region.patch().lattice().sample_count();
+        self.report.samples = self.report.samples.max(samples);
+    }
+
+    /// Whether the region at hand will do for a path.
+    pub(super) fn is_in_reach(&self, target: &Target) -> bool {
+        self.hand.is_none() || self.ground().has_room(&self.region, target)
+    }
+
+    /// Lets earlier paths act again that the region of a hand reaches. A hand that dawdles has time to lift what it let go
+    /// near by: 2.6 % of the depth, where paths ended five radii behind.
+    fn remember(&mut self) {
+        let acting: BTreeSet<usize> = self.acting.iter().map(|a| a.index).collect();
+        let back = (0..self.begun).filter(|i| !acting.contains(i) && self.is_in_reach(&self.targets[*i]));
+        let back: Vec<Acting> = back.map(|i| Acting::new(i, usize::MAX / 2)).collect();
+        self.acting.extend(back);
     }
 
     /// Looks where the surface is now.

@@ -1,5 +1,6 @@
 use bspline::{HierarchicalSpline, Real};
 use fitting::Control;
+use glam::DVec3;
 
 use super::{Chisel, Drill, ForceError, ForceReport, ForceStroke, Pull};
 use crate::paint::Layers;
@@ -52,6 +53,27 @@ impl ForceTool<'_> {
         }
     }
 
+    /// Takes it in hand at a place: where it goes is told step by step, see [`ForceStroke::pose`].
+    ///
+    /// # Errors
+    /// Any [`ForceError`].
+    pub fn hold<T: Real>(
+        &self,
+        field: &HierarchicalSpline<T>,
+        iso: f64,
+        layers: &Layers,
+        at: DVec3,
+    ) -> Result<ForceStroke<T>, ForceError> {
+        let stroke = match self {
+            Self::Pull(tool) => tool.hold(field, iso),
+            Self::Chisel(tool) => tool.hold(field, iso, false, at),
+            Self::Squirt(tool) => tool.hold(field, iso, true, at),
+            Self::Drill(tool) => tool.hold(field, iso, false, at),
+            Self::Join(tool) => tool.hold(field, iso, true, at),
+        };
+        stroke?.painted(layers)
+    }
+
     /// What it leaves of the field with the matter that is painted on it, and what is left to say of it, in sentences.
     ///
     /// # Errors
@@ -70,15 +92,25 @@ impl ForceTool<'_> {
                 .map_err(ForceError::Cancelled)?;
             stroke.step()?;
         }
-        let is_elastic = stroke.is_elastic();
-        let (field, report) = stroke.release()?;
-        let notes = if is_elastic {
-            Vec::new()
-        } else {
-            late_paths(&report)
-        };
-        Ok((field, notes))
+        released(stroke)
     }
+}
+
+/// What a stroke leaves, and what is left to say of it, in sentences.
+///
+/// # Errors
+/// Any [`ForceError`].
+pub(crate) fn released<T: Real>(
+    stroke: ForceStroke<T>,
+) -> Result<(HierarchicalSpline<T>, Vec<String>), ForceError> {
+    let is_elastic = stroke.is_elastic();
+    let (field, report) = stroke.release()?;
+    let notes = if is_elastic {
+        Vec::new()
+    } else {
+        late_paths(&report)
+    };
+    Ok((field, notes))
 }
 
 /// Says what did not arrive.

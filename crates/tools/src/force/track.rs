@@ -9,11 +9,11 @@ pub const DENSITY: f64 = 2.0;
 /// Radii in which a place has to have the surface.
 const NEAR: f64 = 4.0;
 /// Radii that a free end of a curve, or the rim of an area, stands for beside its share.
-const OPEN: f64 = 0.5;
+pub(super) const OPEN: f64 = 0.5;
 /// Cosine of the turn from which on a curve has a corner.
 const CORNER: f64 = 0.9;
 /// Most paths of a tool.
-const MOST: f64 = 20_000.0;
+pub(super) const MOST: f64 = 20_000.0;
 
 /// A place of a tool on the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]

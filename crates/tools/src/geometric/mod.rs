@@ -7,7 +7,6 @@
 mod band;
 mod block;
 mod detail;
-mod formula_solid;
 mod motion;
 mod paste;
 mod shape;
@@ -26,7 +25,6 @@ use serde::{Deserialize, Serialize};
 
 pub use block::block;
 pub use detail::{Refine, Simplify};
-pub use formula_solid::FormulaSolid;
 pub use motion::{Motion, Move, Origin, reflection};
 pub use paste::{Copy, Cut, Paste};
 pub use shape::Shape;
@@ -34,9 +32,10 @@ pub use smooth::{Inflate, Smooth};
 use swept::Pose;
 use write::{Fineness, TOLERANCE, Writer};
 
+use crate::face::Face;
 use crate::limits::Limits;
 use crate::number::{NonNegative, Point, Positive};
-use crate::tool::Others;
+use crate::others::Others;
 use crate::warp::WarpError;
 
 /// What a geometric tool does.
@@ -92,12 +91,14 @@ pub enum GeometricError {
     },
     /// The solid would be cut off.
     #[error(
-        "the solid would leave the box of its field at {at:?}; let the tool end before, or start with more room about the \
-         object"
+        "the solid would leave the box of its field at {at:?}, which cannot grow there: the solid is cut off at that face, or the \
+         box would become too large; let the tool end before"
     )]
     Leaves {
         /// Where.
         at: [f64; 3],
+        /// Through which face.
+        face: Face,
     },
     /// A motion makes no sense.
     #[error(transparent)]

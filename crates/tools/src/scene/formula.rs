@@ -52,9 +52,10 @@ impl Formula {
     /// # Errors
     /// What is wrong with it, and what may stand in one.
     pub fn parse(text: &str) -> Result<Self, String> {
-        let wrong = |why: String| {
+        let wrong = |why: String, rest: &str| {
+            let at = text[..text.len() - rest.len()].chars().count() + 1;
             format!(
-                "the formula {text:?} cannot be read: {why}; it may hold numbers, x, y, z, d (density), PI, + - * / ^ < > \
+                "the formula {text:?} cannot be read at character {at}: {why}; it may hold numbers, x, y, z, d (density), PI, + - * / ^ < > \
                  ( ), min(a, b), max(a, b), abs, sqrt, exp, ln, sin, cos"
             )
         };
@@ -67,9 +68,12 @@ impl Formula {
         let mut parser = Parser {
             rest: text.trim_start(),
         };
-        let root = parser.comparison(0).map_err(wrong)?;
+        let root = parser.comparison(0).map_err(|why| wrong(why, parser.rest))?;
         if !parser.rest.is_empty() {
-            return Err(wrong(format!("it should end before {:?}", parser.rest)));
+            return Err(wrong(
+                format!("it should end before {:?}", parser.rest),
+                parser.rest,
+            ));
         }
         Ok(Self {
             text: text.into(),
@@ -226,15 +230,17 @@ impl Parser<'_> {
                 rest => format!("{rest:?} is neither a number nor a variable nor a function"),
             });
         }
-        self.rest = rest.trim_start();
+        let before = std::mem::replace(&mut self.rest, rest.trim_start());
         if let Some(i) = ["x", "y", "z", "d"].iter().position(|n| *n == name) {
             return Ok(Node::Variable(i));
         }
         if name == "PI" {
             return Ok(Node::Number(std::f64::consts::PI));
         }
-        let function =
-            function(name).ok_or_else(|| format!("there is no variable or function called {name}"))?;
+        let Some(function) = function(name) else {
+            self.rest = before;
+            return Err(format!("there is no variable or function called {name}"));
+        };
         self.expect('(')?;
         let first = self.comparison(depth + 1)?;
         let node = match function {

@@ -10,9 +10,9 @@ use dynamics::region::{Cells, Region, RegionError, RegionMask, RegionOptions};
 use glam::DVec3;
 use serde::Deserialize;
 
+use super::amount::Amount;
 use super::error::{SimulateError, wrong};
 use super::formula::Formula;
-use super::script::Amount;
 use crate::number::Point;
 
 const PLACE: &str = "[region.mask]";

@@ -6,9 +6,10 @@ use dynamics::region::Region;
 use dynamics::springs::{Plasticity, Weights};
 use glam::DVec3;
 
+use super::amount::Amount;
 use super::error::{SimulateError, wrong};
 use super::place::Samples;
-use super::script::{Amount, Material, Paint, Scene, Substance};
+use super::script::{Material, Paint, Scene, Substance};
 use crate::paint::{self, Layers, distance};
 
 /// Matter and scale of rest lengths.

@@ -3,6 +3,7 @@
 //! A [`Scene`] is read by any `serde` format whose tables look like those of the guide; a [`Simulation`] moves it on its field.
 //! Nothing here reads a file, a clock or prints.
 
+mod amount;
 mod error;
 pub(crate) mod formula;
 mod holds;

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use serde::Deserialize;
 use serde::de::{self, Deserializer, Visitor};
 
-use super::formula::Formula;
+use super::amount::Amount;
 use super::mask::MaskTable;
 use super::when::When;
 use crate::number::{Finite, NonNegative, Point, Positive};
@@ -74,15 +74,6 @@ pub struct RegionTable {
 /// A number for all axes or one for each.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PerAxis(pub [f64; 3]);
-
-/// The same everywhere, or by a formula.
-#[derive(Clone, Debug)]
-pub enum Amount {
-    /// The same everywhere.
-    Constant(f64),
-    /// By position and density.
-    Formula(Box<Formula>),
-}
 
 /// Matter per volume.
 #[derive(Clone, Debug, Default, Deserialize)]
@@ -306,34 +297,6 @@ impl Paint {
             return Err("a mass of 0 moves infinitely fast; write a value above 0".into());
         }
         Ok(())
-    }
-}
-
-impl<'de> Deserialize<'de> for Amount {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Read;
-        impl Visitor<'_> for Read {
-            type Value = Amount;
-
-            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-                f.write_str("a number or a formula in quotes")
-            }
-
-            fn visit_f64<E: de::Error>(self, v: f64) -> Result<Amount, E> {
-                let value = NonNegative::try_from(v).map_err(E::custom)?;
-                Ok(Amount::Constant(value.0))
-            }
-
-            fn visit_i64<E: de::Error>(self, v: i64) -> Result<Amount, E> {
-                self.visit_f64(v as f64)
-            }
-
-            fn visit_str<E: de::Error>(self, v: &str) -> Result<Amount, E> {
-                let formula = Formula::parse(v).map_err(E::custom)?;
-                Ok(Amount::Formula(Box::new(formula)))
-            }
-        }
-        deserializer.deserialize_any(Read)
     }
 }
 

@@ -2,6 +2,7 @@
 
 pub mod export;
 pub mod history;
+pub mod info;
 mod like;
 pub mod new;
 pub mod replay;

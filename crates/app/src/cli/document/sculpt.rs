@@ -53,8 +53,10 @@ pub fn run(args: &Args) -> Outcome {
             .apply(document.state(), &mut control)
             .map_err(|e| about(Failure::from(e).about(&title)))?;
         notes.extend(told.into_iter().map(|note| format!("{title}: {note}")));
-        let value = serde_json::to_value(command).expect("a command is plain values with text for keys");
-        if !document.commit(&title, value, next).map_err(failure)? {
+        if !document
+            .commit(&title, command.to_value(), next)
+            .map_err(failure)?
+        {
             notes.push(format!("{title}: changes nothing; no edit was made"));
         }
     }

@@ -1,6 +1,6 @@
 //! Solvers of static problems, which a patch keeps.
 
-use crate::patch::Version;
+use super::version::Version;
 use crate::solve::StepSolver;
 use crate::springs::StepMatrix;
 

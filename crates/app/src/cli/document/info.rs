@@ -1,0 +1,62 @@
+use serde_json::json;
+
+use super::{failure, open};
+use crate::cli::failure::Outcome;
+use crate::cli::quantity::{human_count, human_number};
+use crate::cli::source::Source;
+use crate::cli::summary::{self, hex, table};
+
+/// Describes a document and its objects.
+pub fn run(source: &Source, json: bool) -> Outcome {
+    let mut notes = Vec::new();
+    let mut document = open(source.path(), &mut notes)?;
+    let counts = document.counts().map_err(failure)?;
+    let mut rows = vec![
+        ("kind", "document".to_string()),
+        ("edits done", human_count(counts.done)),
+        ("edits undone", human_count(counts.undone)),
+    ];
+    let mut objects = Vec::new();
+    for (name, object) in document.state().objects() {
+        let field = &object.field;
+        let b = field.lattice().world_box();
+        let painted = object.layers.iter().filter(|(_, layer)| !layer.is_empty());
+        let painted: Vec<_> = painted.map(|(substance, _)| substance.name()).collect();
+        let [lo, hi] = [b.min, b.max].map(|p| p.to_array().map(human_number).join(", "));
+        let coefficients = human_count(field.coefficient_count());
+        rows.push(("object", name.clone()));
+        rows.push((
+            "  coefficients",
+            format!("{coefficients}, shaped to level {}", object.detail()),
+        ));
+        rows.push(("  box", format!("({lo}) to ({hi}) {}", object.meta.unit)));
+        if !painted.is_empty() {
+            rows.push(("  painted", painted.join(", ")));
+        }
+        objects.push(json!({
+            "name": name,
+            "coefficients": field.coefficient_count(),
+            "detail": object.detail(),
+            "box": [b.min.to_array(), b.max.to_array()],
+            "unit": object.meta.unit.symbol(),
+            "iso": object.meta.iso,
+            "painted": painted,
+            "placement": object.properties.placement,
+            "parent": object.properties.parent,
+            "field_sha256": hex(&field.sha256()),
+        }));
+    }
+    let text = match json {
+        false => table(rows, &notes),
+        true => json!({
+            "file": source.name(),
+            "kind": "document",
+            "done": counts.done,
+            "undone": counts.undone,
+            "objects": objects,
+            "notes": notes,
+        })
+        .to_string(),
+    };
+    summary::print(&text, false)
+}

@@ -1,0 +1,54 @@
+//! Objects as tools see them, and what tools leave of them.
+
+use glam::DAffine3;
+use tools::others::Others;
+use tools::tool::Canvas;
+
+use crate::{CommandError, State};
+
+/// An object as a tool sees it, with all others beside it.
+pub fn canvas(state: &State, name: &str) -> Result<Canvas, CommandError> {
+    let object = state.object(name)?;
+    let iso = object.meta.iso;
+    Ok(Canvas {
+        detail: object.detail(),
+        field: object.field.clone(),
+        iso: iso.ok_or_else(|| CommandError::NoSurface(name.into()))?,
+        layers: object.layers.clone(),
+        others: others(state, name)?,
+        copies: Vec::new(),
+    })
+}
+
+/// The state with what a tool left of an object, and with the copies that it made of it.
+pub fn left(state: &State, name: &str, canvas: Canvas) -> Result<State, CommandError> {
+    let object = state.object(name)?;
+    let mut next = state.clone();
+    for copy in canvas.copies {
+        if state.object(&copy).is_ok() {
+            return Err(CommandError::Taken(copy));
+        }
+        next = next.with(&copy, object.clone())?;
+    }
+    let shaped = object.clone().with_shape(canvas.field, canvas.layers);
+    Ok(next.with(name, shaped)?)
+}
+
+/// All objects that have a surface, as they lie to the one of a name.
+fn others(state: &State, name: &str) -> Result<Others, CommandError> {
+    let own = state.placement(name)?;
+    let mut others = Others::default();
+    for (other, object) in state.objects() {
+        if let Some(iso) = object.meta.iso {
+            // Of what lies alike no rounding.
+            let placement = state.placement(other)?;
+            let map = match placement == own {
+                true => DAffine3::IDENTITY,
+                false => own.inverse() * placement,
+            };
+            let put = others.put(other, &object.field, iso, map);
+            put.map_err(|e| CommandError::Script(format!("object {other:?} cannot be used: {e}")))?;
+        }
+    }
+    Ok(others)
+}

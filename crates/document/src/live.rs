@@ -1,0 +1,79 @@
+//! Strokes that a hand makes on a document.
+
+use bspline::Aabb;
+use fitting::Control;
+use glam::DVec3;
+use tools::live::{LiveStroke, Pose};
+use tools::session::Stroke;
+
+use crate::canvas::{canvas, left};
+use crate::{Change, Command, CommandError, Document, State};
+
+/// A stroke in a hand: begun, told a pose a step, ended. Until then the document is as it was, on the disk and in memory;
+/// dropped, the stroke leaves nothing.
+///
+/// The edit that it becomes has the poses of its steps for a command, so it is done again, to the bit, as any other.
+pub struct Live {
+    object: String,
+    before: State,
+    stroke: LiveStroke,
+}
+
+impl Live {
+    /// Begins a stroke on an object, see [`LiveStroke::begin`]. What the stroke says of an object does not count.
+    ///
+    /// # Errors
+    /// Any [`CommandError`].
+    pub fn begin(state: &State, object: &str, stroke: Stroke) -> Result<Self, CommandError> {
+        let stroke = Stroke {
+            object: None,
+            ..stroke
+        };
+        Ok(Self {
+            object: object.into(),
+            before: state.clone(),
+            stroke: LiveStroke::begin(stroke, canvas(state, object)?)?,
+        })
+    }
+
+    /// One step with the tool at a pose of the object's own world; gives the force on the solid, see [`LiveStroke::step`].
+    ///
+    /// # Errors
+    /// [`CommandError::Tool`].
+    pub fn step(&mut self, pose: Pose, control: &mut Control) -> Result<DVec3, CommandError> {
+        Ok(self.stroke.step(pose, control)?)
+    }
+
+    /// What is to be seen now, and the boxes of the object's own world outside of which its field is as at the last look.
+    ///
+    /// # Errors
+    /// [`CommandError`].
+    pub fn look(&mut self) -> Result<(State, Vec<Aabb>), CommandError> {
+        let (canvas, boxes) = self.stroke.look()?;
+        Ok((left(&self.before, &self.object, canvas)?, boxes))
+    }
+
+    /// Lets the tool go, does what it has still to do, and makes it an edit of the document: whether anything changed, and
+    /// what is left to say, in sentences.
+    ///
+    /// # Errors
+    /// [`CommandError::Changed`] if the document is not as it was when the stroke began; any other. The document is as it
+    /// was then.
+    pub fn end(
+        self,
+        document: &mut Document,
+        control: &mut Control,
+    ) -> Result<(bool, Vec<String>), CommandError> {
+        if !Change::between(&self.before, document.state()).is_empty() {
+            return Err(CommandError::Changed(self.object));
+        }
+        let (canvas, stroke, notes) = self.stroke.end(control)?;
+        let next = left(&self.before, &self.object, canvas)?;
+        let command = Command::Stroke {
+            object: self.object,
+            stroke: Box::new(stroke),
+        };
+        let is_changed = document.commit(&command.title(), command.to_value(), next)?;
+        Ok((is_changed, notes))
+    }
+}

@@ -1,0 +1,312 @@
+//! Strokes by hand: what they leave, what their scripts leave, and what is left of them when they are not ended.
+
+use std::path::Path;
+
+use bspline::Field;
+use document::{Command, CommandError, Document, Live, Options, State};
+use fitting::Control;
+use glam::DVec3;
+use tempfile::tempdir;
+use tools::live::Pose;
+use tools::session::Stroke;
+
+use super::clay::{ISO, again, block, height, state_of};
+use super::common::Draw;
+
+fn document(directory: &Path, state: &State) -> Document {
+    Document::create(&directory.join("live.isoclay"), state.clone(), Options::default()).unwrap()
+}
+
+fn stroke(text: &str) -> Stroke {
+    toml::from_str(text).unwrap_or_else(|e| panic!("{text}: {e}"))
+}
+
+fn begun(state: &State, text: &str) -> Live {
+    Live::begin(state, "clay", stroke(text)).unwrap_or_else(|e| panic!("{text}: {e}"))
+}
+
+/// A stroke by hand, at once; gives what was told.
+fn made(document: &mut Document, text: &str, poses: &[Pose]) -> Vec<String> {
+    let control = &mut Control::default();
+    let mut live = begun(document.state(), text);
+    for pose in poses {
+        live.step(*pose, control)
+            .unwrap_or_else(|e| panic!("{text}: {e}"));
+    }
+    let (is_changed, notes) = live
+        .end(document, control)
+        .unwrap_or_else(|e| panic!("{text}: {e}"));
+    assert!(is_changed, "{text}");
+    notes
+}
+
+/// A hand that wanders over the plane `z`, now fast, now standing.
+fn wandering(seed: u64, z: f64, count: usize) -> Vec<Pose> {
+    let mut draw = Draw(seed);
+    let mut at = DVec3::new(9.0, 10.0, z);
+    let mut number = |range: f64| (f64::from(draw.below(2001)) / 1000.0 - 1.0) * range;
+    (0..count)
+        .map(|_| {
+            let pace = number(1.0);
+            if pace > -0.3 {
+                at += pace * pace * DVec3::new(0.9 + number(0.6), number(1.2), number(0.1));
+            }
+            Pose::at(at)
+        })
+        .collect()
+}
+
+#[test]
+fn strokes_by_hand_and_their_scripts_leave_the_same() {
+    let shape = "along = [], shape = { sphere = { radius = 0.9 } }, tolerance = 0.02";
+    let bar = "along = [], shape = { box = { size = [1.6, 1.0, 1.2] } }, tolerance = 0.05";
+    let tools = [
+        "pull = { along = [[9, 10, 12]], radius = 1.2 }".to_string(),
+        "pull = { along = [[9, 10, 12]], disc = 1.5, radius = 1.2 }\nwithin = { min = [1, 1, 1], max = [23, 11, 23] }".into(),
+        "chisel = { along = [], depth = 0.5, radius = 0.8 }".into(),
+        "squirt = { along = [], depth = 0.5, radius = 0.8 }\nsymmetry = { at = [12, 12, 12], normal = [0, 1, 0] }".into(),
+        format!("carve = {{ {shape} }}"),
+        format!("add = {{ {bar} }}"),
+        "paint = { layer = 'stiffness', brush = { along = [], radius = 1.5, value = 5, rate = 0.3 } }".into(),
+        "smooth = { along = [], radius = 2, level = 2 }".into(),
+        "inflate = { along = [], radius = 2, by = 0.1 }\ncoarse = 0".into(),
+        "move = { motion = { grab = { along = [], radius = 4 } } }".into(),
+    ];
+    for (n, text) in tools.iter().enumerate() {
+        let directory = tempdir().unwrap();
+        // Something for smoothing to do.
+        let first = state_of(|p| 12.0 - p.z + 0.2 * (1.7 * p.x).sin() * (1.3 * p.y).cos());
+        let mut document = document(directory.path(), &first);
+        let mut poses = wandering(n as u64, 12.2, 8);
+        for (n, pose) in poses.iter_mut().enumerate() {
+            pose.turn = DVec3::new(0.0, 3.0, 10.0 * n as f64);
+        }
+        made(&mut document, text, &poses);
+        let left = document.state().sha256();
+        for threads in [1, 8] {
+            assert_eq!(
+                again(&mut document, threads).sha256(),
+                left,
+                "{text}, {threads} threads"
+            );
+        }
+        // The stroke as a line of a session.
+        let command = document.command(0).unwrap();
+        let name = |_: Option<&str>| Ok::<_, CommandError>("clay".into());
+        let line = command["stroke"].to_string();
+        let commands = Command::of_script(&format!("\n{line}\n"), name);
+        let commands = commands.unwrap_or_else(|_| {
+            // Begins with an empty line, so it is no JSON.
+            Command::of_script(&line, name).unwrap()
+        });
+        let (scripted, _) = commands[0].apply(&first, &mut Control::default()).unwrap();
+        assert_eq!(scripted.sha256(), left, "{text}");
+    }
+}
+
+/// Slow, fast, and in one leap; standing still, and across its own track.
+#[test]
+fn a_moving_tool_leaves_its_depth_at_any_speed() {
+    let (depth, r) = (0.6, 1.2);
+    let track = [[6.0, 10.0], [15.0, 10.0], [15.0, 14.0], [11.0, 6.0]].map(|[x, y]| DVec3::new(x, y, 12.0));
+    for (tool, sign, paces) in [("chisel", -1.0, &[0.05, 0.4, 3.0][..]), ("squirt", 1.0, &[100.0])] {
+        for &pace in paces {
+            let mut poses = vec![Pose::at(track[0]); 3];
+            for leg in track.windows(2) {
+                let count = (leg[0].distance(leg[1]) / (pace * r)).ceil();
+                let place = |n: usize| Pose::at(leg[0].lerp(leg[1], n as f64 / count));
+                poses.extend((1..=count as usize).map(place));
+            }
+            let directory = tempdir().unwrap();
+            let mut document = document(directory.path(), &block());
+            let text = format!("{tool} = {{ along = [], depth = {depth}, radius = {r} }}");
+            let notes = made(&mut document, &text, &poses);
+            assert!(notes.is_empty(), "{text} {pace}: {notes:?}");
+            let places = (0..=18).map(|n| [6.0 + 0.5 * f64::from(n), 10.0]);
+            let shares: Vec<f64> = places
+                .map(|[x, y]| height(document.state(), x, y) / (sign * depth))
+                .collect();
+            println!("{tool} {pace}: {shares:.4?}");
+            assert!(
+                shares.iter().all(|s| (s - 1.0).abs() < 0.015),
+                "{tool}, {pace} r a step: {shares:.4?}"
+            );
+        }
+    }
+}
+
+/// Wherever the hand goes, the surface ends where it is; the region follows it.
+#[test]
+fn the_surface_follows_a_hand_that_pulls() {
+    for (n, end) in [
+        [0.0, 0.0, 3.0],
+        [2.0, 1.0, 6.0],
+        [0.3, -0.4, -3.0],
+        [0.0, 0.0, -0.6],
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let (from, end) = (DVec3::new(11.0, 12.0, 12.0), DVec3::from_array(end));
+        // There by a detour, in leaps and steps.
+        let steps = 6 + 7 * n;
+        let way = (0..=steps).map(|i| {
+            let t = i as f64 / steps as f64;
+            from + t * end + (t * (1.0 - t)) * DVec3::new(0.8, -0.5, 0.7)
+        });
+        let poses: Vec<Pose> = way.map(Pose::at).collect();
+        let directory = tempdir().unwrap();
+        let mut document = document(directory.path(), &block());
+        let text = "pull = { along = [[11, 12, 12]], radius = 1.2 }";
+        let notes = made(&mut document, text, &poses);
+        assert!(notes.is_empty(), "{notes:?}");
+        // Along the way of the hand the surface is at its end.
+        let field = &document.state().object("clay").unwrap().field;
+        let [before, behind] = [0.97, 1.03].map(|t| field.value(from + t * end) > ISO);
+        assert_eq!(
+            [before, behind],
+            if end.z > 0.0 { [true, false] } else { [false, true] },
+            "{end}"
+        );
+    }
+    // A hand that comes back leaves next to nothing.
+    let there = (0..=20).map(|i| 2.0 * libm::sin(f64::from(i) * 0.05 * std::f64::consts::PI));
+    let poses: Vec<Pose> = there
+        .map(|z| Pose::at(DVec3::new(11.0, 12.0, 12.0 + z)))
+        .collect();
+    let directory = tempdir().unwrap();
+    let mut document = document(directory.path(), &block());
+    made(
+        &mut document,
+        "pull = { along = [[11, 12, 12]], radius = 1.2 }",
+        &poses,
+    );
+    let left = height(document.state(), 11.0, 12.0);
+    assert!(left.abs() < 0.02, "{left}");
+}
+
+#[test]
+fn a_stroke_that_is_not_ended_leaves_the_document_as_it_was() {
+    let directory = tempdir().unwrap();
+    let mut document = document(directory.path(), &block());
+    let bytes = || std::fs::read(directory.path().join("live.isoclay")).unwrap();
+    let (before, hash) = (bytes(), document.state().sha256());
+    let control = &mut Control::default();
+    let text = "squirt = { along = [], depth = 0.5, radius = 1 }";
+    let mut live = begun(document.state(), text);
+    let mut seen = document.state().clone();
+    for n in 0..30 {
+        let at = DVec3::new(6.0 + 0.3 * f64::from(n), 12.0, 12.1);
+        let force = live.step(Pose::at(at), control).unwrap();
+        assert!(n > 0 && n < 25 || force.z > 0.0, "{n}: {force}");
+        if n % 3 == 0 {
+            let (now, boxes) = live.look().unwrap();
+            let [old, new] = [&seen, &now].map(|s| &s.object("clay").unwrap().field);
+            assert!(!boxes.is_empty());
+            for i in 0..2000 {
+                let p = DVec3::new(
+                    f64::from(i % 20),
+                    f64::from(i / 20 % 10) * 2.0,
+                    f64::from(i / 200),
+                ) + 2.1;
+                let is_told = boxes.iter().any(|b| p.cmpge(b.min).all() && p.cmple(b.max).all());
+                assert!(is_told || old.value(p) == new.value(p), "{p}");
+            }
+            seen = now;
+        }
+    }
+    assert!(height(&seen, 8.0, 12.0) > 0.4);
+    assert_eq!(bytes(), before);
+    // Poses that make no sense are refused one by one.
+    let nan = live
+        .step(Pose::at(DVec3::new(f64::NAN, 0.0, 0.0)), control)
+        .unwrap_err();
+    assert!(nan.to_string().contains("finite"), "{nan}");
+    let far = live.step(Pose::at(DVec3::splat(1e300)), control).unwrap_err();
+    assert!(far.to_string().contains("paths"), "{far}");
+    live.step(Pose::at(DVec3::new(15.0, 12.0, 12.0)), control)
+        .unwrap();
+    drop(live);
+    assert_eq!((bytes(), document.state().sha256()), (before, hash));
+    // A document that goes on meanwhile refuses it.
+    let mut live = begun(document.state(), text);
+    live.step(Pose::at(DVec3::splat(12.0)), control).unwrap();
+    made(&mut document, text, &[Pose::at(DVec3::new(6.0, 6.0, 12.0))]);
+    let hash = document.state().sha256();
+    let late = live.end(&mut document, control).unwrap_err();
+    assert!(matches!(late, CommandError::Changed(_)), "{late}");
+    assert_eq!(document.state().sha256(), hash);
+    // An elastic stroke leaves no edit.
+    let mut live = begun(
+        document.state(),
+        "pull = { along = [[9, 12, 12]], radius = 1.2, how = { solid = 'elastic' } }",
+    );
+    for n in 0..40 {
+        let z = 12.0 + 0.15 * f64::from(n);
+        live.step(Pose::at(DVec3::new(9.0, 12.0, z)), control).unwrap();
+    }
+    assert!(!live.end(&mut document, control).unwrap().0);
+    assert_eq!(document.state().sha256(), hash);
+}
+
+#[test]
+fn a_hand_beside_the_object_does_nothing_and_says_so() {
+    let directory = tempdir().unwrap();
+    let mut document = document(directory.path(), &block());
+    let places = |list: &[[f64; 3]]| -> Vec<Pose> { list.iter().map(|p| Pose::at((*p).into())).collect() };
+    let [ball, groove] = [
+        "carve = { along = [], shape = { sphere = { radius = 1 } }, tolerance = 0.05 }",
+        "chisel = { along = [], depth = 0.4, radius = 0.8 }",
+    ];
+    // From the air onto the surface, off it, and on again.
+    let way = [
+        [12.0, 5.0, 60.0],
+        [12.0, 5.0, 40.0],
+        [8.0, 12.0, 12.0],
+        [14.0, 12.0, 12.0],
+    ];
+    let notes = made(&mut document, ball, &places(&way));
+    assert_eq!(notes.len(), 1, "{notes:?}");
+    assert!(notes[0].contains("in 2 of 4 steps"), "{notes:?}");
+    let way = [
+        [5.0, 5.0, 20.0],
+        [5.0, 6.0, 12.0],
+        [5.0, 9.0, 12.0],
+        [5.0, 12.0, 20.0],
+        [5.0, 18.0, 12.0],
+    ];
+    let notes = made(&mut document, groove, &places(&way));
+    assert!(
+        notes.iter().any(|n| n.contains("nothing to work on")),
+        "{notes:?}"
+    );
+    let hash = document.state().sha256();
+    let control = &mut Control::default();
+    for text in [ball, groove] {
+        let mut live = begun(document.state(), text);
+        live.step(Pose::at(DVec3::new(5.0, 5.0, 90.0)), control).unwrap();
+        let nothing = live.end(&mut document, control).unwrap_err().to_string();
+        assert!(
+            nothing.contains("field reaches") || nothing.contains("the field"),
+            "{nothing}"
+        );
+    }
+    for (text, word) in [
+        ("pull = { along = [[12, 12, 20]], radius = 1 }", "no surface"),
+        (
+            "pull = { along = [[12, 12, 12]], lift = 1, radius = 1 }",
+            "by hand",
+        ),
+        (
+            "chisel = { along = [[1, 2, 3]], depth = 1, radius = 1 }",
+            "one by one",
+        ),
+        ("copy = { to = 'b' }", "by hand"),
+        ("paint = { layer = 'mass', formula = 'x' }", "by hand"),
+    ] {
+        let refused = Live::begin(document.state(), "clay", stroke(text)).err();
+        let refused = refused.unwrap_or_else(|| panic!("{text}")).to_string();
+        assert!(refused.contains(word), "{text}: {refused}");
+    }
+    assert_eq!(document.state().sha256(), hash);
+}

@@ -1,0 +1,83 @@
+//! Objects that a tool may name.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::sync::Arc;
+
+use bspline::{Aabb, Csg, CsgError, Field, HierarchicalSpline};
+use glam::DAffine3;
+
+/// Objects by name, each about as the distance from its surface, positive inside, in the world of the canvas.
+#[derive(Clone, Default)]
+pub struct Others(BTreeMap<String, Other>);
+
+#[derive(Clone)]
+struct Other {
+    distance: Arc<dyn Field>,
+    reach: Aabb,
+    /// The field itself and its iso-value, where it lies as the canvas does.
+    own: Option<(HierarchicalSpline<f32>, f64)>,
+}
+
+impl fmt::Debug for Others {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_set().entries(self.0.keys()).finish()
+    }
+}
+
+impl Others {
+    /// Puts an object in; `canvas_from_object` maps its world to that of the canvas.
+    ///
+    /// # Errors
+    /// [`CsgError`] for an iso-value that is not finite, or a map that flattens.
+    pub fn put(
+        &mut self,
+        name: &str,
+        field: &HierarchicalSpline<f32>,
+        iso: f64,
+        canvas_from_object: DAffine3,
+    ) -> Result<(), CsgError> {
+        let steep = 1.0 / field.slope();
+        let distance = Csg::sum(vec![(steep, Arc::new(field.clone()))], -iso * steep)?;
+        let is_beside = canvas_from_object == DAffine3::IDENTITY;
+        let distance: Arc<dyn Field> = match is_beside {
+            true => Arc::new(distance),
+            false => {
+                // A distance of the object, in lengths of the canvas.
+                let stretch = canvas_from_object.matrix3.determinant().abs().cbrt();
+                let placed = Arc::new(Csg::affine(Arc::new(distance), canvas_from_object)?);
+                Arc::new(Csg::sum(vec![(stretch, placed)], 0.0)?)
+            }
+        };
+        let other = Other {
+            distance,
+            reach: field.lattice().world_box().transformed(&canvas_from_object),
+            own: is_beside.then(|| (field.clone(), iso)),
+        };
+        self.0.insert(name.into(), other);
+        Ok(())
+    }
+
+    /// The field of an object and its iso-value, if it lies as the canvas does.
+    pub(crate) fn own(&self, name: &str) -> Option<&(HierarchicalSpline<f32>, f64)> {
+        self.0.get(name)?.own.as_ref()
+    }
+
+    /// The object of a name, and the box of its field.
+    ///
+    /// # Errors
+    /// A sentence.
+    pub fn get(&self, name: &str) -> Result<(Arc<dyn Field>, Aabb), String> {
+        let found = self
+            .0
+            .get(name)
+            .map(|other| (other.distance.clone(), other.reach));
+        found.ok_or_else(|| {
+            let known: Vec<_> = self.0.keys().map(String::as_str).collect();
+            match known.is_empty() {
+                true => format!("there is no object {name:?}, nor any other"),
+                false => format!("there is no object {name:?}; there are {}", known.join(", ")),
+            }
+        })
+    }
+}
