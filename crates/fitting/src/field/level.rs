@@ -186,7 +186,7 @@ impl<T: Real> LevelFit<'_, T> {
             if takes_part[i] != NONE {
                 let mut more = [0.0; TILE * TILE * TILE];
                 convolved(i, &left, QUASI, &mut more);
-                out.iter_mut().zip(more).for_each(|(o, more)| *o = more + *o);
+                out.iter_mut().zip(more).for_each(|(o, more)| *o += more);
             }
         });
         once
