@@ -110,11 +110,7 @@ impl<T: Real> ForceStroke<T> {
         self.load = Load::of(pairs(&bearings, self.acting.iter().map(|a| a.force)));
         let patch = self.region.patch_mut();
         patch.add_responses(&solved.parts, dt)?;
-        if self.how.solid == Solid::Elastic {
-            // Densities are sampled anew: they have to balance in the end.
-            let (p, v) = (patch.state().p.clone(), patch.state().v.clone());
-            patch.set_state(&p, &v)?;
-        } else {
+        if self.how.solid == Solid::Clay {
             let d = patch.state().d.clone();
             patch.springs_mut().relax(&d, -libm::expm1(-FLOW));
         }
