@@ -94,3 +94,93 @@ fn masks_are_solved_by_every_way_and_best_by_the_default() {
         assert!(svg.starts_with("<svg") && svg.contains("<circle"), "{name}");
     }
 }
+
+const TOOL_KEYS: [&str; 12] = [
+    "tool",
+    "paths",
+    "drag_over_r",
+    "sampling_factor",
+    "law",
+    "arrival",
+    "overshoot",
+    "steps_to_99",
+    "profile_error",
+    "loop_ms",
+    "printed_ms",
+    "default",
+];
+
+#[test]
+fn tools_arrive_by_default_whatever_the_sampling_and_the_number_of_paths() {
+    let bench = Bench::new();
+    let points = common::sphere_text([0.0; 3], 1.0, 3000);
+    bench.write("ball.xyz", points);
+    bench.json("fit ball.xyz -o ball.iclay --max-depth 6");
+    let run = bench.run("charts tools ball.iclay --quick --json -o charts");
+    assert_eq!(run.code, 0, "{}", run.stderr);
+    let lines = run.stdout.lines().map(|l| serde_json::from_str(l).unwrap());
+    let lines: Vec<Value> = lines.collect();
+    for line in &lines {
+        let object = line.as_object().unwrap();
+        assert!(TOOL_KEYS.iter().all(|k| object.contains_key(*k)), "{line}");
+        assert!(number(line, "loop_ms") > 0.0, "{line}");
+    }
+    let named = |name: &str| -> Vec<&Value> {
+        let is = |l: &&Value| l["tool"].as_str().unwrap().starts_with(name);
+        lines.iter().filter(is).collect()
+    };
+    // The rule is as exact as it is asked to be.
+    let integrals = named("integral");
+    let default = integrals.iter().filter(|l| l["default"] == true);
+    assert_eq!(default.clone().count(), 4);
+    assert!({ default }.all(|l| number(l, "profile_error") < 2e-4));
+    assert!(integrals.iter().any(|l| number(l, "profile_error") > 1e-3));
+    // Clay that has to arrive does, however finely it is sampled and by however many paths it is held.
+    let strokes = lines
+        .iter()
+        .filter(|l| !l["arrival"].is_null() && l["printed_ms"].is_null());
+    let (mut arrived, mut raw) = (0, 0);
+    for line in strokes {
+        let (arrival, error) = (number(line, "arrival"), number(line, "profile_error"));
+        match line["law"].as_str().unwrap() {
+            "clay, arrive" => {
+                arrived += 1;
+                assert!((arrival - 1.0).abs() < 0.01 && error < 0.02, "{line}");
+                assert!(
+                    number(line, "overshoot") < 0.015 && number(line, "steps_to_99") <= 15.0,
+                    "{line}"
+                );
+            }
+            "elastic, arrive" => assert!((arrival - 0.8).abs() < 0.02 && error < 0.03, "{line}"),
+            law if law.contains("raw") => {
+                raw += 1;
+                assert!(arrival < 0.9, "{line}");
+            }
+            _ => (),
+        }
+    }
+    assert_eq!((arrived, raw), (4, 4));
+    let table = named("point, table 2");
+    assert_eq!(table.len(), 6);
+    for line in table {
+        assert!(number(line, "printed_ms") > 0.0, "{line}");
+        assert!((number(line, "arrival") - 1.0).abs() < 0.01, "{line}");
+    }
+    // Four tools of two sizes, even and painted.
+    let loops = lines
+        .iter()
+        .filter(|l| l["tool"].as_str().unwrap().contains(" ball "));
+    assert_eq!(loops.count(), 16);
+    for name in [
+        "quadrature",
+        "sampling",
+        "paths",
+        "paths-cost",
+        "brush",
+        "table2",
+        "loops",
+    ] {
+        let svg = std::fs::read_to_string(bench.path(&format!("charts/tools-{name}.svg"))).unwrap();
+        assert!(svg.starts_with("<svg") && svg.contains("<circle"), "{name}");
+    }
+}

@@ -22,7 +22,7 @@ pub fn canvas(state: &State, name: &str) -> Result<Canvas, CommandError> {
 
 /// The state with what a tool left of an object, and with the copies that it made of it.
 pub fn left(state: &State, name: &str, canvas: Canvas) -> Result<State, CommandError> {
-    let mut object = state.object(name)?.clone();
+    let object = state.object(name)?;
     let mut next = state.clone();
     for copy in canvas.copies {
         if state.object(&copy).is_ok() {
@@ -30,20 +30,21 @@ pub fn left(state: &State, name: &str, canvas: Canvas) -> Result<State, CommandE
         }
         next = next.with(&copy, object.clone())?;
     }
-    (object.field, object.layers) = (canvas.field, canvas.layers);
-    Ok(next.with(name, object)?)
+    let shaped = object.clone().with_shape(canvas.field, canvas.layers);
+    Ok(next.with(name, shaped)?)
 }
 
 /// All objects that have a surface, as they lie to the one of a name.
 fn others(state: &State, name: &str) -> Result<Others, CommandError> {
-    let own = state.placement(name)?.inverse();
+    let own = state.placement(name)?;
     let mut others = Others::default();
     for (other, object) in state.objects() {
         if let Some(iso) = object.meta.iso {
-            // Of the object itself no rounding.
-            let map = match other == name {
+            // Of what lies alike no rounding.
+            let placement = state.placement(other)?;
+            let map = match placement == own {
                 true => DAffine3::IDENTITY,
-                false => own * state.placement(other)?,
+                false => own.inverse() * placement,
             };
             let put = others.put(other, &object.field, iso, map);
             put.map_err(|e| CommandError::Script(format!("object {other:?} cannot be used: {e}")))?;

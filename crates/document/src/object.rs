@@ -84,6 +84,35 @@ impl Object {
         })
     }
 
+    /// The object with another version of its field, perhaps in a box that has grown, and with what is painted on that.
+    pub(crate) fn with_shape(mut self, field: HierarchicalSpline<f32>, layers: Layers) -> Self {
+        let growth = self.field.lattice().growth_to(field.lattice());
+        if let Some([before, _]) = growth.filter(|[before, _]| *before != [0; 3]) {
+            // Leaves are counted from the corner of the box.
+            let meta = Arc::make_mut(&mut self.meta);
+            for leaf in &mut meta.leaves {
+                leaf.cell = std::array::from_fn(|a| leaf.cell[a] + (before[a] << leaf.level));
+            }
+        }
+        Self {
+            field,
+            layers,
+            ..self
+        }
+    }
+
+    /// The object in the larger box of a later version of it; as it is where that has no such box.
+    pub fn in_box_of(&self, later: &Self) -> Self {
+        let growth = self.field.lattice().growth_to(later.field.lattice());
+        let grown = growth.and_then(|[before, behind]| self.field.grown(before, behind).ok());
+        match grown {
+            Some(field) if field.lattice() != self.field.lattice() => {
+                self.clone().with_shape(field, self.layers.clone())
+            }
+            _ => self.clone(),
+        }
+    }
+
     /// Level of the field that tools work at.
     pub fn detail(&self) -> usize {
         let finest = self.field.level_count() - 1;

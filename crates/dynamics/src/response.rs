@@ -43,7 +43,7 @@ impl<T: Real> Response<T> {
 impl<T: Real> Patch<T> {
     /// What a step of `dt` moves more when a force is added to those that act: of eq. 12 `H⁻¹AᵀJ` with
     /// `H = M̃/Δt² + D̃/(2Δt) + K̃`, of [`Integrator::TrBdf2`] that of both stages. One column per load, each of one or two
-    /// solves to 10⁻⁵. Exact for the linear law, of the first order for the 4-D one; hard constraints hold.
+    /// solves to a residual of 10⁻⁵. Exact for the linear law, of the first order for the 4-D one; hard constraints hold.
     ///
     /// The state stays. The solver is made ready as for a step, and a factor made beside the steps grows by these solves too.
     ///
@@ -56,14 +56,48 @@ impl<T: Real> Patch<T> {
         dt: f64,
         loads: &[OnBox<T>],
     ) -> Result<Vec<Response<T>>, PatchError> {
-        if !(dt.is_finite() && dt > 0.0) {
-            return Err(PatchError::TimeStep { dt });
-        }
-        for load in loads {
-            self.check_load(load)?;
-        }
-        let respond = |load| self.respond_to(integrator, dt, load);
-        loads.iter().map(respond).collect()
+        loads
+            .iter()
+            .map(|load| self.respond_to(integrator, dt, load, RESPONSE))
+            .collect()
+    }
+
+    /// The same for one load, as exact as a step is, in as many iterations: for a tool that becomes part of the step.
+    ///
+    /// # Errors
+    /// As [`respond`](Self::respond).
+    pub fn respond_as_step(
+        &mut self,
+        integrator: Integrator,
+        dt: f64,
+        load: &OnBox<T>,
+    ) -> Result<Response<T>, PatchError> {
+        self.respond_to(integrator, dt, load, f64::INFINITY)
+    }
+
+    /// Makes responses, each with its share, part of the step of `dt` that was taken last.
+    ///
+    /// # Errors
+    /// [`PatchError::Overflow`]; the state is then the one before.
+    pub fn add_responses(&mut self, parts: &[(f64, Response<T>)], dt: f64) -> Result<(), PatchError> {
+        self.cache.work.before.copy_from(&self.motion.state);
+        let state = &mut self.motion.state;
+        let add = |to: &mut [T], rates: &mut [T], of: fn(&Response<T>) -> &[T]| {
+            let mut sums = vec![0.0; to.len()];
+            for (share, response) in parts {
+                let change = of(response).iter();
+                sums.iter_mut()
+                    .zip(change)
+                    .for_each(|(s, c)| *s += share * c.as_f64());
+            }
+            for ((to, rate), sum) in to.iter_mut().zip(rates).zip(&sums) {
+                *to = T::from_f64(to.as_f64() + sum);
+                *rate = T::from_f64(rate.as_f64() + sum / dt);
+            }
+        };
+        add(&mut state.p, &mut state.v, |r| &r.p);
+        add(&mut state.d, &mut state.w, |r| &r.d);
+        self.keep_if_finite()
     }
 
     fn respond_to(
@@ -71,7 +105,12 @@ impl<T: Real> Patch<T> {
         integrator: Integrator,
         dt: f64,
         load: &OnBox<T>,
+        residual: f64,
     ) -> Result<Response<T>, PatchError> {
+        if !(dt.is_finite() && dt > 0.0) {
+            return Err(PatchError::TimeStep { dt });
+        }
+        self.check_load(load)?;
         let dims = self.lattice().sample_dims();
         let gamma = 2.0 - std::f64::consts::SQRT_2;
         let (a, b, share) = match integrator {
@@ -83,10 +122,10 @@ impl<T: Real> Patch<T> {
             other => return Err(PatchError::Explicit { scheme: other.name() }),
         };
         let unit = self.matrix_unit(a, b);
-        self.forces(Some(b / unit));
+        self.tangents(b / unit);
         self.write_impulse(load, dims, share * b / unit);
         self.aim(0.0, 0.0, 0.0);
-        let first = self.solve_step_to(a, b, Some(RESPONSE), None)?;
+        let first = self.solve_step_to(a, b, Some(residual), None)?;
         let response = |work: &crate::patch::Scratch<T>, solve| Response {
             p: work.x.clone(),
             d: work.dx.clone(),
@@ -99,7 +138,7 @@ impl<T: Real> Patch<T> {
         let e = response(&self.cache.work, first);
         let beta = (1.0 - gamma).powi(2) / (gamma * (2.0 - gamma));
         let unit = self.matrix_unit(a, b);
-        self.forces(Some(b / unit));
+        self.tangents(b / unit);
         self.write_impulse(load, dims, -b / unit);
         let factors = [
             2.0 * self.material.lumped.mass.unit,
@@ -112,12 +151,19 @@ impl<T: Real> Patch<T> {
             *g = T::from_f64(g.as_f64() + inertia * e.d[i].as_f64());
         }
         self.aim(0.0, 0.0, 0.0);
-        let second = self.solve_step_to(a, b, Some(RESPONSE), None)?;
+        let second = self.solve_step_to(a, b, Some(residual), None)?;
         let mut whole = response(&self.cache.work, first.and(second));
         let add = |to: &mut [T], from: &[T]| to.iter_mut().zip(from).for_each(|(a, b)| *a += *b);
         add(&mut whole.p, &e.p);
         add(&mut whole.d, &e.d);
         Ok(whole)
+    }
+
+    /// Of the 4-D law; those of the linear one stay.
+    fn tangents(&mut self, factor: f64) {
+        if let Law::FourD { .. } = self.springs().law() {
+            self.forces(Some(factor));
+        }
     }
 
     fn write_impulse(&mut self, load: &OnBox<T>, dims: [usize; 3], factor: f64) {

@@ -2,6 +2,7 @@
 //! add and [carry along](warp). A [session] is a row of strokes; each uses one [tool], within [limits]. Haptics are not built yet.
 
 pub mod coefficients;
+mod face;
 pub mod fade;
 pub mod force;
 mod formula_solid;
@@ -12,6 +13,7 @@ pub mod mix;
 pub mod number;
 pub mod others;
 pub mod paint;
+mod room;
 pub mod scene;
 pub mod session;
 pub mod symmetry;

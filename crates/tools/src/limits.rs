@@ -159,6 +159,11 @@ impl Limits {
         self.region.is_none() && self.mask.is_none()
     }
 
+    /// Whether the mask fades.
+    pub fn is_soft(&self) -> bool {
+        self.weight.is_some()
+    }
+
     /// The part of a box in the region; where they share nothing, a box beside both.
     pub fn cut(&self, b: &Aabb) -> Aabb {
         self.region.as_ref().map_or(*b, |(region, _)| Aabb {

@@ -9,7 +9,15 @@ use glam::DAffine3;
 
 /// Objects by name, each about as the distance from its surface, positive inside, in the world of the canvas.
 #[derive(Clone, Default)]
-pub struct Others(BTreeMap<String, (Arc<dyn Field>, Aabb)>);
+pub struct Others(BTreeMap<String, Other>);
+
+#[derive(Clone)]
+struct Other {
+    distance: Arc<dyn Field>,
+    reach: Aabb,
+    /// The field itself and its iso-value, where it lies as the canvas does.
+    own: Option<(HierarchicalSpline<f32>, f64)>,
+}
 
 impl fmt::Debug for Others {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -31,7 +39,8 @@ impl Others {
     ) -> Result<(), CsgError> {
         let steep = 1.0 / field.slope();
         let distance = Csg::sum(vec![(steep, Arc::new(field.clone()))], -iso * steep)?;
-        let placed: Arc<dyn Field> = match canvas_from_object == DAffine3::IDENTITY {
+        let is_beside = canvas_from_object == DAffine3::IDENTITY;
+        let distance: Arc<dyn Field> = match is_beside {
             true => Arc::new(distance),
             false => {
                 // A distance of the object, in lengths of the canvas.
@@ -40,9 +49,18 @@ impl Others {
                 Arc::new(Csg::sum(vec![(stretch, placed)], 0.0)?)
             }
         };
-        let b = field.lattice().world_box().transformed(&canvas_from_object);
-        self.0.insert(name.into(), (placed, b));
+        let other = Other {
+            distance,
+            reach: field.lattice().world_box().transformed(&canvas_from_object),
+            own: is_beside.then(|| (field.clone(), iso)),
+        };
+        self.0.insert(name.into(), other);
         Ok(())
+    }
+
+    /// The field of an object and its iso-value, if it lies as the canvas does.
+    pub(crate) fn own(&self, name: &str) -> Option<&(HierarchicalSpline<f32>, f64)> {
+        self.0.get(name)?.own.as_ref()
     }
 
     /// The object of a name, and the box of its field.
@@ -50,7 +68,11 @@ impl Others {
     /// # Errors
     /// A sentence.
     pub fn get(&self, name: &str) -> Result<(Arc<dyn Field>, Aabb), String> {
-        self.0.get(name).cloned().ok_or_else(|| {
+        let found = self
+            .0
+            .get(name)
+            .map(|other| (other.distance.clone(), other.reach));
+        found.ok_or_else(|| {
             let known: Vec<_> = self.0.keys().map(String::as_str).collect();
             match known.is_empty() {
                 true => format!("there is no object {name:?}, nor any other"),

@@ -4,12 +4,18 @@ use bspline::HierarchicalSpline;
 use fitting::Control;
 use serde::{Deserialize, Serialize};
 
-use crate::force::{Chisel, Drill, ForceTool, Pull};
-use crate::geometric::{Copy, Cut, Geometric, Inflate, Move, Paste, Refine, Simplify, Smooth};
+use crate::face::Face;
+use crate::force::{Chisel, Drill, ForceError, ForceTool, Pull};
+use crate::geometric::{
+    Copy, Cut, Geometric, GeometricError, Inflate, Move, Paste, Refine, Simplify, Smooth,
+};
 use crate::limits::{Limits, Mask, Region};
 use crate::paint::Paint;
 use crate::symmetry::Symmetry;
 use crate::tool::{Canvas, Tool, ToolError};
+
+/// How often a box grows for one stroke, an eighth at a time: to about seven times its length.
+const MOST_GROWTHS: usize = 16;
 
 /// What a session file says.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -150,11 +156,39 @@ impl Stroke {
         }
     }
 
-    /// What the stroke leaves of a canvas, and what is left to say of it, in sentences.
+    /// What the stroke leaves of a canvas, and what is left to say of it, in sentences. Where the solid needs more room than the box of its
+    /// field has, the box grows.
     ///
     /// # Errors
     /// Any [`ToolError`].
     pub fn apply(&self, canvas: Canvas, control: &mut Control) -> Result<(Canvas, Vec<String>), ToolError> {
+        let before = *canvas.field.lattice();
+        let mut canvas = canvas;
+        for _ in 0..MOST_GROWTHS {
+            match self.in_box(canvas.clone(), control) {
+                Err(ToolError::Geometric(GeometricError::Leaves { at, face })) => {
+                    let leaves = GeometricError::Leaves { at, face };
+                    canvas = canvas.grown(face).ok_or(leaves)?;
+                }
+                Err(ToolError::Force(ForceError::Outside { at, field })) => {
+                    let leaves = ForceError::Outside { at, field };
+                    let face = Face::beyond(&canvas.field, at.into());
+                    canvas = face.and_then(|face| canvas.grown(face)).ok_or(leaves)?;
+                }
+                Ok((left, mut notes)) if left.field.lattice() != &before => {
+                    let b = left.field.lattice().world_box();
+                    let [min, max] = [b.min, b.max].map(|p| p.to_array());
+                    notes.push(format!("the box of the field has grown: {min:?} to {max:?}"));
+                    return Ok((left, notes));
+                }
+                done => return done,
+            }
+        }
+        self.in_box(canvas, control)
+    }
+
+    /// What the stroke leaves if the box of the field has room enough.
+    fn in_box(&self, canvas: Canvas, control: &mut Control) -> Result<(Canvas, Vec<String>), ToolError> {
         let tool = self.tool().map_err(ToolError::Stroke)?;
         let (coarse, limits) = self.prepared(&canvas)?;
         let (left, notes) = self.on_both_sides(tool, coarse, &limits, None, control)?;

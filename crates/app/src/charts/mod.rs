@@ -12,6 +12,7 @@ mod noise;
 mod orient;
 mod outliers;
 mod plot;
+mod tools;
 
 pub use dynamics::{DynamicsError, Extent, Line, Run, cost, sampling, sweep};
 pub use edits::edit_costs;
@@ -24,3 +25,4 @@ pub use noise::noise;
 pub use orient::Oriented;
 pub use outliers::outliers;
 pub use plot::{Chart, Series};
+pub use tools::{Sculpture, ToolLine, ToolRun, ToolsError, tool_costs};

@@ -17,7 +17,7 @@ use super::progress::Bar;
 use super::quantity::between;
 use super::source::{SAMPLES, Source, scratch};
 use super::staged::{StagedFiles, publish};
-use super::{chart_dynamics, chart_edits, chart_fields, chart_masks, chart_mesh, chart_orient};
+use super::{chart_dynamics, chart_edits, chart_fields, chart_masks, chart_mesh, chart_orient, chart_tools};
 use crate::charts::{Chart, Configuration, Input, Measurement, Scene, noise, outliers, sweeps};
 
 /// Arguments of `isoclay charts`.
@@ -43,6 +43,8 @@ enum Subject {
     Edits(chart_edits::Args),
     /// Time of writing a tool's work back into a field, against the size of its box
     Fields(chart_fields::Args),
+    /// Force tools: exactness of integrals, sampling and number of paths against the error; times of whole loops
+    Tools(chart_tools::Args),
     /// Noise against the resolution chosen and the error, and outliers against the error with and without --robust
     Hard(HardArgs),
 }
@@ -93,6 +95,7 @@ impl Args {
             Subject::Masks(a) => a.json,
             Subject::Edits(a) => a.json,
             Subject::Fields(a) => a.json,
+            Subject::Tools(a) => a.json,
             Subject::Orient(_) | Subject::Mesh(_) | Subject::Hard(_) => false,
         }
     }
@@ -109,6 +112,7 @@ pub fn run(args: &Args) -> Outcome {
         Subject::Mesh(args) => chart_mesh::run(args, &cancel),
         Subject::Edits(args) => chart_edits::run(args, &cancel),
         Subject::Fields(args) => chart_fields::run(args, &cancel),
+        Subject::Tools(args) => chart_tools::run(args, &cancel),
         Subject::Hard(args) => hard(args, &cancel),
     }
 }

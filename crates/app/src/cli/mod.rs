@@ -10,6 +10,7 @@ mod chart_fields;
 mod chart_masks;
 mod chart_mesh;
 mod chart_orient;
+mod chart_tools;
 mod charts;
 mod check;
 mod convert;

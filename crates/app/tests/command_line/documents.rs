@@ -231,7 +231,8 @@ fn a_block_is_made_from_nothing_and_shaped() {
     bench.json("new block.isoclay --box 10,6,4 --spacing 0.4 --unit mm");
     let mesh = bench.json("mesh block.isoclay -o block.ply --check");
     let volume = number(&mesh["quality"], "volume");
-    assert!((volume - 240.0).abs() < 2.0, "{mesh}");
+    // 240, less what the rounding of the edges takes: 0.6 mm.
+    assert!((volume - 234.2).abs() < 1.0, "{mesh}");
     bench.write(
         "drill.toml",
         "[[stroke]]\nobject = \"block\"\ncarve = { shape = { cylinder = { axis = [0, 0, 1], radius = 1.0, height = 9.0 } }, along = [[1, 0, 0]] }\n",

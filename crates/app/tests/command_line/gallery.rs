@@ -14,24 +14,33 @@ fn scripts_of_the_gallery_leave_what_is_recorded() {
     let bench = Bench::new();
     bench.json(&format!("fit {} -o bunny.iclay", data("bunny.obj.gz")));
     bench.json(&format!("fit {} -o head.iclay", data("head.nii.gz")));
-    let mut scripts: Vec<_> = gallery
-        .read_dir()
-        .unwrap()
-        .map(|entry| entry.unwrap().path())
-        .filter(|path| path.extension().is_some_and(|e| e == "toml"))
-        .collect();
-    scripts.sort();
+    let files = |ends: &str| {
+        let all = gallery.read_dir().unwrap().map(|entry| entry.unwrap().path());
+        let mut found: Vec<_> = all
+            .filter(|path| path.extension().is_some_and(|e| e == ends))
+            .collect();
+        found.sort_by_key(|path| path.file_stem().unwrap().to_os_string());
+        found
+    };
+    for cloud in files("xyz") {
+        let name = cloud.file_stem().unwrap().to_string_lossy().into_owned();
+        bench.json(&format!("fit {} --unoriented -o {name}.iclay", cloud.display()));
+    }
     let mut found = BTreeMap::new();
-    for script in scripts {
+    for script in files("toml") {
         let name = script.file_stem().unwrap().to_string_lossy().into_owned();
         let text = std::fs::read_to_string(&script).unwrap();
-        let start = match text.lines().next().unwrap() {
-            "# start: bunny" => "bunny.iclay",
-            "# start: head" => "head.iclay",
-            "# start: block" => "--box 48,40,16 --spacing 1 --unit mm",
-            other => panic!("{name}: {other:?} does not say what the script starts from"),
-        };
-        bench.json(&format!("new {name}.isoclay {start}"));
+        let start = text.lines().next().unwrap().strip_prefix("# start: ");
+        let start = start.unwrap_or_else(|| panic!("{name} does not say what the script starts from"));
+        // Another script, a field, or a block.
+        let before = bench.path(&format!("{start}.isoclay"));
+        if before.exists() {
+            std::fs::copy(before, bench.path(&format!("{name}.isoclay"))).unwrap();
+        } else if bench.path(&format!("{start}.iclay")).exists() {
+            bench.json(&format!("new {name}.isoclay {start}.iclay"));
+        } else {
+            bench.json(&format!("new {name}.isoclay {start}"));
+        }
         let done = bench.json(&format!("sculpt {name}.isoclay --script {}", script.display()));
         assert!(done["done"].as_u64() >= Some(1), "{name}: {done}");
         found.insert(name, done["state_sha256"].as_str().unwrap().to_string());

@@ -5,6 +5,7 @@ mod common;
 mod documents;
 mod gallery;
 mod meshes;
+mod strokes;
 #[path = "../common/wrong_values.rs"]
 mod wrong_values;
 

@@ -23,6 +23,7 @@ mod evaluate;
 mod functions;
 mod graft;
 mod grid;
+mod grown;
 mod kernel;
 mod lattice;
 mod local;
@@ -43,6 +44,7 @@ pub use brick::{
 pub use difference::{BrickChange, BrickDiff, DiffError};
 pub use edit::{BlockEdit, BrickEdit, Change, LevelEdit};
 pub use functions::{EditError, MAX_LEVELS};
+pub use grown::shifted;
 pub use lattice::Lattice;
 pub use local::{LocalField, LocalFields};
 pub use motion::Motion;

@@ -11,6 +11,7 @@ use glam::{DAffine3, DMat3, DVec3};
 use tools::geometric::{Geometric, Operation};
 use tools::limits::Limits;
 use tools::others::Others;
+use tools::tool::Canvas;
 
 use super::common::Draw;
 
@@ -197,6 +198,44 @@ fn what_is_moved_takes_the_noise_of_its_scan_along() {
         }
     }
     assert!(checked > 50 && worst < 1.0, "{checked} {worst}");
+}
+
+/// Both halves of the ball go up, the second because of the symmetry alone.
+#[test]
+fn a_move_on_both_sides_takes_the_noise_of_both_along() {
+    let before = fitted();
+    let text = "[[stroke]]\nsymmetry = { at = [12, 0, 0], normal = [1, 0, 0] }\nmove = { motion = { shift = { region = { min = [15, -9, -9], max = [33, 33, 33] }, by = [0, 1, 0], blend = 3 } } }\n";
+    let commands = Command::of_script(text, |_| Ok::<_, document::CommandError>("ball".to_string())).unwrap();
+    let journey = Journey::new(&commands, "ball", &before.lattice().world_box());
+    let Command::Stroke { stroke, .. } = &commands[0] else {
+        unreachable!()
+    };
+    let canvas = Canvas {
+        field: before.clone(),
+        iso: ISO,
+        detail: 0,
+        layers: Default::default(),
+        others: Others::default(),
+        copies: Vec::new(),
+    };
+    let (now, _) = stroke.apply(canvas, &mut Control::default()).unwrap();
+    let scan = scan();
+    let revision = revise_volume(&before, &now.field, &scan, ISO, FILL, &journey).unwrap();
+    let mut checked = [0; 2];
+    for change in &revision.changes {
+        let place = scan.header.world_from_voxel.transform_point3(index(change.voxel));
+        let origin = place - DVec3::Y;
+        let is_inside =
+            ball(place) == 100.0 && ball(origin) == 100.0 && (now.field.value(place) - 100.0).abs() < 0.1;
+        let at = scan.header.world_from_voxel.inverse().transform_point3(origin);
+        let is_in_scan = at.cmpge(DVec3::ONE).all() && at.cmple(DVec3::splat(SIDE as f64 - 2.0)).all();
+        if (place.x - 12.0).abs() > 3.5 && is_inside && is_in_scan {
+            let off = (change.density - trilinear(&scan, at)).abs();
+            assert!(off < 1.0, "{place}: {off}");
+            checked[usize::from(place.x > 12.0)] += 1;
+        }
+    }
+    assert!(checked.iter().all(|n| *n > 20), "{checked:?}");
 }
 
 fn trilinear(scan: &Volume, at: DVec3) -> f64 {

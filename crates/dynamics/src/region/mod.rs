@@ -47,7 +47,7 @@ pub use sleep::{Schedule, Thresholds, Turn};
 pub use snapshot::RegionSnapshot;
 pub use tensor::{TensorOptions, TensorRegion};
 
-use bspline::hierarchical::{EditError, Lattice as FieldLattice, LevelEdit};
+use bspline::hierarchical::{BlockEdit, Change::Add, EditError, Lattice as FieldLattice, LevelEdit};
 use bspline::{Field, Frame, HierarchicalSpline, KnotVector, Real};
 use glam::{DAffine3, DMat3, DVec3};
 
@@ -233,6 +233,19 @@ impl<T: Real> Region<T> {
         self.patch.respond(integrator, dt, loads)
     }
 
+    /// As [`Patch::respond_as_step`]; does not wake the region.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn respond_as_step(
+        &mut self,
+        integrator: Integrator,
+        dt: f64,
+        load: &OnBox<T>,
+    ) -> Result<Response<T>, PatchError> {
+        self.patch.respond_as_step(integrator, dt, load)
+    }
+
     /// As [`Patch::static_response`]; does not wake the region.
     ///
     /// # Errors
@@ -289,17 +302,30 @@ impl<T: Real> Region<T> {
         if coefficients(onto, &self.cells)? != self.origin {
             return Err(RegionError::Changed);
         }
-        let [_, ny, nz] = self.patch.lattice().coefficient_dims();
         // Function s of the level has the support s - 3 .. s + 1: the first inside is number first + 3.
+        let first = self.cells.first.map(|f| f + 3);
+        let shape @ [_, ny, nz] = self.patch.lattice().coefficient_dims();
+        let p = &self.patch.state().p;
+        let level = self.cells.level;
+        if p.iter().all(|p| *p != T::zero()) {
+            let change = Add(p.clone());
+            return Ok(onto.edited_blocks(&[BlockEdit {
+                level,
+                first,
+                shape,
+                change,
+            }])?);
+        }
+        // Functions that were not active, and that nothing moves, stay so.
         let function = |i: usize| {
             let ijk = [i / nz / ny, i / nz % ny, i % nz];
-            std::array::from_fn(|a| self.cells.first[a] + 3 + ijk[a] as u32)
+            std::array::from_fn(|a| first[a] + ijk[a] as u32)
         };
-        let changed = self.patch.state().p.iter().enumerate();
+        let changed = p.iter().enumerate();
         let edits: Vec<LevelEdit<T>> = changed
             .filter(|(_, p)| **p != T::zero())
             .map(|(i, &delta)| LevelEdit {
-                level: self.cells.level,
+                level,
                 function: function(i),
                 delta,
             })

@@ -34,7 +34,7 @@ pub use path::{Path, first_crossing, nearest_surface};
 pub use pull::Pull;
 pub use report::{Arrival, ForceReport, Told};
 pub use stroke::{Extent, ForceStroke};
-pub use target::Target;
+pub use target::{Span, Target};
 pub use tool::ForceTool;
 pub(crate) use tool::released;
 

@@ -76,7 +76,8 @@ impl<'a, T: Real> Functions<'a, T> {
     }
 }
 
-/// What a change of the free coefficients is worth to the mean of the field over a path: a sparse list of weights.
+/// What a change of the free coefficients is worth to the mean of the field over a path: a list of weights,
+/// in which a coefficient may stand more than once: to sort it costs more than to read it some times.
 #[derive(Clone, Debug, Default)]
 pub struct Row(Vec<(usize, f64)>);
 
@@ -88,14 +89,6 @@ impl Row {
         for node in nodes {
             functions.each(at(node.at), |i, w| all.push((i, w * node.weight / whole)));
         }
-        all.sort_by_key(|(i, _)| *i);
-        all.dedup_by(|next, sum| {
-            let same = next.0 == sum.0;
-            if same {
-                sum.1 += next.1;
-            }
-            same
-        });
         Self(all)
     }
 

@@ -93,19 +93,18 @@ impl<T: Real> ForceStroke<T> {
         let solved = system::solve(&right, &soft, &diagonal, most, 1e-4, |z| {
             let of = live.iter().zip(z).map(|(&i, z)| (&bearing(i).spread, *z));
             let load = Load::<T>::of(of);
-            let mut found = region.respond(Integrator::Paper, dt, &[load.on_box()])?;
-            let p = found.pop().map(|r| r.p).unwrap_or_default();
-            let felt = live.iter().map(|&i| bearing(i).row.times(&p)).collect();
-            Ok::<_, ForceError>((p, felt))
+            let found = region.respond_as_step(Integrator::Paper, dt, &load.on_box())?;
+            let felt = live.iter().map(|&i| bearing(i).row.times(&found.p)).collect();
+            Ok::<_, ForceError>((found, felt))
         })?;
         solves += solved.parts.len();
         for (&i, force) in live.iter().zip(&solved.forces) {
             self.acting[i].force += force;
         }
         self.load = Load::of(pairs(&bearings, self.acting.iter().map(|a| a.force)));
-        self.move_on(&solved.parts, dt)?;
+        let patch = self.region.patch_mut();
+        patch.add_responses(&solved.parts, dt)?;
         if self.how.solid == Solid::Clay {
-            let patch = self.region.patch_mut();
             let d = patch.state().d.clone();
             patch.springs_mut().relax(&d, -libm::expm1(-FLOW));
         }
@@ -117,26 +116,6 @@ impl<T: Real> ForceStroke<T> {
             Solid::Clay => FLOW,
             Solid::Elastic => LONG,
         }
-    }
-
-    /// Adds what the solved forces do in a step of `dt`.
-    fn move_on(&mut self, parts: &[(f64, Vec<T>)], dt: f64) -> Result<(), ForceError> {
-        let patch = self.region.patch_mut();
-        let state = patch.state();
-        let mut change = vec![0.0; state.p.len()];
-        for (share, p) in parts {
-            change
-                .iter_mut()
-                .zip(p)
-                .for_each(|(c, p)| *c += share * p.as_f64());
-        }
-        let add = |to: &[T], factor: f64| -> Vec<T> {
-            let sums = to.iter().zip(&change);
-            sums.map(|(a, c)| T::from_f64(a.as_f64() + factor * c)).collect()
-        };
-        let (p, v) = (add(&state.p, 1.0), add(&state.v, 1.0 / dt));
-        patch.set_state(&p, &v)?;
-        Ok(())
     }
 
     /// Arc lengths to which the surface is to go in this step.
@@ -211,8 +190,10 @@ impl<T: Real> ForceStroke<T> {
         let targets = &self.targets;
         let weights = self.acting.iter().map(|a| targets[a.index].weight);
         let load = Load::<T>::of(pairs(bearings, weights));
-        let mut found = self.region.respond(Integrator::Paper, dt, &[load.on_box()])?;
-        let p = found.pop().map(|r| r.p).unwrap_or_default();
+        let found = self
+            .region
+            .respond_as_step(Integrator::Paper, dt, &load.on_box())?;
+        let p = found.p;
         let each = |b: &Option<Bearing>| b.as_ref().map_or(0.0, |b| b.row.times(&p));
         let moved: Vec<f64> = bearings.iter().map(each).collect();
         let most = moved.iter().copied().fold(0.0, f64::max);

@@ -249,6 +249,14 @@ impl<T: Real> ForceStroke<T> {
         &self.region
     }
 
+    /// The field as it is now, which shares with the one before what did not change.
+    ///
+    /// # Errors
+    /// [`ForceError::Region`].
+    pub fn baked(&self) -> Result<HierarchicalSpline<T>, ForceError> {
+        Ok(self.region.bake(&self.field)?)
+    }
+
     /// What it has done so far.
     pub fn report(&self) -> &ForceReport {
         &self.report

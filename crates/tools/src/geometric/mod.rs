@@ -32,6 +32,7 @@ pub use smooth::{Inflate, Smooth};
 use swept::Pose;
 use write::{Fineness, TOLERANCE, Writer};
 
+use crate::face::Face;
 use crate::limits::Limits;
 use crate::number::{NonNegative, Point, Positive};
 use crate::others::Others;
@@ -90,12 +91,14 @@ pub enum GeometricError {
     },
     /// The solid would be cut off.
     #[error(
-        "the solid would leave the box of its field at {at:?}; let the tool end before, or start with more room about the \
-         object"
+        "the solid would leave the box of its field at {at:?}, which cannot grow there: the solid is cut off at that face, or the \
+         box would become too large; let the tool end before"
     )]
     Leaves {
         /// Where.
         at: [f64; 3],
+        /// Through which face.
+        face: Face,
     },
     /// A motion makes no sense.
     #[error(transparent)]

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bspline::primitives::Cuboid;
-use bspline::{Csg, Field, HierarchicalSpline, Real};
+use bspline::{Aabb, Csg, Field, HierarchicalSpline, Real};
 use fitting::Control;
 use fitting::field::FieldFitReport;
 use glam::{DAffine3, DMat3, DVec3};
@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::write::{Fineness, MARGIN, Writer};
 use super::{Geometric, GeometricError, Operation, Shape, rotation_of};
+use crate::coefficients::{changed, support, with_functions};
 use crate::limits::{Limits, Region};
 use crate::mix::{Faded, Mixed};
 use crate::number::{NonNegative, Point, Positive};
@@ -55,7 +56,7 @@ pub struct Paste {
     /// How much larger it becomes; 1 if missing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scale: Option<Positive>,
-    /// Width about the box over which it passes into what is there; four finest knot intervals if missing.
+    /// Width about the box over which it passes into what is there; four knot intervals of the object's detail if missing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub blend: Option<Positive>,
     /// As for [`Geometric`].
@@ -96,39 +97,51 @@ impl Cut {
 impl Paste {
     /// What it makes of a field whose surface lies at `iso`.
     ///
-    /// About the box the two pass into one another, outside of it: pasted where it was cut out, it leaves what was there before.
+    /// About the box the two pass into one another, outside of it: pasted where it was cut out, it leaves what was there before, to
+    /// the bit.
     ///
     /// # Errors
     /// Any [`GeometricError`].
-    pub fn apply<T: Real>(
+    pub fn apply(
         &self,
-        field: &HierarchicalSpline<T>,
+        field: &HierarchicalSpline<f32>,
         iso: f64,
         others: &Others,
         limits: &Limits,
         control: &mut Control,
-    ) -> Result<(HierarchicalSpline<T>, FieldFitReport), GeometricError> {
+    ) -> Result<(HierarchicalSpline<f32>, FieldFitReport), GeometricError> {
         let writer = Writer { field, iso, limits };
         let b = self.region.aabb().map_err(GeometricError::Shape)?;
         let (clip, _) = others.get(&self.from).map_err(GeometricError::Shape)?;
         let (map, scale) = self.map(b.center());
         let solid = Cuboid::new(b.center(), 0.5 * b.size()).map_err(GeometricError::shape)?;
+        let around = MARGIN * writer.spacing();
+        let blend = self.blend.map_or(around, |blend| blend.0);
+        // What a cut rounds off lies a few knots beside the box; elsewhere that would be a moat about what is pasted.
+        let margin = if map == DAffine3::IDENTITY { around } else { 0.0 };
+        let to = b.transformed(&map);
+        let [kept, reach] = [margin, margin + blend].map(|by| Aabb::new(to.min - by, to.max + by));
+        let within = writer.within(&reach)?;
+        let twin = others.own(&self.from);
+        let twin = twin.filter(|(_, twin_iso)| map == DAffine3::IDENTITY && *twin_iso == iso);
+        let begun = match twin.and_then(|(twin, _)| copied(field, twin, &kept, &reach, limits)) {
+            Some((pasted, true)) => return Ok((pasted, FieldFitReport::default())),
+            Some((begun, false)) if !limits.is_soft() => begun,
+            _ => field.clone(),
+        };
         let [clip, cover] = [clip, Arc::new(solid) as Arc<dyn Field>].map(|part| carried(part, map));
         let (clip, cover) = (clip?, cover?);
         let clip = Csg::sum(vec![(scale * field.slope(), clip)], iso).map_err(GeometricError::shape)?;
-        // What a cut rounds off lies a few knots beside the box.
-        let margin = MARGIN * field.finest_spacing();
-        let blend = self.blend.map_or(margin, |blend| blend.0);
         let weight = Faded::new(cover, -(margin + blend) / scale, -margin / scale);
         let mixed = Mixed {
             from: field,
             to: &clip,
             weight: &weight,
         };
-        let mut reach = b.transformed(&map);
-        reach.min -= margin + blend;
-        reach.max += margin + blend;
-        let within = writer.within(&reach)?;
+        let writer = Writer {
+            field: &begun,
+            ..writer
+        };
         let fineness = Fineness {
             tolerance: self.tolerance,
             finer: self.finer,
@@ -152,6 +165,28 @@ impl Paste {
             scale,
         )
     }
+}
+
+/// `field` with those functions of `twin` that lie within `reach`, and whether nothing in `kept` is left to be done: whether the two
+/// differ in no function that reaches from there out of `reach`. None if they are no versions of one field.
+fn copied(
+    field: &HierarchicalSpline<f32>,
+    twin: &HierarchicalSpline<f32>,
+    kept: &Aabb,
+    reach: &Aabb,
+    limits: &Limits,
+) -> Option<(HierarchicalSpline<f32>, bool)> {
+    let mut functions = changed(field, twin).ok()?;
+    let mut is_all = field.slope() == twin.slope();
+    functions.retain(|(level, function), _| {
+        let (_, b) = support(field, *level, *function);
+        let is_within = b.min.cmpge(reach.min).all() && b.max.cmple(reach.max).all();
+        let is_beside = b.max.cmple(kept.min).any() || b.min.cmpge(kept.max).any();
+        is_all &= is_within || is_beside;
+        is_within && limits.finest().is_none_or(|finest| *level <= finest)
+    });
+    let pasted = with_functions(field, &functions).ok()?;
+    Some((limits.kept(field, &pasted), is_all))
 }
 
 /// A field carried by a map; the very same where that leads nowhere.

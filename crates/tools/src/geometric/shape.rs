@@ -2,7 +2,7 @@ use std::sync::Arc;
 
 use bspline::primitives::{Capsule, Cuboid, Cylinder, Primitive, PrimitiveError, Sphere, Torus};
 use bspline::{Aabb, Csg, Field};
-use glam::{DAffine3, DVec2, DVec3};
+use glam::{DAffine3, DQuat, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
 use super::swept::{Pose, Swept};
@@ -122,9 +122,16 @@ impl Shape {
                 });
             }
         }
+        // A box that is never turned reaches no further than its faces.
+        let half = match self {
+            Self::Box { size } if poses.iter().all(|pose| pose.turn == DQuat::IDENTITY) => {
+                0.5 * DVec3::from_array(size.map(|s| s.0))
+            }
+            _ => DVec3::splat(size),
+        };
         for pose in poses {
-            reach.min = reach.min.min(pose.at - size);
-            reach.max = reach.max.max(pose.at + size);
+            reach.min = reach.min.min(pose.at - half);
+            reach.max = reach.max.max(pose.at + half);
         }
         match reach.min.is_finite() && reach.max.is_finite() {
             true => Ok((solids, reach)),

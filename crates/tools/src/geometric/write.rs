@@ -7,6 +7,7 @@ use fitting::field::{Aim, FieldFitOptions, FieldFitReport, fit_field_where};
 use glam::DVec3;
 
 use super::GeometricError;
+use crate::face::Face;
 use crate::limits::Limits;
 use crate::number::Positive;
 
@@ -145,9 +146,9 @@ impl<T: Real> Writer<'_, T> {
         let step = 1.0 / (1u64 << self.detail()) as f64;
         let rim = self.spacing() * self.field.slope();
         for axis in 0..3 {
-            for (face, is_reached) in [
-                (0.0, local.min[axis] <= 0.0),
-                (extent[axis], local.max[axis] >= extent[axis]),
+            for (face, is_last, is_reached) in [
+                (0.0, false, local.min[axis] <= 0.0),
+                (extent[axis], true, local.max[axis] >= extent[axis]),
             ] {
                 if !is_reached {
                     continue;
@@ -164,11 +165,14 @@ impl<T: Real> Writer<'_, T> {
                 target.frame_values(&frame, [0; 3], count, now);
                 self.field.frame_values(&frame, [0; 3], count, then);
                 // Where the solid has been cut off before, its rim may move.
+                let is_cut = then.iter().any(|value| *value > self.iso);
+                let rim = if is_cut { rim } else { 0.0 };
                 let leaves = |(now, then): (&f64, &f64)| *now > self.iso + rim && *then < self.iso - rim;
                 if let Some(n) = now.iter().zip(then.iter()).position(leaves) {
                     let at = [n / count[2] / count[1], n / count[2] % count[1], n % count[2]];
                     return Err(GeometricError::Leaves {
                         at: frame.node(at.map(|i| i as i64)).to_array(),
+                        face: Face { axis, is_last },
                     });
                 }
             }

@@ -1,4 +1,4 @@
-use bspline::hierarchical::{BlockEdit, Change, EditError, Lattice, MAX_LEVELS};
+use bspline::hierarchical::{BlockEdit, Change, EditError, Lattice, LevelCorrections, MAX_LEVELS, shifted};
 use bspline::{Aabb, HierarchicalSpline};
 use glam::{DAffine3, DMat3, DVec3};
 
@@ -54,6 +54,17 @@ impl Layer {
             depth: level + coarser,
             level,
         }
+    }
+
+    /// The layer over a box with `before` and `behind` more cells of the object's coarsest level than `lattice` has. None where the numbers
+    /// do not fit.
+    pub fn grown(&self, lattice: &Lattice, before: [u32; 3], behind: [u32; 3]) -> Option<Self> {
+        let larger = Self::empty(&lattice.grown(before, behind), self.level);
+        let numbers = self.tree.corrections(self.depth);
+        let mut levels = vec![LevelCorrections::new(); larger.depth + 1];
+        levels[larger.depth] = shifted(&numbers, before.map(|n| n << self.level));
+        let tree = HierarchicalSpline::try_from_corrections(*larger.tree.lattice(), 1.0, levels).ok()?;
+        Some(Self { tree, ..larger })
     }
 
     /// The bricks that hold the numbers.

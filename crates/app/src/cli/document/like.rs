@@ -51,7 +51,9 @@ impl Like<'_> {
             )));
         }
         let identity = document.state().sha256();
-        let journey = Journey::new(&done(document)?, name, &extent);
+        // The box may have grown since.
+        let fitted = fitted.in_box_of(&now);
+        let journey = Journey::new(&done(document)?, name, &now.field.lattice().world_box());
         match input {
             Input::Volume(volume) => self.volume([&fitted, &now], &journey, &volume, &identity, output),
             Input::Cloud(cloud) => self.cloud([&fitted, &now], &journey, &cloud, output),

@@ -15,7 +15,7 @@ const VLR_HEAD: usize = 54;
 const EVLR_HEAD: usize = 60;
 
 #[derive(Debug)]
-pub(super) struct Header<'a> {
+pub(in crate::points) struct Header<'a> {
     /// Point format, 0 to 10.
     pub format: u8,
     pub is_compressed: bool,
@@ -31,21 +31,21 @@ pub(super) struct Header<'a> {
 
 /// Something else that the file says.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Record<'a> {
+pub(in crate::points) struct Record<'a> {
     pub user: &'a [u8],
     pub id: u16,
     pub data: &'a [u8],
 }
 
-pub(super) fn u16_at(b: &[u8], at: usize) -> u16 {
+pub(in crate::points) fn u16_at(b: &[u8], at: usize) -> u16 {
     u16::from_le_bytes([b[at], b[at + 1]])
 }
 
-pub(super) fn u32_at(b: &[u8], at: usize) -> u32 {
+pub(in crate::points) fn u32_at(b: &[u8], at: usize) -> u32 {
     u32::from_le_bytes(b[at..at + 4].try_into().expect("four bytes"))
 }
 
-pub(super) fn u64_at(b: &[u8], at: usize) -> u64 {
+pub(in crate::points) fn u64_at(b: &[u8], at: usize) -> u64 {
     u64::from_le_bytes(b[at..at + 8].try_into().expect("eight bytes"))
 }
 
@@ -57,7 +57,7 @@ fn cut(what: impl Into<String>, needed: u64, found: usize) -> Fault {
     }
 }
 
-pub(super) fn read(bytes: &[u8]) -> Result<Header<'_>, Fault> {
+pub(in crate::points) fn read(bytes: &[u8]) -> Result<Header<'_>, Fault> {
     if !bytes.starts_with(b"LASF") {
         return Err(Fault::Value {
             what: "the start of the file",

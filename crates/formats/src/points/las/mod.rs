@@ -3,9 +3,9 @@
 //! The header is read here, since every promise in it has to be checked before anything is made room for; the
 //! compression is crate laz.
 
-mod header;
+pub(super) mod header;
 mod laz;
-mod unit;
+pub(super) mod unit;
 mod write;
 
 use glam::DVec3;

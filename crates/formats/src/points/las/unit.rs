@@ -10,7 +10,7 @@ const GEOGRAPHIC: u16 = 2;
 const METRE: u16 = 9001;
 
 /// The unit, and a doubt about it.
-pub(super) fn of(header: &Header) -> (Unit, Option<String>) {
+pub(in crate::points) fn of(header: &Header) -> (Unit, Option<String>) {
     if let Some(text) = header.record("LASF_Projection", 2112) {
         return of_text(&String::from_utf8_lossy(text));
     }

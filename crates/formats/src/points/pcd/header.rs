@@ -6,7 +6,7 @@ use crate::text::{Lines, integer};
 
 /// Type of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Scalar {
+pub(in crate::points) enum Scalar {
     F4,
     F8,
     I(u8),
@@ -40,7 +40,7 @@ impl Scalar {
 
 /// One of x, y, z and the three of the normal.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Column {
+pub(in crate::points) struct Column {
     pub kind: Scalar,
     /// Bytes of a row before it.
     pub offset: usize,
@@ -49,14 +49,14 @@ pub(super) struct Column {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Encoding {
+pub(in crate::points) enum Encoding {
     Ascii,
     Binary,
     Compressed,
 }
 
 #[derive(Debug)]
-pub(super) struct Header {
+pub(in crate::points) struct Header {
     pub encoding: Encoding,
     pub points: u64,
     /// `x y z`, and `normal_x normal_y normal_z` if there are all three.
@@ -64,6 +64,8 @@ pub(super) struct Header {
     /// Bytes and words of a row.
     pub stride: usize,
     pub words: usize,
+    /// Bytes of each field.
+    pub sizes: Vec<usize>,
     /// Byte at which the rows start, and the line of it.
     pub body: usize,
     pub line: u64,
@@ -72,7 +74,7 @@ pub(super) struct Header {
 
 const FIELDS_REMEDY: &str = "FIELDS, SIZE, TYPE and COUNT have one word for each field";
 
-pub(super) fn read(bytes: &[u8]) -> Result<Header, Fault> {
+pub(in crate::points) fn read(bytes: &[u8]) -> Result<Header, Fault> {
     let mut fields: Vec<String> = Vec::new();
     // Sizes, types and counts, each with its line.
     let mut entries: [Option<(u64, Vec<&[u8]>)>; 3] = [None, None, None];
@@ -132,13 +134,15 @@ pub(super) fn read(bytes: &[u8]) -> Result<Header, Fault> {
                     (Some(n), Some(product)) if n == product => n,
                     _ => return Err(bad("before it stand WIDTH, HEIGHT and POINTS, their product")),
                 };
-                let layout = layout(&fields, &entries)?;
+                let mut sizes = Vec::new();
+                let layout = layout(&fields, &entries, &mut sizes)?;
                 return Ok(Header {
                     encoding,
                     points,
                     columns: layout.0,
                     stride: layout.1,
                     words: layout.2,
+                    sizes,
                     body: bytes.len() - lines.left(),
                     line: line + 1,
                     notes,
@@ -158,10 +162,11 @@ pub(super) fn read(bytes: &[u8]) -> Result<Header, Fault> {
     })
 }
 
-/// The wanted columns, and the bytes and words of a row.
+/// The wanted columns, and the bytes and words of a row; the bytes of each field go to `sizes`.
 fn layout(
     fields: &[String],
     entries: &[Option<(u64, Vec<&[u8]>)>; 3],
+    sizes: &mut Vec<usize>,
 ) -> Result<(Vec<Column>, usize, usize), Fault> {
     let names = ["x", "y", "z", "normal_x", "normal_y", "normal_z"];
     let mut found = [None; 6];
@@ -209,6 +214,7 @@ fn layout(
                 word: words,
             }));
         }
+        sizes.push(kind.size() * usize::from(count));
         stride += kind.size() * usize::from(count);
         words += usize::from(count);
     }

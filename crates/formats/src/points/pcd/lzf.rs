@@ -5,6 +5,16 @@ use crate::Fault;
 /// Bytes that one byte can become: three of a back reference make up to 264.
 pub(super) const MAX_RATIO: u64 = 88;
 
+/// A stream that unpacks to `bytes`, which it holds as they are.
+pub(in crate::points) fn stored(bytes: &[u8]) -> Vec<u8> {
+    let mut out = Vec::with_capacity(bytes.len() + bytes.len() / 32 + 1);
+    for run in bytes.chunks(32) {
+        out.push(run.len() as u8 - 1);
+        out.extend_from_slice(run);
+    }
+    out
+}
+
 /// Unpacks all of `packed` into exactly `out`.
 pub(super) fn unpack(packed: &[u8], out: &mut [u8]) -> Result<(), Fault> {
     let damaged = |at: usize| Fault::Damaged {

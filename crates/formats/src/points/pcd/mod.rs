@@ -2,8 +2,8 @@
 //!
 //! An own reader: crate pcd-rs names no licence that can be checked, and allocates what a header promises.
 
-mod header;
-mod lzf;
+pub(super) mod header;
+pub(super) mod lzf;
 
 use std::io::{self, Write};
 
@@ -92,7 +92,7 @@ fn columns(bytes: &[u8], header: &Header, place: impl Fn(&Column, usize) -> usiz
     raw.normals = normal.map(|c| (0..rows).map(|row| gather(c, row)).collect());
 }
 
-fn unpack(body: &[u8], header: &Header, budget: &mut Budget) -> Result<Vec<u8>, Fault> {
+pub(super) fn unpack(body: &[u8], header: &Header, budget: &mut Budget) -> Result<Vec<u8>, Fault> {
     let size = |at: usize| {
         let b = body.get(at..at + 4).ok_or(Fault::Truncated {
             what: "the sizes of the compressed rows".into(),

@@ -1,5 +1,9 @@
 //! A cloud written again with some points changed: every other row of the file stays as it is, to the bit.
 
+#[cfg(feature = "lidar")]
+mod las;
+mod obj;
+mod pcd;
 mod ply;
 mod xyz;
 
@@ -35,11 +39,12 @@ pub struct CloudChanges {
     pub added: Vec<Placed>,
 }
 
-/// Writes the cloud `like` (PLY or XYZ) to `output`, of the same format, with `changes`. New points follow the last one.
+/// Writes the cloud `like` (PLY, PCD, LAS, OBJ or XYZ) to `output`, of the same format, with `changes`. New points follow the last one.
+/// LAS has whole multiples of its step: edited points are rounded to them.
 ///
 /// # Errors
-/// Those of [`read`](super::read); [`Fault::Value`] for what is not written back: other formats, coordinates that are whole numbers,
-/// points that come or go in a file with faces; I/O. The target is whole or untouched.
+/// Those of [`read`](super::read); [`Fault::Value`] for what is not written back: E57 and LAZ, coordinates that are whole numbers,
+/// points that come or go where others name them by number, or in a raster; I/O. The target is whole or untouched.
 ///
 /// # Panics
 /// If a row is beyond the cloud.
@@ -56,20 +61,25 @@ pub fn save_revised(
         let (revised, name) = match kind_of(&bytes, like)? {
             Kind::Cloud(PointFormat::Ply) => (ply::revised(&bytes, changes)?, "ply"),
             Kind::Cloud(PointFormat::Xyz) => (xyz::revised(&bytes, changes)?, "xyz"),
+            Kind::Cloud(PointFormat::Pcd) => (pcd::revised(&bytes, changes)?, "pcd"),
+            Kind::Cloud(PointFormat::Obj) => (obj::revised(&bytes, changes)?, "obj"),
+            #[cfg(feature = "lidar")]
+            Kind::Cloud(PointFormat::Las) => (las::revised(&bytes, changes)?, "las"),
             other => {
                 return Err(Fault::Value {
                     what: "the format of the scan",
                     value: other.to_string(),
-                    remedy: "edited clouds are written as PLY or XYZ; convert the scan to .ply and fit that",
+                    remedy: "edited clouds are written as PLY, PCD, LAS, OBJ or XYZ; convert the scan to .ply and fit that",
                 });
             }
         };
-        let is_text = name == "xyz" && !matches!(extension(output).as_str(), "ply" | "pcd" | "las" | "obj");
+        let known = ["ply", "pcd", "las", "laz", "obj", "e57"];
+        let is_text = name == "xyz" && !known.contains(&extension(output).as_str());
         if is_gz_name(output) || extension(output) != name && !is_text {
             return Err(Fault::Value {
                 what: "the name of the output",
                 value: output.display().to_string(),
-                remedy: "an edited cloud is written in the format of the scan, not compressed: .ply or .xyz",
+                remedy: "an edited cloud is written in the format of the scan, not compressed",
             });
         }
         Ok(revised)
@@ -114,6 +124,27 @@ impl<'a> Rows<'a> {
             }
             _ => Row::Stays,
         }
+    }
+}
+
+/// Rows of `stride` bytes with their changes; `placed_row` puts a point into a row.
+fn binary_rows(
+    points: &[u8],
+    stride: usize,
+    changes: &CloudChanges,
+    placed_row: impl Fn(&[u8], &Placed) -> Vec<u8>,
+    out: &mut Vec<u8>,
+) {
+    let mut rows = Rows::of(changes);
+    for (n, row) in points.chunks_exact(stride).enumerate() {
+        match rows.next(n) {
+            Row::Stays => out.extend_from_slice(row),
+            Row::Moves(placed) => out.extend(placed_row(row, placed)),
+            Row::Goes => {}
+        }
+    }
+    for placed in &changes.added {
+        out.extend(placed_row(&points[placed.row * stride..][..stride], placed));
     }
 }
 
@@ -245,6 +276,187 @@ mod tests {
         ]
     }
 
+    /// The same points, the tag behind them, in the other formats.
+    fn others() -> Vec<(&'static str, Vec<u8>)> {
+        let rows: [[f32; 6]; 3] = [
+            [1.5, 2.0, 3.0, 1.0, 0.0, 0.0],
+            [4.0, 5.0, 6.0, 0.0, 1.0, 0.0],
+            [7.0, 8.0, 9.5, 0.0, 0.0, -1.0],
+        ];
+        let pcd = |data: &str, body: Vec<u8>| {
+            let head = format!(
+                "# .PCD v0.7 kept\nVERSION 0.7\nFIELDS x y z normal_x normal_y normal_z tag\nSIZE 4 4 4 4 4 4 1\nTYPE F F F F F F U\n\
+                 COUNT 1 1 1 1 1 1 1\nWIDTH 3\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 3\nDATA {data}\n"
+            );
+            [head.into_bytes(), body].concat()
+        };
+        let tag = |n: usize| 10 + n as u8;
+        let text: String = (rows.iter().enumerate())
+            .map(|(n, r)| {
+                format!(
+                    "{} {} {} {} {} {} {}\n",
+                    r[0],
+                    r[1],
+                    r[2],
+                    r[3],
+                    r[4],
+                    r[5],
+                    tag(n)
+                )
+            })
+            .collect();
+        let binary: Vec<u8> = (rows.iter().enumerate())
+            .flat_map(|(n, r)| {
+                r.iter()
+                    .flat_map(|v| v.to_le_bytes())
+                    .chain([tag(n)])
+                    .collect::<Vec<_>>()
+            })
+            .collect();
+        let columns: Vec<u8> = (0..6)
+            .flat_map(|c| rows.iter().flat_map(move |r| r[c].to_le_bytes()))
+            .chain((0..3).map(tag))
+            .collect();
+        let packed = points::pcd::lzf::stored(&columns);
+        let sizes = [packed.len() as u32, columns.len() as u32]
+            .map(u32::to_le_bytes)
+            .concat();
+        let obj: String = (rows.iter().enumerate())
+            .map(|(n, r)| {
+                format!(
+                    "v {} {} {} {}\nvn {} {} {}\n",
+                    r[0],
+                    r[1],
+                    r[2],
+                    tag(n),
+                    r[3],
+                    r[4],
+                    r[5]
+                )
+            })
+            .collect();
+        vec![
+            ("ascii.pcd", pcd("ascii", text.into_bytes())),
+            ("binary.pcd", pcd("binary", binary)),
+            ("packed.pcd", pcd("binary_compressed", [sizes, packed].concat())),
+            ("cloud.obj", [b"# kept\n".to_vec(), obj.into_bytes()].concat()),
+        ]
+    }
+
+    #[test]
+    fn other_formats_follow_too() {
+        for (name, bytes) in others() {
+            assert_eq!(revised(name, &bytes, &CloudChanges::default()).0, bytes, "{name}");
+            let (new, cloud) = revised(name, &bytes, &changes());
+            let places: Vec<_> = cloud.positions.iter().map(|p| p.to_array()).collect();
+            let expected = [[7.0, 0.25, -1.5], [7.0, 8.0, 9.5], [9.0, 0.25, -1.5]];
+            assert_eq!(places, expected, "{name}");
+            assert_eq!(
+                cloud.normals.unwrap(),
+                [DVec3::Z, DVec3::NEG_Z, DVec3::Z],
+                "{name}"
+            );
+            assert!(new.windows(4).any(|w| w == b"kept"), "{name}");
+            let tags: Vec<u8> = match name {
+                "ascii.pcd" | "cloud.obj" => String::from_utf8(new)
+                    .unwrap()
+                    .lines()
+                    .filter(|l| l.starts_with("v ") || name == "ascii.pcd")
+                    .filter_map(|l| l.rsplit(' ').next().unwrap().parse().ok())
+                    .collect::<Vec<u8>>()
+                    .into_iter()
+                    .rev()
+                    .take(3)
+                    .rev()
+                    .collect(),
+                "binary.pcd" => new[new.len() - 75..]
+                    .iter()
+                    .skip(24)
+                    .step_by(25)
+                    .copied()
+                    .collect(),
+                _ => new[new.len() - 3..].to_vec(),
+            };
+            assert_eq!(tags, [11, 12, 12], "{name}");
+        }
+        // A raster keeps its shape, or is refused.
+        let (_, raster) = &others()[1];
+        let raster = String::from_utf8_lossy(&raster[..raster.len() - 75])
+            .replace("WIDTH 3\nHEIGHT 1", "WIDTH 1\nHEIGHT 3");
+        let rows = [
+            raster.into_bytes(),
+            others()[1].1[others()[1].1.len() - 75..].to_vec(),
+        ]
+        .concat();
+        let e = pcd::revised(
+            &rows,
+            &CloudChanges {
+                removed: vec![0],
+                ..CloudChanges::default()
+            },
+        );
+        assert!(e.unwrap_err().to_string().contains("raster"));
+    }
+
+    /// Two points of LAS 1.2 and one that is withheld, at steps of a hundredth; the second is a second return.
+    #[cfg(feature = "lidar")]
+    #[test]
+    fn las_keeps_records_attributes_and_what_is_withheld() {
+        let cloud = points::PointCloud {
+            positions: vec![
+                DVec3::new(1.5, 2.0, 3.0),
+                DVec3::new(4.0, 5.0, 6.0),
+                DVec3::new(7.0, 8.0, 9.5),
+                DVec3::ONE,
+            ],
+            ..Default::default()
+        };
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("a.las");
+        points::save(&path, &cloud).unwrap();
+        let mut bytes = fs::read(&path).unwrap();
+        let at = u32::from_le_bytes(bytes[96..100].try_into().unwrap()) as usize;
+        for (n, point) in bytes[at..].chunks_exact_mut(20).enumerate() {
+            point[12] = 50 + n as u8;
+            point[14] = if n == 2 { 0b010_010 } else { 0b001_001 };
+            point[15] = if n == 3 { 0x80 } else { 0 };
+        }
+        bytes.extend(b"what follows the points");
+        fs::write(&path, &bytes).unwrap();
+        assert_eq!(revised("a.las", &bytes, &CloudChanges::default()).0, bytes);
+        let (new, cloud) = revised("a.las", &bytes, &changes());
+        for (found, expected) in
+            cloud
+                .positions
+                .iter()
+                .zip([[7.0, 0.25, -1.5], [7.0, 8.0, 9.5], [9.0, 0.25, -1.5]])
+        {
+            assert!(found.distance(expected.into()) < 1e-6, "{found}");
+        }
+        let points: Vec<&[u8]> = new[at..].chunks_exact(20).take(4).collect();
+        assert_eq!(
+            points[1],
+            &bytes[at + 40..at + 60],
+            "what was not edited stays to the bit"
+        );
+        assert_eq!(points[2], &bytes[at + 60..at + 80], "what is withheld stays");
+        let told: Vec<u8> = points.iter().map(|p| p[12]).collect();
+        assert_eq!(told, [51, 52, 53, 52]);
+        let count = |at: usize| u32::from_le_bytes(new[at..at + 4].try_into().unwrap());
+        assert_eq!([count(107), count(111), count(115)], [4, 2, 2]);
+        let high = f64::from_le_bytes(new[179..187].try_into().unwrap());
+        assert!((high - 9.0).abs() < 1e-6 && new.ends_with(b"what follows the points"));
+        // Compressed points are refused.
+        points::save(&directory.path().join("a.laz"), &cloud).unwrap();
+        let e = save_revised(
+            &directory.path().join("a.laz"),
+            &changes(),
+            &directory.path().join("b.laz"),
+            &ReadLimits::default(),
+        );
+        assert!(e.unwrap_err().to_string().contains("unpack the scan to .las"));
+    }
+
     #[test]
     fn without_changes_files_are_the_same_to_the_bit() {
         for (name, bytes) in files() {
@@ -321,6 +533,6 @@ mod tests {
         assert!(told("whole.ply", whole, "out.ply").contains("float or double"));
         let (name, bytes) = &files()[1];
         assert!(told(name, bytes, "out.xyz").contains("format of the scan"));
-        assert!(told("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "out.obj").contains("PLY or XYZ"));
+        assert!(told("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\np 1 2 3\n", "out.obj").contains("vertices alone"));
     }
 }

@@ -163,17 +163,7 @@ fn binary(
         }
         row
     };
-    let mut rows = Rows::of(changes);
-    for (n, row) in points.chunks_exact(stride).enumerate() {
-        match rows.next(n) {
-            Row::Stays => out.extend_from_slice(row),
-            Row::Moves(placed) => out.extend(placed_row(row, placed)),
-            Row::Goes => {}
-        }
-    }
-    for placed in &changes.added {
-        out.extend(placed_row(&points[placed.row * stride..][..stride], placed));
-    }
+    super::binary_rows(points, stride, changes, placed_row, out);
     out.extend_from_slice(rest);
     Ok(())
 }
