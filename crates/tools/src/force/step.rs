@@ -45,6 +45,9 @@ impl<T: Real> ForceStroke<T> {
     pub fn step(&mut self) -> Result<Told, ForceError> {
         self.chase()?;
         self.advance()?;
+        if let Some(constraints) = self.drawn.next() {
+            self.region.patch_mut().set_constraints(&constraints)?;
+        }
         let goals = self.goals();
         let bearings = self.bearings(&goals)?;
         let (dt, keep) = match self.how.solid {
@@ -77,7 +80,9 @@ impl<T: Real> ForceStroke<T> {
             .zip(&before)
             .map(|(now, then)| *now - *then)
             .collect();
-        let live: Vec<usize> = (0..bearings.len()).filter(|i| bearings[*i].is_some()).collect();
+        // Where nothing gives way no force is large enough.
+        let is_live = |i: &usize| bearings[*i].is_some() && self.acting[*i].stiffness > 0.0;
+        let live: Vec<usize> = (0..bearings.len()).filter(is_live).collect();
         let bearing = |i: usize| bearings[i].as_ref().expect("live paths have one");
         let right: Vec<f64> = live
             .iter()
@@ -105,11 +110,7 @@ impl<T: Real> ForceStroke<T> {
         self.load = Load::of(pairs(&bearings, self.acting.iter().map(|a| a.force)));
         let patch = self.region.patch_mut();
         patch.add_responses(&solved.parts, dt)?;
-        if self.how.solid == Solid::Elastic {
-            // Densities are sampled anew: they have to balance in the end.
-            let (p, v) = (patch.state().p.clone(), patch.state().v.clone());
-            patch.set_state(&p, &v)?;
-        } else {
+        if self.how.solid == Solid::Clay {
             let d = patch.state().d.clone();
             patch.springs_mut().relax(&d, -libm::expm1(-FLOW));
         }
@@ -141,7 +142,7 @@ impl<T: Real> ForceStroke<T> {
             part * share * self.targets[a.index].path.length()
         });
         let goals = goals.collect();
-        self.settled += usize::from(all);
+        self.settled += usize::from(all && self.drawn.is_done());
         goals
     }
 
@@ -204,7 +205,7 @@ impl<T: Real> ForceStroke<T> {
         let most = moved.iter().copied().fold(0.0, f64::max);
         for (acting, moved) in self.acting.iter_mut().zip(moved) {
             // Paths that the region hardly moves must not rule the others.
-            acting.stiffness = moved.max(1e-3 * most).max(f64::MIN_POSITIVE);
+            acting.stiffness = moved.max(1e-3 * most);
         }
         Ok(())
     }
