@@ -6,7 +6,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use bspline::hierarchical::{
-    BlockEdit, BrickKey, Change, Corrections, DiffError, EditError, Lattice, LevelCorrections, LevelEdit,
+    BlockEdit, BrickEdit, BrickKey, Change, Corrections, DiffError, EditError, Lattice, LevelCorrections,
+    LevelEdit,
 };
 use bspline::{Aabb, Csg, Field, HierarchicalSpline, KnotVector, Real, TensorSpline};
 use common::Random;
@@ -92,6 +93,42 @@ fn assert_same<T: Real>(a: &HierarchicalSpline<T>, b: &HierarchicalSpline<T>, ra
         assert_eq!(bits(v, g), bits(w, h), "at {p}");
         let around = random.small_box(&region);
         assert_eq!(a.bounds(&around), b.bounds(&around));
+    }
+}
+
+fn brick_edit(edit: &LevelEdit<f32>) -> BrickEdit<f32> {
+    let mut add = Corrections::empty();
+    add.set(edit.function.map(|f| f as usize % 8), edit.delta);
+    BrickEdit {
+        level: edit.level,
+        key: BrickKey(edit.function.map(|f| f / 8)),
+        add,
+    }
+}
+
+/// A brick is changed packed where few of its functions change, else with a place for each, and sums of packed ones are
+/// merged: three ways to one field.
+#[test]
+fn functions_added_one_by_one_many_at_once_and_by_the_brick_are_the_same() {
+    for seed in 0..20 {
+        let mut random = Random(seed);
+        let levels = random_levels::<f32>(&lattice(), &mut random);
+        let field = HierarchicalSpline::from_corrections(lattice(), 0.5, levels);
+        let edits = random_edits::<f32>(300, 3, &mut random);
+        let at_once = field.edited(&edits).unwrap();
+        let alone = (edits.iter()).fold(field.clone(), |field, edit| field.edited(&[*edit]).unwrap());
+        let bricks: Vec<_> = edits.iter().map(brick_edit).collect();
+        assert_same(&at_once, &alone, &mut random);
+        assert_same(&at_once, &field.added(&bricks).unwrap(), &mut random);
+        let largest = LevelEdit {
+            delta: f32::MAX,
+            ..edits[0]
+        };
+        let error = field.added(&[brick_edit(&largest), brick_edit(&largest)]).err();
+        let (level, function) = (largest.level, largest.function);
+        assert!(
+            matches!(error, Some(EditError::NotFinite { level: l, function: f, .. }) if l == level && f == function)
+        );
     }
 }
 

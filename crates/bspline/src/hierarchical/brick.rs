@@ -75,14 +75,20 @@ impl<T: Real> Corrections<T> {
 
     /// Makes slot `(x, y, z)` active with coefficient `c`.
     pub fn set(&mut self, slot: [usize; 3], c: T) {
-        let number = (slot[0] * BRICK + slot[1]) * BRICK + slot[2];
-        let (rank, c) = (self.rank(number), c + T::zero());
-        if self.is_active(number) {
-            self.values[rank] = c;
-        } else {
-            self.mask[slot[0]] |= 1 << (number % 64);
-            self.values.insert(rank, c);
+        self.put((slot[0] * BRICK + slot[1]) * BRICK + slot[2], Some(c));
+    }
+
+    /// Gives slot number `64x + 8y + z` a coefficient, or makes it inactive.
+    pub(super) fn put(&mut self, slot: usize, value: Option<T>) {
+        let (rank, bit) = (self.rank(slot), 1 << (slot % 64));
+        match (self.is_active(slot), value) {
+            (true, Some(c)) => self.values[rank] = c + T::zero(),
+            (false, Some(c)) => self.values.insert(rank, c + T::zero()),
+            (true, None) => drop(self.values.remove(rank)),
+            (false, None) => {}
         }
+        self.mask[slot / 64] &= !bit;
+        self.mask[slot / 64] |= if value.is_some() { bit } else { 0 };
     }
 
     /// One bit per slot: word `x`, bit `8y + z`.
@@ -120,6 +126,36 @@ impl<T: Real> Corrections<T> {
         let (word, bit) = (slot / 64, slot % 64);
         let before: u32 = self.mask[..word].iter().map(|w| w.count_ones()).sum();
         (before + (self.mask[word] & ((1 << bit) - 1)).count_ones()) as usize
+    }
+
+    /// With the coefficients of `add` added, and the slots that this changes, one bit each as in [`Self::mask`].
+    pub(super) fn plus(&self, add: &Self) -> (Self, [u64; BRICK]) {
+        let mask: [u64; BRICK] = std::array::from_fn(|x| self.mask[x] | add.mask[x]);
+        let count: u32 = mask.iter().map(|w| w.count_ones()).sum();
+        let mut values = Vec::with_capacity(count as usize);
+        let (mut own, mut more) = (&self.values[..], &add.values[..]);
+        let changed = std::array::from_fn(|x| {
+            let (here, there) = (self.mask[x], add.mask[x]);
+            let (a, b);
+            (a, own) = own.split_at(here.count_ones() as usize);
+            (b, more) = more.split_at(there.count_ones() as usize);
+            if there == 0 {
+                values.extend_from_slice(a);
+                return 0;
+            }
+            let (mut a, mut b) = (a.iter(), b.iter());
+            let next = |values: &mut std::slice::Iter<T>, word: u64, slot: usize| {
+                let is_active = word >> slot & 1 == 1;
+                is_active.then(|| *values.next().expect("a value for each function"))
+            };
+            bits(here | there).fold(0, |changed, slot| {
+                let old = next(&mut a, here, slot);
+                let new = old.unwrap_or(T::zero()) + next(&mut b, there, slot).unwrap_or(T::zero());
+                values.push(new);
+                changed | u64::from(old != Some(new)) << slot
+            })
+        });
+        (Self { mask, values }, changed)
     }
 
     /// Whether the support of an active function reaches into the brick `back` bricks behind on each axis (0 or 1).
@@ -185,6 +221,21 @@ impl<T: Real> DenseCorrections<T> {
     pub fn set(&mut self, slot: [usize; 3], c: T) {
         self.mask[slot[0]] |= 1 << (BRICK * slot[1] + slot[2]);
         self.values[(slot[0] * BRICK + slot[1]) * BRICK + slot[2]] = c;
+    }
+
+    /// Coefficient of slot number `64x + 8y + z`, if it is active.
+    #[inline]
+    pub(super) fn get(&self, slot: usize) -> Option<T> {
+        (self.mask[slot / 64] >> (slot % 64) & 1 == 1).then(|| self.values[slot])
+    }
+
+    /// Gives slot number `64x + 8y + z` a coefficient, or makes it inactive.
+    #[inline]
+    pub(super) fn put(&mut self, slot: usize, value: Option<T>) {
+        let bit = 1 << (slot % 64);
+        self.mask[slot / 64] &= !bit;
+        self.mask[slot / 64] |= if value.is_some() { bit } else { 0 };
+        self.values[slot] = value.unwrap_or(T::zero());
     }
 
     /// The active functions alone.

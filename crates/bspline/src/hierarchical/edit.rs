@@ -5,9 +5,10 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::brick::{BRICK, Corrections, DenseCorrections, HALO, HALO_LEN};
+use super::brick::{BRICK, Corrections, HALO, HALO_LEN};
+use super::changed_brick::ChangedBrick;
 use super::functions::{EditError, MAX_LEVELS, check_function, check_functions};
-use super::graft::Graft;
+use super::graft::{Graft, Way};
 use super::prolong::prolong;
 use super::renew::renewed;
 use super::{BrickKey, HierarchicalSpline, Lattice};
@@ -70,25 +71,30 @@ impl<T: Real> HierarchicalSpline<T> {
         for edit in edits {
             check_function(&self.lattice, edit.level, edit.function)?;
         }
+        const FEW: usize = 8;
         let place = |edit: &LevelEdit<T>| (edit.level, BrickKey::of(edit.function));
-        self.edited_by_brick(edits, place, |brick, edit| {
+        self.edited_by_brick(edits, FEW, place, |brick, edit| {
             brick.put(edit.function, |old| Some(old.unwrap_or(T::zero()) + edit.delta))
         })
     }
 
-    /// The field with edits put into their bricks, brick beside brick; those of one brick in their order.
+    /// The field with edits put into their bricks, brick beside brick; those of one brick in their order. `few`: as many
+    /// edits of one brick do not pay for [`DenseCorrections`](super::DenseCorrections).
     fn edited_by_brick<E: Sync>(
         &self,
         edits: &[E],
-        place: impl Fn(&E) -> (usize, BrickKey),
+        few: usize,
+        place: impl Fn(&E) -> (usize, BrickKey) + Sync,
         put: impl Fn(&mut ChangedBrick<T>, &E) -> Result<(), EditError> + Sync,
     ) -> Result<Self, EditError> {
-        let mut order: Vec<_> = edits.iter().map(|edit| (place(edit), edit)).collect();
-        order.sort_by_key(|(place, _)| *place);
+        // In the order of the tree, so that bricks close in it are found one after the other.
+        let way = |edit: &E| Way::to(&self.lattice, place(edit));
+        let mut order: Vec<_> = edits.iter().map(|edit| (way(edit), edit)).collect();
+        order.sort_by_key(|(way, _)| *way);
         let groups: Vec<_> = order.chunk_by(|a, b| a.0 == b.0).collect();
         let changed = groups.into_par_iter().with_min_len(64).map(|group| {
-            let (level, key) = group[0].0;
-            let mut brick = ChangedBrick::of(self, level, key);
+            let (level, key) = place(group[0].1);
+            let mut brick = ChangedBrick::of(self, level, key, group.len() <= few);
             group.iter().try_for_each(|(_, edit)| put(&mut brick, edit))?;
             Ok(brick.graft(&self.lattice))
         });
@@ -129,7 +135,7 @@ impl<T: Real> HierarchicalSpline<T> {
             for key in keys_between(BrickKey::of(edit.first), BrickKey::of(last)) {
                 bricks
                     .entry((edit.level, key))
-                    .or_insert_with(|| ChangedBrick::of(self, edit.level, key))
+                    .or_insert_with(|| ChangedBrick::of(self, edit.level, key, false))
                     .put_block(edit, last)?;
             }
         }
@@ -151,18 +157,8 @@ impl<T: Real> HierarchicalSpline<T> {
         for edit in edits {
             check_functions(&self.lattice, edit.level, edit.key, &edit.add)?;
         }
-        self.edited_by_brick(
-            edits,
-            |edit| (edit.level, edit.key),
-            |brick, edit| {
-                let corner = edit.key.0.map(|k| k * BRICK as u32);
-                edit.add.iter().try_for_each(|(slot, delta)| {
-                    let at = [slot / 64, slot / 8 % 8, slot % 8];
-                    let function = std::array::from_fn(|a| corner[a] + at[a] as u32);
-                    brick.put(function, |old| Some(old.unwrap_or(T::zero()) + delta))
-                })
-            },
-        )
+        let place = |edit: &BrickEdit<T>| (edit.level, edit.key);
+        self.edited_by_brick(edits, usize::MAX, place, |brick, edit| brick.add(&edit.add))
     }
 
     /// Coefficients `first .. first + count` of the total spline of `level` (function numbers as in [`LevelEdit`]), last
@@ -282,87 +278,6 @@ fn last_of(first: [u32; 3], count: [usize; 3]) -> [u32; 3] {
 fn keys_between(first: BrickKey, last: BrickKey) -> impl Iterator<Item = BrickKey> {
     let range = move |a: usize| first.0[a]..=last.0[a];
     range(0).flat_map(move |x| range(1).flat_map(move |y| range(2).map(move |z| BrickKey([x, y, z]))))
-}
-
-/// A brick whose functions change.
-struct ChangedBrick<T> {
-    level: usize,
-    key: BrickKey,
-    corrections: DenseCorrections<T>,
-    /// Slots that changed, as in [`DenseCorrections::mask`].
-    changed: [u64; BRICK],
-}
-
-impl<T: Real> ChangedBrick<T> {
-    fn of(field: &HierarchicalSpline<T>, level: usize, key: BrickKey) -> Self {
-        let node = field.find(level, key);
-        let corrections = node.and_then(|n| n.corrections.as_deref());
-        Self {
-            level,
-            key,
-            corrections: corrections.map_or_else(DenseCorrections::empty, DenseCorrections::from),
-            changed: [0; BRICK],
-        }
-    }
-
-    /// Does what a block asks of the brick's functions; `last` is the block's last.
-    fn put_block(&mut self, edit: &BlockEdit<T>, last: [u32; 3]) -> Result<(), EditError> {
-        let corner = self.key.0.map(|k| k * BRICK as u32);
-        let range = |a: usize| edit.first[a].max(corner[a])..=last[a].min(corner[a] + BRICK as u32 - 1);
-        for x in range(0) {
-            for y in range(1) {
-                for z in range(2) {
-                    let [i, j, k] =
-                        [x - edit.first[0], y - edit.first[1], z - edit.first[2]].map(|n| n as usize);
-                    let n = (i * edit.shape[1] + j) * edit.shape[2] + k;
-                    self.put([x, y, z], |old| match &edit.change {
-                        Change::Add(values) => Some(old.unwrap_or(T::zero()) + values[n]),
-                        Change::Set(values) => Some(values[n]),
-                        Change::Deactivate => None,
-                    })?;
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// Changes one function: from its coefficient, none if it is not active, to a new one.
-    #[inline]
-    fn put(
-        &mut self,
-        function: [u32; 3],
-        change: impl FnOnce(Option<T>) -> Option<T>,
-    ) -> Result<(), EditError> {
-        let slot = function.map(|s| s as usize % BRICK);
-        let bit = 1 << (BRICK * slot[1] + slot[2]);
-        let is_active = self.corrections.mask[slot[0]] & bit != 0;
-        let value = &mut self.corrections.values[(slot[0] * BRICK + slot[1]) * BRICK + slot[2]];
-        let old = is_active.then_some(*value);
-        let new = change(old);
-        if let Some(new) = new.filter(|new| !new.is_finite()) {
-            return Err(EditError::NotFinite {
-                level: self.level,
-                function,
-                value: new.as_f64(),
-            });
-        }
-        if old != new {
-            *value = new.unwrap_or(T::zero());
-            self.changed[slot[0]] |= bit;
-            self.corrections.mask[slot[0]] &= !bit;
-            if new.is_some() {
-                self.corrections.mask[slot[0]] |= bit;
-            }
-        }
-        Ok(())
-    }
-
-    /// What the tree is to do, if anything has changed.
-    fn graft(self, lattice: &Lattice) -> Option<Graft<T>> {
-        let functions = || Some(Arc::new(self.corrections.pack()));
-        let graft = || Graft::new(lattice, (self.level, self.key), self.changed, functions());
-        (self.changed != [0; BRICK]).then(graft)
-    }
 }
 
 impl<T: Real> HierarchicalSpline<T> {

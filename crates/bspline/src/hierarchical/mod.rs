@@ -15,6 +15,7 @@ mod batch;
 mod bounds;
 mod brick;
 mod build;
+mod changed_brick;
 mod curvature;
 mod difference;
 mod digest;

@@ -1,5 +1,6 @@
 //! A tree with other functions in some bricks, made by copying the paths to what changes.
 
+use std::hint::black_box;
 use std::sync::{Arc, Mutex};
 
 use rayon::prelude::*;
@@ -159,12 +160,22 @@ impl<T: Real> Renewal<'_, T> {
         }
     }
 
+    /// Reads a word of each child and of its totals. In a large field they are far from the cache, and the walk would wait
+    /// for them one after the other; here they are asked for together.
+    fn ask_for_children(&self) {
+        let children = || self.old.iter().flat_map(|old| old.children.iter().flatten());
+        black_box(children().map(|child| child.count).sum::<u64>());
+        let totals = children().filter_map(|child| child.totals.as_ref());
+        black_box(totals.map(|totals| totals[0]).fold(T::zero(), |all, t| all + t));
+    }
+
     fn children(&self, totals: Option<&[T; HALO_LEN]>, has_changed: bool) -> Children<T> {
         let reached = self.window.reached_children();
+        self.ask_for_children();
         let is_built = self.old.is_none() && self.place.0 < 0;
         let child = |octant: usize| {
             let old = self.old.and_then(|old| old.children[octant].as_ref());
-            if reached[octant] || is_built || old.is_some() && has_changed {
+            if reached >> octant & 1 == 1 || is_built || old.is_some() && has_changed {
                 self.child(octant, totals).run(has_changed)
             } else {
                 old.cloned()

@@ -75,9 +75,15 @@ impl<'a, T: Real> Window<'a, T> {
             .any(|place| !place.below(self.depth).is_empty())
     }
 
-    /// The children about whose windows something changes, there or below.
-    pub fn reached_children(&self) -> [bool; 8] {
-        let mut reached = [false; 8];
+    /// The children about whose windows something changes, there or below: a bit each.
+    pub fn reached_children(&self) -> u8 {
+        // The octants in the first half on an axis, in the second, in both.
+        const HALVES: [[u8; 4]; 3] = [
+            [0, 0x0f, 0xf0, 0xff],
+            [0, 0x33, 0xcc, 0xff],
+            [0, 0x55, 0xaa, 0xff],
+        ];
+        let mut reached = 0;
         for (n, place) in self.places.iter().enumerate() {
             let mut grafts = place.below(self.depth);
             while let Some(first) = grafts.first() {
@@ -86,15 +92,13 @@ impl<'a, T: Real> Window<'a, T> {
                 let (here, rest) = grafts.split_at(end);
                 grafts = rest;
                 let behind = Graft::reach_behind(here, self.depth + 1);
-                // Halves from the place's start; a child's window spans its own half and the next.
-                let half: [usize; 3] = std::array::from_fn(|a| 2 * ahead(n)[a] + ahead(octant)[a]);
-                for (child, reached) in reached.iter_mut().enumerate() {
-                    *reached |= (0..3).all(|a| match half[a].wrapping_sub(ahead(child)[a]) {
-                        0 => true,
-                        1 => behind[a],
-                        _ => false,
-                    });
-                }
+                let on_axes = [0, 1, 2].map(|a| {
+                    // Halves from the place's start; a child's window spans its own half and the next.
+                    let half = 2 * ahead(n)[a] + ahead(octant)[a];
+                    let halves = 1 << half | u8::from(behind[a]) << half >> 1;
+                    HALVES[a][usize::from(halves & 3)]
+                });
+                reached |= on_axes[0] & on_axes[1] & on_axes[2];
             }
         }
         reached
@@ -107,8 +111,10 @@ impl<'a, T: Real> Window<'a, T> {
 
     /// Whether any function that is active from now on reaches into the place's cells.
     pub fn has_functions(&self) -> bool {
-        self.corrections()
-            .any(|(ahead, corrections)| corrections.is_some_and(|c| c.reaches(ahead)))
+        // All of its own do, and there is none of a node without them.
+        self.own_corrections().is_some()
+            || (self.corrections().skip(1))
+                .any(|(ahead, corrections)| corrections.is_some_and(|c| c.reaches(ahead)))
     }
 
     /// Functions of the eight from now on, and how many bricks ahead they stand.
@@ -155,7 +161,8 @@ impl<'a, T: Real> Window<'a, T> {
         if count > FEW {
             return None;
         }
-        let mut totals = old.clone();
+        // What others share is copied, not first counted: that would wait for memory far from the cache.
+        let mut copy: Option<Arc<[T]>> = None;
         for (n, slots) in changed.iter().enumerate() {
             // Nodes beside the place are not read where nothing changes in them.
             if *slots == [0; BRICK] {
@@ -170,12 +177,14 @@ impl<'a, T: Real> Window<'a, T> {
                     total += correction;
                 }
                 let at = number(at, HALO);
-                if !has_same_bits(totals[at], total) {
-                    Arc::make_mut(&mut totals)[at] = total;
+                if !has_same_bits(old[at], total) {
+                    let copy = copy.get_or_insert_with(|| Arc::from(old.as_slice()));
+                    Arc::get_mut(copy).expect("just made")[at] = total;
                 }
             }
         }
-        Some(totals)
+        let whole = |copy: Arc<[T]>| copy.try_into().expect("as long as it was");
+        Some(copy.map_or_else(|| old.clone(), whole))
     }
 }
 
@@ -183,7 +192,7 @@ impl<'a, T: Real> Place<'a, T> {
     /// What changes at the place itself.
     #[inline]
     fn own(&self, depth: u8) -> Option<&'a Graft<T>> {
-        self.grafts.first().filter(|g| g.depth == depth)
+        self.grafts.first().filter(|g| g.depth() == depth)
     }
 
     /// What changes below it.

@@ -1,6 +1,7 @@
 //! One level of a field fit: which functions take part, and what they add.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use bspline::hierarchical::{BRICK, BrickEdit, BrickKey, DenseCorrections};
 use bspline::{Field, HierarchicalSpline, Real};
@@ -134,8 +135,8 @@ impl<T: Real> LevelFit<'_, T> {
         keys.retain(|key| between(*key, lo, hi) != NONE);
         let tiles = Tiles::new(keys);
         let fields = [self.target, self.field as &dyn Field];
-        let (target, rest, counts) =
-            tiles.fill_runs(|run, target, rest| sample(fields, &self.region, run[0], target, rest));
+        let (target, rest, counts) = tiles
+            .fill_runs(|run, target, rest, room| sample(fields, &self.region, run[0], target, rest, room));
         for (key, target) in tiles.keys.iter().zip(&target) {
             let inside = between(*key, lo, hi);
             if let Some(bad) = places(&inside).find(|i| !target[*i].is_finite()) {
@@ -170,7 +171,7 @@ impl<T: Real> LevelFit<'_, T> {
             let rows = Rows::of(&between(tiles.keys[i], first, last));
             stencil(&tiles.padded(i, &rows, values, None), &rows, weights, out);
         };
-        let once = tiles.fill(|i, out| {
+        let mut once = tiles.fill(|i, out| {
             if tiles.is_any_near(i, takes_part) {
                 convolved(i, rest, QUASI, out);
             }
@@ -181,45 +182,38 @@ impl<T: Real> LevelFit<'_, T> {
                 out.iter_mut().zip(&rest[i]).for_each(|(o, r)| *o = r - *o);
             }
         });
-        tiles.fill(|i, out| {
+        tiles.change(&mut once, |i, out| {
             if takes_part[i] != NONE {
-                convolved(i, &left, QUASI, out);
-                out.iter_mut().zip(&once[i]).for_each(|(o, first)| *o += first);
+                let mut more = [0.0; TILE * TILE * TILE];
+                convolved(i, &left, QUASI, &mut more);
+                out.iter_mut().zip(more).for_each(|(o, more)| *o += more);
             }
-        })
+        });
+        once
     }
 
     /// Coefficients of the functions that take part, brick by brick.
     fn edits(&self, keys: &[TileKey], takes_part: &[Mask], coefficients: &[Values]) -> Vec<BrickEdit<T>> {
+        // Function `k + 1` is centred on knot `k`: the last knots of a tile are the first functions of the next bricks.
+        const PARTS: [Range<usize>; 2] = [0..TILE - 1, TILE - 1..TILE];
         let mut bricks: BTreeMap<BrickKey, DenseCorrections<T>> = BTreeMap::new();
         for ((key, mask), values) in keys.iter().zip(takes_part).zip(coefficients) {
-            for (x, word) in mask.iter().enumerate() {
-                for (y, bits) in word.to_le_bytes().into_iter().enumerate() {
-                    if bits == 0 {
-                        continue;
-                    }
-                    // Function `k + 1` is centred on knot `k`.
-                    let [fx, fy, fz] = knot_of(*key, (x * TILE + y) * TILE).map(|k| k + 1);
-                    let row = &values[(x * TILE + y) * TILE..][..TILE];
-                    for part in [0..TILE - 1, TILE - 1..TILE] {
-                        let bits = bits >> part.start & (((1u16 << part.len()) - 1) as u8);
-                        if bits == 0 {
-                            continue;
-                        }
-                        let function = [fx, fy, fz + part.start as i64];
-                        let first = function.map(|f| f.max(0) as u32);
-                        let brick = bricks
-                            .entry(BrickKey::of(first))
-                            .or_insert_with(DenseCorrections::empty);
-                        for z in (0..part.len()).filter(|z| bits >> z & 1 == 1) {
-                            let slot = [
-                                first[0] as usize % BRICK,
-                                first[1] as usize % BRICK,
-                                (function[2] + z as i64) as usize % BRICK,
-                            ];
-                            brick.set(slot, T::from_f64(row[part.start + z]));
-                        }
-                    }
+            if *mask == NONE {
+                continue;
+            }
+            for n in 0..8 {
+                let [xs, ys, zs] = [n >> 2, n >> 1 & 1, n & 1].map(|part: usize| PARTS[part].clone());
+                let places = xs.flat_map(|x| {
+                    let (ys, zs) = (ys.clone(), zs.clone());
+                    ys.flat_map(move |y| zs.clone().map(move |z| (x * TILE + y) * TILE + z))
+                });
+                let mut taken = places.filter(|at| mask[at / 64] >> (at % 64) & 1 == 1).peekable();
+                let Some(first) = taken.peek() else { continue };
+                let function = |at| knot_of(*key, at).map(|k| (k + 1).max(0) as u32);
+                let brick = bricks.entry(BrickKey::of(function(*first)));
+                let brick = brick.or_insert_with(DenseCorrections::empty);
+                for at in taken {
+                    brick.set(function(at).map(|f| f as usize % BRICK), T::from_f64(values[at]));
                 }
             }
         }

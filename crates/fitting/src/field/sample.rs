@@ -3,7 +3,7 @@
 use bspline::Field;
 
 use super::region::Region;
-use super::tiles::{RUN, TILE, TileKey, Values};
+use super::tiles::{TILE, TileKey, Values};
 
 /// Target and rest (`target - field`) at the knots of a run of tiles along z, from the one of `key` on; gives the number of
 /// points asked for. Knots that are not sampled get the target NaN.
@@ -13,6 +13,7 @@ pub(super) fn sample(
     key: TileKey,
     targets: &mut [Values],
     rests: &mut [Values],
+    room: &mut Vec<f64>,
 ) -> u64 {
     targets.as_flattened_mut().fill(f64::NAN);
     let (lo, hi) = region.sampled();
@@ -30,9 +31,8 @@ pub(super) fn sample(
     let to: [i64; 3] = std::array::from_fn(|a| end[a].min(last[a]).max((from[a] + 1).min(last[a])));
     let count: [usize; 3] = std::array::from_fn(|a| (to[a] - from[a] + 1) as usize);
     let len = count.iter().product::<usize>();
-    let mut target_values = [0.0; (TILE + 2) * (TILE + 2) * (RUN * TILE + 2)];
-    let mut field_values = target_values;
-    let (target_values, field_values) = (&mut target_values[..len], &mut field_values[..len]);
+    room.resize(2 * len, 0.0);
+    let (target_values, field_values) = room.split_at_mut(len);
     let frame = region.frame();
     target.frame_values(&frame, from, count, target_values);
     field.frame_values(&frame, from, count, field_values);

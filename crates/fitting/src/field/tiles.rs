@@ -89,6 +89,12 @@ impl Tiles {
     /// Values of each tile as `of` writes them over zeros.
     pub fn fill(&self, of: impl Fn(usize, &mut Values) + Sync + Send) -> Vec<Values> {
         let mut values = vec![[0.0; LEN]; self.keys.len()];
+        self.change(&mut values, of);
+        values
+    }
+
+    /// Changes the values of each tile.
+    pub fn change(&self, values: &mut [Values], of: impl Fn(usize, &mut Values) + Sync + Send) {
         match values.len() < SIDE_BY_SIDE {
             true => values.iter_mut().enumerate().for_each(|(i, v)| of(i, v)),
             false => {
@@ -96,14 +102,13 @@ impl Tiles {
                 all.for_each(|(i, v)| of(i, v));
             }
         }
-        values
     }
 
     /// Two values of each tile as `of` writes them over zeros, and what it gives for each run of tiles along z: what is asked
-    /// for together costs less.
+    /// for together costs less. With room for intermediate values.
     pub fn fill_runs<R: Send>(
         &self,
-        of: impl Fn(&[TileKey], &mut [Values], &mut [Values]) -> R + Sync + Send,
+        of: impl Fn(&[TileKey], &mut [Values], &mut [Values], &mut Vec<f64>) -> R + Sync + Send,
     ) -> (Vec<Values>, Vec<Values>, Vec<R>) {
         let zeros = || vec![[0.0; LEN]; self.keys.len()];
         let (mut a, mut b) = (zeros(), zeros());
@@ -117,10 +122,15 @@ impl Tiles {
                 (run, own_a, own_b)
             })
             .collect();
-        let of = |(run, a, b): (&[TileKey], &mut [Values], &mut [Values])| of(run, a, b);
+        let of = |room: &mut Vec<f64>, (run, a, b): (&[TileKey], &mut [Values], &mut [Values])| {
+            of(run, a, b, room)
+        };
         let found = match self.keys.len() < SIDE_BY_SIDE {
-            true => runs.into_iter().map(of).collect(),
-            false => runs.into_par_iter().map(of).collect(),
+            true => {
+                let mut room = Vec::new();
+                runs.into_iter().map(|run| of(&mut room, run)).collect()
+            }
+            false => runs.into_par_iter().map_init(Vec::new, of).collect(),
         };
         (a, b, found)
     }

@@ -2,7 +2,8 @@
 
 use bspline::Real;
 use dynamics::integrators::Integrator;
-use dynamics::response::Against;
+use dynamics::region::Region;
+use dynamics::response::{Against, Response};
 use glam::DVec3;
 
 use super::quadrature::Tolerance;
@@ -94,11 +95,11 @@ impl<T: Real> ForceStroke<T> {
             .map(|(&i, soft)| self.acting[i].stiffness / self.targets[self.acting[i].index].weight + soft)
             .collect();
         let most = self.extent.solves();
-        let region = &mut self.region;
+        let (region, solid) = (&mut self.region, self.how.solid);
         let solved = system::solve(&right, &soft, &diagonal, most, 1e-4, |z| {
             let of = live.iter().zip(z).map(|(&i, z)| (&bearing(i).spread, *z));
             let load = Load::<T>::of(of);
-            let found = region.respond_as_step(Integrator::Paper, dt, &load.on_box())?;
+            let found = answer(region, solid, dt, &load)?;
             let felt = live.iter().map(|&i| bearing(i).row.times(&found.p)).collect();
             Ok::<_, ForceError>((found, felt))
         })?;
@@ -271,6 +272,20 @@ impl<T: Real> ForceStroke<T> {
             residual,
         }
     }
+}
+
+/// What a load adds to a step. That of clay is as exact as the step; elastic solids have to come to rest in balance.
+fn answer<T: Real>(
+    region: &mut Region<T>,
+    solid: Solid,
+    dt: f64,
+    load: &Load<T>,
+) -> Result<Response<T>, ForceError> {
+    let load = load.on_box();
+    Ok(match solid {
+        Solid::Clay => region.respond_as_step(Integrator::Paper, dt, &load)?,
+        Solid::Elastic => region.respond(Integrator::Paper, dt, &[load])?.remove(0),
+    })
 }
 
 /// Spreads of the paths that ask for something, with a factor each.

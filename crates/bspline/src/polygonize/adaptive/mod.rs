@@ -18,6 +18,7 @@ mod patch;
 mod pieces;
 mod polygons;
 mod sample;
+mod splice;
 mod surface;
 mod tree;
 mod vertices;

@@ -15,7 +15,10 @@ use super::octree::Place;
 use super::order_of;
 use super::pieces::{ABOUT, Corner, Parts, corner};
 use super::polygons::ExtraKey;
+use super::splice::Splice;
+use super::vertices::LOOP_BITS;
 use crate::Field;
+use crate::polygonize::blocks::CELLS;
 use crate::polygonize::settle::{SettleOptions, settle};
 
 /// Rings about a change that are taken over. Of 274 strokes on splines 271 moved vertices within 4 rings, the farthest was
@@ -82,6 +85,25 @@ struct Block {
     triangles: Option<std::ops::Range<u32>>,
     /// Whether all triangles at its vertices are loaded.
     is_complete: bool,
+    /// Number of the first vertex of each leaf that has any, once one was asked for.
+    starts: Vec<u16>,
+}
+
+impl Block {
+    /// Number of the vertex of that name, of the block's `names`. Six triangles ask for each vertex: a table instead of as
+    /// many searches.
+    fn number(&mut self, names: &[u16], name: u16) -> Option<usize> {
+        let leaf = |name: u16| usize::from(name >> LOOP_BITS);
+        if self.starts.is_empty() {
+            self.starts.resize(CELLS.pow(3), 0);
+            for (n, name) in names.iter().enumerate().rev() {
+                self.starts[leaf(*name)] = n as u16;
+            }
+        }
+        let start = usize::from(self.starts[leaf(name)]);
+        let of_leaf = names[start..].iter();
+        Some(start + of_leaf.take_while(|n| **n <= name).position(|n| *n == name)?)
+    }
 }
 
 #[derive(Clone, Copy)]
@@ -128,6 +150,7 @@ impl<'a> Patch<'a> {
                 first: self.vertices.len() as u32,
                 triangles: None,
                 is_complete: false,
+                starts: Vec::new(),
             });
             let count = self.parts.vertices_of(place).names.len();
             self.vertices.resize(
@@ -165,13 +188,12 @@ impl<'a> Patch<'a> {
             let corners = t.map(|code| match corner(code) {
                 Corner::Extra(n) => extras[n],
                 Corner::Of(n, name) => {
-                    let (holder, first) = *about[n].get_or_insert_with(|| {
+                    let (id, names) = *about[n].get_or_insert_with(|| {
                         let holder = self.parts.about(place, n).expect("it was drawn");
-                        let id = self.id(holder);
-                        (holder, self.blocks[id as usize].first)
+                        (self.id(holder), &self.parts.vertices_of(holder).names[..])
                     });
-                    let number = self.parts.vertices_of(holder).find(name);
-                    first + number.expect("it was drawn") as u32
+                    let holder = &mut self.blocks[id as usize];
+                    holder.first + holder.number(names, name).expect("it was drawn") as u32
                 }
             });
             for v in corners {
@@ -383,35 +405,15 @@ impl<'a> Patch<'a> {
             .filter_map(|(n, b)| Some((b.triangles.clone().filter(|t| !t.is_empty())?.start, n)))
             .collect();
         starts.sort_unstable();
+        let mut block = 0..0;
+        let mut n = 0;
         triangles.iter().map(move |t| {
-            let after = starts.partition_point(|(start, _)| start <= t);
-            starts[after - 1].1
+            if !block.contains(t) {
+                let after = starts.partition_point(|(start, _)| start <= t);
+                let end = starts.get(after).map_or(u32::MAX, |next| next.0);
+                (block, n) = (starts[after - 1].0..end, starts[after - 1].1);
+            }
+            n
         })
-    }
-}
-
-/// What has settled otherwise than before.
-#[derive(Default)]
-struct Splice {
-    positions: Vec<(At, DVec3)>,
-    /// Triangles by block and number, with the keys of their corners if they are not as drawn; those of a block
-    /// follow each other.
-    triangles: Vec<(Place, u32, Option<[u64; 3]>)>,
-    changed: Vec<Place>,
-}
-
-impl Splice {
-    fn put(self, parts: &mut Parts) -> Vec<Place> {
-        for (((level, slot), number), to) in self.positions {
-            parts.calm[level][slot as usize].positions[number] = to;
-        }
-        for part in self.triangles.chunk_by(|a, b| a.0 == b.0) {
-            let (level, slot) = part[0].0;
-            let turned = &mut parts.calm[level][slot as usize].turned;
-            turned.retain(|(number, _)| part.binary_search_by_key(number, |(_, n, _)| *n).is_err());
-            turned.extend(part.iter().filter_map(|(_, n, to)| Some((*n, (*to)?))));
-            turned.sort_unstable();
-        }
-        self.changed
     }
 }
