@@ -51,7 +51,7 @@ impl Meet {
         let [f, g] = &self.formulas;
         if crossings.places.is_empty() {
             return Err(format!(
-                "{f:?} and {g:?} vanish together nowhere from {:?} to {:?}; move the box within, or make it smaller",
+                "{f:?} and {g:?} cross nowhere from {:?} to {:?}; move the box within, or make it smaller",
                 within.min.to_array(),
                 within.max.to_array()
             ));

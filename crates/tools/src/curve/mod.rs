@@ -272,7 +272,7 @@ mod tests {
             ("along = { meet = { formulas = ['x', 'y +'] } }", "ends too early"),
             ("along = { meet = { formulas = ['x', '1/y'] } }", "finite"),
             ("along = { meet = { formulas = ['x - 9', 'y'] } }", "nowhere"),
-            ("along = { meet = { formulas = ['x', 'x'] } }", "surface"),
+            ("along = { meet = { formulas = ['x', 'x'] } }", "nowhere"),
             (
                 "along = { meet = { formulas = ['x', 'y'], within = { min = [0, 0, 0], max = [0, 1, 1] } } }",
                 "no size",
