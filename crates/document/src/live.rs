@@ -4,6 +4,7 @@ use bspline::Aabb;
 use fitting::Control;
 use glam::DVec3;
 use tools::live::{LiveStroke, Pose};
+use tools::paint::Paint;
 use tools::session::Stroke;
 
 use crate::canvas::{canvas, left};
@@ -42,6 +43,14 @@ impl Live {
     /// [`CommandError::Tool`].
     pub fn step(&mut self, pose: Pose, control: &mut Control) -> Result<DVec3, CommandError> {
         Ok(self.stroke.step(pose, control)?)
+    }
+
+    /// Lays paint on while a force tool works, see [`LiveStroke::paint`].
+    ///
+    /// # Errors
+    /// [`CommandError::Tool`].
+    pub fn paint(&mut self, paint: &Paint, control: &mut Control) -> Result<(), CommandError> {
+        Ok(self.stroke.paint(paint, control)?)
     }
 
     /// What is to be seen now, and the boxes of the object's own world outside of which its field is as at the last look.

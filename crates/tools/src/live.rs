@@ -105,7 +105,8 @@ impl LiveStroke {
                 pose.at, pose.turn
             )));
         }
-        let first = *self.first.get_or_insert(pose);
+        let first = self.first.unwrap_or(pose);
+        let here = pose;
         let pose = match (&self.stroke.pull, self.turn) {
             // Its way begins at the surface.
             (Some(_), _) => Pose::at(pose.at - first.at),
@@ -114,8 +115,10 @@ impl LiveStroke {
         };
         let force = match &self.stroke.motion {
             Some(_) => {
-                self.stroke.grab([first.at, pose.at]);
-                self.work.carry(&self.stroke, first.at == pose.at, control)?;
+                let mut stroke = self.stroke.clone();
+                stroke.grab([first.at, pose.at]);
+                self.work.carry(&stroke, first.at == pose.at, control)?;
+                self.stroke = stroke;
                 DVec3::ZERO
             }
             None => {
@@ -123,6 +126,7 @@ impl LiveStroke {
                 self.work.step(tool, pose, control)?
             }
         };
+        self.first.get_or_insert(here);
         self.stroke.push(pose, self.turn.is_none());
         Ok(force)
     }
@@ -233,10 +237,21 @@ impl Work {
         }
     }
 
-    /// One step; gives the force on the solid.
+    /// One step; gives the force on the solid. One that fails does not count.
     pub fn step(&mut self, tool: Tool, pose: Pose, control: &mut Control) -> Result<DVec3, ToolError> {
+        let force = self.tried(tool, self.last, pose, control)?;
+        self.last = Some(pose);
         self.steps += 1;
-        let from = self.last.replace(pose);
+        Ok(force)
+    }
+
+    fn tried(
+        &mut self,
+        tool: Tool,
+        from: Option<Pose>,
+        pose: Pose,
+        control: &mut Control,
+    ) -> Result<DVec3, ToolError> {
         if let Tool::Force(tool) = tool {
             let Canvas {
                 field, iso, layers, ..
@@ -292,10 +307,11 @@ impl Work {
 
     /// Lays paint on the canvas, and under the tool.
     fn lay_on(&mut self, paint: &Paint, control: &mut Control) -> Result<(), ToolError> {
-        (self.canvas, _) = Tool::Paint(paint).apply(self.canvas.clone(), &self.limits, control)?;
+        let (painted, _) = Tool::Paint(paint).apply(self.canvas.clone(), &self.limits, control)?;
         if let Some(force) = &mut self.force {
-            force.repaint(&self.canvas.layers)?;
+            force.repaint(&painted.layers)?;
         }
+        self.canvas = painted;
         Ok(())
     }
 

@@ -138,9 +138,10 @@ impl<T: Real> ForceStroke<T> {
     /// # Errors
     /// [`ForceError::Tool`] for a pose that is not finite, or so far away that it would take too many paths; all is as before.
     pub fn pose(&mut self, pose: DVec3) -> Result<(), ForceError> {
-        if !pose.is_finite() {
+        // Its square as well, or the hand is nowhere to be reached.
+        if !pose.length_squared().is_finite() {
             return Err(ForceError::tool(format!(
-                "the hand cannot be at {pose}; give finite coordinates"
+                "the hand cannot be at {pose}; give coordinates that are finite, and within reason"
             )));
         }
         match self.hand.as_mut().map(|hand| &mut hand.way) {
