@@ -14,8 +14,8 @@ use crate::paint::Paint;
 use crate::symmetry::Symmetry;
 use crate::tool::{Canvas, Tool, ToolError};
 
-/// How often a box grows for one stroke, an eighth at a time: to about seven times its length.
-const MOST_GROWTHS: usize = 16;
+/// How often a box grows for one stroke, an eighth at a time: to about twice its length. Further away is a slip of the pen.
+const MOST_GROWTHS: usize = 6;
 
 /// What a session file says.
 #[derive(Clone, Debug, PartialEq, Deserialize)]

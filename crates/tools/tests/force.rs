@@ -489,7 +489,7 @@ fn what_makes_no_sense_is_refused() {
             "wider than the field",
         ),
         (
-            "pull = { along = [[12, 12, 50]], lift = 1, radius = 1 }",
+            "pull = { along = [[12, 12, 60]], lift = 1, radius = 1 }",
             "stay within",
         ),
         (

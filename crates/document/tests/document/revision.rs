@@ -139,7 +139,7 @@ fn what_is_carved_is_filled_and_leaves_no_ghost_of_its_surface() {
 
 #[test]
 fn what_is_added_is_no_denser_than_the_scan() {
-    let centre = DVec3::new(12.0, 12.0, 20.0);
+    let centre = DVec3::new(12.0, 12.0, 18.0);
     let (now, revision) = edited(Operation::Add, &sphere(centre, 5.0));
     let scan = scan();
     let largest = scan.values.iter().copied().fold(0.0, f32::max);
