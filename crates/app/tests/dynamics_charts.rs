@@ -113,10 +113,7 @@ const TOOL_KEYS: [&str; 12] = [
 #[test]
 fn tools_arrive_by_default_whatever_the_sampling_and_the_number_of_paths() {
     let bench = Bench::new();
-    let points = common::sphere_text([0.0; 3], 1.0, 3000);
-    bench.write("ball.xyz", points);
-    bench.json("fit ball.xyz -o ball.iclay --max-depth 6");
-    let run = bench.run("charts tools ball.iclay --quick --json -o charts");
+    let run = bench.run("charts tools --quick --json -o charts");
     assert_eq!(run.code, 0, "{}", run.stderr);
     let lines = run.stdout.lines().map(|l| serde_json::from_str(l).unwrap());
     let lines: Vec<Value> = lines.collect();
@@ -166,20 +163,12 @@ fn tools_arrive_by_default_whatever_the_sampling_and_the_number_of_paths() {
         assert!(number(line, "printed_ms") > 0.0, "{line}");
         assert!((number(line, "arrival") - 1.0).abs() < 0.01, "{line}");
     }
-    // Four tools of two sizes, even and painted.
-    let loops = lines
+    // Three tools that pull and one that carves, of two sizes.
+    let brushes = lines
         .iter()
-        .filter(|l| l["tool"].as_str().unwrap().contains(" ball "));
-    assert_eq!(loops.count(), 16);
-    for name in [
-        "quadrature",
-        "sampling",
-        "paths",
-        "paths-cost",
-        "brush",
-        "table2",
-        "loops",
-    ] {
+        .filter(|l| l["tool"].as_str().unwrap().contains("radius"));
+    assert_eq!(brushes.count(), 8);
+    for name in ["quadrature", "sampling", "paths", "paths-cost", "brush", "table2"] {
         let svg = std::fs::read_to_string(bench.path(&format!("charts/tools-{name}.svg"))).unwrap();
         assert!(svg.starts_with("<svg") && svg.contains("<circle"), "{name}");
     }

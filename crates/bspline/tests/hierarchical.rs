@@ -433,3 +433,45 @@ fn evaluation_order_keeps_the_points_of_a_cell_together() {
         assert!(same.is_sorted(), "points of one cell keep their order");
     }
 }
+
+/// On oblique lattices with functions at every face: in the old box nothing changes but by rounding, outside the field goes on, and
+/// in two steps the box is the same as in one.
+fn grows<T: Real>() {
+    for seed in 0..20 {
+        let cells = [5 + seed as u32 % 4, 7, 9];
+        let field = random_spline::<T>(seed, oblique(), cells);
+        let [before, behind] = [[1, 0, 3], [0, 2, seed as u32]];
+        let grown = field.grown(before, behind).unwrap();
+        let growth = field.lattice().growth_to(grown.lattice());
+        assert_eq!(growth, Some([before, behind]));
+        assert!(grown.lattice().growth_to(field.lattice()).is_none());
+        let old = field.coefficient_counts();
+        assert_eq!(
+            grown.coefficient_counts()[1..],
+            old[1..],
+            "finer functions only move"
+        );
+        let mut rng = Lcg(seed + 99);
+        let bound = field.rounding_bound() + grown.rounding_bound();
+        let extent = field.lattice().extent();
+        for _ in 0..400 {
+            let q = rng.point(DVec3::ZERO, extent);
+            let p = oblique().transform_point3(q);
+            let off = (field.value(p) - grown.value(p)).abs();
+            assert!(off <= bound, "{q}: off by {off}, {bound} allowed");
+        }
+        let again = field
+            .grown([1, 0, 0], [0; 3])
+            .unwrap()
+            .grown([0, 0, 3], behind)
+            .unwrap();
+        assert_eq!(again.lattice().cells, grown.lattice().cells);
+        assert!(again.lattice().growth_to(grown.lattice()) == Some([[0; 3]; 2]));
+    }
+}
+
+#[test]
+fn a_box_that_grows_keeps_its_field() {
+    grows::<f32>();
+    grows::<f64>();
+}

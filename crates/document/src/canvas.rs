@@ -15,6 +15,7 @@ pub fn canvas(state: &State, name: &str) -> Result<Canvas, CommandError> {
         field: object.field.clone(),
         iso: iso.ok_or_else(|| CommandError::NoSurface(name.into()))?,
         layers: object.layers.clone(),
+        holds: object.properties.holds.clone(),
         others: others(state, name)?,
         copies: Vec::new(),
     })
@@ -30,7 +31,8 @@ pub fn left(state: &State, name: &str, canvas: Canvas) -> Result<State, CommandE
         }
         next = next.with(&copy, object.clone())?;
     }
-    let shaped = object.clone().with_shape(canvas.field, canvas.layers);
+    let mut shaped = object.clone().with_shape(canvas.field, canvas.layers);
+    shaped.properties.holds = canvas.holds;
     Ok(next.with(name, shaped)?)
 }
 

@@ -6,6 +6,7 @@ use formats::field::FieldMeta;
 use glam::{DAffine3, DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
+use tools::hold::Held;
 use tools::paint::Layers;
 
 /// A solid of a document. Cheap to copy.
@@ -33,6 +34,9 @@ pub struct Properties {
     /// places have become. That of the field when it became an object; the finest that it has if missing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub detail: Option<usize>,
+    /// Constraints that force tools keep.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub holds: Vec<Held>,
 }
 
 impl Default for Properties {
@@ -54,6 +58,7 @@ impl Properties {
             placement: [x_axis, y_axis, z_axis, map.translation].map(|c| c.to_array()),
             parent: None,
             detail: None,
+            holds: Vec::new(),
         }
     }
 
@@ -129,6 +134,11 @@ impl Object {
         hash.update((parent.len() as u64).to_le_bytes());
         hash.update(parent);
         hash.update((self.detail() as u64).to_le_bytes());
+        for held in &self.properties.holds {
+            let text = serde_json::to_vec(held).expect("names and numbers have a JSON form");
+            hash.update((text.len() as u64).to_le_bytes());
+            hash.update(text);
+        }
         for (substance, layer) in self.layers.iter().filter(|(_, layer)| !layer.is_empty()) {
             hash.update(substance.name());
             hash.update(layer.tree().sha256());

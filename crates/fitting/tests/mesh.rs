@@ -126,6 +126,10 @@ fn a_tighter_tolerance_costs_coefficients_and_a_budget_stops_it() {
             .map(|s| s.depth)
             .eq((6..=tight.depth).map(Some))
     );
+    // A number of iterations is made and no residual asked, so none is missed.
+    assert!(tight.solves.iter().all(|s| s.goal.is_none()));
+    let missed = |note: &String| note.contains("did not converge");
+    assert!(!tight.notes.iter().any(missed), "{:?}", tight.notes);
     let spent = MeshOptions {
         coefficients: Some(loose.coefficients),
         ..tolerance(0.003)

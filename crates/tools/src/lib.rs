@@ -2,11 +2,13 @@
 //! add and [carry along](warp). A [session] is a row of strokes; each uses one [tool], within [limits]. Haptics are not built yet.
 
 pub mod coefficients;
+pub mod curve;
 mod face;
 pub mod fade;
 pub mod force;
 mod formula_solid;
 pub mod geometric;
+pub mod hold;
 pub mod limits;
 pub mod live;
 pub mod mix;

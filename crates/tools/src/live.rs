@@ -11,6 +11,7 @@ use bspline::{Aabb, Field, HierarchicalSpline};
 use fitting::Control;
 use glam::DVec3;
 
+use crate::curve::Along;
 use crate::force::{ForceError, ForceStroke, ForceTool, released};
 use crate::geometric::{Geometric, GeometricError, Motion};
 use crate::limits::Limits;
@@ -201,7 +202,8 @@ impl Work {
         // A hand that pulls takes hold before it goes anywhere.
         let force = match tool {
             Tool::Force(tool @ ForceTool::Pull(_)) => {
-                Some(tool.hold(&canvas.field, canvas.iso, &canvas.layers, DVec3::ZERO)?)
+                let holding = canvas.holding(&limits);
+                Some(tool.hold(&canvas.field, canvas.iso, &canvas.layers, &holding, DVec3::ZERO)?)
             }
             _ => None,
         };
@@ -214,7 +216,7 @@ impl Work {
     /// A force tool that knows its way.
     fn of_force(force: ForceStroke<f32>, canvas: Canvas, limits: &Limits) -> Result<Self, ToolError> {
         Ok(Self {
-            force: Some(force.painted(&canvas.layers)?),
+            force: Some(force.painted(&canvas.layers)?.held(&canvas.holding(limits))?),
             ..Self::on(canvas, limits.clone())
         })
     }
@@ -241,7 +243,7 @@ impl Work {
             } = &self.canvas;
             let force = match &mut self.force {
                 Some(force) => force,
-                None => match tool.hold(field, *iso, layers, pose.at) {
+                None => match tool.hold(field, *iso, layers, &self.canvas.holding(&self.limits), pose.at) {
                     Ok(held) => self.force.insert(held),
                     Err(why) => return self.miss(why.into()).map(|()| DVec3::ZERO),
                 },
@@ -453,8 +455,8 @@ impl Stroke {
                     })
                     .collect()
             }
-            Tool::Force(ForceTool::Chisel(tool) | ForceTool::Squirt(tool)) => places(&tool.along),
-            Tool::Force(ForceTool::Drill(tool) | ForceTool::Join(tool)) => places(&tool.along),
+            Tool::Force(ForceTool::Chisel(tool) | ForceTool::Squirt(tool)) => places(by_points(&tool.along)?),
+            Tool::Force(ForceTool::Drill(tool) | ForceTool::Join(tool)) => places(by_points(&tool.along)?),
             Tool::Force(ForceTool::Pull(tool)) => {
                 if tool.by.is_some() || tool.lift.is_some() {
                     let why = "a pull by hand goes where the hand goes; write way, a vector for each step, and not by or lift";
@@ -567,5 +569,16 @@ fn check_during(tool: Tool, during: &[During]) -> Result<(), ToolError> {
             pair[1].step, pair[0].step
         ))),
         None => Ok(()),
+    }
+}
+
+/// The places of a tool by hand: it has no other curves.
+fn by_points(along: &Along) -> Result<&[Point], ToolError> {
+    match along {
+        Along::Points(points) => Ok(points),
+        Along::Curve(_) => {
+            let why = "a tool by hand goes from point to point; write points for along, or leave paced out";
+            Err(ToolError::Stroke(why.into()))
+        }
     }
 }

@@ -9,6 +9,7 @@ use crate::force::{Chisel, Drill, ForceError, ForceTool, Pull};
 use crate::geometric::{
     Copy, Cut, Geometric, GeometricError, Inflate, Move, Paste, Refine, Simplify, Smooth,
 };
+use crate::hold::{Free, Hold};
 use crate::limits::{Limits, Mask, Region};
 use crate::paint::Paint;
 use crate::symmetry::Symmetry;
@@ -109,6 +110,12 @@ pub struct Stroke {
     /// Paints matter or touch.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub paint: Option<Paint>,
+    /// Constrains the force tools that come later.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hold: Option<Hold>,
+    /// Takes constraints off.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub free: Option<Free>,
 }
 
 impl Stroke {
@@ -140,6 +147,8 @@ impl Stroke {
             self.refine.as_ref().map(Tool::Refine),
             self.simplify.as_ref().map(Tool::Simplify),
             self.paint.as_ref().map(Tool::Paint),
+            self.hold.as_ref().map(Tool::Hold),
+            self.free.as_ref().map(Tool::Free),
         ];
         let given: Vec<_> = all.into_iter().flatten().collect();
         match given[..] {
@@ -243,7 +252,11 @@ impl Stroke {
         let Some(symmetry) = &self.symmetry else {
             return once(canvas);
         };
-        if matches!(tool, Tool::Paint(_) | Tool::Copy(_)) || !self.during.is_empty() {
+        if matches!(
+            tool,
+            Tool::Paint(_) | Tool::Copy(_) | Tool::Hold(_) | Tool::Free(_)
+        ) || !self.during.is_empty()
+        {
             let paints = if self.during.is_empty() {
                 tool.name()
             } else {
@@ -251,6 +264,10 @@ impl Stroke {
             };
             let why = format!("{paints} knows no symmetry; write a stroke for each side");
             return Err(ToolError::Stroke(why));
+        }
+        if matches!(tool, Tool::Force(_)) && !canvas.holds.is_empty() {
+            let why = "holds are on one side only; write a stroke for each side, or free them first";
+            return Err(ToolError::Stroke(why.into()));
         }
         if matches!(tool, Tool::Move(_)) && canvas.layers.values().any(|layer| !layer.is_empty()) {
             let why = "a painted object cannot be moved on both sides at once; write a stroke for each side";

@@ -4,10 +4,11 @@ use bspline::{Aabb, HierarchicalSpline};
 use fitting::field::FieldFitReport;
 use fitting::{Control, FitError};
 
-use crate::force::{ForceError, ForceTool};
+use crate::force::{ForceError, ForceTool, Holding};
 use crate::geometric::{
     Copy, Cut, Geometric, GeometricError, Inflate, Move, Operation, Paste, Refine, Simplify, Smooth,
 };
+use crate::hold::{Free, Held, Hold};
 use crate::limits::Limits;
 use crate::others::Others;
 use crate::paint::{Layer, Layers, Paint, PaintError};
@@ -23,10 +24,23 @@ pub struct Canvas {
     pub detail: usize,
     /// What is painted on it.
     pub layers: Layers,
+    /// Its constraints.
+    pub holds: Vec<Held>,
     /// Objects that a tool may name.
     pub others: Others,
     /// Names under which the object as it was before is to be kept.
     pub copies: Vec<String>,
+}
+
+impl Canvas {
+    /// What force tools may not move.
+    pub(crate) fn holding(&self, limits: &Limits) -> Holding {
+        Holding {
+            iso: self.iso,
+            holds: self.holds.clone(),
+            limits: limits.clone(),
+        }
+    }
 }
 
 /// A tool with all that it is told.
@@ -56,6 +70,10 @@ pub enum Tool<'a> {
     Simplify(&'a Simplify),
     /// Paints matter or touch.
     Paint(&'a Paint),
+    /// Constrains.
+    Hold(&'a Hold),
+    /// Takes constraints off.
+    Free(&'a Free),
 }
 
 /// Why a tool cannot be used.
@@ -88,11 +106,11 @@ impl ToolError {
 
 impl Tool<'_> {
     /// Names of all tools, as sessions write them.
-    pub const NAMES: [&'static str; 16] = {
+    pub const NAMES: [&'static str; 18] = {
         let [pull, chisel, squirt, drill, join] = ForceTool::NAMES;
         [
             "carve", "add", pull, chisel, squirt, drill, join, "move", "smooth", "inflate", "copy", "cut",
-            "paste", "refine", "simplify", "paint",
+            "paste", "refine", "simplify", "paint", "hold", "free",
         ]
     };
 
@@ -111,6 +129,8 @@ impl Tool<'_> {
             Self::Refine(_) => "refine",
             Self::Simplify(_) => "simplify",
             Self::Paint(_) => "paint",
+            Self::Hold(_) => "hold",
+            Self::Free(_) => "free",
         }
     }
 
@@ -149,9 +169,18 @@ impl Tool<'_> {
                 return Ok((canvas, Vec::new()));
             }
             Self::Force(tool) => {
-                let (field, told) = tool.apply(old, *iso, &canvas.layers, control)?;
+                let holding = canvas.holding(limits);
+                let (field, told) = tool.apply(old, *iso, &canvas.layers, &holding, control)?;
                 let field = limits.kept(old, &field);
                 return Ok((Canvas { field, ..canvas }, told));
+            }
+            Self::Hold(hold) => {
+                let holds = hold.joined(old, *iso, &canvas.holds).map_err(ToolError::Stroke)?;
+                return Ok((Canvas { holds, ..canvas }, Vec::new()));
+            }
+            Self::Free(free) => {
+                let holds = free.left(&canvas.holds).map_err(ToolError::Stroke)?;
+                return Ok((Canvas { holds, ..canvas }, Vec::new()));
             }
             Self::Copy(copy) => {
                 copies.push(copy.to.clone());

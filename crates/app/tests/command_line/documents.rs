@@ -311,3 +311,59 @@ fn a_cloud_comes_back_with_the_edits_of_its_object() {
     assert!(number(&check, "rms") < 0.01, "{check}");
     assert!(number(&check, "input_count") >= 2000.0);
 }
+
+#[test]
+fn clouds_of_other_formats_come_back_too() {
+    let bench = ball();
+    let bytes = |name: &str| std::fs::read(bench.path(name)).unwrap();
+    for format in ["pcd", "las", "laz", "e57"] {
+        bench.json(&format!("convert cloud.ply cloud.{format}"));
+    }
+    bench.write(
+        "swell.toml",
+        "[[stroke]]\ninflate = { along = [[0, 0, 1]], radius = 0.7, by = 0.1 }\n",
+    );
+    let text = super::common::sphere_text([0.0; 3], 1.0, 1500);
+    let lines = text.lines().map(|line| {
+        let n: Vec<&str> = line.split(' ').collect();
+        format!(
+            "v {} {} {} 0.5\nvn {} {} {}\n",
+            n[0], n[1], n[2], n[3], n[4], n[5]
+        )
+    });
+    bench.write("cloud.obj", lines.collect::<String>());
+    for format in ["pcd", "las", "obj"] {
+        bench.json(&format!("fit cloud.{format} -o {format}.iclay --max-depth 6"));
+        bench.json(&format!("new {format}.isoclay {format}.iclay"));
+        let export = format!("export {format}.isoclay --like cloud.{format} -o");
+        bench.json(&format!("{export} same.{format}"));
+        assert_eq!(
+            bytes(&format!("same.{format}")),
+            bytes(&format!("cloud.{format}"))
+        );
+        bench.json(&format!("sculpt {format}.isoclay --script swell.toml"));
+        bench.json(&format!("{export} swollen.{format}"));
+        bench.json(&format!("export {format}.isoclay -o {format}-now.iclay"));
+        let check = bench.json(&format!("check {format}-now.iclay swollen.{format} --anyway"));
+        assert!(number(&check, "rms") < 0.01, "{format}: {check}");
+    }
+    for (format, word) in [
+        ("laz", "unpack the scan to .las"),
+        ("e57", "convert the scan to .ply"),
+    ] {
+        bench.json(&format!("fit cloud.{format} -o {format}.iclay --max-depth 6"));
+        bench.json(&format!("new {format}.isoclay {format}.iclay"));
+        let run = bench.run(&format!(
+            "export {format}.isoclay --like cloud.{format} -o out.{format}"
+        ));
+        assert!(run.code == 3 && run.stderr.contains(word), "{}", run.stderr);
+    }
+    bench.json("mesh ball.iclay -o ball.stl");
+    bench.json("new clay.isoclay ball.iclay");
+    let run = bench.run("export clay.isoclay --like ball.stl -o out.stl");
+    assert!(
+        run.code == 2 && run.stderr.contains("this is a mesh"),
+        "{}",
+        run.stderr
+    );
+}

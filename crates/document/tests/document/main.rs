@@ -609,3 +609,50 @@ fn strokes_after_strokes_get_no_finer_by_themselves() {
     let grown = sizes[7] - sizes[0];
     assert!(grown < 4 * sizes[0], "{sizes:?}");
 }
+
+#[test]
+fn holds_are_kept_with_the_object_and_undone() {
+    let directory = tempdir().unwrap();
+    let path = directory.path().join("held.isoclay");
+    let lattice = bspline::hierarchical::Lattice {
+        world_from_lattice: DAffine3::IDENTITY,
+        cells: [24; 3],
+    };
+    let block = HierarchicalSpline::<f32>::schoenberg(lattice, 1.0, |p| 12.0 - p.z).unwrap();
+    let meta = FieldMeta {
+        iso: Some(0.0),
+        ..object(&ball()).meta.as_ref().clone()
+    };
+    let first = State::new()
+        .with("a", document::Object::new(&AnyField::F32(block), meta).unwrap())
+        .unwrap();
+    let mut document = Document::create(&path, first.clone(), Options::default()).unwrap();
+    let session = "[[stroke]]\nhold = { name = 'rim', sketch = { meet = { formulas = ['(x - 12)^2 + (y - 12)^2 - 9', 'z - 12'] } } }\n\
+                   [[stroke]]\npull = { along = [[12, 12, 12]], lift = 1.5, radius = 1.2 }\n[[stroke]]\nfree = { name = 'rim' }";
+    let commands =
+        document::Command::of_script::<document::CommandError>(session, |_| Ok("a".into())).unwrap();
+    let mut hashes = vec![first.sha256()];
+    for command in &commands {
+        // As the journal has it.
+        let command: document::Command =
+            serde_json::from_value(serde_json::to_value(command).unwrap()).unwrap();
+        let (next, _) = command.apply(document.state(), &mut Default::default()).unwrap();
+        let text = serde_json::to_value(&command).unwrap();
+        assert!(document.commit(&command.title(), text, next).unwrap());
+        hashes.push(document.state().sha256());
+        drop(document);
+        document = open(&path);
+        assert_eq!(document.state().sha256(), *hashes.last().unwrap());
+    }
+    assert!(document.state().object("a").unwrap().properties.holds.is_empty());
+    assert_eq!(document.undo(1).unwrap(), 1);
+    assert_eq!(
+        document.state().object("a").unwrap().properties.holds[0].name,
+        "rim"
+    );
+    let held = &document.state().object("a").unwrap().field;
+    let on_curve = bspline::Field::value(held, DVec3::new(15.0, 12.0, 12.0));
+    assert!(on_curve.abs() < 0.01, "{on_curve}");
+    assert_eq!(document.undo(2).unwrap(), 2);
+    assert_eq!(document.state().sha256(), hashes[0]);
+}

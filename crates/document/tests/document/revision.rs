@@ -216,6 +216,7 @@ fn a_move_on_both_sides_takes_the_noise_of_both_along() {
         detail: 0,
         layers: Default::default(),
         others: Others::default(),
+        holds: Vec::new(),
         copies: Vec::new(),
     };
     let (now, _) = stroke.apply(canvas, &mut Control::default()).unwrap();

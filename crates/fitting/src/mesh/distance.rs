@@ -223,15 +223,19 @@ impl MeshDistance {
             .unwrap_or_else(|| self.wind(p, &found))
     }
 
-    /// How far the other side of a sheet is from a point of the surface along `way`, a unit vector across it, if it is
+    /// How far the other side of a sheet is from the foot that was found along `way`, a unit vector across it, if it is
     /// nearer than `reach` and faces the other way: the contact of the ball that touches the surface in both
     /// \[Ma12\].
-    pub(crate) fn across(&self, foot: DVec3, way: DVec3, reach: f64) -> Option<f64> {
+    pub(crate) fn across(&self, found: &Distance, way: DVec3, reach: f64) -> Option<f64> {
+        let foot = found.foot;
         let mut radius = 0.5 * reach;
         let mut to = None;
+        // The ball touches the last triangle found: none beyond it is looked at.
+        let mut hint = found.hint;
         for _ in 0..12 {
             let center = foot + way * radius;
-            let point = self.surface.boundary.nearest(center, 0).point;
+            let Nearest { point, triangle, .. } = self.surface.boundary.nearest(center, hint);
+            hint = triangle;
             if center.distance(point) >= radius * (1.0 - 1e-6) {
                 let to: DVec3 = to?;
                 let faces_back = (to - way * radius).dot(way) > 0.5 * radius;

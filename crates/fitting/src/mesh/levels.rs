@@ -25,8 +25,8 @@ use crate::{Control, FitError, FitReport, SolverOutcome, StopReason};
 const BETA: f64 = 0.4;
 /// Weight `μ` of the bending energy.
 const BENDING: f64 = 1e-5;
-/// Conjugate gradients stop at this relative residual, or after so many iterations.
-const RESIDUAL: f64 = 0.01;
+/// Iterations of conjugate gradients, whatever residual they leave (5 to 11 % of the first): twelve, which leave 1 to 4 %,
+/// lower no error.
 const ITERATIONS: usize = 6;
 /// How far coefficients are held round the active functions: all that the cells they reach read.
 const REACH: u32 = 3;
@@ -350,7 +350,7 @@ impl Octree<'_> {
                 mu: BENDING,
             },
         );
-        let (x, outcome) = problem.solve(RESIDUAL, ITERATIONS);
+        let (x, outcome) = problem.solve(0.0, ITERATIONS);
         self.solves.push(outcome);
         drop(conditions);
         band.add_active(&x);

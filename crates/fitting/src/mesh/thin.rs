@@ -7,6 +7,7 @@
 
 use std::collections::BTreeMap;
 
+use rayon::prelude::*;
 use rustc_hash::FxHashSet;
 
 use super::distance::MeshDistance;
@@ -72,11 +73,14 @@ impl Sheets {
             begun: BTreeMap::new(),
             unknown: Vec::new(),
         };
-        for (i, cell, octants, quality) in above {
-            if !quality.is_lost() && quality.rms() <= UNSEEN * h {
-                continue;
-            }
-            let Some(t) = thickness(mesh, cell, octants, depth) else {
+        let may_be_unseen = |q: &Quality| q.is_lost() || q.rms() > UNSEEN * h;
+        let above: Vec<_> = above.filter(|(.., quality)| may_be_unseen(quality)).collect();
+        let thick: Vec<Option<f64>> = above
+            .par_iter()
+            .map(|(_, cell, octants, _)| thickness(mesh, cell, octants, depth))
+            .collect();
+        for ((i, .., quality), t) in above.into_iter().zip(thick) {
+            let Some(t) = t else {
                 out.unknown.push(i);
                 continue;
             };
@@ -179,20 +183,20 @@ fn thickness(mesh: &MeshDistance, cell: &Cell, octants: &Octants, depth: usize) 
         .places(depth)
         .zip(octants)
         .filter(|(_, found)| found.on_face && found.distance <= h)
-        .filter_map(|(place, found)| Some((found.foot, found.gradient(place)?)))
+        .filter_map(|(place, found)| Some((found, found.gradient(place)?)))
         .collect();
     let mut widest: Option<f64> = None;
     for (i, (p, inward)) in sides.iter().enumerate() {
         for (q, other) in &sides[..i] {
             if inward.dot(*other) < OPPOSITE {
-                let way = (*p - *q).dot(*inward).abs();
+                let way = (p.foot - q.foot).dot(*inward).abs();
                 widest = Some(widest.map_or(way, |w| w.max(way)));
             }
         }
     }
     widest.or_else(|| {
-        let (foot, inward) = sides.first()?;
-        let across = [*inward, -*inward].map(|way| mesh.across(*foot, way, h));
+        let (found, inward) = sides.first()?;
+        let across = [*inward, -*inward].map(|way| mesh.across(found, way, h));
         across.into_iter().flatten().reduce(f64::min)
     })
 }

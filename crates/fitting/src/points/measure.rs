@@ -1,6 +1,8 @@
 //! Errors of a field at points of a surface: one definition, for the fit that states them and for whoever measures
 //! again.
 
+use std::ops::ControlFlow;
+
 use bspline::{Field, HierarchicalSpline, Real};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -57,6 +59,8 @@ pub struct PointErrors {
 
 /// Points measured together.
 const BLOCK: usize = 1 << 16;
+/// Points asked for at once.
+const TOGETHER: usize = 64;
 
 /// Measures `field` at the positions that count, each of which may lie in one of `leaf_count` leaves.
 pub fn measure_points<T: Real>(
@@ -81,14 +85,14 @@ pub(crate) fn measure_in_order<T: Real>(
 ) -> PointErrors {
     let spacing = field.lattice().spacing(field.level_count() - 1).min_element();
     let mut errors: Vec<Option<PointError>> = vec![None; positions.len()];
-    let measured = |&i: &u32| counts(i as usize).then(|| point_error(field, positions[i as usize], spacing));
-    let mut found = Vec::with_capacity(BLOCK.min(order.len()));
-    for block in order.chunks(BLOCK) {
+    let counted: Vec<u32> = order.iter().copied().filter(|&i| counts(i as usize)).collect();
+    let mut found = vec![None; BLOCK.min(counted.len())];
+    for block in counted.chunks(BLOCK) {
         block
-            .par_iter()
-            .with_min_len(1024)
-            .map(measured)
-            .collect_into_vec(&mut found);
+            .par_chunks(TOGETHER)
+            .zip(found.par_chunks_mut(TOGETHER))
+            .with_min_len(1024 / TOGETHER)
+            .for_each(|(block, found)| errors_of(field, positions, block, spacing, found));
         for (i, error) in block.iter().zip(&found) {
             errors[*i as usize] = *error;
         }
@@ -130,38 +134,130 @@ pub(crate) fn measure_in_order<T: Real>(
 /// Where the steps from `p` end. None is longer than `spacing`, the finest knot spacing; a step that turns the sign over
 /// without bringing the surface much nearer, as to and fro across a crease, is halved until it meets it.
 pub fn point_error(field: &dyn Field, p: DVec3, spacing: f64) -> PointError {
-    let (first, mut gradient) = field.value_gradient(p);
-    let (mut x, mut f) = (p, first);
-    let reached = |x: DVec3| PointError {
-        distance: x.distance(p),
-        value: first.abs(),
-        converged: true,
-    };
-    let mut left = 0.0;
-    for _ in 0..NEWTON_STEPS {
-        if f == 0.0 {
-            return reached(x);
+    let mut walk = Walk::new(p, field.value_gradient(p));
+    loop {
+        let next = match walk.next(spacing) {
+            ControlFlow::Break(end) => return end,
+            ControlFlow::Continue(next) => next,
+        };
+        if let Some(end) = walk.go(field, next, field.value_gradient(next)) {
+            return end;
         }
-        let slope = gradient.length();
-        left = f.abs() / slope;
-        if !left.is_finite() {
-            left = spacing;
-            break;
-        }
-        let next = x - gradient * (f / slope / slope * (spacing / left).min(1.0));
-        if left <= spacing && left <= SETTLED * next.distance(p) {
-            return reached(next);
-        }
-        let (f_next, gradient_next) = field.value_gradient(next);
-        if f_next.abs() > 0.5 * f.abs() && (f_next > 0.0) != (f > 0.0) {
-            return reached(crossing(field, [x, next], f > 0.0));
-        }
-        (x, f, gradient) = (next, f_next, gradient_next);
     }
-    PointError {
-        distance: x.distance(p) + left,
-        value: first.abs(),
-        converged: false,
+}
+
+/// [`point_error`] of the positions `which`, at most [`TOGETHER`], step by step together.
+fn errors_of(
+    field: &dyn Field,
+    positions: &[DVec3],
+    which: &[u32],
+    spacing: f64,
+    out: &mut [Option<PointError>],
+) {
+    let mut places = [DVec3::ZERO; TOGETHER];
+    let mut found = [(0.0, DVec3::ZERO); TOGETHER];
+    for (place, &i) in places.iter_mut().zip(which) {
+        *place = positions[i as usize];
+    }
+    field.values_gradients(&places[..which.len()], &mut found[..which.len()]);
+    let mut walks: [Walk; TOGETHER] = std::array::from_fn(|k| Walk::new(places[k], found[k]));
+    let mut going: [usize; TOGETHER] = std::array::from_fn(|k| k);
+    let mut count = which.len();
+    while count > 0 {
+        let mut asking = 0;
+        for at in 0..count {
+            let k = going[at];
+            match walks[k].next(spacing) {
+                ControlFlow::Break(end) => out[k] = Some(end),
+                ControlFlow::Continue(next) => {
+                    (going[asking], places[asking]) = (k, next);
+                    asking += 1;
+                }
+            }
+        }
+        field.values_gradients(&places[..asking], &mut found[..asking]);
+        count = 0;
+        for at in 0..asking {
+            let k = going[at];
+            match walks[k].go(field, places[at], found[at]) {
+                Some(end) => out[k] = Some(end),
+                None => {
+                    going[count] = k;
+                    count += 1;
+                }
+            }
+        }
+    }
+}
+
+/// Newton's steps from a point.
+struct Walk {
+    start: DVec3,
+    /// Value there.
+    first: f64,
+    steps: usize,
+    /// Where they have come to, with value and gradient.
+    x: DVec3,
+    f: f64,
+    gradient: DVec3,
+    /// What is left by first order.
+    left: f64,
+}
+
+impl Walk {
+    fn new(start: DVec3, (first, gradient): (f64, DVec3)) -> Self {
+        Self {
+            start,
+            first,
+            steps: 0,
+            x: start,
+            f: first,
+            gradient,
+            left: 0.0,
+        }
+    }
+
+    fn reached(&self, x: DVec3) -> PointError {
+        PointError {
+            distance: x.distance(self.start),
+            value: self.first.abs(),
+            converged: true,
+        }
+    }
+
+    /// Where the next step leads, or how the steps end.
+    fn next(&mut self, spacing: f64) -> ControlFlow<PointError, DVec3> {
+        if self.steps < NEWTON_STEPS {
+            self.steps += 1;
+            if self.f == 0.0 {
+                return ControlFlow::Break(self.reached(self.x));
+            }
+            let slope = self.gradient.length();
+            self.left = self.f.abs() / slope;
+            if self.left.is_finite() {
+                let share = (spacing / self.left).min(1.0);
+                let next = self.x - self.gradient * (self.f / slope / slope * share);
+                if self.left <= spacing && self.left <= SETTLED * next.distance(self.start) {
+                    return ControlFlow::Break(self.reached(next));
+                }
+                return ControlFlow::Continue(next);
+            }
+            self.left = spacing;
+        }
+        ControlFlow::Break(PointError {
+            distance: self.x.distance(self.start) + self.left,
+            value: self.first.abs(),
+            converged: false,
+        })
+    }
+
+    /// Goes to `next`, where this was found; the end if the surface was crossed.
+    fn go(&mut self, field: &dyn Field, next: DVec3, (f, gradient): (f64, DVec3)) -> Option<PointError> {
+        if f.abs() > 0.5 * self.f.abs() && (f > 0.0) != (self.f > 0.0) {
+            return Some(self.reached(crossing(field, [self.x, next], self.f > 0.0)));
+        }
+        (self.x, self.f, self.gradient) = (next, f, gradient);
+        None
     }
 }
 
@@ -224,6 +320,25 @@ mod tests {
                 (found.distance - t.abs()).abs() <= 1e-3 * t.abs() + 1e-7,
                 "{found:?} {t}"
             );
+        }
+    }
+
+    #[test]
+    fn points_measured_together_have_the_errors_of_each_alone() {
+        let place = |i: usize| {
+            let t = i as f64;
+            DVec3::new((0.7 * t).sin() * 2.2, (1.3 * t).cos(), (2.1 * t).sin()) * (i % 5) as f64 * 0.3
+        };
+        let positions: Vec<DVec3> = (0..200).map(place).collect();
+        for count in [1, 7, TOGETHER] {
+            let which: Vec<u32> = (0..count as u32).map(|i| i * 3).collect();
+            let mut together = vec![None; count];
+            errors_of(&Ellipsoid, &positions, &which, 0.1, &mut together);
+            let alone = which
+                .iter()
+                .map(|&i| Some(point_error(&Ellipsoid, positions[i as usize], 0.1)));
+            assert!(together.iter().copied().eq(alone), "{together:?}");
+            assert!(count < 7 || together.iter().flatten().any(|e| !e.converged));
         }
     }
 

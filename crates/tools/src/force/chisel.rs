@@ -6,15 +6,16 @@ use super::path::Path;
 use super::stroke::{Extent, ForceStroke};
 use super::target::Target;
 use super::{ForceError, How, track};
-use crate::number::{Point, Positive};
+use crate::curve::Along;
+use crate::number::Positive;
 
 /// A groove along a track, or a ridge: short paths along the normals, all of one length \[Hua04 §6.1\]. The depth counts from the
 /// surface as it is when the stroke begins, so that standing still, or crossing the track, goes no deeper.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Chisel {
-    /// The track, drawn to the nearest surface: a polyline, or one point.
-    pub along: Vec<Point>,
+    /// The track, drawn to the nearest surface: a curve, or one point.
+    pub along: Along,
     /// Depth of the groove, or height of the ridge, a world length.
     pub depth: Positive,
     /// Standard deviation of the spread of its force, a world length.
@@ -35,8 +36,7 @@ impl Chisel {
         iso: f64,
         grows: bool,
     ) -> Result<ForceStroke<T>, ForceError> {
-        let points: Vec<_> = self.along.iter().map(|p| p.0).collect();
-        let places = track::along(field, iso, &points, self.radius.0)?;
+        let places = track::along(field, iso, &self.along, self.radius.0)?;
         let targets: Result<Vec<_>, _> = places.iter().map(|place| self.target(place, grows)).collect();
         ForceStroke::new(field, iso, targets?, Extent::Track, self.radius.0, &self.how)
     }

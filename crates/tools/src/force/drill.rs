@@ -6,6 +6,7 @@ use super::path::Path;
 use super::stroke::{Extent, ForceStroke};
 use super::target::Target;
 use super::{ForceError, How, track};
+use crate::curve::Along;
 use crate::number::{Point, Positive};
 
 /// Radii by which a hole, or a bridge, is made wider than a thread.
@@ -16,8 +17,8 @@ const WIDER: f64 = 0.5;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Drill {
-    /// Where it begins, drawn to the nearest surface: one point, or the polyline of a cut.
-    pub along: Vec<Point>,
+    /// Where it begins, drawn to the nearest surface: one point, or the curve of a cut.
+    pub along: Along,
     /// Direction and length.
     pub by: Point,
     /// Standard deviation of the spread of its force, a world length.
@@ -38,8 +39,7 @@ impl Drill {
         iso: f64,
         grows: bool,
     ) -> Result<ForceStroke<T>, ForceError> {
-        let points: Vec<_> = self.along.iter().map(|p| p.0).collect();
-        let places = track::along(field, iso, &points, self.radius.0)?;
+        let places = track::along(field, iso, &self.along, self.radius.0)?;
         let targets: Result<Vec<_>, _> = places.iter().map(|place| self.target(place, grows)).collect();
         let goal = self.goal(field, iso, grows);
         ForceStroke::new(field, goal, targets?, Extent::Curve, self.radius.0, &self.how)

@@ -290,7 +290,14 @@ impl<T: Real> ForceStroke<T> {
         self.settled = 0;
         if !self.targets.iter().all(|target| self.is_in_reach(target)) {
             let targets: Vec<&Target> = self.targets.iter().collect();
-            (self.field, self.region) = self.ground().follow(&self.region, &targets)?;
+            if self.region.patch().mask().is_some() && !self.is_elastic() {
+                // These do not follow: the shape so far becomes the one at rest.
+                self.field = self.region.release_clay(&self.field)?;
+                self.region = self.ground().cut(&targets)?;
+            } else {
+                (self.field, self.region) = self.ground().follow(&self.region, &targets)?;
+            }
+            self.hold()?;
             self.count_cut();
         }
         Ok(())

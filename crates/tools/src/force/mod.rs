@@ -9,11 +9,13 @@
 //! With `T` the total force of a path, `e = I/ℓ` the mean that it is short of, `J` its spread and `J̃` the mean of the field
 //! over it, a step solves `(J̃ᵀH⁻¹J + diag(s))ΔT = e − J̃ᵀy − sT` ([`system`]), `y` what the step does with the forces at hand.
 
+mod area;
 mod chisel;
 mod drill;
 mod filter;
 mod ground;
 mod hand;
+mod holding;
 mod path;
 mod pull;
 pub mod quadrature;
@@ -30,6 +32,7 @@ mod track;
 pub use chisel::Chisel;
 pub use drill::Drill;
 pub use filter::Filter;
+pub use holding::Holding;
 pub use path::{Path, first_crossing, nearest_surface};
 pub use pull::Pull;
 pub use report::{Arrival, ForceReport, Told};

@@ -74,15 +74,17 @@ impl Path {
         from + share * (to - from)
     }
 
-    /// Arc lengths of the points between the ends at which it turns by more than an angle of this cosine.
-    pub fn corners(&self, cosine: f64) -> impl Iterator<Item = f64> {
+    /// Arc lengths of the points between the ends at which it turns by more than an angle of this cosine, and the cosine there.
+    pub fn corners(&self, cosine: f64) -> impl Iterator<Item = (f64, f64)> {
         let ways: Vec<DVec3> = self
             .points
             .windows(2)
             .map(|w| (w[1] - w[0]).normalize())
             .collect();
-        let turns = (1..ways.len()).filter(move |i| ways[*i].dot(ways[i - 1]) < cosine);
-        turns.map(|i| self.lengths[i])
+        let turns = (1..ways.len()).map(move |i| (i, ways[i].dot(ways[i - 1])));
+        turns
+            .filter(move |(_, turn)| *turn < cosine)
+            .map(|(i, turn)| (self.lengths[i], turn))
     }
 
     /// Unit vector of the way at an arc length.

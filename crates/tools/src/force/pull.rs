@@ -4,16 +4,21 @@ use serde::{Deserialize, Serialize};
 use super::path::Path;
 use super::stroke::{Extent, ForceStroke};
 use super::target::Target;
-use super::{ForceError, How, track};
+use super::{ForceError, How, area, track};
+use crate::curve::Along;
 use crate::number::{Finite, Point, Positive};
 
-/// Takes hold of the surface at a point, along a curve or over a disc, and brings it elsewhere. Exactly one of `by`, `way` and
+/// Takes hold of the surface at a point, along a curve or over an area, and brings it elsewhere. Exactly one of `by`, `way` and
 /// `lift` is given.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Pull {
-    /// Where it takes hold, drawn to the nearest surface: one point, or a polyline.
-    pub along: Vec<Point>,
+    /// Where it takes hold, drawn to the nearest surface: one point, or a curve.
+    #[serde(default, skip_serializing_if = "Along::is_empty")]
+    pub along: Along,
+    /// Outline of an area, in place of `along`: the area within a closed curve.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub area: Option<Along>,
     /// Radius of a disc about the point, if it takes hold of an area.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub disc: Option<Positive>,
@@ -76,9 +81,9 @@ impl Pull {
     }
 
     fn extent(&self) -> Extent {
-        match self.disc {
-            Some(_) => Extent::Area,
-            None => Extent::Curve,
+        match (&self.area, self.disc) {
+            (None, None) => Extent::Curve,
+            _ => Extent::Area,
         }
     }
 
@@ -89,14 +94,16 @@ impl Pull {
         iso: f64,
     ) -> Result<Vec<track::Place>, ForceError> {
         let radius = self.radius.0;
-        let points: Vec<_> = self.along.iter().map(|p| p.0).collect();
-        match (self.disc, &points[..]) {
-            (None, _) => track::along(field, iso, &points, radius),
-            (Some(disc), [middle]) => track::disc(field, iso, *middle, disc.0, radius),
-            (Some(_), _) => Err(ForceError::tool(format!(
-                "a disc has one middle, and along has {} points; write one, or leave disc out",
-                points.len()
-            ))),
+        match (&self.area, self.disc, self.along.points()) {
+            (Some(outline), None, []) => area::within(field, iso, outline, radius),
+            (Some(_), ..) => Err(ForceError::tool(
+                "an area is all there is; leave along and disc out",
+            )),
+            (None, None, _) => track::along(field, iso, &self.along, radius),
+            (None, Some(disc), [middle]) => track::disc(field, iso, middle.0, disc.0, radius),
+            (None, Some(_), _) => Err(ForceError::tool(
+                "a disc has one middle; write one point for along, or leave disc out",
+            )),
         }
     }
 }

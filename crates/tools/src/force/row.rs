@@ -68,6 +68,13 @@ impl<'a, T: Real> Functions<'a, T> {
         }
     }
 
+    /// Sum of the weights at a place of those functions that count.
+    pub fn weight(&self, at: DVec3, counts: impl Fn(usize) -> bool) -> f64 {
+        let mut sum = 0.0;
+        self.each(at, |i, w| sum += if counts(i) { w } else { 0.0 });
+        sum
+    }
+
     /// The field with changes `p` of the free coefficients.
     pub fn value(&self, p: &[T], at: DVec3) -> f64 {
         let mut sum = self.field.value(at);

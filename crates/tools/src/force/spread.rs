@@ -113,7 +113,7 @@ impl Spread {
 }
 
 /// Unit vectors of the axes of a region's samples.
-fn axes<T: Real>(region: &Region<T>) -> [DVec3; 3] {
+pub fn axes<T: Real>(region: &Region<T>) -> [DVec3; 3] {
     let origin = region.sample_position([0; 3]);
     [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map(|ijk| (region.sample_position(ijk) - origin).normalize())
 }

@@ -2,7 +2,8 @@
 
 use bspline::Real;
 use dynamics::integrators::Integrator;
-use dynamics::response::Against;
+use dynamics::region::Region;
+use dynamics::response::{Against, Response};
 use glam::DVec3;
 
 use super::quadrature::Tolerance;
@@ -44,6 +45,9 @@ impl<T: Real> ForceStroke<T> {
     pub fn step(&mut self) -> Result<Told, ForceError> {
         self.chase()?;
         self.advance()?;
+        if let Some(constraints) = self.drawn.next() {
+            self.region.patch_mut().set_constraints(&constraints)?;
+        }
         let goals = self.goals();
         let bearings = self.bearings(&goals)?;
         let (dt, keep) = match self.how.solid {
@@ -76,7 +80,9 @@ impl<T: Real> ForceStroke<T> {
             .zip(&before)
             .map(|(now, then)| *now - *then)
             .collect();
-        let live: Vec<usize> = (0..bearings.len()).filter(|i| bearings[*i].is_some()).collect();
+        // Where nothing gives way no force is large enough.
+        let is_live = |i: &usize| bearings[*i].is_some() && self.acting[*i].stiffness > 0.0;
+        let live: Vec<usize> = (0..bearings.len()).filter(is_live).collect();
         let bearing = |i: usize| bearings[i].as_ref().expect("live paths have one");
         let right: Vec<f64> = live
             .iter()
@@ -89,11 +95,11 @@ impl<T: Real> ForceStroke<T> {
             .map(|(&i, soft)| self.acting[i].stiffness / self.targets[self.acting[i].index].weight + soft)
             .collect();
         let most = self.extent.solves();
-        let region = &mut self.region;
+        let (region, solid) = (&mut self.region, self.how.solid);
         let solved = system::solve(&right, &soft, &diagonal, most, 1e-4, |z| {
             let of = live.iter().zip(z).map(|(&i, z)| (&bearing(i).spread, *z));
             let load = Load::<T>::of(of);
-            let found = region.respond_as_step(Integrator::Paper, dt, &load.on_box())?;
+            let found = answer(region, solid, dt, &load)?;
             let felt = live.iter().map(|&i| bearing(i).row.times(&found.p)).collect();
             Ok::<_, ForceError>((found, felt))
         })?;
@@ -136,7 +142,7 @@ impl<T: Real> ForceStroke<T> {
             part * share * self.targets[a.index].path.length()
         });
         let goals = goals.collect();
-        self.settled += usize::from(all);
+        self.settled += usize::from(all && self.drawn.is_done());
         goals
     }
 
@@ -199,7 +205,7 @@ impl<T: Real> ForceStroke<T> {
         let most = moved.iter().copied().fold(0.0, f64::max);
         for (acting, moved) in self.acting.iter_mut().zip(moved) {
             // Paths that the region hardly moves must not rule the others.
-            acting.stiffness = moved.max(1e-3 * most).max(f64::MIN_POSITIVE);
+            acting.stiffness = moved.max(1e-3 * most);
         }
         Ok(())
     }
@@ -266,6 +272,20 @@ impl<T: Real> ForceStroke<T> {
             residual,
         }
     }
+}
+
+/// What a load adds to a step. That of clay is as exact as the step; elastic solids have to come to rest in balance.
+fn answer<T: Real>(
+    region: &mut Region<T>,
+    solid: Solid,
+    dt: f64,
+    load: &Load<T>,
+) -> Result<Response<T>, ForceError> {
+    let load = load.on_box();
+    Ok(match solid {
+        Solid::Clay => region.respond_as_step(Integrator::Paper, dt, &load)?,
+        Solid::Elastic => region.respond(Integrator::Paper, dt, &[load])?.remove(0),
+    })
 }
 
 /// Spreads of the paths that ask for something, with a factor each.

@@ -8,6 +8,7 @@ use glam::DVec3;
 use super::filter::Shape;
 use super::ground::Ground;
 use super::hand::Hand;
+use super::holding::{Drawn, Holding};
 use super::report::{Arrival, ForceReport};
 use super::row::Functions;
 use super::spread::Load;
@@ -88,6 +89,9 @@ pub struct ForceStroke<T> {
     pub(super) field: HierarchicalSpline<T>,
     pub(super) region: Region<T>,
     pub(super) layers: Layers,
+    pub(super) holding: Holding,
+    /// Constraints of the region.
+    pub(super) drawn: Drawn,
     pub(super) iso: f64,
     pub(super) radius: f64,
     pub(super) shape: Shape,
@@ -159,10 +163,11 @@ impl<T: Real> ForceStroke<T> {
             f64::INFINITY
         };
         let first: Vec<&Target> = targets.iter().filter(|t| t.begins <= gone).collect();
-        let layers = Layers::new();
+        let (layers, holding) = (Layers::new(), Holding::default());
         let ground = Ground {
             field,
             layers: &layers,
+            holding: &holding,
             radius,
             roam: 0.0,
         };
@@ -177,6 +182,8 @@ impl<T: Real> ForceStroke<T> {
             field: field.clone(),
             region,
             layers,
+            holding,
+            drawn: Drawn::default(),
             iso,
             radius,
             shape,
@@ -213,9 +220,27 @@ impl<T: Real> ForceStroke<T> {
     /// [`ForceError::Region`], [`ForceError::Step`].
     pub fn painted(mut self, layers: &Layers) -> Result<Self, ForceError> {
         self.layers = layers.clone();
+        self.cut_first()?;
+        Ok(self)
+    }
+
+    /// The same where some places are held. To be called before the first step.
+    ///
+    /// # Errors
+    /// [`ForceError::Region`], [`ForceError::Step`], [`ForceError::Tool`] for more constraints than can be solved for.
+    pub fn held(mut self, holding: &Holding) -> Result<Self, ForceError> {
+        if !holding.is_none() {
+            self.holding = holding.clone();
+            self.cut_first()?;
+            self.hold()?;
+        }
+        Ok(self)
+    }
+
+    fn cut_first(&mut self) -> Result<(), ForceError> {
         let first: Vec<&Target> = self.targets.iter().filter(|t| t.begins <= self.gone).collect();
         self.region = self.ground().cut(&first)?;
-        Ok(self)
+        Ok(())
     }
 
     /// Goes on with other paint.
@@ -227,6 +252,7 @@ impl<T: Real> ForceStroke<T> {
         let ground = Ground {
             field: &self.field,
             layers: &self.layers,
+            holding: &self.holding,
             radius: self.radius,
             roam: ROAM,
         };
@@ -239,9 +265,16 @@ impl<T: Real> ForceStroke<T> {
         Ground {
             field: &self.field,
             layers: &self.layers,
+            holding: &self.holding,
             radius: self.radius,
             roam: if self.hand.is_some() { ROAM } else { 0.0 },
         }
+    }
+
+    /// Makes the constraints ready for a region that was cut.
+    pub(super) fn hold(&mut self) -> Result<(), ForceError> {
+        self.drawn = self.holding.on(&self.field, &self.region, self.radius)?;
+        Ok(())
     }
 
     /// The region that moves.
@@ -312,7 +345,7 @@ impl<T: Real> ForceStroke<T> {
             let target = &self.targets[a.index];
             let length = target.path.length();
             let ahead = self.ahead(target, crossing);
-            if target.ends_early && ahead > 0.0 {
+            if target.ends_early && ahead > 0.0 || a.stiffness == 0.0 {
                 return true;
             }
             match (self.how.solid, a.before) {
@@ -406,6 +439,7 @@ impl<T: Real> ForceStroke<T> {
                 .chain(next)
                 .collect();
             self.region = self.ground().cut(&paths)?;
+            self.hold()?;
             self.count_cut();
         }
         self.report.steps += 1;

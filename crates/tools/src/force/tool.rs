@@ -2,7 +2,7 @@ use bspline::{HierarchicalSpline, Real};
 use fitting::Control;
 use glam::DVec3;
 
-use super::{Chisel, Drill, ForceError, ForceReport, ForceStroke, Pull};
+use super::{Chisel, Drill, ForceError, ForceReport, ForceStroke, Holding, Pull};
 use crate::paint::Layers;
 
 /// A force tool with all that it is told.
@@ -62,6 +62,7 @@ impl ForceTool<'_> {
         field: &HierarchicalSpline<T>,
         iso: f64,
         layers: &Layers,
+        holding: &Holding,
         at: DVec3,
     ) -> Result<ForceStroke<T>, ForceError> {
         let stroke = match self {
@@ -71,10 +72,11 @@ impl ForceTool<'_> {
             Self::Drill(tool) => tool.hold(field, iso, false, at),
             Self::Join(tool) => tool.hold(field, iso, true, at),
         };
-        stroke?.painted(layers)
+        stroke?.painted(layers)?.held(holding)
     }
 
-    /// What it leaves of the field with the matter that is painted on it, and what is left to say of it, in sentences.
+    /// What it leaves of the field with the matter that is painted on it and what is held, and what is left to say of it, in
+    /// sentences.
     ///
     /// # Errors
     /// Any [`ForceError`].
@@ -83,9 +85,10 @@ impl ForceTool<'_> {
         field: &HierarchicalSpline<T>,
         iso: f64,
         layers: &Layers,
+        holding: &Holding,
         control: &mut Control,
     ) -> Result<(HierarchicalSpline<T>, Vec<String>), ForceError> {
-        let mut stroke = self.begin(field, iso)?.painted(layers)?;
+        let mut stroke = self.begin(field, iso)?.painted(layers)?.held(holding)?;
         while !stroke.is_over() {
             control
                 .step("pulling", stroke.progress())

@@ -3,13 +3,14 @@ use glam::DVec3;
 
 use super::ForceError;
 use super::path::{Path, nearest_surface};
+use crate::curve::Along;
 
 /// Paths per radius of a tool, along a curve and across an area.
 pub const DENSITY: f64 = 2.0;
 /// Radii in which a place has to have the surface.
 const NEAR: f64 = 4.0;
 /// Radii that a free end of a curve, or the rim of an area, stands for beside its share.
-pub(super) const OPEN: f64 = 0.5;
+pub const OPEN: f64 = 0.5;
 /// Cosine of the turn from which on a curve has a corner.
 const CORNER: f64 = 0.9;
 /// Most paths of a tool.
@@ -56,48 +57,90 @@ pub fn within<T: Real>(field: &HierarchicalSpline<T>, p: DVec3) -> Result<(), Fo
     })
 }
 
-/// Places along a polyline, half a radius apart at most, each drawn to the surface; of a single point that one.
+/// Places along curves, half a radius apart at most, each drawn to the surface; of single points these.
 pub fn along<T: Real>(
     field: &HierarchicalSpline<T>,
     iso: f64,
-    points: &[DVec3],
+    along: &Along,
     radius: f64,
 ) -> Result<Vec<Place>, ForceError> {
-    let first = *points
-        .first()
-        .ok_or_else(|| ForceError::tool("along has no place; write at least one point"))?;
-    let place = |p: DVec3, weight, along| {
-        let (at, normal) = grabbed(field, iso, p, radius)?;
-        Ok(Place {
-            at,
-            normal,
-            weight,
-            along,
-        })
-    };
-    if points.iter().all(|p| *p == first) {
-        return Ok(vec![place(first, 1.0, 0.0)?]);
+    let lines = along.lines(&field.lattice().world_box());
+    let (mut places, mut gone) = (Vec::new(), 0.0);
+    for line in lines.map_err(ForceError::Tool)? {
+        let (stops, length) = stops(&line, radius)?;
+        few(places.len() as f64 + stops.len() as f64)?;
+        for stop in stops {
+            let (at, normal) = grabbed(field, iso, stop.at, radius)?;
+            places.push(Place {
+                at,
+                normal,
+                weight: stop.weight,
+                along: gone + stop.along,
+            });
+        }
+        gone += length;
     }
-    let path = Path::through(points.iter().copied())?;
+    Ok(places)
+}
+
+/// A place of a line, before it is drawn to the surface.
+pub struct Stop {
+    pub at: DVec3,
+    /// Length that it stands for.
+    pub weight: f64,
+    /// Arc length.
+    pub along: f64,
+}
+
+/// Places along a polyline, half a radius apart at most, and its length; one that ends where it begins is closed.
+pub fn stops(line: &[DVec3], radius: f64) -> Result<(Vec<Stop>, f64), ForceError> {
+    if line.iter().all(|p| *p == line[0]) {
+        let only = Stop {
+            at: line[0],
+            weight: 1.0,
+            along: 0.0,
+        };
+        return Ok((vec![only], 0.0));
+    }
+    let path = Path::through(line.iter().copied())?;
+    let length = path.length();
+    let is_closed = line.len() > 3 && line[0] == line[line.len() - 1];
     // Corners get places of their own.
-    let ends: Vec<f64> = path.corners(CORNER).collect();
-    let mut stops = vec![0.0];
-    for (from, to) in std::iter::once(0.0)
-        .chain(ends.iter().copied())
-        .zip(ends.iter().copied().chain([path.length()]))
-    {
+    let corners: Vec<(f64, f64)> = path.corners(CORNER).collect();
+    let mut stops = vec![(0.0, 1.0)];
+    let mut from = 0.0;
+    let end = if is_closed {
+        path.direction(0.0).dot(path.direction(length))
+    } else {
+        1.0
+    };
+    for (to, turn) in corners.into_iter().chain([(length, end)]) {
         let count = (DENSITY * (to - from) / radius).ceil();
         few(stops.len() as f64 + count)?;
-        stops.extend((1..=count as usize).map(|i| from + (to - from) * i as f64 / count));
+        stops.extend((1..=count as usize).map(|i| (from + (to - from) * i as f64 / count, 1.0)));
+        let last = stops.len() - 1;
+        stops[last].1 = turn;
+        from = to;
     }
+    stops[0].1 = end;
+    let (stops, turns): (Vec<f64>, Vec<f64>) = stops.into_iter().unzip();
     let last = stops.len() - 1;
-    (0..=last)
-        .map(|i| {
-            let width = 0.5 * (stops[(i + 1).min(last)] - stops[i.saturating_sub(1)]);
-            let open = if i == 0 || i == last { OPEN * radius } else { 0.0 };
-            place(path.at(stops[i]), width + open, stops[i])
-        })
-        .collect()
+    let stop = |i: usize| {
+        let width = 0.5 * (stops[(i + 1).min(last)] - stops[i.saturating_sub(1)]);
+        let beside = match (is_closed, i) {
+            (true, 0) => 0.5 * (stops[last] - stops[last - 1]),
+            (false, i) if i == 0 || i == last => OPEN * radius,
+            _ => 0.0,
+        };
+        Stop {
+            at: path.at(stops[i]),
+            // One that turns back on itself is two ends.
+            weight: width + beside + OPEN * radius * (1.0 - turns[i]),
+            along: stops[i],
+        }
+    };
+    let count = if is_closed { last } else { last + 1 };
+    Ok(((0..count).map(stop).collect(), length))
 }
 
 /// Places on rings about the middle of a disc that touches the surface, the last on its rim, each drawn to the surface.
@@ -142,7 +185,7 @@ pub fn disc<T: Real>(
     Ok(places)
 }
 
-fn few(count: f64) -> Result<(), ForceError> {
+pub fn few(count: f64) -> Result<(), ForceError> {
     match count <= MOST {
         true => Ok(()),
         false => Err(ForceError::tool(format!(

@@ -210,6 +210,7 @@ fn strokes_that_make_no_sense_say_why() {
 #[test]
 fn a_move_carries_what_is_painted() {
     let canvas = crate::tool::Canvas {
+        holds: Vec::new(),
         field: ball(40),
         iso: 0.0,
         detail: 0,

@@ -52,10 +52,22 @@ impl Formula {
     /// # Errors
     /// What is wrong with it, and what may stand in one.
     pub fn parse(text: &str) -> Result<Self, String> {
+        Self::parse_of(&["x", "y", "z", "d"], "x, y, z, d (density)", text)
+    }
+
+    /// Reads a formula of one number `t`; [`at_parameter`](Self::at_parameter) tells its values.
+    ///
+    /// # Errors
+    /// What is wrong with it, and what may stand in one.
+    pub fn parse_parameter(text: &str) -> Result<Self, String> {
+        Self::parse_of(&["t"], "t", text)
+    }
+
+    fn parse_of(names: &'static [&'static str], told: &str, text: &str) -> Result<Self, String> {
         let wrong = |why: String, rest: &str| {
             let at = text[..text.len() - rest.len()].chars().count() + 1;
             format!(
-                "the formula {text:?} cannot be read at character {at}: {why}; it may hold numbers, x, y, z, d (density), PI, + - * / ^ < > \
+                "the formula {text:?} cannot be read at character {at}: {why}; it may hold numbers, {told}, PI, + - * / ^ < > \
                  ( ), min(a, b), max(a, b), abs, sqrt, exp, ln, sin, cos"
             )
         };
@@ -67,6 +79,7 @@ impl Formula {
         }
         let mut parser = Parser {
             rest: text.trim_start(),
+            names,
         };
         let root = parser.comparison(0).map_err(|why| wrong(why, parser.rest))?;
         if !parser.rest.is_empty() {
@@ -89,6 +102,21 @@ impl Formula {
     /// Whether the density is in it.
     pub fn reads_density(&self) -> bool {
         self.root.reads(3)
+    }
+
+    /// The value at `t` of one that was read as a formula of `t`.
+    ///
+    /// # Errors
+    /// If the value is not finite.
+    pub fn at_parameter(&self, t: f64) -> Result<f64, String> {
+        let value = self.root.value(&[t, 0.0, 0.0, 0.0]);
+        match value.is_finite() {
+            true => Ok(value),
+            false => Err(format!(
+                "the formula {:?} is {value} at t = {t}; it has to be finite from end to end",
+                self.text
+            )),
+        }
     }
 
     /// Its value where the field has the density `d`.
@@ -136,6 +164,8 @@ impl Node {
 struct Parser<'a> {
     /// What is not read yet, without blanks in front.
     rest: &'a str,
+    /// Its variables.
+    names: &'static [&'static str],
 }
 
 impl Parser<'_> {
@@ -231,7 +261,7 @@ impl Parser<'_> {
             });
         }
         let before = std::mem::replace(&mut self.rest, rest.trim_start());
-        if let Some(i) = ["x", "y", "z", "d"].iter().position(|n| *n == name) {
+        if let Some(i) = self.names.iter().position(|n| *n == name) {
             return Ok(Node::Variable(i));
         }
         if name == "PI" {

@@ -132,7 +132,8 @@ impl Number for Interval {
         match f {
             Unary::Negate => -a,
             Unary::Abs => a.abs(),
-            Unary::Sqrt if a.lo >= 0.0 => a.sqrt(),
+            // Sums of squares may come out below 0 by a rounding.
+            Unary::Sqrt if a.lo >= -f64::MIN_POSITIVE => Self::new(a.lo.max(0.0), a.hi.max(0.0)).sqrt(),
             Unary::Exp => rising(libm::exp),
             Unary::Ln if a.lo > 0.0 => rising(libm::log),
             // Not a number somewhere.
@@ -194,7 +195,10 @@ fn power(a: Interval, b: Interval) -> Interval {
         return Interval::EVERYTHING;
     }
     match n % 2.0 == 0.0 {
-        true => corners(a.abs(), b),
+        true => {
+            let found = corners(a.abs(), b);
+            Interval::new(found.lo.max(0.0), found.hi)
+        }
         false => corners(a, b),
     }
 }

@@ -43,6 +43,7 @@ fn stroke(text: &str) -> Stroke {
 /// A canvas with nothing beside it.
 fn canvas(field: &HierarchicalSpline<f32>) -> Canvas {
     Canvas {
+        holds: Vec::new(),
         field: field.clone(),
         iso: ISO,
         // Of the block itself.

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use ::tools::curve::Along;
 use ::tools::force::{Chisel, ForceStroke, Pull, nearest_surface};
 use ::tools::number::{Finite, Point, Positive};
 use ::tools::paint::{Layers, Paint, Substance};
@@ -58,7 +59,7 @@ impl Kind {
         let (drag, r) = (1.6 * radius, Positive(radius));
         if self == Self::Track {
             let chisel = Chisel {
-                along: walk(16.0)?,
+                along: Along::Points(walk(16.0)?),
                 depth: Positive(0.8 * radius),
                 radius: r,
                 how: Default::default(),
@@ -66,10 +67,11 @@ impl Kind {
             return Ok(chisel.begin(field, iso, true)?);
         }
         let pull = Pull {
-            along: match self {
+            along: Along::Points(match self {
                 Self::Curve => walk(6.0)?,
                 _ => vec![Point(at)],
-            },
+            }),
+            area: None,
             disc: (self == Self::Area).then_some(Positive(2.0 * radius)),
             by: None,
             way: None,

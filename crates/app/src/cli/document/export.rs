@@ -1,12 +1,12 @@
 use std::path::{Path, PathBuf};
 
-use formats::Kind;
 use formats::volumes::VolumeFormat;
+use formats::{Kind, PointFormat};
 
 use super::like::Like;
 use super::{chosen, edited_meta, open};
 use crate::cli::cost::Cost;
-use crate::cli::failure::Outcome;
+use crate::cli::failure::{Failure, Outcome};
 use crate::cli::output::Output;
 use crate::cli::quantity::finite;
 use crate::cli::source::{SAMPLES, Source};
@@ -77,7 +77,18 @@ fn scan_with_edits(args: &Args, scan: &Path, cost: &Cost) -> Outcome {
     let formats: &[&str] = match kind {
         Kind::Volume(VolumeFormat::Dicom) => &[],
         Kind::Volume(_) => &["nii", "nii.gz"],
-        _ => &["ply", "xyz", "txt", "csv"],
+        Kind::Cloud(PointFormat::Ply) => &["ply"],
+        Kind::Cloud(PointFormat::Pcd) => &["pcd"],
+        Kind::Cloud(PointFormat::Las) => &["las", "laz"],
+        Kind::Cloud(PointFormat::Obj) => &["obj"],
+        Kind::Cloud(PointFormat::E57) => &["e57"],
+        Kind::Mesh(_) => {
+            return Err(Failure::usage(format!(
+                "{}: volumes and clouds are written back, and this is a mesh; mesh the object, or export its field",
+                source.name()
+            )));
+        }
+        _ => &["xyz", "xyzn", "txt", "csv", "asc", "pts"],
     };
     let output = match formats {
         [] => None,
