@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 use bspline::hierarchical::{HierarchicalSpline, Lattice};
 use bspline::AnyField;
 use document::{Command, CommandError, Object, State};
-use fitting::{Cancel, Control};
+use fitting::{Cancel, Control, Progress};
 use formats::field::FieldMeta;
 use glam::{DAffine3, DVec3};
 use libfuzzer_sys::fuzz_target;
@@ -55,7 +55,7 @@ fuzz_target!(|bytes: &[u8]| {
         let Some(command) = bounded(command) else { continue };
         let cancel = Cancel::new();
         let (stop, mut steps) = (cancel.clone(), 0);
-        let on_progress = Box::new(move |_| {
+        let on_progress = Box::new(move |_: Progress| {
             steps += 1;
             if steps > PATIENCE {
                 stop.cancel();
