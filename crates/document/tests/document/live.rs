@@ -56,13 +56,18 @@ fn wandering(seed: u64, z: f64, count: usize) -> Vec<Pose> {
         .collect()
 }
 
+/// A block with something for moves and smoothing to do.
+fn rippled() -> State {
+    state_of(|p| 12.0 - p.z + 0.2 * (1.7 * p.x).sin() * (1.3 * p.y).cos())
+}
+
 #[test]
 fn strokes_by_hand_and_their_scripts_leave_the_same() {
     let shape = "along = [], shape = { sphere = { radius = 0.9 } }, tolerance = 0.02";
     let bar = "along = [], shape = { box = { size = [1.6, 1.0, 1.2] } }, tolerance = 0.05";
     let tools = [
         "pull = { along = [[9, 10, 12]], radius = 1.2 }".to_string(),
-        "pull = { along = [[9, 10, 12]], disc = 1.5, radius = 1.2 }\nwithin = { min = [1, 1, 1], max = [23, 11, 23] }".into(),
+        "pull = { along = [[9, 10, 12]], disc = 1.5, radius = 1.2 }\nwithin = { min = [1, 1, 1], max = [23, 19, 23] }".into(),
         "chisel = { along = [], depth = 0.5, radius = 0.8 }".into(),
         "squirt = { along = [], depth = 0.5, radius = 0.8 }\nsymmetry = { at = [12, 12, 12], normal = [0, 1, 0] }".into(),
         format!("carve = {{ {shape} }}"),
@@ -74,8 +79,7 @@ fn strokes_by_hand_and_their_scripts_leave_the_same() {
     ];
     for (n, text) in tools.iter().enumerate() {
         let directory = tempdir().unwrap();
-        // Something for smoothing to do.
-        let first = state_of(|p| 12.0 - p.z + 0.2 * (1.7 * p.x).sin() * (1.3 * p.y).cos());
+        let first = rippled();
         let mut document = document(directory.path(), &first);
         let mut poses = wandering(n as u64, 12.2, 8);
         for (n, pose) in poses.iter_mut().enumerate() {
@@ -120,7 +124,7 @@ fn what_a_hand_was_refused_is_not_in_its_script() {
         ("move = { motion = { grab = { along = [], radius = 4 } } }", false),
     ] {
         let directory = tempdir().unwrap();
-        let mut document = document(directory.path(), &block());
+        let mut document = document(directory.path(), &rippled());
         let mut live = begun(document.state(), text);
         let far = Pose::at(DVec3::new(12.0, 12.0, if is_force { f64::NAN } else { 40.0 }));
         assert!(!is_force || live.step(far, control).is_err(), "{text}");
@@ -136,7 +140,8 @@ fn what_a_hand_was_refused_is_not_in_its_script() {
             };
             assert!(live.step(leap, control).is_err(), "{text}");
         }
-        assert!(live.end(&mut document, control).unwrap().0);
+        let (is_edit, notes) = live.end(&mut document, control).unwrap();
+        assert!(is_edit, "{text}: {notes:?}");
         assert_eq!(
             again(&mut document, 2).sha256(),
             document.state().sha256(),
