@@ -9,6 +9,7 @@ pub mod force;
 mod formula_solid;
 pub mod geometric;
 pub mod hold;
+mod interior;
 pub mod limits;
 pub mod live;
 pub mod mix;

@@ -7,10 +7,12 @@ use std::sync::Arc;
 
 use bspline::primitives::Cuboid;
 use bspline::{Aabb, Csg, Field, HierarchicalSpline, Real};
+use glam::DAffine3;
 use serde::{Deserialize, Serialize};
 
 use crate::coefficients::{changed, coefficient, support, with_functions};
 use crate::formula_solid::FormulaSolid;
+use crate::interior::Interior;
 use crate::mix::{Faded, Mixed};
 use crate::number::{Point, Positive};
 use crate::others::Others;
@@ -53,6 +55,10 @@ pub struct Limits {
     region: Option<(Aabb, Cuboid)>,
     mask: Option<Arc<dyn Field>>,
     weight: Option<Faded>,
+    /// What lies deep enough below the outer surface.
+    interior: Option<Arc<Interior>>,
+    /// Where a stroke happens on the other side too.
+    mirror: Option<DAffine3>,
     /// Finest level that may change.
     finest: Option<usize>,
     /// Level that the object is shaped to.
@@ -123,8 +129,34 @@ impl Limits {
             region,
             mask: Some(named),
             weight,
-            finest: None,
-            detail: None,
+            ..Self::default()
+        })
+    }
+
+    /// Without what lies within `wall` of the outer surface of `field`; of a stroke on both sides of a mirror, of what
+    /// lies there on either of them. The wall of a closed cavity is no outer surface.
+    ///
+    /// # Errors
+    /// A sentence, where nothing is left.
+    pub fn below<T: Real>(
+        self,
+        field: &HierarchicalSpline<T>,
+        iso: f64,
+        wall: f64,
+        mirror: Option<DAffine3>,
+    ) -> Result<Self, String> {
+        let interior = Interior::new(field, iso, wall);
+        let deepest = interior.deepest();
+        if deepest <= wall {
+            return Err(format!(
+                "no place of the solid lies deeper than {deepest:.4} below its outer surface, so a wall of {wall} leaves nothing to \
+                 work on; make it thinner"
+            ));
+        }
+        Ok(Self {
+            interior: Some(Arc::new(interior)),
+            mirror,
+            ..self
         })
     }
 
@@ -156,7 +188,7 @@ impl Limits {
 
     /// Whether all is free.
     pub fn is_none(&self) -> bool {
-        self.region.is_none() && self.mask.is_none()
+        self.region.is_none() && self.mask.is_none() && self.interior.is_none()
     }
 
     /// Whether the mask fades.
@@ -178,7 +210,23 @@ impl Limits {
             .region
             .iter()
             .all(|(_, solid)| solid.bounds(support).lo > 0.0);
-        region && self.mask.iter().all(|mask| mask.bounds(support).lo > 0.0)
+        let is_deep =
+            |interior: &Arc<Interior>| self.each_side(support).all(|b| interior.bounds(&b).lo > 0.0);
+        region
+            && self.mask.iter().all(|mask| mask.bounds(support).lo > 0.0)
+            && self.interior.iter().all(is_deep)
+    }
+
+    /// The same for functions that may not be active yet: of the outer surface no bit is to change.
+    pub fn may_change(&self, support: &Aabb) -> bool {
+        let may = |interior: &Arc<Interior>| self.each_side(support).all(|b| interior.may_change(&b));
+        self.is_free(support) && self.interior.iter().all(may)
+    }
+
+    /// A box, and where it is on the other side.
+    fn each_side(&self, b: &Aabb) -> impl Iterator<Item = Aabb> {
+        let other = self.mirror.map(|mirror| b.transformed(&mirror));
+        std::iter::once(*b).chain(other)
     }
 
     /// What a tool makes of `field`, where the mask fades.
@@ -211,7 +259,7 @@ impl Limits {
                     [coefficient(old, *level, *function), *value].map(|c| c.unwrap_or(T::zero()));
                 *value = Some(from + T::from_f64(weight.value(knot)) * (to - from));
             }
-            self.is_free(&support)
+            self.may_change(&support)
         });
         with_functions(old, &functions).expect("functions of the lattice")
     }

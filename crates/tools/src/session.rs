@@ -5,12 +5,13 @@ use fitting::Control;
 use serde::{Deserialize, Serialize};
 
 use crate::face::Face;
-use crate::force::{Chisel, Drill, ForceError, ForceTool, Pull};
+use crate::force::{Bend, Chisel, Drill, Extrude, ForceError, ForceTool, Pull};
 use crate::geometric::{
-    Copy, Cut, Geometric, GeometricError, Inflate, Move, Paste, Refine, Simplify, Smooth,
+    Copy, Cut, Geometric, GeometricError, Inflate, Move, Paste, Refine, Simplify, Smooth, Sweep, reflection,
 };
 use crate::hold::{Free, Hold};
 use crate::limits::{Limits, Mask, Region};
+use crate::number::Positive;
 use crate::paint::Paint;
 use crate::symmetry::Symmetry;
 use crate::tool::{Canvas, Tool, ToolError};
@@ -49,6 +50,9 @@ pub struct Stroke {
     /// Adds a solid.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub add: Option<Geometric>,
+    /// Carries a solid along a curve.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sweep: Option<Sweep>,
     /// Brings the surface elsewhere.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pull: Option<Pull>,
@@ -64,6 +68,12 @@ pub struct Stroke {
     /// Makes a bridge or a seam.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub join: Option<Drill>,
+    /// Draws an area out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub extrude: Option<Extrude>,
+    /// Bends by forces.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bend: Option<Bend>,
     /// Carries along.
     #[serde(default, rename = "move", skip_serializing_if = "Option::is_none")]
     pub motion: Option<Move>,
@@ -107,6 +117,9 @@ pub struct Stroke {
     /// What may change.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mask: Option<Mask>,
+    /// Thickness of the shell below the outer surface that stays as it is, to the bit: a world length.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wall: Option<Positive>,
     /// Paints matter or touch.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub paint: Option<Paint>,
@@ -127,6 +140,7 @@ impl Stroke {
         let all = [
             self.carve.as_ref().map(Tool::Carve),
             self.add.as_ref().map(Tool::Add),
+            self.sweep.as_ref().map(Tool::Sweep),
             self.pull.as_ref().map(|tool| Tool::Force(ForceTool::Pull(tool))),
             self.chisel
                 .as_ref()
@@ -138,6 +152,8 @@ impl Stroke {
                 .as_ref()
                 .map(|tool| Tool::Force(ForceTool::Drill(tool))),
             self.join.as_ref().map(|tool| Tool::Force(ForceTool::Join(tool))),
+            self.extrude.as_ref().map(Tool::Extrude),
+            self.bend.as_ref().map(Tool::Bend),
             self.motion.as_ref().map(Tool::Move),
             self.smooth.as_ref().map(Tool::Smooth),
             self.inflate.as_ref().map(Tool::Inflate),
@@ -208,7 +224,12 @@ impl Stroke {
     pub(crate) fn prepared(&self, canvas: &Canvas) -> Result<(Canvas, Limits), ToolError> {
         let whole = canvas.field.lattice().world_box();
         let limits = Limits::new(self.within.as_ref(), self.mask.as_ref(), &canvas.others, &whole);
-        let limits = limits.map_err(ToolError::Stroke)?.at_detail(canvas.detail);
+        let mut limits = limits.map_err(ToolError::Stroke)?.at_detail(canvas.detail);
+        if let Some(wall) = self.wall {
+            let mirror = self.symmetry.map(|plane| reflection(plane.at.0, plane.normal.0));
+            let below = limits.below(&canvas.field, canvas.iso, wall.0, mirror.transpose()?);
+            limits = below.map_err(ToolError::Stroke)?;
+        }
         let Some(level) = self.coarse else {
             return Ok((canvas.clone(), limits));
         };
@@ -265,7 +286,7 @@ impl Stroke {
             let why = format!("{paints} knows no symmetry; write a stroke for each side");
             return Err(ToolError::Stroke(why));
         }
-        if matches!(tool, Tool::Force(_)) && !canvas.holds.is_empty() {
+        if matches!(tool, Tool::Force(_) | Tool::Extrude(_) | Tool::Bend(_)) && !canvas.holds.is_empty() {
             let why = "holds are on one side only; write a stroke for each side, or free them first";
             return Err(ToolError::Stroke(why.into()));
         }

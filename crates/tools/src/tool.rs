@@ -4,9 +4,9 @@ use bspline::{Aabb, HierarchicalSpline};
 use fitting::field::FieldFitReport;
 use fitting::{Control, FitError};
 
-use crate::force::{ForceError, ForceTool, Holding};
+use crate::force::{Bend, Extrude, ForceError, ForceTool, Holding};
 use crate::geometric::{
-    Copy, Cut, Geometric, GeometricError, Inflate, Move, Operation, Paste, Refine, Simplify, Smooth,
+    Copy, Cut, Geometric, GeometricError, Inflate, Move, Operation, Paste, Refine, Simplify, Smooth, Sweep,
 };
 use crate::hold::{Free, Held, Hold};
 use crate::limits::Limits;
@@ -50,8 +50,14 @@ pub enum Tool<'a> {
     Carve(&'a Geometric),
     /// Adds a solid.
     Add(&'a Geometric),
+    /// Carries a solid along a curve.
+    Sweep(&'a Sweep),
     /// Pushes or pulls.
     Force(ForceTool<'a>),
+    /// Draws an area out.
+    Extrude(&'a Extrude),
+    /// Bends by forces.
+    Bend(&'a Bend),
     /// Carries along.
     Move(&'a Move),
     /// Evens out.
@@ -106,11 +112,11 @@ impl ToolError {
 
 impl Tool<'_> {
     /// Names of all tools, as sessions write them.
-    pub const NAMES: [&'static str; 18] = {
+    pub const NAMES: [&'static str; 21] = {
         let [pull, chisel, squirt, drill, join] = ForceTool::NAMES;
         [
-            "carve", "add", pull, chisel, squirt, drill, join, "move", "smooth", "inflate", "copy", "cut",
-            "paste", "refine", "simplify", "paint", "hold", "free",
+            "carve", "add", "sweep", pull, chisel, squirt, drill, join, "extrude", "bend", "move", "smooth",
+            "inflate", "copy", "cut", "paste", "refine", "simplify", "paint", "hold", "free",
         ]
     };
 
@@ -119,7 +125,10 @@ impl Tool<'_> {
         match self {
             Self::Carve(_) => "carve",
             Self::Add(_) => "add",
+            Self::Sweep(_) => "sweep",
             Self::Force(tool) => tool.name(),
+            Self::Extrude(_) => "extrude",
+            Self::Bend(_) => "bend",
             Self::Move(_) => "move",
             Self::Smooth(_) => "smooth",
             Self::Inflate(_) => "inflate",
@@ -174,6 +183,18 @@ impl Tool<'_> {
                 let field = limits.kept(old, &field);
                 return Ok((Canvas { field, ..canvas }, told));
             }
+            Self::Extrude(tool) => {
+                let holding = canvas.holding(limits);
+                let (field, told) = tool.apply(old, *iso, &canvas.layers, &holding, control)?;
+                let field = limits.kept(old, &field);
+                return Ok((Canvas { field, ..canvas }, told));
+            }
+            Self::Bend(tool) => {
+                let holding = canvas.holding(limits);
+                let (field, told) = tool.apply(old, *iso, &canvas.layers, &holding, control)?;
+                let field = limits.kept(old, &field);
+                return Ok((Canvas { field, ..canvas }, told));
+            }
             Self::Hold(hold) => {
                 let holds = hold.joined(old, *iso, &canvas.holds).map_err(ToolError::Stroke)?;
                 return Ok((Canvas { holds, ..canvas }, Vec::new()));
@@ -190,6 +211,7 @@ impl Tool<'_> {
             Self::Simplify(tool) => (tool.apply(old, limits)?, FieldFitReport::default()),
             Self::Carve(tool) => tool.apply(Operation::Carve, old, *iso, others, limits, control)?,
             Self::Add(tool) => tool.apply(Operation::Add, old, *iso, others, limits, control)?,
+            Self::Sweep(tool) => tool.apply(old, *iso, limits, control)?,
             Self::Smooth(tool) => tool.apply(old, *iso, limits, control)?,
             Self::Inflate(tool) => tool.apply(old, *iso, limits, control)?,
             Self::Cut(tool) => {

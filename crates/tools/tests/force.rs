@@ -4,6 +4,8 @@
 mod areas;
 #[path = "force/holds.rs"]
 mod holds;
+#[path = "force/shapes.rs"]
+mod shapes;
 
 use bspline::hierarchical::{HierarchicalSpline, Lattice};
 use bspline::polygonize::{PolygonizeOptions, check_mesh, polygonize};

@@ -27,7 +27,9 @@ impl Journey {
             let Command::Stroke { object, stroke } = command else {
                 continue;
             };
-            let motion = stroke.motion.as_ref().filter(|_| object == name);
+            // What moves below a wall takes nothing of the scan's surface along, and the wall is known no more.
+            let is_ours = object == name && stroke.wall.is_none();
+            let motion = stroke.motion.as_ref().filter(|_| is_ours);
             let Some(origin) = motion.and_then(|m| m.motion.origin(within).ok()) else {
                 continue;
             };

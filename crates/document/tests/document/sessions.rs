@@ -46,9 +46,15 @@ chisel = { along = [[6, 6, 13.6], [6.1, 6, 13.6], [9, 6, 13.6]], depth = 0.3, ra
 [[stroke]]
 paced = true
 pull = { along = [[8, 12, 14.5]], way = [[0, 0, 0.2], [0.2, 0, 0.9], [0.5, 0, 1.4]], radius = 1.2 }
+[[stroke]]
+extrude = { area = [[4, 12, 13.6], [9, 12, 13.6], [9, 17, 13.6], [4, 17, 13.6]], by = [0, 0, 1], radius = 1.2 }
+[[stroke]]
+bend = { at = [12, 12, 12], axis = [0, -1, 0], direction = [1, 0, 0], angle = 4, length = 6, radius = 1.2, region = { min = [8, 9, 10], max = [18, 15, 16] } }
+[[stroke]]
+sweep = { operation = "carve", shape = { box = { size = [1, 1, 1] } }, along = { spline = { through = [[6, 6, 12], [12, 8, 12.2], [18, 6, 12]] } }, follow = true }
 "#;
     let commands = commands(script).unwrap();
-    assert_eq!(commands.len(), 10);
+    assert_eq!(commands.len(), 13);
     for command in &commands {
         let (next, _) = command
             .apply(document.state(), &mut Control::default())
@@ -247,6 +253,67 @@ const REFUSED: &[(&str, &[&str])] = &[
     (
         "paced = true\nchisel = { along = [[1, 1, 12], [23, 23, 12]], depth = 0.1, radius = 0.001 }",
         &["smaller box"],
+    ),
+    // Curves, outlines and walls.
+    (
+        "sweep = { operation = 'add', along = [[12, 12, nan]], shape = { sphere = { radius = 1 } } }",
+        &["line 2", "finite"],
+    ),
+    (
+        "sweep = { operation = 'cut', along = [[12, 12, 12]], shape = { sphere = { radius = 1 } } }",
+        &["line 2", "`carve` or `add`"],
+    ),
+    (
+        "sweep = { operation = 'add', along = [[12, 12, 99]], shape = { sphere = { radius = 1 } } }",
+        &["reaches from"],
+    ),
+    (
+        "sweep = { operation = 'add', along = [[12, 12, 12], [14, 12, 12]], shape = { object = { name = 'clay' } } }",
+        &["does not sweep"],
+    ),
+    (
+        "sweep = { operation = 'add', along = { formulas = { x = 't', y = '1/t', z = '0', from = 0, to = 1 } }, shape = { sphere = { radius = 1 } } }",
+        &["finite"],
+    ),
+    (
+        "paced = true\nsweep = { operation = 'add', along = [[12, 12, 12]], shape = { sphere = { radius = 1 } } }",
+        &["sweep goes nowhere by hand"],
+    ),
+    (
+        "extrude = { area = [[9, 9, 12], [15, 9, 12], [15, 15, 12]], by = [0, 0, 0], radius = 1 }",
+        &["no length"],
+    ),
+    (
+        "extrude = { area = [[9, 9, 12], [15, 9, 12], [15, 15, 12]], by = [0, 0, 2], radius = 3 }",
+        &["radii across"],
+    ),
+    (
+        "extrude = { area = [[9, 9, 12], [15, 9, 12], [15, 15, 12]], by = [0, 0, 1e9], radius = 1 }",
+        &["stay within"],
+    ),
+    (
+        "extrude = { area = [[9, 9, 12], [15, 9, 12]], by = [0, 0, 2], radius = 1 }",
+        &["encloses nothing"],
+    ),
+    (
+        "bend = { at = [12, 12, 12], axis = [1, 0, 0], direction = [1, 0, 0], angle = 9, length = 3, radius = 1 }",
+        &["same way"],
+    ),
+    (
+        "bend = { at = [12, 12, 12], axis = [0, 1, 0], direction = [1, 0, 0], angle = 9, length = 3, radius = 0 }",
+        &["line 2", "above 0"],
+    ),
+    (
+        "during = [{ step = 1, paint = { layer = 'mass', formula = '2' } }]\nbend = { at = [12, 12, 12], axis = [0, 1, 0], direction = [1, 0, 0], angle = 9, length = 3, radius = 1 }",
+        &["takes no time"],
+    ),
+    (
+        "wall = 0\ncarve = { along = [[12, 12, 9]], shape = { sphere = { radius = 1 } } }",
+        &["line 2", "above 0"],
+    ),
+    (
+        "wall = 40\ncarve = { along = [[12, 12, 9]], shape = { sphere = { radius = 1 } } }",
+        &["make it thinner"],
     ),
     // Formulas.
     (

@@ -10,8 +10,10 @@
 //! over it, a step solves `(J̃ᵀH⁻¹J + diag(s))ΔT = e − J̃ᵀy − sT` ([`system`]), `y` what the step does with the forces at hand.
 
 mod area;
+mod bend;
 mod chisel;
 mod drill;
+mod extrude;
 mod filter;
 mod ground;
 mod hand;
@@ -27,10 +29,13 @@ mod stroke;
 mod system;
 mod target;
 mod tool;
+mod toward;
 mod track;
 
+pub use bend::Bend;
 pub use chisel::Chisel;
 pub use drill::Drill;
+pub use extrude::Extrude;
 pub use filter::Filter;
 pub use holding::Holding;
 pub use path::{Path, first_crossing, nearest_surface};

@@ -91,7 +91,7 @@ impl Refine {
             for y in y..y + ny {
                 for z in z..z + nz {
                     let (knot, support) = support(field, level, [x, y, z]);
-                    if weight.value(knot) > 0.0 && limits.is_free(&support) {
+                    if weight.value(knot) > 0.0 && limits.may_change(&support) {
                         edits.push(BlockEdit {
                             level,
                             first: [x, y, z],
@@ -142,7 +142,7 @@ pub(super) fn simplified<T: Real>(
                 let function = std::array::from_fn(|a| key.0[a] * BRICK as u32 + at[a] as u32);
                 let (_, b) = support(field, level, function);
                 let is_within = b.min.cmpge(within.min).all() && b.max.cmple(within.max).all();
-                if is_within && limits.is_free(&b) {
+                if is_within && limits.may_change(&b) {
                     gone.insert((level, function), None);
                 }
             }

@@ -6,18 +6,20 @@
 
 mod band;
 mod block;
+mod chain;
 mod detail;
 mod motion;
 mod paste;
 mod shape;
 mod smooth;
+mod sweep;
 mod swept;
 mod write;
 
 use std::sync::Arc;
 
 use bspline::csg::Rounding;
-use bspline::{Csg, Field, HierarchicalSpline, Real};
+use bspline::{Aabb, Csg, Field, HierarchicalSpline, Real};
 use fitting::field::FieldFitReport;
 use fitting::{Control, FitError};
 use glam::{DQuat, DVec3};
@@ -29,6 +31,7 @@ pub use motion::{Motion, Move, Origin, reflection};
 pub use paste::{Copy, Cut, Paste};
 pub use shape::Shape;
 pub use smooth::{Inflate, Smooth};
+pub use sweep::Sweep;
 use swept::Pose;
 use write::{Fineness, TOLERANCE, Writer};
 
@@ -39,7 +42,8 @@ use crate::others::Others;
 use crate::warp::WarpError;
 
 /// What a geometric tool does.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Operation {
     /// Takes the tool out of the solid.
     Carve,
@@ -154,22 +158,55 @@ impl Geometric {
     ) -> Result<(HierarchicalSpline<T>, FieldFitReport), GeometricError> {
         let poses = self.poses().map_err(GeometricError::Shape)?;
         let solids = self.shape.solids(&poses, self.each, others);
-        let (solids, mut reach) = solids.map_err(GeometricError::Shape)?;
-        reach.min -= self.blend.0;
-        reach.max += self.blend.0;
-        let writer = Writer { field, iso, limits };
+        let (solids, reach) = solids.map_err(GeometricError::Shape)?;
+        let fineness = Fineness {
+            tolerance: self.tolerance,
+            finer: self.finer,
+            feature: Some(self.shape.feature()),
+        };
+        let combined = Combined {
+            operation,
+            solids,
+            reach,
+            blend: self.blend.0,
+        };
+        combined.written(&Writer { field, iso, limits }, &fineness, control)
+    }
+}
+
+/// Solids that are carved from a field or added to it.
+struct Combined {
+    operation: Operation,
+    /// Distances, positive inside.
+    solids: Vec<Arc<dyn Field>>,
+    /// A box about them.
+    reach: Aabb,
+    /// Width of the rounded crease.
+    blend: f64,
+}
+
+impl Combined {
+    fn written<T: Real>(
+        self,
+        writer: &Writer<T>,
+        fineness: &Fineness,
+        control: &mut Control,
+    ) -> Result<(HierarchicalSpline<T>, FieldFitReport), GeometricError> {
+        let Writer { field, iso, .. } = *writer;
+        let reach = Aabb::new(self.reach.min - self.blend, self.reach.max + self.blend);
         let within = writer.within(&reach)?;
         let slope = field.slope();
         let solid: Arc<dyn Field> = Arc::new(field.clone());
-        let tools: Result<Vec<Arc<dyn Field>>, _> = solids
+        let tools: Result<Vec<Arc<dyn Field>>, _> = self
+            .solids
             .into_iter()
             .map(|tool| Csg::sum(vec![(slope, tool)], iso).map(|tool| Arc::new(tool) as Arc<dyn Field>))
             .collect();
         let tools = tools.map_err(GeometricError::shape)?;
         let rounding = Rounding::Bounded {
-            range: self.blend.0 * slope,
+            range: self.blend * slope,
         };
-        let target: Arc<dyn Field> = match (operation, self.blend.0 > 0.0) {
+        let target: Arc<dyn Field> = match (self.operation, self.blend > 0.0) {
             (Operation::Carve, false) => {
                 Arc::new(Csg::difference(solid, tools, iso).map_err(GeometricError::shape)?)
             }
@@ -184,12 +221,7 @@ impl Geometric {
                 }
             }
         };
-        let fineness = Fineness {
-            tolerance: self.tolerance,
-            finer: self.finer,
-            feature: Some(self.shape.feature()),
-        };
-        writer.written(&*target, &within, &fineness, control)
+        writer.written(&*target, &within, fineness, control)
     }
 }
 

@@ -5,7 +5,8 @@ use bspline::{Aabb, Csg, Field};
 use glam::{DAffine3, DQuat, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
-use super::swept::{Pose, Swept};
+use super::chain::Leg;
+use super::swept::{Pose, Search, Swept};
 use crate::formula_solid::FormulaSolid;
 use crate::number::{Point, Positive};
 use crate::others::Others;
@@ -112,14 +113,7 @@ impl Shape {
             }
         } else {
             for leg in legs {
-                solids.push(match self {
-                    // However it is turned, a ball is a ball.
-                    Self::Sphere { .. } if leg[0].at == leg[1].at => placed(&solid, &leg[0])?,
-                    Self::Sphere { radius } => {
-                        Arc::new(Capsule::new(leg[0].at, leg[1].at, radius.0).map_err(|e| e.to_string())?)
-                    }
-                    _ => Arc::new(Swept::new(solid.clone(), size, leg[0], leg[1])),
-                });
+                solids.push(self.leg(&solid, size, [leg[0], leg[1]])?);
             }
         }
         // A box that is never turned reaches no further than its faces.
@@ -137,6 +131,59 @@ impl Shape {
             true => Ok((solids, reach)),
             false => Err("the tool reaches beyond all numbers; make it smaller".into()),
         }
+    }
+
+    /// A solid whose distance is known between two poses.
+    fn leg(&self, solid: &Primitive, size: f64, [from, to]: [Pose; 2]) -> Result<Arc<dyn Field>, String> {
+        Ok(match self {
+            // However it is turned, a ball is a ball.
+            Self::Sphere { .. } if from.at == to.at => placed(solid, &from)?,
+            Self::Sphere { radius } => {
+                Arc::new(Capsule::new(from.at, to.at, radius.0).map_err(|e| e.to_string())?)
+            }
+            _ => {
+                let search = Search::Distance {
+                    is_convex: !matches!(solid, Primitive::Torus(_)),
+                };
+                Arc::new(Swept::new(Arc::new(solid.clone()), size, [from, to], search))
+            }
+        })
+    }
+
+    /// The solid on its way from pose to pose, leg by leg, and the radius of a ball that holds it. Formulas sweep too.
+    pub(super) fn legs(&self, poses: &[Pose]) -> Result<(Vec<Leg>, f64), String> {
+        if let Self::Object { name } = self {
+            return Err(format!(
+                "the object {name:?} does not sweep; add or carve it at places, or sweep a formula"
+            ));
+        }
+        let kind = self.kind(&Others::default())?;
+        let leg = |from: Pose, to: Pose| {
+            let solid = match &kind {
+                Kind::Known(solid, size) => self.leg(solid, *size, [from, to])?,
+                Kind::Any(field, b) => {
+                    let size = 0.5 * b.size().length();
+                    Arc::new(Swept::new(field.clone(), size, [from, to], Search::Any))
+                }
+            };
+            Ok(Leg {
+                from: from.at,
+                to: to.at,
+                solid,
+            })
+        };
+        let pairs = poses.windows(2).filter(|pair| pair[0] != pair[1]);
+        let mut legs = pairs
+            .map(|pair| leg(pair[0], pair[1]))
+            .collect::<Result<Vec<_>, String>>()?;
+        if legs.is_empty() {
+            legs.push(leg(poses[0], poses[0])?);
+        }
+        let size = match &kind {
+            Kind::Known(_, size) => *size,
+            Kind::Any(_, b) => 0.5 * b.size().length(),
+        };
+        Ok((legs, size))
     }
 
     fn kind(&self, others: &Others) -> Result<Kind, String> {
@@ -207,7 +254,7 @@ fn placed(solid: &Primitive, pose: &Pose) -> Result<Arc<dyn Field>, String> {
 /// Any field at places, each alone.
 fn at_places(field: &Arc<dyn Field>, b: &Aabb, poses: &[Pose], is_each: bool) -> Result<Solids, String> {
     if poses.len() > 1 && !is_each {
-        return Err("formulas and objects do not sweep; write each = true, or one place".into());
+        return Err("formulas and objects do not sweep here; write each = true, or one place, or use sweep for a formula".into());
     }
     let mut reach: Option<Aabb> = None;
     let mut solids: Vec<Arc<dyn Field>> = Vec::new();

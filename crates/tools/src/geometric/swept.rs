@@ -1,4 +1,5 @@
-use bspline::primitives::Primitive;
+use std::sync::Arc;
+
 use bspline::{Aabb, Field, Interval, Jet};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
@@ -29,19 +30,37 @@ impl Pose {
 /// a search that uses that `d` is a distance, so `d(x(t))` changes no faster than the point moves \[Piyavskii72\].
 #[derive(Clone)]
 pub(super) struct Swept {
-    solid: Primitive,
+    solid: Arc<dyn Field>,
     /// Radius of a ball about the origin that holds the solid.
     size: f64,
     from: Pose,
     by: DVec3,
     axis: DVec3,
     angle: f64,
-    is_concave: bool,
+    search: Search,
 }
+
+/// What is known of a solid that helps to find its nearest pose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Search {
+    /// It is a distance.
+    Distance {
+        /// Whether the solid is convex.
+        is_convex: bool,
+    },
+    /// Its bounds alone; between poses that are a share of its size apart it has no detail.
+    Any,
+}
+
+/// Share of the size of a solid without a known distance after which it is asked again on its way.
+const ASKED: f64 = 1.0 / 24.0;
+
+/// Pieces of a leg over which such a solid is bounded.
+const PIECES: usize = 4;
 
 impl Swept {
     /// `solid` about the origin, within `size` of it, on its way between two poses.
-    pub fn new(solid: Primitive, size: f64, from: Pose, to: Pose) -> Self {
+    pub fn new(solid: Arc<dyn Field>, size: f64, [from, to]: [Pose; 2], search: Search) -> Self {
         let between = to.turn * from.turn.inverse();
         // The short way round.
         let between = if between.w < 0.0 { -between } else { between };
@@ -49,7 +68,6 @@ impl Swept {
             sine if sine < 1e-12 => (DVec3::Z, 0.0),
             sine => (between.xyz() / sine, 2.0 * libm::atan2(sine, between.w)),
         };
-        let is_convex = !matches!(solid, Primitive::Torus(_));
         Self {
             solid,
             size,
@@ -57,8 +75,15 @@ impl Swept {
             by: to.at - from.at,
             axis,
             angle,
-            is_concave: is_convex && angle == 0.0,
+            search,
         }
+    }
+
+    /// Bound on the speed of a point in the coordinates of the solid, over the whole way.
+    fn speed(&self, p: DVec3) -> f64 {
+        let away = p - self.from.at;
+        let farthest = away.length().max((away - self.by).length());
+        (self.by.length() + self.angle * farthest) * (1.0 + 1e-9)
     }
 
     /// World from solid at `t` between 0 and 1.
@@ -81,9 +106,10 @@ impl Swept {
     /// Where on its way the solid is nearest, and its distance there.
     fn nearest(&self, p: DVec3) -> (f64, f64) {
         let ends = [0.0, 1.0].map(|t| (t, self.at(p, t)));
-        let found = match self.is_concave {
-            true => self.golden(p, 0.0, 1.0),
-            false => self.searched(p, ends),
+        let found = match self.search {
+            Search::Distance { is_convex: true } if self.angle == 0.0 => self.golden(p, 0.0, 1.0),
+            Search::Distance { .. } => self.searched(p, ends),
+            Search::Any => self.asked(p, ends),
         };
         // An end counts as much as what is between.
         ends.into_iter()
@@ -92,9 +118,7 @@ impl Swept {
 
     /// The nearest pose, told from others to a share of the solid's size, and then followed to its peak.
     fn searched(&self, p: DVec3, ends: [(f64, f64); 2]) -> (f64, f64) {
-        let away = p - self.from.at;
-        let farthest = away.length().max((away - self.by).length());
-        let speed = (self.by.length() + self.angle * farthest) * (1.0 + 1e-9);
+        let speed = self.speed(p);
         let [first, last] = ends;
         let mut best = if last.1 > first.1 { last } else { first };
         let mut around = (first.0, last.0);
@@ -117,6 +141,41 @@ impl Swept {
         }
         let refined = self.golden(p, around.0, around.1);
         if refined.1 > best.1 { refined } else { best }
+    }
+
+    /// The nearest pose of a solid of which only bounds are known.
+    fn asked(&self, p: DVec3, ends: [(f64, f64); 2]) -> (f64, f64) {
+        let speed = self.speed(p);
+        let [first, last] = ends;
+        let mut best = if last.1 > first.1 { last } else { first };
+        let mut width = 1.0;
+        let mut open = vec![(0.0, 1.0)];
+        while let Some((a, b)) = open.pop() {
+            let t: f64 = 0.5 * (a + b);
+            let reach = 0.5 * (b - a) * speed;
+            let at = self.local(p, t);
+            if self.solid.bounds(&Aabb::new(at - reach, at + reach)).hi <= best.1 {
+                continue;
+            }
+            let value = self.solid.value(at);
+            if value > best.1 {
+                (best, width) = ((t, value), b - a);
+            }
+            if 2.0 * reach > ASKED * self.size {
+                open.extend([(t, b), (a, t)]);
+            } else {
+                width = width.min(b - a);
+            }
+        }
+        // The top of the parabola through the poses beside it.
+        let [low, high] = [(best.0 - width).max(0.0), (best.0 + width).min(1.0)];
+        let [a, b] = [low, high].map(|t| (best.1 - self.at(p, t)) / (best.0 - t));
+        let bend = (b - a) / (high - low);
+        let top = 0.5 * (low + best.0 - a / bend);
+        if top > low && top < high && self.at(p, top) > best.1 {
+            best = (top, self.at(p, top));
+        }
+        best
     }
 
     /// How far a distance may be off; far from the surface nobody asks for more.
@@ -176,6 +235,17 @@ impl Field for Swept {
 
     /// The largest of distances is no steeper than they are.
     fn bounds(&self, b: &Aabb) -> Interval {
+        if self.search == Search::Any {
+            let (p, half) = (b.center(), 0.5 * b.size().length());
+            let reach = 0.5 * self.speed(p) / PIECES as f64 + half;
+            let pieces = (0..PIECES).map(|i| {
+                let at = self.local(p, (i as f64 + 0.5) / PIECES as f64);
+                self.solid.bounds(&Aabb::new(at - reach, at + reach))
+            });
+            // In each piece there is a pose with at least its lower bound.
+            let both = pieces.reduce(|a, b| Interval::new(a.lo.max(b.lo), a.hi.max(b.hi)));
+            return both.expect("a way has pieces");
+        }
         let value = self.value(b.center());
         Interval::point(value).widened(0.5 * b.size().length() + self.slack(value))
     }

@@ -73,6 +73,14 @@ impl<T: Real> Writer<'_, T> {
         self.field.lattice().spacing(self.detail()).min_element()
     }
 
+    /// Distance that may stay where a tool makes the field as fine as it asks for.
+    pub fn tolerance(&self, fineness: &Fineness) -> f64 {
+        let lattice = self.field.lattice();
+        let finest = fineness.finest(lattice, self.detail());
+        let own = TOLERANCE * lattice.spacing(finest).min_element();
+        fineness.tolerance.map_or(own, |t| t.0)
+    }
+
     /// Finest level with functions that reach a world box.
     pub fn finest_in(&self, b: &Aabb) -> usize {
         let local = b.transformed(self.field.lattice_from_world());
@@ -133,7 +141,7 @@ impl<T: Real> Writer<'_, T> {
             finest,
             look: true,
         };
-        let is_free = |support: &Aabb| self.limits.is_free(support);
+        let is_free = |support: &Aabb| self.limits.may_change(support);
         let (field, _, report) = fit_field_where(target, self.field, within, &options, &is_free, control)?;
         Ok((field, report))
     }

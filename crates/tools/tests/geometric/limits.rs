@@ -12,7 +12,7 @@ use super::{block, done, random, refused, stroke};
 fn no_tool_changes_what_is_masked_out() {
     let field = block();
     let mut changes = 0;
-    for seed in 0..21 {
+    for seed in 0..24 {
         let mut draw = random(seed);
         let mut place = |from: f64, to: f64| [draw(8.0, 16.0), draw(8.0, 16.0), draw(from, to)];
         let (a, b, low) = (place(11.5, 12.5), place(11.5, 12.5), place(7.0, 9.0));
@@ -29,6 +29,10 @@ fn no_tool_changes_what_is_masked_out() {
             format!("refine = {{ along = [{a:?}, {b:?}], radius = 1.5 }}"),
             "cut = { region = { min = [9, 9, 10], max = [15, 15, 13] } }".into(),
             format!("simplify = {{ along = [{a:?}, {b:?}], radius = 3.0, tolerance = 0.2 }}"),
+            format!(
+                "sweep = {{ operation = 'add', shape = {{ box = {{ size = [2, 1, 1] }} }}, follow = true,
+                along = {{ spline = {{ through = [{a:?}, {b:?}, [12, 12, 12]] }} }} }}"
+            ),
         ];
         let tool = &tools[seed as usize % tools.len()];
         let box_of = format!("{{ min = {min:?}, max = {max:?} }}");
@@ -46,7 +50,7 @@ fn no_tool_changes_what_is_masked_out() {
             changes += usize::from(count > 0);
         }
     }
-    assert!(changes > 40, "{changes} of 63 strokes changed something");
+    assert!(changes > 40, "{changes} of 72 strokes changed something");
 }
 
 /// Asserts that functions whose supports are not free kept their coefficients; gives the number of those that changed.

@@ -1,9 +1,11 @@
 //! Geometric tools: volumes, what stays, and what is refused.
 
 mod brushes;
+mod interior;
 mod limits;
 mod moves;
 mod parts;
+mod sweeps;
 mod symmetry;
 
 use std::f64::consts::PI;
