@@ -12,6 +12,7 @@ use crate::geometric::{
 use crate::hold::{Free, Hold};
 use crate::limits::{Limits, Mask, Region};
 use crate::paint::Paint;
+use crate::place::Place;
 use crate::symmetry::Symmetry;
 use crate::tool::{Canvas, Tool, ToolError};
 
@@ -116,6 +117,9 @@ pub struct Stroke {
     /// Takes constraints off.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub free: Option<Free>,
+    /// Puts the whole object elsewhere.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub place: Option<Place>,
 }
 
 impl Stroke {
@@ -149,6 +153,7 @@ impl Stroke {
             self.paint.as_ref().map(Tool::Paint),
             self.hold.as_ref().map(Tool::Hold),
             self.free.as_ref().map(Tool::Free),
+            self.place.as_ref().map(Tool::Place),
         ];
         let given: Vec<_> = all.into_iter().flatten().collect();
         match given[..] {
@@ -252,38 +257,21 @@ impl Stroke {
         let Some(symmetry) = &self.symmetry else {
             return once(canvas);
         };
-        if matches!(
-            tool,
-            Tool::Paint(_) | Tool::Copy(_) | Tool::Hold(_) | Tool::Free(_)
-        ) || !self.during.is_empty()
-        {
-            let paints = if self.during.is_empty() {
-                tool.name()
-            } else {
-                "paint"
-            };
-            let why = format!("{paints} knows no symmetry; write a stroke for each side");
+        if let Tool::Copy(_) | Tool::Hold(_) | Tool::Free(_) | Tool::Place(_) = tool {
+            let why = format!("{} knows no symmetry; write a stroke for each side", tool.name());
             return Err(ToolError::Stroke(why));
         }
-        if matches!(tool, Tool::Force(_)) && !canvas.holds.is_empty() {
-            let why = "holds are on one side only; write a stroke for each side, or free them first";
+        let mut paints = self
+            .paint
+            .iter()
+            .chain(self.during.iter().map(|d| &d.paint))
+            .peekable();
+        let is_painting = paints.peek().is_some();
+        if paints.any(|paint| paint.brush.is_none()) {
+            let why = "only brushes paint on both sides; let the formula or the curve say both, or write a stroke for each side";
             return Err(ToolError::Stroke(why.into()));
         }
-        if matches!(tool, Tool::Move(_)) && canvas.layers.values().any(|layer| !layer.is_empty()) {
-            let why = "a painted object cannot be moved on both sides at once; write a stroke for each side";
-            return Err(ToolError::Stroke(why.into()));
-        }
-        let (mut left, mut notes) = (canvas.clone(), Vec::new());
-        left.field = symmetry.apply(&canvas.field, |field| {
-            let canvas = Canvas {
-                field,
-                ..canvas.clone()
-            };
-            let (canvas, told) = once(canvas)?;
-            (left.copies, notes) = (canvas.copies, told);
-            Ok::<_, ToolError>(canvas.field)
-        })?;
-        Ok((left, notes))
+        symmetry.apply(canvas, tool, is_painting, once)
     }
 }
 
