@@ -4,20 +4,15 @@ use bspline::HierarchicalSpline;
 use fitting::Control;
 use serde::{Deserialize, Serialize};
 
-use crate::face::Face;
-use crate::force::{Chisel, Drill, ForceError, ForceTool, Pull};
-use crate::geometric::{
-    Copy, Cut, Geometric, GeometricError, Inflate, Move, Paste, Refine, Simplify, Smooth,
-};
+use crate::force::{Chisel, Drill, ForceTool, Pull};
+use crate::geometric::{Copy, Cut, Geometric, Inflate, Move, Paste, Refine, Simplify, Smooth};
 use crate::hold::{Free, Hold};
 use crate::limits::{Limits, Mask, Region};
 use crate::paint::Paint;
 use crate::place::Place;
+use crate::room::MOST_GROWTHS;
 use crate::symmetry::Symmetry;
 use crate::tool::{Canvas, Tool, ToolError};
-
-/// How often a box grows for one stroke, an eighth at a time: to about twice its length. Further away is a slip of the pen.
-const MOST_GROWTHS: usize = 6;
 
 /// What a session file says.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -176,29 +171,21 @@ impl Stroke {
     /// # Errors
     /// Any [`ToolError`].
     pub fn apply(&self, canvas: Canvas, control: &mut Control) -> Result<(Canvas, Vec<String>), ToolError> {
-        let before = *canvas.field.lattice();
-        let mut canvas = canvas;
-        for _ in 0..MOST_GROWTHS {
-            match self.in_box(canvas.clone(), control) {
-                Err(ToolError::Geometric(GeometricError::Leaves { at, face })) => {
-                    let leaves = GeometricError::Leaves { at, face };
-                    canvas = canvas.grown(face).ok_or(leaves)?;
+        let mut grown = canvas.clone();
+        for growths in 0..=MOST_GROWTHS {
+            match self.in_box(grown.clone(), control) {
+                Err(why) if growths < MOST_GROWTHS => {
+                    let larger = grown.face_for(&why).and_then(|face| grown.grown(face));
+                    grown = larger.ok_or(why)?;
                 }
-                Err(ToolError::Force(ForceError::Outside { at, field })) => {
-                    let leaves = ForceError::Outside { at, field };
-                    let face = Face::beyond(&canvas.field, at.into());
-                    canvas = face.and_then(|face| canvas.grown(face)).ok_or(leaves)?;
-                }
-                Ok((left, mut notes)) if left.field.lattice() != &before => {
-                    let b = left.field.lattice().world_box();
-                    let [min, max] = [b.min, b.max].map(|p| p.to_array());
-                    notes.push(format!("the box of the field has grown: {min:?} to {max:?}"));
+                Err(why) => return Err(why),
+                Ok((left, mut notes)) => {
+                    notes.extend(left.growth_since(&canvas));
                     return Ok((left, notes));
                 }
-                done => return done,
             }
         }
-        self.in_box(canvas, control)
+        unreachable!("the last round ends")
     }
 
     /// What the stroke leaves if the box of the field has room enough.
