@@ -1,6 +1,6 @@
 //! Boxes of fields that grow when a stroke needs more room.
 
-use bspline::{Aabb, Field, Frame, HierarchicalSpline};
+use bspline::{Aabb, Field, HierarchicalSpline};
 use glam::DVec3;
 
 use crate::face::Face;
@@ -16,9 +16,6 @@ const SHARE: u32 = 8;
 
 /// Most cells of a box along an axis on the finest level, as files have it.
 const MOST_CELLS: u64 = 1 << 30;
-
-/// Points across a face at which it is asked for solid that was cut off there.
-const ACROSS: u32 = 256;
 
 impl Canvas {
     /// The face beyond which the box has to grow for what a tool was refused. None where it was refused for something else, where it
@@ -78,16 +75,35 @@ impl Canvas {
 /// Whether the solid reaches a face.
 fn is_cut(field: &HierarchicalSpline<f32>, iso: f64, face: Face) -> bool {
     let lattice = field.lattice();
-    let mut part = Aabb::new(DVec3::ZERO, lattice.extent());
-    let at = if face.is_last { part.max } else { part.min }[face.axis];
-    (part.min[face.axis], part.max[face.axis]) = (at, at);
-    let cells = lattice
-        .cells_at(field.level_count() - 1)
-        .map(|n| n.clamp(1, ACROSS));
-    let mut frame = Frame::over(&part, cells);
-    frame.world_from_grid = lattice.world_from_lattice * frame.world_from_grid;
-    let count = std::array::from_fn(|a| if a == face.axis { 1 } else { cells[a] as usize + 1 });
-    let mut values = vec![0.0; count.iter().product()];
-    field.frame_values(&frame, [0; 3], count, &mut values);
-    values.iter().any(|value| *value > iso)
+    let step = 1.0 / (1u64 << (field.level_count() - 1)) as f64;
+    let whole = Aabb::new(DVec3::ZERO, lattice.extent());
+    let nodes = face.nodes(lattice, &whole, step);
+    nodes.is_some_and(|nodes| nodes.values(field).iter().any(|value| *value > iso))
+}
+
+/// Says where a tool has widened the solid at a face that had cut it off before; elsewhere it would have left its box, which is refused.
+pub fn cut_off(
+    before: &HierarchicalSpline<f32>,
+    after: &HierarchicalSpline<f32>,
+    iso: f64,
+) -> Option<String> {
+    let lattice = after.lattice();
+    let changed = after.changed_boxes(before, &lattice.world_box());
+    let changed = changed
+        .into_iter()
+        .reduce(|a, b| Aabb::new(a.min.min(b.min), a.max.max(b.max)))?;
+    let within = changed.transformed(after.lattice_from_world());
+    let level = after.level_count() - 1;
+    let step = 1.0 / (1u64 << level) as f64;
+    let rim = lattice.spacing(level).max_element() * after.slope();
+    Face::ALL.into_iter().find_map(|face| {
+        let nodes = face.nodes(lattice, &within, step)?;
+        let [now, then] = [after, before].map(|field| nodes.values(field));
+        let mut both = now.iter().zip(&then);
+        let n = both.position(|(now, then)| *now > iso + rim && *then < iso - rim)?;
+        Some(format!(
+            "the solid goes on beyond the box of its field at {:?}, where it was cut off before; it is cut off there too",
+            nodes.place(n).to_array()
+        ))
+    })
 }

@@ -14,6 +14,7 @@ use crate::limits::Limits;
 use crate::others::Others;
 use crate::paint::{Layer, Layers, Paint, PaintError};
 use crate::place::{Place, Placement};
+use crate::room::cut_off;
 
 /// What a tool works on. Cheap to copy.
 #[derive(Clone, Debug)]
@@ -196,13 +197,14 @@ impl Tool<'_> {
                 let layers = carried(&origin, &canvas, limits)?;
                 let to = |p| p + limits.share(p) * (origin.forth(p) - p);
                 let holds = canvas.holds.iter().map(|held| held.carried(to)).collect();
+                let notes = told(&report, old, &field, *iso);
                 let moved = Canvas {
                     field,
                     layers,
                     holds,
                     ..canvas
                 };
-                return Ok((moved, thin_parts(&report)));
+                return Ok((moved, notes));
             }
             Self::Paint(paint) => {
                 let layer = painted(paint, &canvas, limits)?;
@@ -244,12 +246,13 @@ impl Tool<'_> {
             }
             Self::Paste(tool) => tool.apply(old, *iso, others, limits, control)?,
         };
+        let notes = told(&report, old, &field, *iso);
         let canvas = Canvas {
             field,
             copies,
             ..canvas
         };
-        Ok((canvas, thin_parts(&report)))
+        Ok((canvas, notes))
     }
 }
 
@@ -286,8 +289,13 @@ fn painted(paint: &Paint, canvas: &Canvas, limits: &Limits) -> Result<Layer, Too
     Ok(layer.with_tree(kept).expect("some of the nodes painted"))
 }
 
-/// Says what was too thin for the field.
-fn thin_parts(report: &FieldFitReport) -> Vec<String> {
+/// Says what was too thin for the field, or beyond it.
+fn told(
+    report: &FieldFitReport,
+    before: &HierarchicalSpline<f32>,
+    after: &HierarchicalSpline<f32>,
+    iso: f64,
+) -> Vec<String> {
     let left = report.left.filter(|left| left.wrong_signs > 0);
     let told = left.map(|left| {
         format!(
@@ -295,5 +303,5 @@ fn thin_parts(report: &FieldFitReport) -> Vec<String> {
             left.wrong_signs, report.samples,
         )
     });
-    told.into_iter().collect()
+    told.into_iter().chain(cut_off(before, after, iso)).collect()
 }
