@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use bspline::primitives::Cuboid;
 use bspline::{Aabb, Csg, Field, HierarchicalSpline, Real};
-use glam::DAffine3;
+use glam::{DAffine3, DVec3};
 use serde::{Deserialize, Serialize};
 
 use crate::coefficients::{changed, coefficient, support, with_functions};
@@ -227,6 +227,15 @@ impl Limits {
     fn each_side(&self, b: &Aabb) -> impl Iterator<Item = Aabb> {
         let other = self.mirror.map(|mirror| b.transformed(&mirror));
         std::iter::once(*b).chain(other)
+    }
+
+    /// How much of a change happens at a place, 0 to 1.
+    pub fn share(&self, p: DVec3) -> f64 {
+        match (&self.weight, self.is_free(&Aabb { min: p, max: p })) {
+            (_, false) => 0.0,
+            (Some(weight), true) => weight.value(p),
+            (None, true) => 1.0,
+        }
     }
 
     /// What a tool makes of `field`, where the mask fades.

@@ -3,24 +3,12 @@
 use super::*;
 use tools::session::Stroke;
 
-fn canvas(field: &HierarchicalSpline<f32>) -> Canvas {
-    Canvas {
-        field: field.clone(),
-        iso: ISO,
-        detail: 0,
-        layers: Default::default(),
-        holds: Vec::new(),
-        others: Default::default(),
-        copies: Vec::new(),
-    }
-}
-
 fn tried(
     field: &HierarchicalSpline<f32>,
     text: &str,
 ) -> Result<(HierarchicalSpline<f32>, Vec<String>), String> {
     let stroke: Stroke = toml::from_str(text).unwrap_or_else(|e| panic!("{text}: {e}"));
-    let done = stroke.apply(canvas(field), &mut Control::default());
+    let done = stroke.apply(Canvas::alone(field.clone(), ISO, 0), &mut Control::default());
     done.map(|(left, notes)| (left.field, notes))
         .map_err(|e| e.to_string())
 }
