@@ -191,6 +191,11 @@ impl Limits {
         self.region.is_none() && self.mask.is_none() && self.interior.is_none()
     }
 
+    /// Whether the outer surface stays.
+    pub fn is_inside(&self) -> bool {
+        self.interior.is_some()
+    }
+
     /// Whether the mask fades.
     pub fn is_soft(&self) -> bool {
         self.weight.is_some()

@@ -129,7 +129,10 @@ impl<T: Real> Writer<'_, T> {
         let spacing = self.field.lattice().spacing(finest).min_element();
         let mixed = self.limits.mixed(self.field, target);
         let target: &dyn Field = mixed.as_ref().map_or(target, |mixed| mixed);
-        self.stays_in_box(target, within)?;
+        // What stays as it is needs no more room.
+        if !self.limits.is_inside() {
+            self.stays_in_box(target, within)?;
+        }
         let options = FieldFitOptions {
             aim: Aim::Surface {
                 iso: self.iso,
