@@ -18,6 +18,7 @@ pub fn canvas(state: &State, name: &str) -> Result<Canvas, CommandError> {
         layers: object.layers.clone(),
         holds: object.properties.holds.clone(),
         placement: placement(state, object)?,
+        material: object.properties.material,
         others: others(state, name)?,
         copies: Vec::new(),
     })
@@ -37,6 +38,7 @@ pub fn left(state: &State, name: &str, canvas: Canvas) -> Result<State, CommandE
     shaped.properties.holds = canvas.holds;
     shaped.properties.set_placement(canvas.placement.map);
     shaped.properties.parent = canvas.placement.parent;
+    shaped.properties.material = canvas.material;
     Ok(next.with(name, shaped)?)
 }
 

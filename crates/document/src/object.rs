@@ -7,6 +7,7 @@ use glam::{DAffine3, DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use tools::hold::Held;
+use tools::material::Material;
 use tools::paint::Layers;
 
 /// A solid of a document. Cheap to copy.
@@ -37,6 +38,13 @@ pub struct Properties {
     /// Constraints that force tools keep.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub holds: Vec<Held>,
+    /// What it is by itself.
+    #[serde(default, skip_serializing_if = "is_usual")]
+    pub material: Material,
+}
+
+fn is_usual(material: &Material) -> bool {
+    *material == Material::default()
 }
 
 impl Default for Properties {
@@ -54,6 +62,7 @@ impl Properties {
             parent: None,
             detail: None,
             holds: Vec::new(),
+            material: Material::default(),
         };
         placed.set_placement(map);
         placed
@@ -137,6 +146,10 @@ impl Object {
         hash.update((parent.len() as u64).to_le_bytes());
         hash.update(parent);
         hash.update((self.detail() as u64).to_le_bytes());
+        if !is_usual(&self.properties.material) {
+            let text = serde_json::to_vec(&self.properties.material).expect("names have a JSON form");
+            hash.update(text);
+        }
         for held in &self.properties.holds {
             let text = serde_json::to_vec(held).expect("names and numbers have a JSON form");
             hash.update((text.len() as u64).to_le_bytes());

@@ -12,6 +12,7 @@ pub mod hold;
 mod interior;
 pub mod limits;
 pub mod live;
+pub mod material;
 pub mod mix;
 pub mod number;
 pub mod others;

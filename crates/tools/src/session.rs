@@ -10,6 +10,7 @@ use crate::geometric::{
 };
 use crate::hold::{Free, Hold};
 use crate::limits::{Limits, Mask, Region};
+use crate::material::Material;
 use crate::number::Positive;
 use crate::paint::Paint;
 use crate::place::Place;
@@ -130,6 +131,9 @@ pub struct Stroke {
     /// Puts the whole object elsewhere.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub place: Option<Place>,
+    /// Says what the object is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub material: Option<Material>,
 }
 
 impl Stroke {
@@ -167,6 +171,7 @@ impl Stroke {
             self.hold.as_ref().map(Tool::Hold),
             self.free.as_ref().map(Tool::Free),
             self.place.as_ref().map(Tool::Place),
+            self.material.as_ref().map(Tool::Material),
         ];
         let given: Vec<_> = all.into_iter().flatten().collect();
         match given[..] {
@@ -189,9 +194,10 @@ impl Stroke {
     /// # Errors
     /// Any [`ToolError`].
     pub fn apply(&self, canvas: Canvas, control: &mut Control) -> Result<(Canvas, Vec<String>), ToolError> {
+        let stroke = self.of(canvas.material);
         let mut grown = canvas.clone();
         for growths in 0..=MOST_GROWTHS {
-            match self.in_box(grown.clone(), control) {
+            match stroke.in_box(grown.clone(), control) {
                 Err(why) if growths < MOST_GROWTHS => {
                     let larger = grown.face_for(&why).and_then(|face| grown.grown(face));
                     grown = larger.ok_or(why)?;
@@ -204,6 +210,19 @@ impl Stroke {
             }
         }
         unreachable!("the last round ends")
+    }
+
+    /// The stroke on an object of a material, which counts where the stroke says nothing else.
+    pub(crate) fn of(&self, material: Material) -> Self {
+        let mut stroke = self.clone();
+        let drawn =
+            [&mut stroke.chisel, &mut stroke.squirt].map(|tool| tool.as_mut().map(|tool| &mut tool.how));
+        let bars = [&mut stroke.drill, &mut stroke.join].map(|tool| tool.as_mut().map(|tool| &mut tool.how));
+        let pull = stroke.pull.as_mut().map(|tool| &mut tool.how);
+        for how in drawn.into_iter().chain(bars).chain([pull]).flatten() {
+            how.solid.get_or_insert(material.solid);
+        }
+        stroke
     }
 
     /// What the stroke leaves if the box of the field has room enough.
@@ -267,7 +286,7 @@ impl Stroke {
         let Some(symmetry) = &self.symmetry else {
             return once(canvas);
         };
-        if let Tool::Copy(_) | Tool::Hold(_) | Tool::Free(_) | Tool::Place(_) = tool {
+        if let Tool::Copy(_) | Tool::Hold(_) | Tool::Free(_) | Tool::Place(_) | Tool::Material(_) = tool {
             let why = format!("{} knows no symmetry; write a stroke for each side", tool.name());
             return Err(ToolError::Stroke(why));
         }

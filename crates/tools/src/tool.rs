@@ -12,6 +12,7 @@ use crate::geometric::{
 };
 use crate::hold::{Free, Held, Hold};
 use crate::limits::Limits;
+use crate::material::Material;
 use crate::others::Others;
 use crate::paint::{Layer, Layers, Paint, PaintError};
 use crate::place::{Place, Placement};
@@ -32,6 +33,8 @@ pub struct Canvas {
     pub holds: Vec<Held>,
     /// Where its world lies.
     pub placement: Placement,
+    /// What it is by itself.
+    pub material: Material,
     /// Objects that a tool may name.
     pub others: Others,
     /// Names under which the object as it was before is to be kept.
@@ -48,6 +51,7 @@ impl Canvas {
             layers: Layers::new(),
             holds: Vec::new(),
             placement: Placement::default(),
+            material: Material::default(),
             others: Others::default(),
             copies: Vec::new(),
         }
@@ -119,6 +123,8 @@ pub enum Tool<'a> {
     Free(&'a Free),
     /// Puts the whole object elsewhere.
     Place(&'a Place),
+    /// Says what the object is.
+    Material(&'a Material),
 }
 
 /// Why a tool cannot be used.
@@ -151,11 +157,12 @@ impl ToolError {
 
 impl Tool<'_> {
     /// Names of all tools, as sessions write them.
-    pub const NAMES: [&'static str; 22] = {
+    pub const NAMES: [&'static str; 23] = {
         let [pull, chisel, squirt, drill, join] = ForceTool::NAMES;
         [
             "carve", "add", "sweep", pull, chisel, squirt, drill, join, "extrude", "bend", "move", "smooth",
             "inflate", "copy", "cut", "paste", "refine", "simplify", "paint", "hold", "free", "place",
+            "material",
         ]
     };
 
@@ -180,6 +187,7 @@ impl Tool<'_> {
             Self::Hold(_) => "hold",
             Self::Free(_) => "free",
             Self::Place(_) => "place",
+            Self::Material(_) => "material",
         }
     }
 
@@ -244,6 +252,10 @@ impl Tool<'_> {
             Self::Place(place) => {
                 let placement = place.apply(&canvas).map_err(ToolError::Stroke)?;
                 return Ok((Canvas { placement, ..canvas }, Vec::new()));
+            }
+            Self::Material(material) => {
+                let material = **material;
+                return Ok((Canvas { material, ..canvas }, Vec::new()));
             }
             Self::Copy(copy) => {
                 copies.push(copy.to.clone());

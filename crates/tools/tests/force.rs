@@ -534,7 +534,7 @@ fn what_makes_no_sense_is_refused() {
     let none = Target::single(Path::through([DVec3::ZERO, DVec3::X]).unwrap(), true);
     let how = How {
         rule: Rule::Arrive,
-        solid: Solid::Clay,
+        solid: Some(Solid::Clay),
         ..How::default()
     };
     assert!(ForceStroke::new(&field, ISO, Vec::new(), Extent::Curve, R, &how).is_err());

@@ -74,6 +74,7 @@ pub const ROWS: &[Row] = &[
     ("new", "--box", "new.isoclay --spacing 1 --box *1,2", "three"),
     ("new", "--box", "new.isoclay --spacing 1 --box *0", "above zero"),
     ("new", "--spacing", "new.isoclay --box 1 --spacing *-1", "above zero"),
+    ("new", "--material", "new.isoclay --box 9 --spacing 1 --material *jelly", "elastic"),
     ("new", "--iso", "new.isoclay field.iclay --iso *nan", "finite"),
     ("new", "--iso", "new.isoclay field.iclay --iso *99", "another --iso"),
     ("new", "--unit", "new.isoclay --box 9 --spacing 1 --unit *inch", "mm, cm or m"),

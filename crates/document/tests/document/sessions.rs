@@ -169,6 +169,7 @@ const REFUSED: &[(&str, &[&str])] = &[
         "symmetry = { at = [12, 12, 12], normal = [1, 0, 0] }\nplace = { by = [1, 0, 0] }",
         &["symmetry"],
     ),
+    ("material = { solid = 'jelly' }", &["line 2", "clay"]),
     // Vectors and boxes without length.
     (
         "pull = { along = [[12, 12, 12]], by = [0, 0, 0], radius = 1 }",

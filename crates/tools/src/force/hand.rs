@@ -85,9 +85,9 @@ impl<T: Real> ForceStroke<T> {
         radius: f64,
         how: &How,
     ) -> Result<Self, ForceError> {
-        if how.solid == Solid::Elastic {
+        if how.solid() == Solid::Elastic {
             return Err(ForceError::tool(
-                "an elastic solid keeps no track; leave solid out, or write the whole track in a stroke that is not by hand",
+                "an elastic solid keeps no track; write how = { solid = \"clay\" }, or the whole track in a stroke that is not by hand",
             ));
         }
         let (start, normal) = track::grabbed(field, iso, at, radius)?;

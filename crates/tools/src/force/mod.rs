@@ -83,12 +83,20 @@ pub enum Rule {
 pub struct How {
     /// How the force is spread.
     pub filter: Filter,
-    /// Whether the shape stays.
-    pub solid: Solid,
+    /// Whether the shape stays; that of the object if missing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub solid: Option<Solid>,
     /// How large it is.
     pub rule: Rule,
     /// `b`: 15 of clay and 4 of elastic solids if missing.
     pub gain: Option<Positive>,
+}
+
+impl How {
+    /// Whether the shape stays.
+    pub fn solid(&self) -> Solid {
+        self.solid.unwrap_or_default()
+    }
 }
 
 /// Why a force tool cannot be used.

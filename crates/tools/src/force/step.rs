@@ -50,7 +50,7 @@ impl<T: Real> ForceStroke<T> {
         }
         let goals = self.goals();
         let bearings = self.bearings(&goals)?;
-        let (dt, keep) = match self.how.solid {
+        let (dt, keep) = match self.how.solid() {
             Solid::Clay => (self.dt(), libm::exp(-FLOW)),
             Solid::Elastic => (self.dt(), 1.0),
         };
@@ -95,7 +95,7 @@ impl<T: Real> ForceStroke<T> {
             .map(|(&i, soft)| self.acting[i].stiffness / self.targets[self.acting[i].index].weight + soft)
             .collect();
         let most = self.extent.solves();
-        let (region, solid) = (&mut self.region, self.how.solid);
+        let (region, solid) = (&mut self.region, self.how.solid());
         let solved = system::solve(&right, &soft, &diagonal, most, 1e-4, |z| {
             let of = live.iter().zip(z).map(|(&i, z)| (&bearing(i).spread, *z));
             let load = Load::<T>::of(of);
@@ -110,7 +110,7 @@ impl<T: Real> ForceStroke<T> {
         self.load = Load::of(pairs(&bearings, self.acting.iter().map(|a| a.force)));
         let patch = self.region.patch_mut();
         patch.add_responses(&solved.parts, dt)?;
-        if self.how.solid == Solid::Clay {
+        if self.how.solid() == Solid::Clay {
             let d = patch.state().d.clone();
             patch.springs_mut().relax(&d, -libm::expm1(-FLOW));
         }
@@ -118,7 +118,7 @@ impl<T: Real> ForceStroke<T> {
     }
 
     fn dt(&self) -> f64 {
-        match self.how.solid {
+        match self.how.solid() {
             Solid::Clay => FLOW,
             Solid::Elastic => LONG,
         }
@@ -215,7 +215,7 @@ impl<T: Real> ForceStroke<T> {
         let weight = |a: &Acting| self.targets[a.index].weight;
         match self.how.rule {
             Rule::Arrive => {
-                let soft = SOFT[usize::from(self.how.solid == Solid::Elastic)];
+                let soft = SOFT[usize::from(self.how.solid() == Solid::Elastic)];
                 Ok(self
                     .acting
                     .iter()

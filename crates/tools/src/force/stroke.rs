@@ -146,14 +146,14 @@ impl<T: Real> ForceStroke<T> {
         let shape = Shape::new(&how.filter).map_err(ForceError::Tool)?;
         let longest = targets.iter().map(|t| t.path.length()).fold(0.0, f64::max);
         let gain = how.gain.map_or(
-            match how.solid {
+            match how.solid() {
                 Solid::Clay => 15.0,
                 Solid::Elastic => 4.0,
             },
             |g| g.0,
         );
         // Elastic springs may not follow at all.
-        let extent = match (extent, how.solid) {
+        let extent = match (extent, how.solid()) {
             (Extent::Track, Solid::Elastic) => Extent::Curve,
             (extent, _) => extent,
         };
@@ -302,7 +302,7 @@ impl<T: Real> ForceStroke<T> {
 
     /// Whether it springs back when it is let go.
     pub fn is_elastic(&self) -> bool {
-        self.how.solid == Solid::Elastic
+        self.how.solid() == Solid::Elastic
     }
 
     /// Forces on the samples that the last step ended with.
@@ -348,7 +348,7 @@ impl<T: Real> ForceStroke<T> {
             if target.ends_early && ahead > 0.0 || a.stiffness == 0.0 {
                 return true;
             }
-            match (self.how.solid, a.before) {
+            match (self.how.solid(), a.before) {
                 (Solid::Clay, _) => ahead.abs() <= off,
                 (Solid::Elastic, Some(before)) => (crossing - before).abs() <= AT_REST * length,
                 (Solid::Elastic, None) => false,
@@ -359,7 +359,7 @@ impl<T: Real> ForceStroke<T> {
 
     /// Share of its path to which a surface is brought.
     pub(super) fn share(&self) -> f64 {
-        match (self.how.solid, self.how.rule) {
+        match (self.how.solid(), self.how.rule) {
             (Solid::Elastic, Rule::Arrive) => self.gain / (1.0 + self.gain),
             _ => 1.0,
         }
@@ -380,18 +380,18 @@ impl<T: Real> ForceStroke<T> {
     /// # Errors
     /// [`ForceError::Region`].
     pub fn release(mut self) -> Result<(HierarchicalSpline<T>, ForceReport), ForceError> {
-        let field = match self.how.solid {
+        let field = match self.how.solid() {
             Solid::Clay => self.region.release_clay(&self.field)?,
             Solid::Elastic => self.field.clone(),
         };
         self.report.arrival = self.arrival(|t| {
-            let value = |p| match self.how.solid {
+            let value = |p| match self.how.solid() {
                 Solid::Clay => field.value(p),
                 Solid::Elastic => self.value(p),
             };
             t.crossing(&value, self.iso, self.radius, self.look())
         });
-        let field = match self.how.solid {
+        let field = match self.how.solid() {
             Solid::Clay => field,
             Solid::Elastic => self.origin,
         };

@@ -55,7 +55,7 @@ impl<T: Real> Toward<'_, T> {
         goal: impl Fn(f64) -> Result<Box<dyn Field + 'g>, ForceError>,
         control: &mut Control,
     ) -> Result<(HierarchicalSpline<T>, Option<(f64, DVec3)>), ForceError> {
-        if self.how.solid == Solid::Elastic {
+        if self.how.solid() == Solid::Elastic {
             return Err(ForceError::tool(
                 "an elastic solid would spring back after every stage; leave solid out",
             ));

@@ -63,7 +63,8 @@ impl LiveStroke {
     ///
     /// # Errors
     /// Any [`ToolError`].
-    pub fn begin(mut stroke: Stroke, canvas: Canvas) -> Result<Self, ToolError> {
+    pub fn begin(stroke: Stroke, canvas: Canvas) -> Result<Self, ToolError> {
+        let mut stroke = stroke.of(canvas.material);
         let told = stroke.poses()?;
         if !stroke.during.is_empty() {
             let why = "a stroke in a hand gets its paint as it goes; none is given before it begins";

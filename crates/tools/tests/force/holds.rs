@@ -237,3 +237,20 @@ fn holds_keep_on_their_side_of_a_plane() {
         rise(18.0)
     );
 }
+
+/// An elastic object springs back from every force tool but those that say otherwise.
+#[test]
+fn strokes_ask_the_object_what_stays() {
+    let field = block::<f32>(24);
+    let pull =
+        |how: &str| format!("[[stroke]]\npull = {{ along = [[12, 12, 12]], lift = 1, radius = 2{how} }}\n");
+    let elastic = "[[stroke]]\nmaterial = { solid = 'elastic' }\n";
+    let left = |script: &str| played(&field, script).unwrap().0.field;
+    let rise = |script: &str| height(&left(script), 12.0, 12.0);
+    assert!((rise(&pull("")) - 1.0).abs() < 0.02);
+    assert_eq!(left(&format!("{elastic}{}", pull(""))).sha256(), field.sha256());
+    let kept = pull(", how = { solid = 'clay' }");
+    assert!((rise(&format!("{elastic}{kept}")) - 1.0).abs() < 0.02);
+    let again = "[[stroke]]\nmaterial = { solid = 'clay' }\n";
+    assert!((rise(&format!("{elastic}{again}{}", pull(""))) - 1.0).abs() < 0.02);
+}

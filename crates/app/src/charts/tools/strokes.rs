@@ -39,7 +39,7 @@ fn half_space<T: Real>(cells: u32) -> Result<HierarchicalSpline<T>, EditError> {
 /// What the solid does, and how large the forces are.
 fn law(solid: Solid, rule: Rule) -> (String, How, f64) {
     let how = How {
-        solid,
+        solid: Some(solid),
         rule,
         ..How::default()
     };

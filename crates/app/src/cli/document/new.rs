@@ -5,6 +5,7 @@ use fitting::{Cancel, FitReport};
 use formats::Unit;
 use formats::field::{AnyField, FieldMeta, SourceKind};
 use glam::DVec3;
+use tools::force::Solid;
 use tools::geometric::block;
 
 use super::{Told, failure, options};
@@ -36,6 +37,9 @@ pub struct Args {
     /// Finest knot interval of the block: the least that can be shaped is a few of it
     #[arg(long, value_name = "LENGTH", requires = "block", value_parser = positive, allow_negative_numbers = true)]
     spacing: Option<f64>,
+    /// What the objects are when a force tool lets go: clay keeps its new shape, elastic springs back
+    #[arg(long, value_enum, default_value = "clay")]
+    material: Material,
     /// Unit of the block's lengths: um, mm, cm or m
     #[arg(long, requires = "block")]
     unit: Option<Unit>,
@@ -45,6 +49,26 @@ pub struct Args {
     /// Print one JSON object instead of a table
     #[arg(long)]
     pub json: bool,
+}
+
+/// What an object does with its shape.
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Material {
+    /// It keeps the new one.
+    Clay,
+    /// It springs back.
+    Elastic,
+}
+
+impl From<Material> for tools::material::Material {
+    fn from(material: Material) -> Self {
+        Self {
+            solid: match material {
+                Material::Clay => Solid::Clay,
+                Material::Elastic => Solid::Elastic,
+            },
+        }
+    }
 }
 
 /// Finest knot interval over what a mesh of a block may be off by, as for a fit.
@@ -89,8 +113,9 @@ pub fn run(args: &Args) -> Outcome {
             iso: args.iso.or(loaded.meta.iso),
             ..loaded.meta.clone()
         };
-        let object = Object::new(&loaded.field, meta)
+        let mut object = Object::new(&loaded.field, meta)
             .map_err(|e| Failure::input(format!("{}: {e}", source.name())))?;
+        object.properties.material = args.material.into();
         state = state.with(&name, object).map_err(failure)?;
     }
     if let (Some(OneOrThree(size)), Some(spacing)) = (args.block, args.spacing) {
@@ -111,7 +136,8 @@ pub fn run(args: &Args) -> Outcome {
             report: stored_text(&report),
             ..FieldMeta::default()
         };
-        let object = Object::new(&AnyField::F32(field), meta).map_err(Failure::input)?;
+        let mut object = Object::new(&AnyField::F32(field), meta).map_err(Failure::input)?;
+        object.properties.material = args.material.into();
         state = state.with("block", object).map_err(failure)?;
     }
     let mut document = Document::create(&args.document, state, options()).map_err(failure)?;
