@@ -2,6 +2,8 @@
 
 #[path = "force/areas.rs"]
 mod areas;
+#[path = "force/borders.rs"]
+mod borders;
 #[path = "force/holds.rs"]
 mod holds;
 

@@ -1,5 +1,6 @@
 use bspline::Real;
 use dynamics::lattice::{OnBox, SampleBox};
+use dynamics::matter::Quantity;
 use dynamics::region::Region;
 use glam::DVec3;
 
@@ -18,6 +19,8 @@ const PIECE: [(f64, f64); 3] = [
 pub struct Spread {
     pub at: SampleBox,
     pub shares: Vec<f64>,
+    /// Mean stiffness of the matter that it is spread over.
+    pub stiffness: f64,
 }
 
 /// A part of a path whose force is spread.
@@ -101,15 +104,41 @@ impl Spread {
             }
         }
         let sum: f64 = shares.iter().sum();
-        if sum > 0.0 && sum.is_finite() {
-            shares.iter_mut().for_each(|s| *s /= sum);
-            return Ok(Self { at, shares });
+        if !(sum > 0.0 && sum.is_finite()) {
+            return Ok(Self {
+                at: SampleBox::default(),
+                shares: Vec::new(),
+                stiffness: 1.0,
+            });
         }
+        shares.iter_mut().for_each(|s| *s /= sum);
+        let stiffness = match &region.patch().matter().stiffness {
+            Quantity::Constant(all) => *all,
+            Quantity::PerSample(each) => yielding(&mut shares, at, lattice.sample_dims(), each),
+        };
         Ok(Self {
-            at: SampleBox::default(),
-            shares: Vec::new(),
+            at,
+            shares,
+            stiffness,
         })
     }
+}
+
+/// Takes from the shares of what is softer than the mean, and gives the mean. What moves a stiff solid by a little would carry
+/// soft matter beside it far beyond, where it tears off.
+fn yielding(shares: &mut [f64], at: SampleBox, dims: [usize; 3], stiffness: &[f64]) -> f64 {
+    let felt = || at.indices(dims).map(|i| stiffness[i]);
+    let mean: f64 = shares.iter().zip(felt()).map(|(s, k)| s * k).sum();
+    if mean.is_nan() || mean <= 0.0 {
+        return 1.0;
+    }
+    let mut sum = 0.0;
+    for (share, k) in shares.iter_mut().zip(felt()) {
+        *share *= (k / mean).min(1.0);
+        sum += *share;
+    }
+    shares.iter_mut().for_each(|s| *s /= sum);
+    mean
 }
 
 /// Unit vectors of the axes of a region's samples.

@@ -22,6 +22,10 @@ const FLOW: f64 = 0.1;
 const LONG: f64 = 10.0;
 /// Softness of paths that have to arrive, over their own stiffness.
 const SOFT: [f64; 2] = [0.01, 0.003];
+/// Share of its length that a path of clay may be off its goal for the solve of a step.
+const CLOSE: f64 = 0.002;
+/// Factor by which the matter under a path may become other before its softness does.
+const OTHER: f64 = 1.5;
 /// Of the integrals: over the value, and of the mean over the fall of the density in a radius.
 const EXACT: Tolerance = Tolerance {
     relative: 1e-4,
@@ -62,7 +66,7 @@ impl<T: Real> ForceStroke<T> {
             };
         }
         let mut solves = 1;
-        if self.scales {
+        if self.scales || self.are_elsewhere(&bearings) {
             self.scale(&bearings, dt)?;
             solves += 1;
         }
@@ -92,11 +96,14 @@ impl<T: Real> ForceStroke<T> {
         let diagonal: Vec<f64> = live
             .iter()
             .zip(&soft)
-            .map(|(&i, soft)| self.acting[i].stiffness / self.targets[self.acting[i].index].weight + soft)
+            .map(|(&i, soft)| self.acting[i].stiffness / self.acting[i].worth + soft)
             .collect();
+        let enough: Vec<f64> = live.iter().map(|&i| self.enough(&self.acting[i])).collect();
+        self.memory
+            .turn_to(live.iter().map(|&i| self.acting[i].index).collect());
         let most = self.extent.solves();
         let (region, solid) = (&mut self.region, self.how.solid);
-        let solved = system::solve(&right, &soft, &diagonal, most, 1e-4, |z| {
+        let solved = system::solve(&right, &soft, &diagonal, most, &enough, &mut self.memory, |z| {
             let of = live.iter().zip(z).map(|(&i, z)| (&bearing(i).spread, *z));
             let load = Load::<T>::of(of);
             let found = answer(region, solid, dt, &load)?;
@@ -191,11 +198,38 @@ impl<T: Real> ForceStroke<T> {
         self.acting.iter().zip(goals).map(one).collect()
     }
 
-    /// How far each path goes by a unit of force on all, by their weights.
+    /// Density that a path may be short of after the solve of a step.
+    fn enough(&self, acting: &Acting) -> f64 {
+        match self.how.solid {
+            Solid::Clay => CLOSE * self.whole(&self.targets[acting.index]) * self.field.slope(),
+            // They come to rest in balance.
+            Solid::Elastic => 0.0,
+        }
+    }
+
+    /// Whether paths have come to other matter.
+    fn are_elsewhere(&self, bearings: &[Option<Bearing>]) -> bool {
+        let mut both = self.acting.iter().zip(bearings);
+        both.any(|(acting, bearing)| {
+            let now = bearing.as_ref().map_or(acting.worth, |b| self.worth(acting, b));
+            !(1.0 / OTHER..=OTHER).contains(&(now / acting.worth))
+        })
+    }
+
+    /// What a path stands for: its weight, and the stiffness of what it moves. Forces in proportion to that move all paths
+    /// about as far, on both sides of a border.
+    fn worth(&self, acting: &Acting, bearing: &Bearing) -> f64 {
+        self.targets[acting.index].weight * bearing.spread.stiffness
+    }
+
+    /// How far each path goes by a unit of force on all, by what they stand for.
     fn scale(&mut self, bearings: &[Option<Bearing>], dt: f64) -> Result<(), ForceError> {
-        let targets = &self.targets;
-        let weights = self.acting.iter().map(|a| targets[a.index].weight);
-        let load = Load::<T>::of(pairs(bearings, weights));
+        for i in 0..self.acting.len() {
+            if let Some(bearing) = &bearings[i] {
+                self.acting[i].worth = self.worth(&self.acting[i], bearing);
+            }
+        }
+        let load = Load::<T>::of(pairs(bearings, self.acting.iter().map(|a| a.worth)));
         let found = self
             .region
             .respond_as_step(Integrator::Paper, dt, &load.on_box())?;
@@ -216,11 +250,7 @@ impl<T: Real> ForceStroke<T> {
         match self.how.rule {
             Rule::Arrive => {
                 let soft = SOFT[usize::from(self.how.solid == Solid::Elastic)];
-                Ok(self
-                    .acting
-                    .iter()
-                    .map(|a| soft * a.stiffness / weight(a))
-                    .collect())
+                Ok(self.acting.iter().map(|a| soft * a.stiffness / a.worth).collect())
             }
             Rule::Raw(alpha) => {
                 let of = |b: &Option<Bearing>| b.as_ref().map_or(1.0, |b| b.span.to - b.span.from);

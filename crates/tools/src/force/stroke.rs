@@ -12,6 +12,7 @@ use super::holding::{Drawn, Holding};
 use super::report::{Arrival, ForceReport};
 use super::row::Functions;
 use super::spread::Load;
+use super::system::Memory;
 use super::target::Target;
 use super::{ForceError, How, Rule, Solid, track};
 use crate::paint::Layers;
@@ -45,11 +46,11 @@ pub enum Extent {
 }
 
 impl Extent {
-    /// Solves of a step beside the first.
+    /// Most solves of a step beside the first.
     pub(super) fn solves(self) -> usize {
         match self {
-            Self::Curve | Self::Track => 3,
-            Self::Area => 5,
+            Self::Curve | Self::Track => 8,
+            Self::Area => 12,
         }
     }
 }
@@ -65,8 +66,10 @@ pub(super) struct Acting {
     pub(super) before: Option<f64>,
     /// Steps that it has acted.
     pub(super) age: usize,
-    /// What moves it by itself, a unit of force on all paths by their weights.
+    /// How far it goes by a unit of force on all paths, by what they stand for.
     pub(super) stiffness: f64,
+    /// What it stands for.
+    pub(super) worth: f64,
 }
 
 impl Acting {
@@ -78,6 +81,7 @@ impl Acting {
             crossing: None,
             before: None,
             stiffness: 0.0,
+            worth: 1.0,
         }
     }
 }
@@ -114,6 +118,8 @@ pub struct ForceStroke<T> {
     pub(super) hand: Option<Hand>,
     /// Forces of the last step.
     pub(super) load: Load<T>,
+    /// What they moved.
+    pub(super) memory: Memory,
     pub(super) report: ForceReport,
 }
 
@@ -199,6 +205,7 @@ impl<T: Real> ForceStroke<T> {
             is_repainted: false,
             hand: None,
             load: Load::of(std::iter::empty()),
+            memory: Memory::default(),
             report: ForceReport {
                 paths: targets.len(),
                 steps: 0,
@@ -324,14 +331,17 @@ impl<T: Real> ForceStroke<T> {
 
     /// How far the surface at an arc length is beyond the end of a path, as a share of what it has to go.
     pub(super) fn ahead(&self, target: &Target, crossing: f64) -> f64 {
+        (crossing - target.path.length()) / self.whole(target)
+    }
+
+    /// Length that errors on a path count by: a hand may end where it began.
+    pub(super) fn whole(&self, target: &Target) -> f64 {
         let length = target.path.length();
-        // A hand may end where it began.
-        let whole = if self.hand.is_some() {
+        if self.hand.is_some() {
             length.max(self.radius)
         } else {
             length
-        };
-        (crossing - length) / whole
+        }
     }
 
     fn is_stage_over(&self) -> bool {
