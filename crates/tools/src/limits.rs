@@ -181,6 +181,12 @@ impl Limits {
         region && self.mask.iter().all(|mask| mask.bounds(support).lo > 0.0)
     }
 
+    /// Whether nothing in a world box may change.
+    pub fn is_shut(&self, part: &Aabb) -> bool {
+        let region = self.region.iter().any(|(_, solid)| solid.bounds(part).hi <= 0.0);
+        region || self.mask.iter().any(|mask| mask.bounds(part).hi <= 0.0)
+    }
+
     /// What a tool makes of `field`, where the mask fades.
     pub fn mixed<'a>(&'a self, field: &'a dyn Field, target: &'a dyn Field) -> Option<Mixed<'a>> {
         self.weight.as_ref().map(|weight| Mixed {

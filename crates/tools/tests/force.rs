@@ -6,6 +6,8 @@ mod areas;
 mod borders;
 #[path = "force/holds.rs"]
 mod holds;
+#[path = "force/limits.rs"]
+mod limits;
 
 use bspline::hierarchical::{HierarchicalSpline, Lattice};
 use bspline::polygonize::{PolygonizeOptions, check_mesh, polygonize};

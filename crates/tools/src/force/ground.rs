@@ -1,4 +1,4 @@
-use bspline::{HierarchicalSpline, Real};
+use bspline::{Aabb, HierarchicalSpline, Real};
 use dynamics::matter::{Matter, Quantity};
 use dynamics::region::{Cells, Region, RegionOptions};
 use dynamics::springs::Weights;
@@ -7,6 +7,7 @@ use glam::DVec3;
 use super::ForceError;
 use super::holding::Holding;
 use super::target::Target;
+use super::within::FINER;
 use crate::paint::{self, Layers, Substance};
 
 /// Samples at most this share of a radius apart: coarser ones show in the result.
@@ -17,8 +18,10 @@ const SAMPLES_PER_CELL: f64 = 4.0 / 3.0;
 const ROOM: f64 = 4.0;
 /// Knot intervals that the rim takes from a region.
 const RIM: f64 = 0.58;
-/// Levels by which a region may be finer than its tool asks for, where limits leave little room.
-const FINER: usize = 2;
+/// Share of the paths that have to be able to move their places, or the region is finer than the tool asks for.
+const MOVING: f64 = 0.5;
+/// Parts of a knot interval over which the change fades beyond a border.
+const FADE: f64 = 0.25;
 /// Mass and damping over `K/(λr)²` and `K/(λr²)`.
 const MASS: f64 = 0.1;
 const DAMPING: f64 = 1.0;
@@ -40,22 +43,28 @@ impl<T: Real> Ground<'_, T> {
     /// A region about paths, at rest, of matter that moves as wide as the tool is.
     pub fn cut(&self, targets: &[&Target]) -> Result<Region<T>, ForceError> {
         let coarsest = level(self.field, self.radius)?;
-        let cut = |level: usize| -> Result<Region<T>, ForceError> {
-            let options = RegionOptions::of(self.field, level);
-            let matter = matter(self.field, self.radius);
-            let cells = self.cells(level, targets)?;
-            Ok(self.holding.cut(self.field, cells, matter, &options)?)
-        };
-        let mut region = cut(coarsest)?;
         // Narrow places move by narrow functions alone.
-        for finer in 1..=FINER {
-            if self.holding.gives_way(self.field, &region, targets) {
-                break;
-            }
-            region = cut(coarsest + finer)?;
-        }
+        let level = (coarsest..coarsest + FINER).find(|level| self.gives_way(*level, targets));
+        let level = level.unwrap_or(coarsest + FINER);
+        let mut region = Region::new(
+            self.field,
+            self.cells(level, targets)?,
+            matter(self.field, self.radius),
+            &RegionOptions::of(self.field, level),
+        )?;
         self.paint(&mut region)?;
         Ok(region)
+    }
+
+    /// Whether enough of the paths that begin where limits allow it can move the surface there.
+    fn gives_way(&self, level: usize, targets: &[&Target]) -> bool {
+        let limits = &self.holding.limits;
+        let is_free = |p: &DVec3| limits.is_free(&Aabb::new(*p, *p));
+        let starts = targets.iter().map(|t| t.path.at(0.0)).filter(is_free);
+        let moving: Vec<bool> = starts
+            .map(|p| self.holding.gives_way(self.field, level, p))
+            .collect();
+        moving.iter().filter(|m| **m).count() as f64 >= MOVING * moving.len() as f64
     }
 
     /// The field with the change of a region, and one about other paths that goes on where it was.
@@ -111,6 +120,7 @@ impl<T: Real> Ground<'_, T> {
                 values.zip(factors).for_each(|(value, factor)| *value *= factor);
             }
         }
+        self.fade(region, &mut matter);
         if *region.patch().matter() != matter {
             region.patch_mut().set_matter(matter)?;
         }
@@ -120,6 +130,30 @@ impl<T: Real> Ground<'_, T> {
         };
         region.patch_mut().springs_mut().rest_mut().scale = scale;
         Ok(())
+    }
+
+    /// Holds what may not move: the change fades within a part of a knot interval.
+    fn fade(&self, region: &Region<T>, matter: &mut Matter) {
+        let (limits, cells) = (&self.holding.limits, region.cells());
+        let lattice = self.field.lattice();
+        let spacing = lattice.spacing(cells.level);
+        let [nx, ny, nz] = region.patch().lattice().sample_dims();
+        let corners = [[0; 3], [nx - 1, ny - 1, nz - 1]].map(|ijk| region.sample_position(ijk));
+        if limits.is_none()
+            || limits.is_free(&Aabb::new(corners[0].min(corners[1]), corners[0].max(corners[1])))
+        {
+            return;
+        }
+        let half = 0.5 / SAMPLES_PER_CELL * spacing;
+        let held = (FADE * spacing.min_element()).powi(-2);
+        let ground = |i: usize| {
+            let p = region.sample_position([i / nz / ny, i / nz % ny, i % nz]);
+            match limits.is_free(&Aabb::new(p - half, p + half)) {
+                true => 0.0,
+                false => held * matter.stiffness.at(i),
+            }
+        };
+        matter.ground = Quantity::PerSample((0..nx * ny * nz).map(ground).collect());
     }
 
     /// Cells about paths, with room on all sides.

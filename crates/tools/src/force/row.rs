@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::quadrature::Node;
 
 /// The four cubic B-splines of uniform knots that are not 0 at `t` in their cell.
-fn basis(t: f64) -> [f64; 4] {
+pub fn basis(t: f64) -> [f64; 4] {
     let s = 1.0 - t;
     [
         s * s * s / 6.0,
@@ -68,10 +68,10 @@ impl<'a, T: Real> Functions<'a, T> {
         }
     }
 
-    /// Sum of the weights at a place of those functions that count.
-    pub fn weight(&self, at: DVec3, counts: impl Fn(usize) -> bool) -> f64 {
+    /// Sum of the weights at a place.
+    pub fn weight(&self, at: DVec3) -> f64 {
         let mut sum = 0.0;
-        self.each(at, |i, w| sum += if counts(i) { w } else { 0.0 });
+        self.each(at, |_, w| sum += w);
         sum
     }
 

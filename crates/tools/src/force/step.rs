@@ -2,6 +2,7 @@
 
 use bspline::Real;
 use dynamics::integrators::Integrator;
+use dynamics::matter::Quantity;
 use dynamics::region::Region;
 use dynamics::response::{Against, Response};
 use glam::DVec3;
@@ -10,17 +11,15 @@ use super::quadrature::Tolerance;
 use super::report::{Arrival, Told};
 use super::row::{Functions, Row};
 use super::spread::{Load, Part, Spread};
-use super::stroke::{Acting, ForceStroke};
+use super::stroke::{ADVANCE, Acting, ForceStroke, LEAST_OPEN};
 use super::target::Span;
 use super::{ForceError, Rule, Solid, system};
 
-/// Radii that the goal of the longest path advances in a step.
-pub(super) const ADVANCE: f64 = 0.3;
 /// Share of what is missing by which rest lengths follow in a step of clay, as an exponent: `λΔt`.
 const FLOW: f64 = 0.1;
 /// Steps, in `1/λ`, of elastic solids.
 const LONG: f64 = 10.0;
-/// Softness of paths that have to arrive, over their own stiffness.
+/// Softness of paths that have to arrive, over their own stiffness: of clay, and of elastic or painted matter.
 const SOFT: [f64; 2] = [0.01, 0.003];
 /// Share of its length that a path of clay may be off its goal for the solve of a step.
 const CLOSE: f64 = 0.002;
@@ -146,7 +145,7 @@ impl<T: Real> ForceStroke<T> {
             a.age += 1;
             let part = (a.age as f64 / steps).min(1.0);
             all &= part == 1.0;
-            part * share * self.targets[a.index].path.length()
+            part * share * a.open * self.targets[a.index].path.length()
         });
         let goals = goals.collect();
         self.settled += usize::from(all && self.drawn.is_done());
@@ -167,6 +166,7 @@ impl<T: Real> ForceStroke<T> {
             let target = &self.targets[acting.index];
             let Some(span) = acting
                 .crossing
+                .filter(|_| acting.open >= LEAST_OPEN)
                 .and_then(|at| target.span(&value, self.iso, at, *goal, step))
             else {
                 return Ok(None);
@@ -226,7 +226,11 @@ impl<T: Real> ForceStroke<T> {
     fn scale(&mut self, bearings: &[Option<Bearing>], dt: f64) -> Result<(), ForceError> {
         for i in 0..self.acting.len() {
             if let Some(bearing) = &bearings[i] {
-                self.acting[i].worth = self.worth(&self.acting[i], bearing);
+                let worth = self.worth(&self.acting[i], bearing);
+                let acting = &mut self.acting[i];
+                // What has come to softer matter needs less.
+                acting.force *= if acting.age > 1 { worth / acting.worth } else { 1.0 };
+                acting.worth = worth;
             }
         }
         let load = Load::<T>::of(pairs(bearings, self.acting.iter().map(|a| a.worth)));
@@ -249,7 +253,8 @@ impl<T: Real> ForceStroke<T> {
         let weight = |a: &Acting| self.targets[a.index].weight;
         match self.how.rule {
             Rule::Arrive => {
-                let soft = SOFT[usize::from(self.how.solid == Solid::Elastic)];
+                let is_even = matches!(self.region.patch().matter().stiffness, Quantity::Constant(_));
+                let soft = SOFT[usize::from(self.how.solid == Solid::Elastic || !is_even)];
                 Ok(self.acting.iter().map(|a| soft * a.stiffness / a.worth).collect())
             }
             Rule::Raw(alpha) => {

@@ -232,8 +232,8 @@ mod tests {
         let counts = |remembers: bool| -> Vec<usize> {
             let mut memory = Memory::default();
             let one = |round: i32| {
-                let gives = |i: usize| if i < n / 2 { 0.01 } else { 1.0 };
-                let c = |i: usize, j: usize| {
+                let gives = |i: usize| -> f64 { if i < n / 2 { 0.01 } else { 1.0 } };
+                let c = |i: usize, j: usize| -> f64 {
                     let far = (i as f64 - j as f64) / (4.0 + 0.02 * f64::from(round));
                     (gives(i) * gives(j)).sqrt() * (-far * far).exp()
                 };
