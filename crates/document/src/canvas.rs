@@ -2,9 +2,10 @@
 
 use glam::DAffine3;
 use tools::others::Others;
+use tools::place::Placement;
 use tools::tool::Canvas;
 
-use crate::{CommandError, State};
+use crate::{CommandError, Object, State};
 
 /// An object as a tool sees it, with all others beside it.
 pub fn canvas(state: &State, name: &str) -> Result<Canvas, CommandError> {
@@ -16,6 +17,7 @@ pub fn canvas(state: &State, name: &str) -> Result<Canvas, CommandError> {
         iso: iso.ok_or_else(|| CommandError::NoSurface(name.into()))?,
         layers: object.layers.clone(),
         holds: object.properties.holds.clone(),
+        placement: placement(state, object)?,
         others: others(state, name)?,
         copies: Vec::new(),
     })
@@ -33,7 +35,22 @@ pub fn left(state: &State, name: &str, canvas: Canvas) -> Result<State, CommandE
     }
     let mut shaped = object.clone().with_shape(canvas.field, canvas.layers);
     shaped.properties.holds = canvas.holds;
+    shaped.properties.set_placement(canvas.placement.map);
+    shaped.properties.parent = canvas.placement.parent;
     Ok(next.with(name, shaped)?)
+}
+
+/// Where an object lies, in its parent's world and in that.
+fn placement(state: &State, object: &Object) -> Result<Placement, CommandError> {
+    let parent = object.properties.parent.clone();
+    Ok(Placement {
+        map: object.properties.parent_from_object(),
+        shared_from_parent: match &parent {
+            Some(name) => state.placement(name)?,
+            None => DAffine3::IDENTITY,
+        },
+        parent,
+    })
 }
 
 /// All objects that have a surface, as they lie to the one of a name.

@@ -49,17 +49,20 @@ impl Default for Properties {
 impl Properties {
     /// Placed by a map, with no parent.
     pub fn placed(map: DAffine3) -> Self {
-        let DMat3 {
-            x_axis,
-            y_axis,
-            z_axis,
-        } = map.matrix3;
-        Self {
-            placement: [x_axis, y_axis, z_axis, map.translation].map(|c| c.to_array()),
+        let mut placed = Self {
+            placement: [[0.0; 3]; 4],
             parent: None,
             detail: None,
             holds: Vec::new(),
-        }
+        };
+        placed.set_placement(map);
+        placed
+    }
+
+    /// Sets the map from the object's own world to that of its parent.
+    pub fn set_placement(&mut self, map: DAffine3) {
+        let [x, y, z] = [0, 1, 2].map(|axis| map.matrix3.col(axis));
+        self.placement = [x, y, z, map.translation].map(|c| c.to_array());
     }
 
     /// Map from the object's own world to that of its parent.

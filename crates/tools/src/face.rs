@@ -1,5 +1,9 @@
-use bspline::HierarchicalSpline;
+use bspline::hierarchical::Lattice;
+use bspline::{Aabb, Field, Frame, HierarchicalSpline};
 use glam::DVec3;
+
+/// Most points across a face at which it is looked at.
+const ACROSS: u32 = 256;
 
 /// A face of a field's box.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -10,7 +14,69 @@ pub struct Face {
     pub is_last: bool,
 }
 
+/// Points of a face.
+pub struct FaceNodes {
+    frame: Frame,
+    count: [usize; 3],
+}
+
+impl FaceNodes {
+    /// Values of a field at the points.
+    pub fn values(&self, field: &dyn Field) -> Vec<f64> {
+        let mut values = vec![0.0; self.count.iter().product()];
+        field.frame_values(&self.frame, [0; 3], self.count, &mut values);
+        values
+    }
+
+    /// Where a point is.
+    pub fn place(&self, n: usize) -> DVec3 {
+        let [_, y, z] = self.count;
+        self.frame.node([n / z / y, n / z % y, n % z].map(|i| i as i64))
+    }
+}
+
 impl Face {
+    /// All six.
+    pub const ALL: [Self; 6] = {
+        let mut all = [Self {
+            axis: 0,
+            is_last: false,
+        }; 6];
+        let mut n = 0;
+        while n < 6 {
+            all[n] = Self {
+                axis: n / 2,
+                is_last: n % 2 == 1,
+            };
+            n += 1;
+        }
+        all
+    };
+
+    /// Points of the face in a box of lattice coordinates, about `step` cells of level 0 apart; none where the box does not reach it.
+    pub fn nodes(self, lattice: &Lattice, within: &Aabb, step: f64) -> Option<FaceNodes> {
+        let Self { axis, is_last } = self;
+        let extent = lattice.extent();
+        let (at, is_reached) = match is_last {
+            false => (0.0, within.min[axis] <= 0.0),
+            true => (extent[axis], within.max[axis] >= extent[axis]),
+        };
+        let mut part = Aabb {
+            min: within.min.max(DVec3::ZERO),
+            max: within.max.min(extent),
+        };
+        if !is_reached || part.min.cmpgt(part.max).any() {
+            return None;
+        }
+        (part.min[axis], part.max[axis]) = (at, at);
+        let steps = (part.size() / step).ceil();
+        let cells = steps.to_array().map(|n| (n as u32).clamp(1, ACROSS));
+        let mut frame = Frame::over(&part, cells);
+        frame.world_from_grid = lattice.world_from_lattice * frame.world_from_grid;
+        let count = std::array::from_fn(|a| if a == axis { 1 } else { cells[a] as usize + 1 });
+        Some(FaceNodes { frame, count })
+    }
+
     /// The face beyond which a place lies, by the most cells; none for a place in the box.
     pub fn beyond(field: &HierarchicalSpline<f32>, place: DVec3) -> Option<Self> {
         let at = field.lattice_from_world().transform_point3(place);

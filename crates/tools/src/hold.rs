@@ -143,6 +143,17 @@ impl Hold {
     }
 }
 
+impl Held {
+    /// The constraint with every place brought elsewhere.
+    pub(crate) fn carried(&self, to: impl Fn(DVec3) -> DVec3) -> Self {
+        let line = |line: &Vec<Point>| line.iter().map(|p| Point(to(p.0))).collect();
+        Self {
+            lines: self.lines.iter().map(line).collect(),
+            ..self.clone()
+        }
+    }
+}
+
 impl Free {
     /// The constraints of an object without what is freed.
     ///

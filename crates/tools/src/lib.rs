@@ -15,6 +15,7 @@ pub mod mix;
 pub mod number;
 pub mod others;
 pub mod paint;
+pub mod place;
 mod room;
 pub mod scene;
 pub mod session;

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use bspline::primitives::Cuboid;
 use bspline::{Aabb, Csg, Field, HierarchicalSpline, Real};
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use crate::coefficients::{changed, coefficient, support, with_functions};
@@ -185,6 +186,15 @@ impl Limits {
     pub fn is_shut(&self, part: &Aabb) -> bool {
         let region = self.region.iter().any(|(_, solid)| solid.bounds(part).hi <= 0.0);
         region || self.mask.iter().any(|mask| mask.bounds(part).hi <= 0.0)
+    }
+
+    /// How much of a change happens at a place, 0 to 1.
+    pub fn share(&self, p: DVec3) -> f64 {
+        match (&self.weight, self.is_free(&Aabb { min: p, max: p })) {
+            (_, false) => 0.0,
+            (Some(weight), true) => weight.value(p),
+            (None, true) => 1.0,
+        }
     }
 
     /// What a tool makes of `field`, where the mask fades.

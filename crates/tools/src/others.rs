@@ -15,6 +15,7 @@ pub struct Others(BTreeMap<String, Other>);
 struct Other {
     distance: Arc<dyn Field>,
     reach: Aabb,
+    canvas_from_object: DAffine3,
     /// The field itself and its iso-value, where it lies as the canvas does.
     own: Option<(HierarchicalSpline<f32>, f64)>,
 }
@@ -52,6 +53,7 @@ impl Others {
         let other = Other {
             distance,
             reach: field.lattice().world_box().transformed(&canvas_from_object),
+            canvas_from_object,
             own: is_beside.then(|| (field.clone(), iso)),
         };
         self.0.insert(name.into(), other);
@@ -68,11 +70,20 @@ impl Others {
     /// # Errors
     /// A sentence.
     pub fn get(&self, name: &str) -> Result<(Arc<dyn Field>, Aabb), String> {
-        let found = self
-            .0
-            .get(name)
-            .map(|other| (other.distance.clone(), other.reach));
-        found.ok_or_else(|| {
+        let other = self.known(name)?;
+        Ok((other.distance.clone(), other.reach))
+    }
+
+    /// Map from the world of an object to that of the canvas.
+    ///
+    /// # Errors
+    /// A sentence.
+    pub(crate) fn map(&self, name: &str) -> Result<DAffine3, String> {
+        Ok(self.known(name)?.canvas_from_object)
+    }
+
+    fn known(&self, name: &str) -> Result<&Other, String> {
+        self.0.get(name).ok_or_else(|| {
             let known: Vec<_> = self.0.keys().map(String::as_str).collect();
             match known.is_empty() {
                 true => format!("there is no object {name:?}, nor any other"),

@@ -1,10 +1,15 @@
 //! Boxes of fields that grow when a stroke needs more room.
 
-use bspline::{Aabb, Field, Frame, HierarchicalSpline};
+use bspline::{Aabb, Field, HierarchicalSpline};
 use glam::DVec3;
 
 use crate::face::Face;
-use crate::tool::Canvas;
+use crate::force::ForceError;
+use crate::geometric::GeometricError;
+use crate::tool::{Canvas, ToolError};
+
+/// How often a box grows for one stroke: to about twice its length. Further away is a slip of the pen.
+pub const MOST_GROWTHS: usize = 6;
 
 /// Share of the cells along an axis by which a box grows at once.
 const SHARE: u32 = 8;
@@ -12,20 +17,46 @@ const SHARE: u32 = 8;
 /// Most cells of a box along an axis on the finest level, as files have it.
 const MOST_CELLS: u64 = 1 << 30;
 
-/// Points across a face at which it is asked for solid that was cut off there.
-const ACROSS: u32 = 256;
-
 impl Canvas {
+    /// The face beyond which the box has to grow for what a tool was refused. None where it was refused for something else, where it
+    /// goes too far, or where the box cannot grow: the solid is cut off at the face, so that nobody knows how it goes on; or the box is
+    /// as large as boxes get.
+    pub fn face_for(&self, refused: &ToolError) -> Option<Face> {
+        let face = match refused {
+            ToolError::Geometric(GeometricError::Leaves { face, .. }) => *face,
+            ToolError::Force(ForceError::Outside { at, .. }) => {
+                let at = DVec3::from_array(*at);
+                let local = self.field.lattice_from_world().transform_point3(at);
+                let extent = self.field.lattice().extent();
+                let is_near = local.cmpge(-extent).all() && local.cmple(2.0 * extent).all();
+                Face::beyond(&self.field, at).filter(|_| is_near)?
+            }
+            _ => return None,
+        };
+        let finest = self.field.level_count().max(self.detail + 1) - 1;
+        let cells = u64::from(self.field.lattice().cells[face.axis] + self.step(face));
+        let can_grow = cells << finest <= MOST_CELLS && !is_cut(&self.field, self.iso, face);
+        can_grow.then_some(face)
+    }
+
+    /// What is left to say of a box that was another one before.
+    pub fn growth_since(&self, before: &Self) -> Option<String> {
+        let lattice = self.field.lattice();
+        let b = lattice.world_box();
+        let [min, max] = [b.min, b.max].map(|p| p.to_array());
+        (lattice != before.field.lattice())
+            .then(|| format!("the box of the field has grown: {min:?} to {max:?}"))
+    }
+
+    fn step(&self, face: Face) -> u32 {
+        self.field.lattice().cells[face.axis].div_ceil(SHARE)
+    }
+
     /// The canvas with a box that is larger beyond a face: whole cells of the coarsest level, filled with what the field was outside. None
-    /// where that cannot be: the solid is cut off at the face, so that nobody knows how it goes on; or the box is as large as boxes get.
+    /// where the numbers do not fit.
     pub fn grown(&self, face: Face) -> Option<Self> {
         let lattice = self.field.lattice();
-        let by = lattice.cells[face.axis].div_ceil(SHARE);
-        let cells = u64::from(lattice.cells[face.axis]) + u64::from(by);
-        let finest = self.field.level_count().max(self.detail + 1) - 1;
-        if cells << finest > MOST_CELLS || is_cut(&self.field, self.iso, face) {
-            return None;
-        }
+        let by = self.step(face);
         let mut ends = [[0; 3]; 2];
         ends[usize::from(face.is_last)][face.axis] = by;
         let [before, behind] = ends;
@@ -44,16 +75,35 @@ impl Canvas {
 /// Whether the solid reaches a face.
 fn is_cut(field: &HierarchicalSpline<f32>, iso: f64, face: Face) -> bool {
     let lattice = field.lattice();
-    let mut part = Aabb::new(DVec3::ZERO, lattice.extent());
-    let at = if face.is_last { part.max } else { part.min }[face.axis];
-    (part.min[face.axis], part.max[face.axis]) = (at, at);
-    let cells = lattice
-        .cells_at(field.level_count() - 1)
-        .map(|n| n.clamp(1, ACROSS));
-    let mut frame = Frame::over(&part, cells);
-    frame.world_from_grid = lattice.world_from_lattice * frame.world_from_grid;
-    let count = std::array::from_fn(|a| if a == face.axis { 1 } else { cells[a] as usize + 1 });
-    let mut values = vec![0.0; count.iter().product()];
-    field.frame_values(&frame, [0; 3], count, &mut values);
-    values.iter().any(|value| *value > iso)
+    let step = 1.0 / (1u64 << (field.level_count() - 1)) as f64;
+    let whole = Aabb::new(DVec3::ZERO, lattice.extent());
+    let nodes = face.nodes(lattice, &whole, step);
+    nodes.is_some_and(|nodes| nodes.values(field).iter().any(|value| *value > iso))
+}
+
+/// Says where a tool has widened the solid at a face that had cut it off before; elsewhere it would have left its box, which is refused.
+pub fn cut_off(
+    before: &HierarchicalSpline<f32>,
+    after: &HierarchicalSpline<f32>,
+    iso: f64,
+) -> Option<String> {
+    let lattice = after.lattice();
+    let changed = after.changed_boxes(before, &lattice.world_box());
+    let changed = changed
+        .into_iter()
+        .reduce(|a, b| Aabb::new(a.min.min(b.min), a.max.max(b.max)))?;
+    let within = changed.transformed(after.lattice_from_world());
+    let level = after.level_count() - 1;
+    let step = 1.0 / (1u64 << level) as f64;
+    let rim = lattice.spacing(level).max_element() * after.slope();
+    Face::ALL.into_iter().find_map(|face| {
+        let nodes = face.nodes(lattice, &within, step)?;
+        let [now, then] = [after, before].map(|field| nodes.values(field));
+        let mut both = now.iter().zip(&then);
+        let n = both.position(|(now, then)| *now > iso + rim && *then < iso - rim)?;
+        Some(format!(
+            "the solid goes on beyond the box of its field at {:?}, where it was cut off before; it is cut off there too",
+            nodes.place(n).to_array()
+        ))
+    })
 }

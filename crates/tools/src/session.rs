@@ -4,19 +4,15 @@ use bspline::HierarchicalSpline;
 use fitting::Control;
 use serde::{Deserialize, Serialize};
 
-use crate::face::Face;
-use crate::force::{Chisel, Drill, ForceError, ForceTool, Pull};
-use crate::geometric::{
-    Copy, Cut, Geometric, GeometricError, Inflate, Move, Paste, Refine, Simplify, Smooth,
-};
+use crate::force::{Chisel, Drill, ForceTool, Pull};
+use crate::geometric::{Copy, Cut, Geometric, Inflate, Move, Paste, Refine, Simplify, Smooth};
 use crate::hold::{Free, Hold};
 use crate::limits::{Limits, Mask, Region};
 use crate::paint::Paint;
+use crate::place::Place;
+use crate::room::MOST_GROWTHS;
 use crate::symmetry::Symmetry;
 use crate::tool::{Canvas, Tool, ToolError};
-
-/// How often a box grows for one stroke, an eighth at a time: to about twice its length. Further away is a slip of the pen.
-const MOST_GROWTHS: usize = 6;
 
 /// What a session file says.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -116,6 +112,9 @@ pub struct Stroke {
     /// Takes constraints off.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub free: Option<Free>,
+    /// Puts the whole object elsewhere.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub place: Option<Place>,
 }
 
 impl Stroke {
@@ -149,6 +148,7 @@ impl Stroke {
             self.paint.as_ref().map(Tool::Paint),
             self.hold.as_ref().map(Tool::Hold),
             self.free.as_ref().map(Tool::Free),
+            self.place.as_ref().map(Tool::Place),
         ];
         let given: Vec<_> = all.into_iter().flatten().collect();
         match given[..] {
@@ -171,29 +171,21 @@ impl Stroke {
     /// # Errors
     /// Any [`ToolError`].
     pub fn apply(&self, canvas: Canvas, control: &mut Control) -> Result<(Canvas, Vec<String>), ToolError> {
-        let before = *canvas.field.lattice();
-        let mut canvas = canvas;
-        for _ in 0..MOST_GROWTHS {
-            match self.in_box(canvas.clone(), control) {
-                Err(ToolError::Geometric(GeometricError::Leaves { at, face })) => {
-                    let leaves = GeometricError::Leaves { at, face };
-                    canvas = canvas.grown(face).ok_or(leaves)?;
+        let mut grown = canvas.clone();
+        for growths in 0..=MOST_GROWTHS {
+            match self.in_box(grown.clone(), control) {
+                Err(why) if growths < MOST_GROWTHS => {
+                    let larger = grown.face_for(&why).and_then(|face| grown.grown(face));
+                    grown = larger.ok_or(why)?;
                 }
-                Err(ToolError::Force(ForceError::Outside { at, field })) => {
-                    let leaves = ForceError::Outside { at, field };
-                    let face = Face::beyond(&canvas.field, at.into());
-                    canvas = face.and_then(|face| canvas.grown(face)).ok_or(leaves)?;
-                }
-                Ok((left, mut notes)) if left.field.lattice() != &before => {
-                    let b = left.field.lattice().world_box();
-                    let [min, max] = [b.min, b.max].map(|p| p.to_array());
-                    notes.push(format!("the box of the field has grown: {min:?} to {max:?}"));
+                Err(why) => return Err(why),
+                Ok((left, mut notes)) => {
+                    notes.extend(left.growth_since(&canvas));
                     return Ok((left, notes));
                 }
-                done => return done,
             }
         }
-        self.in_box(canvas, control)
+        unreachable!("the last round ends")
     }
 
     /// What the stroke leaves if the box of the field has room enough.
@@ -252,38 +244,21 @@ impl Stroke {
         let Some(symmetry) = &self.symmetry else {
             return once(canvas);
         };
-        if matches!(
-            tool,
-            Tool::Paint(_) | Tool::Copy(_) | Tool::Hold(_) | Tool::Free(_)
-        ) || !self.during.is_empty()
-        {
-            let paints = if self.during.is_empty() {
-                tool.name()
-            } else {
-                "paint"
-            };
-            let why = format!("{paints} knows no symmetry; write a stroke for each side");
+        if let Tool::Copy(_) | Tool::Hold(_) | Tool::Free(_) | Tool::Place(_) = tool {
+            let why = format!("{} knows no symmetry; write a stroke for each side", tool.name());
             return Err(ToolError::Stroke(why));
         }
-        if matches!(tool, Tool::Force(_)) && !canvas.holds.is_empty() {
-            let why = "holds are on one side only; write a stroke for each side, or free them first";
+        let mut paints = self
+            .paint
+            .iter()
+            .chain(self.during.iter().map(|d| &d.paint))
+            .peekable();
+        let is_painting = paints.peek().is_some();
+        if paints.any(|paint| paint.brush.is_none()) {
+            let why = "only brushes paint on both sides; let the formula or the curve say both, or write a stroke for each side";
             return Err(ToolError::Stroke(why.into()));
         }
-        if matches!(tool, Tool::Move(_)) && canvas.layers.values().any(|layer| !layer.is_empty()) {
-            let why = "a painted object cannot be moved on both sides at once; write a stroke for each side";
-            return Err(ToolError::Stroke(why.into()));
-        }
-        let (mut left, mut notes) = (canvas.clone(), Vec::new());
-        left.field = symmetry.apply(&canvas.field, |field| {
-            let canvas = Canvas {
-                field,
-                ..canvas.clone()
-            };
-            let (canvas, told) = once(canvas)?;
-            (left.copies, notes) = (canvas.copies, told);
-            Ok::<_, ToolError>(canvas.field)
-        })?;
-        Ok((left, notes))
+        symmetry.apply(canvas, tool, is_painting, once)
     }
 }
 

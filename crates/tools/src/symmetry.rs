@@ -7,8 +7,9 @@ use glam::{DAffine3, DVec3};
 use serde::{Deserialize, Serialize};
 
 use crate::coefficients::{Functions, changed, coefficient, with_functions};
-use crate::geometric::{GeometricError, reflection};
+use crate::geometric::reflection;
 use crate::number::Point;
+use crate::tool::{Canvas, Tool, ToolError};
 
 /// A plane on both sides of which a stroke happens.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -30,32 +31,53 @@ struct Plane {
 }
 
 impl Symmetry {
-    /// What a stroke, given as `tool`, leaves of a field if it happens on both sides.
+    /// What a stroke of `tool`, done by `once`, leaves of a canvas if it happens on both sides, and what is left to say of it; `paints` if
+    /// it changes what is painted.
     ///
-    /// The other side is that of the mirrored field, which is the same coefficients on a mirrored lattice, so any tool can be used. Where the
+    /// The other side is that of the mirrored canvas, which is the same coefficients on a mirrored lattice, so any tool can be used. Where the
     /// plane is one of the lattice's and the field is even about it, the coefficients of one side are those of the other to the bit: they
-    /// are copied.
+    /// are copied. Holds are on their own side alone, so what they keep is not copied.
     ///
     /// # Errors
-    /// Those of the tool; [`GeometricError`] for a normal without direction.
-    pub fn apply<E: From<GeometricError>>(
+    /// Those of the tool; [`GeometricError`](crate::geometric::GeometricError) for a normal without direction.
+    pub(crate) fn apply(
         &self,
-        field: &HierarchicalSpline<f32>,
-        mut tool: impl FnMut(HierarchicalSpline<f32>) -> Result<HierarchicalSpline<f32>, E>,
-    ) -> Result<HierarchicalSpline<f32>, E> {
+        before: Canvas,
+        tool: Tool,
+        paints: bool,
+        mut once: impl FnMut(Canvas) -> Result<(Canvas, Vec<String>), ToolError>,
+    ) -> Result<(Canvas, Vec<String>), ToolError> {
         let mirror = reflection(self.at.0, self.normal.0)?;
-        let once = tool(field.clone())?;
-        let plane = Plane::of(field, &mirror, self.normal.0);
-        if let Some(plane) = &plane
-            && let Some(both) = plane.copied(field, &once)
-        {
-            return Ok(both);
+        let field = &before.field;
+        let is_held = matches!(tool, Tool::Force(_)) && !before.holds.is_empty();
+        let plane = Plane::of(field, &mirror, self.normal.0).filter(|_| !is_held);
+        let (one, notes) = once(before.clone())?;
+        let copied = plane.as_ref().and_then(|plane| plane.copied(field, &one.field));
+        // Only fields are copied.
+        let has_more = match tool {
+            Tool::Move(_) => !(one.layers.is_empty() && one.holds.is_empty()),
+            _ => paints,
+        };
+        if let (Some(field), false) = (&copied, has_more) {
+            return Ok((
+                Canvas {
+                    field: field.clone(),
+                    ..one
+                },
+                notes,
+            ));
         }
         let lattice = field.lattice().world_from_lattice;
-        let other = once.placed(mirror * lattice);
-        let both = tool(other)?.placed(lattice);
-        let even = plane.and_then(|plane| plane.evened(field, &both));
-        Ok(even.unwrap_or(both))
+        let (other, notes) = once(one.placed(mirror * lattice, &mirror))?;
+        let mut both = other.placed(lattice, &mirror);
+        if !matches!(tool, Tool::Move(_)) {
+            both.holds = one.holds;
+        }
+        let even = || plane.as_ref()?.evened(field, &both.field);
+        if let Some(even) = copied.or_else(even) {
+            both.field = even;
+        }
+        Ok((both, notes))
     }
 }
 

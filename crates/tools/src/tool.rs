@@ -3,15 +3,18 @@
 use bspline::{Aabb, HierarchicalSpline};
 use fitting::field::FieldFitReport;
 use fitting::{Control, FitError};
+use glam::DAffine3;
 
 use crate::force::{ForceError, ForceTool, Holding};
 use crate::geometric::{
-    Copy, Cut, Geometric, GeometricError, Inflate, Move, Operation, Paste, Refine, Simplify, Smooth,
+    Copy, Cut, Geometric, GeometricError, Inflate, Move, Operation, Origin, Paste, Refine, Simplify, Smooth,
 };
 use crate::hold::{Free, Held, Hold};
 use crate::limits::Limits;
 use crate::others::Others;
 use crate::paint::{Layer, Layers, Paint, PaintError};
+use crate::place::{Place, Placement};
+use crate::room::cut_off;
 
 /// What a tool works on. Cheap to copy.
 #[derive(Clone, Debug)]
@@ -26,6 +29,8 @@ pub struct Canvas {
     pub layers: Layers,
     /// Its constraints.
     pub holds: Vec<Held>,
+    /// Where its world lies.
+    pub placement: Placement,
     /// Objects that a tool may name.
     pub others: Others,
     /// Names under which the object as it was before is to be kept.
@@ -33,6 +38,37 @@ pub struct Canvas {
 }
 
 impl Canvas {
+    /// A field with nothing on it or beside it.
+    pub fn alone(field: HierarchicalSpline<f32>, iso: f64, detail: usize) -> Self {
+        Self {
+            field,
+            iso,
+            detail,
+            layers: Layers::new(),
+            holds: Vec::new(),
+            placement: Placement::default(),
+            others: Others::default(),
+            copies: Vec::new(),
+        }
+    }
+
+    /// The canvas elsewhere: what it is made of on a lattice that lies so, its holds brought along by `map`.
+    pub(crate) fn placed(&self, world_from_lattice: DAffine3, map: &DAffine3) -> Self {
+        let layers = self.layers.iter();
+        Self {
+            field: self.field.placed(world_from_lattice),
+            layers: layers
+                .map(|(substance, layer)| (*substance, layer.placed(world_from_lattice)))
+                .collect(),
+            holds: self
+                .holds
+                .iter()
+                .map(|held| held.carried(|p| map.transform_point3(p)))
+                .collect(),
+            ..self.clone()
+        }
+    }
+
     /// What force tools may not move.
     pub(crate) fn holding(&self, limits: &Limits) -> Holding {
         Holding {
@@ -74,6 +110,8 @@ pub enum Tool<'a> {
     Hold(&'a Hold),
     /// Takes constraints off.
     Free(&'a Free),
+    /// Puts the whole object elsewhere.
+    Place(&'a Place),
 }
 
 /// Why a tool cannot be used.
@@ -106,11 +144,11 @@ impl ToolError {
 
 impl Tool<'_> {
     /// Names of all tools, as sessions write them.
-    pub const NAMES: [&'static str; 18] = {
+    pub const NAMES: [&'static str; 19] = {
         let [pull, chisel, squirt, drill, join] = ForceTool::NAMES;
         [
             "carve", "add", pull, chisel, squirt, drill, join, "move", "smooth", "inflate", "copy", "cut",
-            "paste", "refine", "simplify", "paint", "hold", "free",
+            "paste", "refine", "simplify", "paint", "hold", "free", "place",
         ]
     };
 
@@ -131,6 +169,7 @@ impl Tool<'_> {
             Self::Paint(_) => "paint",
             Self::Hold(_) => "hold",
             Self::Free(_) => "free",
+            Self::Place(_) => "place",
         }
     }
 
@@ -154,13 +193,18 @@ impl Tool<'_> {
         let (field, report) = match self {
             Self::Move(tool) => {
                 let (field, report) = tool.apply(old, *iso, limits, control)?;
-                let layers = carried(tool, &canvas, limits)?;
+                let origin = tool.motion.origin(&old.lattice().world_box())?;
+                let layers = carried(&origin, &canvas, limits)?;
+                let to = |p| p + limits.share(p) * (origin.forth(p) - p);
+                let holds = canvas.holds.iter().map(|held| held.carried(to)).collect();
+                let notes = told(&report, old, &field, *iso);
                 let moved = Canvas {
                     field,
                     layers,
+                    holds,
                     ..canvas
                 };
-                return Ok((moved, thin_parts(&report)));
+                return Ok((moved, notes));
             }
             Self::Paint(paint) => {
                 let layer = painted(paint, &canvas, limits)?;
@@ -182,6 +226,10 @@ impl Tool<'_> {
                 let holds = free.left(&canvas.holds).map_err(ToolError::Stroke)?;
                 return Ok((Canvas { holds, ..canvas }, Vec::new()));
             }
+            Self::Place(place) => {
+                let placement = place.apply(&canvas).map_err(ToolError::Stroke)?;
+                return Ok((Canvas { placement, ..canvas }, Vec::new()));
+            }
             Self::Copy(copy) => {
                 copies.push(copy.to.clone());
                 return Ok((Canvas { copies, ..canvas }, Vec::new()));
@@ -198,19 +246,19 @@ impl Tool<'_> {
             }
             Self::Paste(tool) => tool.apply(old, *iso, others, limits, control)?,
         };
+        let notes = told(&report, old, &field, *iso);
         let canvas = Canvas {
             field,
             copies,
             ..canvas
         };
-        Ok((canvas, thin_parts(&report)))
+        Ok((canvas, notes))
     }
 }
 
 /// What is painted, carried along by a move as far as the limits allow.
-fn carried(tool: &Move, canvas: &Canvas, limits: &Limits) -> Result<Layers, ToolError> {
+fn carried(origin: &Origin, canvas: &Canvas, limits: &Limits) -> Result<Layers, ToolError> {
     let whole = canvas.field.lattice().world_box();
-    let origin = tool.motion.origin(&whole)?;
     let reach = origin.reach();
     let within = limits.cut(&Aabb {
         min: reach.min.max(whole.min),
@@ -241,8 +289,13 @@ fn painted(paint: &Paint, canvas: &Canvas, limits: &Limits) -> Result<Layer, Too
     Ok(layer.with_tree(kept).expect("some of the nodes painted"))
 }
 
-/// Says what was too thin for the field.
-fn thin_parts(report: &FieldFitReport) -> Vec<String> {
+/// Says what was too thin for the field, or beyond it.
+fn told(
+    report: &FieldFitReport,
+    before: &HierarchicalSpline<f32>,
+    after: &HierarchicalSpline<f32>,
+    iso: f64,
+) -> Vec<String> {
     let left = report.left.filter(|left| left.wrong_signs > 0);
     let told = left.map(|left| {
         format!(
@@ -250,5 +303,5 @@ fn thin_parts(report: &FieldFitReport) -> Vec<String> {
             left.wrong_signs, report.samples,
         )
     });
-    told.into_iter().collect()
+    told.into_iter().chain(cut_off(before, after, iso)).collect()
 }

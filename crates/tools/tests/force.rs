@@ -306,15 +306,7 @@ fn painted_matter_shows() {
     let field = block::<f32>(24);
     let paint = "[[stroke]]\npaint = { layer = 'stiffness', formula = '1 + 9 * (x < 12)' }";
     let session: Session = toml::from_str(paint).unwrap();
-    let canvas = Canvas {
-        holds: Vec::new(),
-        copies: Vec::new(),
-        field: field.clone(),
-        iso: ISO,
-        layers: Default::default(),
-        others: Default::default(),
-        detail: 0,
-    };
+    let canvas = Canvas::alone(field.clone(), ISO, 0);
     let (canvas, _) = session.stroke[0].apply(canvas, &mut Control::default()).unwrap();
     let travel = |x: f64, rule: &str| {
         let text = format!(
@@ -396,15 +388,7 @@ fn grooves_and_ridges_have_their_depth() {
 /// Pieces, and handles of all, of what a session leaves of a field.
 fn topology(field: &HierarchicalSpline<f32>, script: &str) -> (u64, i64) {
     let session: Session = toml::from_str(script).unwrap_or_else(|e| panic!("{e}"));
-    let mut canvas = Canvas {
-        holds: Vec::new(),
-        copies: Vec::new(),
-        field: field.clone(),
-        iso: ISO,
-        layers: Default::default(),
-        others: Default::default(),
-        detail: 0,
-    };
+    let mut canvas = Canvas::alone(field.clone(), ISO, 0);
     for stroke in &session.stroke {
         let (after, notes) = stroke
             .apply(canvas, &mut Control::default())
@@ -460,15 +444,7 @@ fn what_makes_no_sense_is_refused() {
         let told = match session {
             Err(e) => e.to_string(),
             Ok(session) => {
-                let canvas = Canvas {
-                    holds: Vec::new(),
-                    copies: Vec::new(),
-                    field: field.clone(),
-                    iso: ISO,
-                    layers: Default::default(),
-                    others: Default::default(),
-                    detail: 0,
-                };
+                let canvas = Canvas::alone(field.clone(), ISO, 0);
                 let stroke = &session.stroke[0];
                 let done = stroke.apply(canvas, &mut Control::default());
                 done.map(|_| ()).expect_err(text).to_string()

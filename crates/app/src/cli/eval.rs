@@ -38,7 +38,7 @@ const PART: usize = 1 << 12;
 pub fn run(args: &Args) -> Outcome {
     set_threads(args.threads)?;
     let cancel = Cancel::new();
-    let open = args.field.load(&args.field.source(&cancel)?)?;
+    let open = args.field.load_placed(&args.field.source(&cancel)?)?;
     // Lines of numbers are what people type.
     let lines = (args.points == Path::new("-")).then_some("xyz");
     let format = args.format.as_deref().or(lines);

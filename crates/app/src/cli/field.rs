@@ -7,6 +7,7 @@ use fitting::orient::Route;
 use fitting::{Cancel, FitReport, Leaf, SignReport, StopReason};
 use formats::field::{AnyField, FieldMeta, LeafRecord, LoadedField, SourceKind};
 use formats::{Fault, FormatError, Kind, Unit};
+use glam::DAffine3;
 use serde::{Deserialize, Serialize};
 
 use super::failure::{Failure, Outcome};
@@ -32,9 +33,14 @@ impl FieldArgs {
         Source::open(&self.field, None, FIELDS, cancel)
     }
 
-    /// Reads the field from the file.
+    /// Reads the field from the file; an object of a document in its own world.
     pub fn load(&self, source: &Source) -> Outcome<OpenField> {
         OpenField::load_object(source, self.object.as_deref())
+    }
+
+    /// Reads the field from the file; an object of a document where the document places it.
+    pub fn load_placed(&self, source: &Source) -> Outcome<OpenField> {
+        self.load(source).map(OpenField::in_place)
     }
 }
 
@@ -42,6 +48,11 @@ impl FieldArgs {
 pub struct OpenField {
     loaded: LoadedField,
     report: FitReport,
+    /// Where its document places it.
+    placement: DAffine3,
+    /// The field as it is asked, and the lengths there over its own.
+    asked: AnyField,
+    stretch: f64,
 }
 
 /// The figures of a [`FitReport`] as they stand in the file; leaves and notes have places of their own.
@@ -93,10 +104,11 @@ impl OpenField {
 
     /// Reads a field file, or an object of a document: the only one, or that of a name.
     pub fn load_object(source: &Source, named: Option<&str>) -> Outcome<Self> {
-        let loaded = match (document::is_document(source.path()), named) {
+        let (loaded, placement) = match (document::is_document(source.path()), named) {
             (true, named) => of_document(source, named)?,
             (false, None) => {
-                formats::field::load(source.path(), &limits(None)).map_err(|e| not_loaded(source, e))?
+                let loaded = formats::field::load(source.path(), &limits(None));
+                (loaded.map_err(|e| not_loaded(source, e))?, DAffine3::IDENTITY)
             }
             (false, Some(name)) => {
                 return Err(Failure::usage(format!(
@@ -148,7 +160,49 @@ impl OpenField {
             solves: stored.solves.into_iter().map(Into::into).collect(),
             notes: loaded.meta.notes.clone(),
         };
-        Ok(Self { loaded, report })
+        Ok(Self {
+            placement,
+            asked: loaded.field.clone(),
+            stretch: 1.0,
+            loaded,
+            report,
+        })
+    }
+
+    /// The same field where its document places it.
+    fn in_place(mut self) -> Self {
+        if self.placement == DAffine3::IDENTITY {
+            return self;
+        }
+        let world_from_lattice = self.placement * self.lattice().world_from_lattice;
+        self.asked = match &self.loaded.field {
+            AnyField::F32(f) => AnyField::F32(f.placed(world_from_lattice)),
+            AnyField::F64(f) => AnyField::F64(f.placed(world_from_lattice)),
+        };
+        let stretch = self.placement.matrix3.determinant().abs().cbrt();
+        self.stretch = stretch;
+        // Errors of volumes are densities.
+        if self.source() != SourceKind::Volume {
+            let report = &mut self.report;
+            let leaves = report
+                .leaves
+                .iter_mut()
+                .flat_map(|leaf| [&mut leaf.rms, &mut leaf.max]);
+            leaves.for_each(|length| *length *= stretch as f32);
+            let FitReport {
+                rms,
+                p95,
+                max,
+                bound,
+                tolerance,
+                ..
+            } = report;
+            [rms, p95, max, bound, tolerance]
+                .into_iter()
+                .chain(&mut report.noise)
+                .for_each(|l| *l *= stretch);
+        }
+        self
     }
 
     /// The file as it was read.
@@ -158,12 +212,12 @@ impl OpenField {
 
     /// The field, to be asked.
     pub fn field(&self) -> &dyn Field {
-        self.loaded.field.as_field()
+        self.asked.as_field()
     }
 
     /// The field, to be part of others; its bricks are shared.
     pub fn shared_field(&self) -> Arc<dyn Field> {
-        either!(&self.loaded.field, f => Arc::new(f.clone()))
+        either!(&self.asked, f => Arc::new(f.clone()))
     }
 
     /// What the fit said of itself.
@@ -173,12 +227,12 @@ impl OpenField {
 
     /// Grids the field stands on.
     pub fn lattice(&self) -> &Lattice {
-        either!(&self.loaded.field, f => f.lattice())
+        either!(&self.asked, f => f.lattice())
     }
 
     /// Median slope of the field, density per world length.
     pub fn slope(&self) -> f64 {
-        either!(&self.loaded.field, f => f.slope())
+        either!(&self.asked, f => f.slope()) / self.stretch
     }
 
     /// Number of levels.
@@ -206,7 +260,7 @@ impl OpenField {
         either!(&self.loaded.field, f => f.totals_bytes())
     }
 
-    /// SHA-256 of the field, hexadecimal.
+    /// SHA-256 of the field as it was read, hexadecimal.
     pub fn sha256(&self) -> String {
         hex(&either!(&self.loaded.field, f => f.sha256()))
     }
@@ -268,7 +322,7 @@ impl OpenField {
         let lattice = self.lattice();
         let step = lattice.extent() / glam::DVec3::from_array(cells.map(f64::from));
         Frame {
-            world_from_grid: lattice.world_from_lattice * glam::DAffine3::from_scale(step),
+            world_from_grid: lattice.world_from_lattice * DAffine3::from_scale(step),
             cells,
         }
     }
@@ -286,8 +340,8 @@ impl OpenField {
     }
 }
 
-/// The field of an object of a document, in the object's own place.
-fn of_document(source: &Source, named: Option<&str>) -> Outcome<LoadedField> {
+/// The field of an object of a document, in the object's own world, and where the document places that.
+fn of_document(source: &Source, named: Option<&str>) -> Outcome<(LoadedField, DAffine3)> {
     let document = super::document::open(source.path(), &mut Vec::new())?;
     let state = document.state();
     let names: Vec<_> = state.objects().keys().map(String::as_str).collect();
@@ -307,11 +361,16 @@ fn of_document(source: &Source, named: Option<&str>) -> Outcome<LoadedField> {
     let object = state
         .object(name)
         .map_err(|e| Failure::usage(format!("--object: {e}")))?;
-    Ok(LoadedField {
+    let placement = state.placement(name);
+    let loaded = LoadedField {
         field: AnyField::F32(object.field.clone()),
         meta: super::document::edited_meta(object),
         skipped_chunks: Vec::new(),
-    })
+    };
+    Ok((
+        loaded,
+        placement.map_err(|e| Failure::usage(format!("--object: {e}")))?,
+    ))
 }
 
 /// What is wrong with a file that is no field: one of another kind has to be fitted first.

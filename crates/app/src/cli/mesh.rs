@@ -87,7 +87,7 @@ pub fn run(args: &Args) -> Outcome {
     let field = args.field.source(&cancel)?;
     let output = Output::check("-o", &args.output, &MESHES, format, &[&field])?;
     set_threads(args.threads)?;
-    let open = args.field.load(&field)?;
+    let open = args.field.load_placed(&field)?;
     let options = PolygonizeOptions {
         iso: open.iso_or(args.iso, &field)?,
         open: args.open,

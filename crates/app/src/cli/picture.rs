@@ -99,7 +99,7 @@ pub fn run(args: &Args) -> Outcome {
     let source = args.field.source(&cancel)?;
     let output = Output::check("-o", &args.output, &["png"], None, &[&source])?;
     set_threads(args.threads)?;
-    let open = args.field.load(&source)?;
+    let open = args.field.load_placed(&source)?;
     let bar = Bar::new();
     let options = PolygonizeOptions {
         iso: open.iso_or(args.iso, &source)?,

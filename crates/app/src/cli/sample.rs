@@ -85,7 +85,7 @@ pub fn run(args: &Args) -> Outcome {
     if let Some(spacing) = spacing {
         notes.extend(resample(&mut header, spacing)?);
     }
-    let open = args.field.load(&field)?;
+    let open = args.field.load_placed(&field)?;
     let [nx, ny, nz] = header.dims;
     let depth = SLAB.min(nz);
     let needed = (nx as u64 * ny as u64)

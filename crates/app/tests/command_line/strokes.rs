@@ -199,6 +199,62 @@ fn knots_come_and_go_without_a_move_of_the_surface() {
     clay.ends();
 }
 
+/// A turned and enlarged copy hangs on the block: both are meshed and asked where they are, and neither field changes.
+#[test]
+fn objects_are_placed_and_move_with_their_parents() {
+    let clay = Clay::new();
+    clay.sculpt(&[
+        "copy = { to = 'part' }",
+        "object = 'part'\nplace = { turn = [0, 0, 90], scale = 2, by = [0, 0, 10] }",
+        "object = 'part'\nplace = { parent = 'block' }",
+        "place = { by = [100, 0, 0], turn = [90, 0, 0], about = [0, 0, 0] }",
+    ]);
+    let part = || {
+        clay.bench
+            .json("mesh clay.isoclay --object part -o part.ply --tolerance 1%");
+        let mesh = super::common::read_mesh(&clay.bench.path("part.ply"));
+        let first = mesh.positions[0];
+        let ends = mesh
+            .positions
+            .iter()
+            .fold([first; 2], |[lo, hi], p| [lo.min(*p), hi.max(*p)]);
+        (volume(&mesh), ends)
+    };
+    // 12 × 10 × 6 becomes 20 × 24 × 12 by the first turn; the second lays y on z, and z on -y.
+    let (large, [lo, hi]) = part();
+    let expected = [DVec3::new(90.0, -16.0, -12.0), DVec3::new(110.0, -4.0, 12.0)];
+    assert!(
+        lo.abs_diff_eq(expected[0], 0.5) && hi.abs_diff_eq(expected[1], 0.5),
+        "{lo} {hi}"
+    );
+    clay.bench
+        .json("mesh clay.isoclay --object block -o now.ply --tolerance 1%");
+    let own = volume(&super::common::read_mesh(&clay.bench.path("now.ply")));
+    assert!((large / own - 8.0).abs() < 0.05, "{large} of {own}");
+    let value = |object: &str, place: &str| {
+        clay.bench.write("place.xyz", place);
+        let told = clay
+            .bench
+            .run(&format!("eval clay.isoclay --object {object} --points place.xyz"))
+            .stdout;
+        let row = told.lines().nth(1).unwrap().split(',');
+        row.map(|n| n.parse::<f64>().unwrap()).collect::<Vec<_>>()
+    };
+    let [above, below] = ["100 -10 11\n", "100 -10 13\n"].map(|place| value("part", place)[3]);
+    assert!(above > 0.0 && below < 0.0, "{above} {below}");
+    let fields = clay.bench.json("info clay.isoclay");
+    let placed = &fields["objects"][1];
+    assert_eq!(placed["parent"], "block");
+    assert_eq!(placed["field_sha256"], fields["objects"][0]["field_sha256"]);
+    // Without its parent it stays where it is; a mirror image has its outside outside.
+    clay.sculpt(&["object = 'part'\nplace = { parent = '' }"]);
+    let (again, [low, high]) = part();
+    assert!((again / large - 1.0).abs() < 1e-3 && low.abs_diff_eq(lo, 1e-3) && high.abs_diff_eq(hi, 1e-3));
+    clay.sculpt(&["object = 'part'\nplace = { map = [[-1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0]] }"]);
+    assert!((part().0 / own - 1.0).abs() < 1e-2);
+    clay.ends();
+}
+
 #[test]
 fn strokes_happen_on_both_sides_and_on_coarse_levels_alone() {
     let clay = Clay::new();

@@ -108,6 +108,105 @@ fn strokes_by_hand_and_their_scripts_leave_the_same() {
     }
 }
 
+/// A bar through a slab, and one between two.
+#[test]
+fn holes_and_bridges_by_hand_and_their_scripts_are_the_same() {
+    let slab = state_of(|p| 3.0 - (p.z - 9.0).abs());
+    let two = state_of(|p| (p.z - 12.0).abs() - 2.0);
+    let poses: Vec<Pose> = (0..6)
+        .map(|n| Pose::at(DVec3::new(9.0 + 0.7 * f64::from(n), 12.0, 12.0)))
+        .collect();
+    let low = |pose: &Pose| Pose::at(pose.at - 2.0 * DVec3::Z);
+    for (tool, first, poses, middle) in [
+        (
+            "drill = { along = [], by = [0, 0, -9], radius = 1.2 }",
+            slab,
+            poses.clone(),
+            9.0,
+        ),
+        (
+            "join = { along = [], by = [0, 0, 6], radius = 1.2 }",
+            two,
+            poses.iter().map(low).collect(),
+            12.0,
+        ),
+    ] {
+        let directory = tempdir().unwrap();
+        let mut document = document(directory.path(), &first);
+        made(&mut document, tool, &poses);
+        let field = &document.state().object("clay").unwrap().field;
+        let is_solid = field.value(DVec3::new(11.0, 12.0, middle)) > ISO;
+        assert_eq!(is_solid, tool.starts_with("join"), "{tool}");
+        let left = document.state().sha256();
+        for threads in [1, 8] {
+            assert_eq!(
+                again(&mut document, threads).sha256(),
+                left,
+                "{tool}, {threads} threads"
+            );
+        }
+    }
+}
+
+/// A tower that is added, and one that is pulled, out of the box of the field; a leap beyond all reason is refused as before.
+#[test]
+fn boxes_grow_with_strokes_by_hand() {
+    let high = state_of(|p| 8.0 - p.distance(DVec3::new(12.0, 12.0, 13.0)));
+    for (text, from) in [
+        (
+            "add = { along = [], shape = { sphere = { radius = 1.5 } }, tolerance = 0.05 }",
+            21.0,
+        ),
+        (
+            "add = { along = [], shape = { sphere = { radius = 1.5 } }, tolerance = 0.05 }\nsymmetry = { at = [12, 12, 13], normal = [0, 0, 1] }",
+            21.0,
+        ),
+        ("pull = { along = [[12, 12, 21]], radius = 2 }", 21.0),
+        (
+            "move = { motion = { grab = { along = [], radius = 5, rigid = 2 } } }",
+            20.5,
+        ),
+    ] {
+        let directory = tempdir().unwrap();
+        let mut document = document(directory.path(), &high);
+        let control = &mut Control::default();
+        let mut live = begun(&high, text);
+        let end = if text.starts_with("move") {
+            from + 5.0
+        } else {
+            26.0
+        };
+        for n in 0..=10 {
+            let z = from + (end - from) * f64::from(n) / 10.0;
+            live.step(Pose::at(DVec3::new(12.0, 12.0, z)), control)
+                .unwrap_or_else(|e| panic!("{text}: {e}"));
+        }
+        let (state, boxes) = live.look().unwrap();
+        let seen = &state.object("clay").unwrap().field;
+        assert!(boxes.iter().any(|b| b.max.z >= 24.0), "{text}: {boxes:?}");
+        assert!(seen.lattice().world_box().max.z > 25.0, "{text}");
+        let far = live.step(Pose::at(DVec3::splat(1e300)), control);
+        assert!(far.is_err() || text.starts_with("add"), "{text}");
+        let (is_edit, notes) = live.end(&mut document, control).unwrap();
+        assert!(
+            is_edit && notes.iter().any(|n| n.contains("has grown")),
+            "{text}: {notes:?}"
+        );
+        let field = &document.state().object("clay").unwrap().field;
+        assert!(field.value(DVec3::new(12.0, 12.0, end - 0.2)) > ISO, "{text}");
+        for threads in [1, 8] {
+            let again = again(&mut document, threads);
+            assert_eq!(
+                again.sha256(),
+                document.state().sha256(),
+                "{text}, {threads} threads"
+            );
+        }
+        document.undo(1).unwrap();
+        assert_eq!(document.state().sha256(), high.sha256(), "{text}");
+    }
+}
+
 /// Poses that were refused, and paint on the way.
 #[test]
 fn what_a_hand_was_refused_is_not_in_its_script() {
@@ -126,8 +225,8 @@ fn what_a_hand_was_refused_is_not_in_its_script() {
         let directory = tempdir().unwrap();
         let mut document = document(directory.path(), &rippled());
         let mut live = begun(document.state(), text);
-        let far = Pose::at(DVec3::new(12.0, 12.0, if is_force { f64::NAN } else { 40.0 }));
-        assert!(!is_force || live.step(far, control).is_err(), "{text}");
+        let nowhere = Pose::at(DVec3::new(12.0, 12.0, f64::NAN));
+        assert!(live.step(nowhere, control).is_err(), "{text}");
         for (n, pose) in wandering(3, 12.1, 8).into_iter().enumerate() {
             live.step(pose, control).unwrap_or_else(|e| panic!("{text}: {e}"));
             if n == 3 {
@@ -136,7 +235,7 @@ fn what_a_hand_was_refused_is_not_in_its_script() {
             let leap = if is_force {
                 Pose::at(DVec3::splat(1e300))
             } else {
-                far
+                nowhere
             };
             assert!(live.step(leap, control).is_err(), "{text}");
         }

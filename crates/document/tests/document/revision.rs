@@ -210,15 +210,7 @@ fn a_move_on_both_sides_takes_the_noise_of_both_along() {
     let Command::Stroke { stroke, .. } = &commands[0] else {
         unreachable!()
     };
-    let canvas = Canvas {
-        field: before.clone(),
-        iso: ISO,
-        detail: 0,
-        layers: Default::default(),
-        others: Others::default(),
-        holds: Vec::new(),
-        copies: Vec::new(),
-    };
+    let canvas = Canvas::alone(before.clone(), ISO, 0);
     let (now, _) = stroke.apply(canvas, &mut Control::default()).unwrap();
     let scan = scan();
     let revision = revise_volume(&before, &now.field, &scan, ISO, FILL, &journey).unwrap();

@@ -145,6 +145,24 @@ const REFUSED: &[(&str, &[&str])] = &[
         "paced = true\npull = { along = [[12, 12, 12]], way = [[0, 0, nan]], radius = 1 }",
         &["line 3", "finite"],
     ),
+    // Objects that are placed nowhere.
+    ("place = {}", &["says nothing"]),
+    (
+        "place = { by = [1, 0, 0], about = [1, 2, 3] }",
+        &["about", "turn or a scale"],
+    ),
+    ("place = { scale = 0 }", &["line 2", "above 0"]),
+    ("place = { by = [0, 0, inf] }", &["line 2", "finite"]),
+    ("place = { parent = 'nobody' }", &["no object \"nobody\"", "clay"]),
+    ("place = { parent = 'clay' }", &["circle"]),
+    (
+        "place = { map = [[1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 0, 0]] }",
+        &["flattens"],
+    ),
+    (
+        "symmetry = { at = [12, 12, 12], normal = [1, 0, 0] }\nplace = { by = [1, 0, 0] }",
+        &["symmetry"],
+    ),
     // Vectors and boxes without length.
     (
         "pull = { along = [[12, 12, 12]], by = [0, 0, 0], radius = 1 }",
@@ -314,7 +332,7 @@ const REFUSED: &[(&str, &[&str])] = &[
     (
         "during = [{ step = 2, paint = { layer = 'mass', formula = '2' } }]\nsymmetry = { at = [12, 12, 12], normal = [1, 0, 0] }\n\
       pull = { along = [[12, 12, 12]], lift = 1, radius = 1 }",
-        &["symmetry"],
+        &["both sides"],
     ),
     (
         "carve = { along = [[9, 9, 9], [12, 12, 12], [15, 15, 9]], turn = [[0, 0, 1], [0, 0, 2]], shape = { sphere = { radius = 1 } } }",

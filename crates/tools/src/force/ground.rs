@@ -18,7 +18,7 @@ const SAMPLES_PER_CELL: f64 = 4.0 / 3.0;
 const ROOM: f64 = 4.0;
 /// Knot intervals that the rim takes from a region.
 const RIM: f64 = 0.58;
-/// Share of the paths that have to be able to move their places, or the region is finer than the tool asks for.
+/// Share of its way that limits have to let a tool go, or the region is finer than the tool asks for.
 const MOVING: f64 = 0.5;
 /// Parts of a knot interval over which the change fades beyond a border.
 const FADE: f64 = 0.25;
@@ -56,15 +56,13 @@ impl<T: Real> Ground<'_, T> {
         Ok(region)
     }
 
-    /// Whether enough of the paths that begin where limits allow it can move the surface there.
+    /// Whether paths that begin where limits allow it can go enough of their way.
     fn gives_way(&self, level: usize, targets: &[&Target]) -> bool {
         let limits = &self.holding.limits;
         let is_free = |p: &DVec3| limits.is_free(&Aabb::new(*p, *p));
         let starts = targets.iter().map(|t| t.path.at(0.0)).filter(is_free);
-        let moving: Vec<bool> = starts
-            .map(|p| self.holding.gives_way(self.field, level, p))
-            .collect();
-        moving.iter().filter(|m| **m).count() as f64 >= MOVING * moving.len() as f64
+        let open: Vec<f64> = starts.map(|p| self.holding.open(self.field, level, p)).collect();
+        open.iter().sum::<f64>() >= MOVING * open.len() as f64
     }
 
     /// The field with the change of a region, and one about other paths that goes on where it was.

@@ -105,6 +105,19 @@ impl<T: Real> ForceStroke<T> {
         Ok(())
     }
 
+    /// Refuses a way of a hand that drags, on which paths would end beside the field.
+    ///
+    /// # Errors
+    /// [`ForceError::Outside`].
+    pub(crate) fn check_way(&self, to: DVec3) -> Result<(), ForceError> {
+        match self.hand.as_ref().map(|hand| &hand.way) {
+            Some(Way::Drag { from, .. }) => from
+                .iter()
+                .try_for_each(|place| track::within(&self.origin, place.at + to)),
+            _ => Ok(()),
+        }
+    }
+
     /// Lets the tool go: what it has still to do is done in the steps to come.
     pub fn let_go(&mut self) {
         if let Some(hand) = &self.hand

@@ -194,7 +194,7 @@ impl Geometric {
 }
 
 /// A turn given by its axis, as long as the angle in degrees.
-fn rotation_of(turn: DVec3) -> DQuat {
+pub(crate) fn rotation_of(turn: DVec3) -> DQuat {
     let angle = turn.length().to_radians();
     let axis = turn.normalize_or_zero();
     let (sine, cosine) = (libm::sin(0.5 * angle), libm::cos(0.5 * angle));

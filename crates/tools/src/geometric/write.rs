@@ -1,7 +1,7 @@
 //! How the result of a tool becomes coefficients.
 
 use bspline::hierarchical::{Lattice, MAX_LEVELS};
-use bspline::{Aabb, Field, Frame, HierarchicalSpline, Real};
+use bspline::{Aabb, Field, HierarchicalSpline, Real};
 use fitting::Control;
 use fitting::field::{Aim, FieldFitOptions, FieldFitReport, fit_field_where};
 use glam::DVec3;
@@ -16,9 +16,6 @@ pub(super) const TOLERANCE: f64 = 0.02;
 
 /// Knot intervals of the finest level that a tool's box reaches beyond the tool and its blend: the supports of what changes.
 pub(super) const MARGIN: f64 = 4.0;
-
-/// Points across a face of the field's box at which it is asked for what leaves the box.
-const FACE: u32 = 256;
 
 /// How closely the result of a tool is followed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -138,43 +135,23 @@ impl<T: Real> Writer<'_, T> {
         Ok((field, report))
     }
 
-    /// Looks at the faces of the field's box for solid that was not there.
+    /// Looks at the faces of the field's box for solid that was not there, where none has been cut off before.
     fn stays_in_box(&self, target: &dyn Field, within: &Aabb) -> Result<(), GeometricError> {
-        let lattice = self.field.lattice();
         let local = within.transformed(self.field.lattice_from_world());
-        let extent = lattice.extent();
         let step = 1.0 / (1u64 << self.detail()) as f64;
-        let rim = self.spacing() * self.field.slope();
-        for axis in 0..3 {
-            for (face, is_last, is_reached) in [
-                (0.0, false, local.min[axis] <= 0.0),
-                (extent[axis], true, local.max[axis] >= extent[axis]),
-            ] {
-                if !is_reached {
-                    continue;
-                }
-                let mut part = Aabb::new(local.min.max(DVec3::ZERO), local.max.min(extent));
-                (part.min[axis], part.max[axis]) = (face, face);
-                let steps = (part.size() / step).ceil();
-                let cells = steps.to_array().map(|n| (n as u32).clamp(1, FACE));
-                let mut frame = Frame::over(&part, cells);
-                frame.world_from_grid = lattice.world_from_lattice * frame.world_from_grid;
-                let count = std::array::from_fn(|a| if a == axis { 1 } else { cells[a] as usize + 1 });
-                let mut values = [(); 2].map(|()| vec![0.0; count.iter().product()]);
-                let [now, then] = &mut values;
-                target.frame_values(&frame, [0; 3], count, now);
-                self.field.frame_values(&frame, [0; 3], count, then);
-                // Where the solid has been cut off before, its rim may move.
-                let is_cut = then.iter().any(|value| *value > self.iso);
-                let rim = if is_cut { rim } else { 0.0 };
-                let leaves = |(now, then): (&f64, &f64)| *now > self.iso + rim && *then < self.iso - rim;
-                if let Some(n) = now.iter().zip(then.iter()).position(leaves) {
-                    let at = [n / count[2] / count[1], n / count[2] % count[1], n % count[2]];
-                    return Err(GeometricError::Leaves {
-                        at: frame.node(at.map(|i| i as i64)).to_array(),
-                        face: Face { axis, is_last },
-                    });
-                }
+        for face in Face::ALL {
+            let Some(nodes) = face.nodes(self.field.lattice(), &local, step) else {
+                continue;
+            };
+            let then = nodes.values(self.field);
+            if then.iter().any(|value| *value > self.iso) {
+                continue;
+            }
+            if let Some(n) = nodes.values(target).iter().position(|now| *now > self.iso) {
+                return Err(GeometricError::Leaves {
+                    at: nodes.place(n).to_array(),
+                    face,
+                });
             }
         }
         Ok(())

@@ -39,13 +39,18 @@ fn coarser(lattice: &Lattice, level: usize) -> usize {
     enough.unwrap_or(MAX_LEVELS).min(MAX_LEVELS - 1 - level)
 }
 
+/// Where the coarsest level of a layer lies that has so many levels above those of a lattice.
+fn coarse_map(world_from_lattice: DAffine3, coarser: usize) -> DAffine3 {
+    let step = DMat3::from_diagonal(DVec3::splat((1u64 << coarser) as f64));
+    world_from_lattice * DAffine3::from_mat3(step)
+}
+
 impl Layer {
     /// Nothing painted over the box of `lattice`; nodes are as far apart as the knots of its `level`.
     pub fn empty(lattice: &Lattice, level: usize) -> Self {
         let coarser = coarser(lattice, level);
-        let step = DMat3::from_diagonal(DVec3::splat((1u64 << coarser) as f64));
         let coarse = Lattice {
-            world_from_lattice: lattice.world_from_lattice * DAffine3::from_mat3(step),
+            world_from_lattice: coarse_map(lattice.world_from_lattice, coarser),
             cells: lattice.cells.map(|n| n.div_ceil(1 << coarser)),
         };
         let tree = HierarchicalSpline::from_corrections(coarse, 1.0, Vec::new());
@@ -65,6 +70,15 @@ impl Layer {
         levels[larger.depth] = shifted(&numbers, before.map(|n| n << self.level));
         let tree = HierarchicalSpline::try_from_corrections(*larger.tree.lattice(), 1.0, levels).ok()?;
         Some(Self { tree, ..larger })
+    }
+
+    /// The layer of an object whose lattice lies elsewhere: the very same numbers.
+    pub fn placed(&self, world_from_lattice: DAffine3) -> Self {
+        let map = coarse_map(world_from_lattice, self.depth - self.level);
+        Self {
+            tree: self.tree.placed(map),
+            ..*self
+        }
     }
 
     /// The bricks that hold the numbers.

@@ -4,15 +4,7 @@ use super::*;
 use tools::tool::ToolError;
 
 fn canvas(field: &HierarchicalSpline<f32>) -> Canvas {
-    Canvas {
-        holds: Vec::new(),
-        copies: Vec::new(),
-        field: field.clone(),
-        iso: ISO,
-        layers: Default::default(),
-        others: Default::default(),
-        detail: 0,
-    }
+    Canvas::alone(field.clone(), ISO, 0)
 }
 
 fn played(field: &HierarchicalSpline<f32>, script: &str) -> Result<(Canvas, Vec<String>), ToolError> {
@@ -158,7 +150,6 @@ fn springs_draw_the_surface_to_where_it_is_not_yet() {
 #[test]
 fn holds_that_make_no_sense_are_refused() {
     let field = block::<f32>(24);
-    let pull = format!("pull = {{ along = [[12, 12, 12]], lift = 1, radius = {R} }}");
     for (strokes, word) in [
         (
             vec!["hold = { name = '', points = [[12, 12, 12]] }"],
@@ -203,13 +194,6 @@ fn holds_that_make_no_sense_are_refused() {
         ),
         (
             vec![
-                "hold = { name = 'a', points = [[12, 12, 12]] }",
-                &format!("symmetry = {{ at = [12, 12, 12], normal = [1, 0, 0] }}\n{pull}"),
-            ],
-            "one side only",
-        ),
-        (
-            vec![
                 "symmetry = { at = [12, 12, 12], normal = [1, 0, 0] }\nhold = { name = 'a', points = [[12, 12, 12]] }",
             ],
             "knows no symmetry",
@@ -233,4 +217,23 @@ fn where_a_mask_holds_the_tool_nothing_moves() {
     let (left, notes) = played(&field, script).unwrap();
     assert_eq!(left.field.sha256(), field.sha256());
     assert!(notes.iter().any(|n| n.contains("0.0 %")), "{notes:?}");
+}
+
+/// A pull on both sides keeps a hold on the one side that has it.
+#[test]
+fn holds_keep_on_their_side_of_a_plane() {
+    let field = block::<f32>(24);
+    let pull = "symmetry = { at = [12, 12, 12], normal = [1, 0, 0] }\npull = { along = [[7, 12, 12]], lift = 1, radius = 1.5 }";
+    let hold = "hold = { name = 'a', points = [[18, 12, 12]] }";
+    let (left, _) = played(&field, &format!("[[stroke]]\n{hold}\n[[stroke]]\n{pull}\n")).unwrap();
+    let rise = |x: f64| height(&left.field, x, 12.0);
+    assert!(off(&left) < 0.02, "{}", off(&left));
+    assert!((rise(7.0) - 1.0).abs() < 0.02, "{}", rise(7.0));
+    // The mirrored tool pulls up beside the place that is held.
+    assert!(
+        (rise(17.0) - 1.0).abs() < 0.05 && rise(18.0).abs() < 0.02,
+        "{} {}",
+        rise(17.0),
+        rise(18.0)
+    );
 }

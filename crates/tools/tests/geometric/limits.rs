@@ -2,9 +2,11 @@
 
 use bspline::Field;
 use bspline::hierarchical::{BRICK, HierarchicalSpline};
+use fitting::Control;
+use glam::DVec3;
 use tools::coefficients::support;
 
-use super::{block, done, random, refused, stroke};
+use super::{ISO, block, canvas, done, random, refused, stroke};
 
 /// Strokes of every tool at random in regions and masks at random: no function whose support meets what is masked out
 /// changes, and something else does.
@@ -85,10 +87,10 @@ fn paint_keeps_to_the_mask() {
     let text = "mask = { boxes = [{ min = [6, 6, 6], max = [12, 18, 18] }] }
         paint = { layer = \"mass\", brush = { value = 3.0, along = [[12, 12, 12]], radius = 5.0, fade = 0.0 } }";
     let (left, _) = stroke(text)
-        .apply(super::canvas(&block()), &mut fitting::Control::default())
+        .apply(canvas(&block()), &mut Control::default())
         .unwrap();
     let layer = left.layers.values().next().unwrap();
-    let at = |x: f64| layer.at(glam::DVec3::new(x, 12.0, 12.0));
+    let at = |x: f64| layer.at(DVec3::new(x, 12.0, 12.0));
     assert_eq!([at(12.0), at(14.0), at(16.5)], [0.0; 3]);
     assert_eq!(at(9.0), 2.0);
 }
@@ -106,9 +108,7 @@ fn a_soft_mask_fades() {
 {tool}"
         ),
     );
-    let rise = |x: f64| {
-        changed.value(glam::DVec3::new(x, 12.0, 13.0)) - field.value(glam::DVec3::new(x, 12.0, 13.0))
-    };
+    let rise = |x: f64| changed.value(DVec3::new(x, 12.0, 13.0)) - field.value(DVec3::new(x, 12.0, 13.0));
     assert_eq!(rise(5.9), 0.0);
     let all: Vec<f64> = [7.0, 9.0, 10.0, 11.0, 13.5].map(rise).to_vec();
     assert!(all.is_sorted_by(|a, b| a < b), "{all:?}");
@@ -138,4 +138,57 @@ fn limits_that_make_no_sense_are_refused() {
         );
         assert!(error.contains(why), "{limit}: {error}");
     }
+}
+
+/// Where a scan has cut the solid off, tools work across the face, and say that what goes on beyond it is cut off too.
+#[test]
+fn tools_work_across_faces_that_cut_the_solid() {
+    let field = block();
+    for (text, at, is_wider) in [
+        (
+            "inflate = { along = [[0, 12, 12]], radius = 4, by = 1.5 }",
+            [0.2, 12.0, 13.0],
+            true,
+        ),
+        (
+            "add = { along = [[24, 12, 12.5]], shape = { sphere = { radius = 2 } } }",
+            [23.8, 12.0, 14.0],
+            true,
+        ),
+        (
+            "move = { motion = { grab = { along = [[12, 0, 12], [12, 0, 14]], radius = 4, rigid = 1 } } }",
+            [12.0, 0.2, 13.5],
+            true,
+        ),
+        (
+            "smooth = { along = [[0, 12, 12]], radius = 3, level = 2 }",
+            [0.2, 12.0, 11.5],
+            false,
+        ),
+        (
+            "carve = { along = [[24, 12, 12]], shape = { sphere = { radius = 2 } } }",
+            [23.8, 12.0, 9.5],
+            false,
+        ),
+    ] {
+        let (left, notes) = stroke(text)
+            .apply(canvas(&field), &mut Control::default())
+            .unwrap();
+        assert!(left.field.value(DVec3::from_array(at)) > ISO, "{text}");
+        assert_eq!(left.field.lattice(), field.lattice(), "{text}");
+        assert_eq!(
+            notes.iter().any(|note| note.contains("cut off")),
+            is_wider,
+            "{text}: {notes:?}"
+        );
+    }
+    // Its upper face is clear of it, so the box grows there.
+    let tower = "add = { along = [[12, 12, 12], [12, 12, 25]], shape = { sphere = { radius = 2 } } }";
+    let (left, notes) = stroke(tower)
+        .apply(canvas(&field), &mut Control::default())
+        .unwrap();
+    assert!(
+        left.field.value(DVec3::new(12.0, 12.0, 26.5)) > ISO && notes[0].contains("grown"),
+        "{notes:?}"
+    );
 }

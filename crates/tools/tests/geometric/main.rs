@@ -42,16 +42,7 @@ fn stroke(text: &str) -> Stroke {
 
 /// A canvas with nothing beside it.
 fn canvas(field: &HierarchicalSpline<f32>) -> Canvas {
-    Canvas {
-        holds: Vec::new(),
-        field: field.clone(),
-        iso: ISO,
-        // Of the block itself.
-        detail: 0,
-        layers: Default::default(),
-        others: Others::default(),
-        copies: Vec::new(),
-    }
+    Canvas::alone(field.clone(), ISO, 0)
 }
 
 /// What a stroke leaves.

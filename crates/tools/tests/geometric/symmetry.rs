@@ -2,10 +2,12 @@
 
 use bspline::Field;
 use bspline::hierarchical::HierarchicalSpline;
+use fitting::Control;
 use glam::DVec3;
 use tools::coefficients::coefficient;
+use tools::paint::{Substance, values};
 
-use super::{ISO, block, done, random};
+use super::{ISO, block, canvas, done, random, stroke};
 
 /// Whether the field is even about the middle of its box along x, to the bit.
 fn is_even(field: &HierarchicalSpline<f32>) -> bool {
@@ -83,4 +85,51 @@ fn strokes_about_any_plane_happen_on_both_sides() {
         }
     }
     assert!(count > 50, "{count}");
+}
+
+/// What is painted and what is held comes along on both sides, and a brush paints on both.
+#[test]
+fn paint_and_holds_go_to_both_sides() {
+    let both = "symmetry = { at = [12, 12, 12], normal = [1, 0, 0] }";
+    let strokes = [
+        format!(
+            "{both}\npaint = {{ layer = 'stiffness', brush = {{ value = 9, along = [[6, 12, 12]], radius = 3, rate = 0.5 }} }}"
+        ),
+        format!(
+            "{both}\npaint = {{ layer = 'mass', brush = {{ value = 2, along = [[11, 8, 12]], radius = 3 }} }}"
+        ),
+        "hold = { name = 'both', points = [[6, 12, 12], [18, 12, 12], [12, 20, 12]] }".into(),
+        format!(
+            "{both}\nmove = {{ motion = {{ grab = {{ along = [[6, 12, 12], [6, 12, 14]], radius = 3, rigid = 1 }} }} }}"
+        ),
+    ];
+    let mut left = canvas(&block());
+    for text in &strokes {
+        left = stroke(text).apply(left, &mut Control::default()).unwrap().0;
+    }
+    let at = |substance, p: [f64; 3]| values(&left.layers, substance, &[DVec3::from_array(p)]).unwrap()[0];
+    assert!(is_even(&left.field));
+    assert!((at(Substance::Stiffness, [6.0, 12.0, 14.0]) - 5.0).abs() < 1e-6);
+    let mut draw = random(3);
+    for _ in 0..200 {
+        let [x, y, z] = [draw(0.0, 24.0), draw(0.0, 24.0), draw(6.0, 18.0)];
+        for substance in [Substance::Stiffness, Substance::Mass] {
+            let [one, other] = [[x, y, z], [24.0 - x, y, z]].map(|p| at(substance, p));
+            assert!(
+                (one - other).abs() < 1e-5,
+                "{substance:?} {x} {y} {z}: {one} {other}"
+            );
+        }
+    }
+    let places: Vec<_> = left.holds[0].lines.iter().map(|line| line[0].0).collect();
+    let expected = [[6.0, 12.0, 14.0], [18.0, 12.0, 14.0], [12.0, 20.0, 12.0]];
+    for (found, expected) in places.iter().zip(expected) {
+        assert!(found.abs_diff_eq(DVec3::from_array(expected), 1e-9), "{places:?}");
+    }
+    let formula = format!("{both}\npaint = {{ layer = 'mass', formula = '2 + x' }}");
+    let told = stroke(&formula)
+        .apply(left, &mut Control::default())
+        .unwrap_err()
+        .to_string();
+    assert!(told.contains("both sides"), "{told}");
 }

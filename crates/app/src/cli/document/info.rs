@@ -1,3 +1,4 @@
+use glam::DAffine3;
 use serde_json::json;
 
 use super::{failure, open};
@@ -30,6 +31,16 @@ pub fn run(source: &Source, json: bool) -> Outcome {
             format!("{coefficients}, shaped to level {}", object.detail()),
         ));
         rows.push(("  box", format!("({lo}) to ({hi}) {}", object.meta.unit)));
+        if let Some(parent) = &object.properties.parent {
+            rows.push(("  moves with", parent.clone()));
+        }
+        let [x, y, z, origin] = object
+            .properties
+            .placement
+            .map(|c| c.map(human_number).join(", "));
+        if object.properties.parent_from_object() != DAffine3::IDENTITY {
+            rows.push(("  placed", format!("axes ({x}), ({y}), ({z}), origin ({origin})")));
+        }
         if !painted.is_empty() {
             rows.push(("  painted", painted.join(", ")));
         }

@@ -1,4 +1,4 @@
-use super::{CloudChanges, Placed, Row, Rows, words};
+use super::{CloudChanges, Placed, text_rows, words};
 use crate::limits::Budget;
 use crate::points::pcd::header::{self, Column, Encoding, Header, Scalar};
 use crate::points::pcd::{lzf, unpack};
@@ -93,26 +93,7 @@ fn ascii(body: &[u8], header: &Header, changes: &CloudChanges, out: &mut Vec<u8>
             .collect();
         words(line, |c| c.is_ascii_whitespace(), &new)
     };
-    let mut rows = Rows::of(changes);
-    let mut points: Vec<&[u8]> = Vec::new();
-    for line in body.split_inclusive(|c| *c == b'\n') {
-        if points.len() as u64 >= header.points || line.trim_ascii().is_empty() {
-            out.extend_from_slice(line);
-            continue;
-        }
-        match rows.next(points.len()) {
-            Row::Stays => out.extend_from_slice(line),
-            Row::Moves(placed) => out.extend(placed_line(line, placed)),
-            Row::Goes => {}
-        }
-        points.push(line);
-    }
-    for placed in &changes.added {
-        if !out.ends_with(b"\n") {
-            out.push(b'\n');
-        }
-        out.extend(placed_line(points[placed.row], placed));
-    }
+    text_rows(body, header.points, changes, placed_line, out);
 }
 
 /// Rows of bytes with their changes.

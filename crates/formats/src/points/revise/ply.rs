@@ -1,4 +1,4 @@
-use super::{CloudChanges, Placed, Row, Rows, words};
+use super::{CloudChanges, Placed, text_rows, words};
 use crate::Fault;
 use crate::points::ply::header::{self, Element, Encoding, Header, Scalar, Shape};
 
@@ -84,9 +84,6 @@ fn put_header(header: &[u8], count: usize, out: &mut Vec<u8>) {
 }
 
 fn ascii(body: &[u8], vertex: &Element, columns: &Columns, changes: &CloudChanges, out: &mut Vec<u8>) {
-    let mut rows = Rows::of(changes);
-    let mut points: Vec<&[u8]> = Vec::new();
-    let mut lines = body.split_inclusive(|c| *c == b'\n');
     let placed_line = |line: &[u8], placed: &Placed| {
         let new: Vec<_> = columns
             .numbers(placed)
@@ -97,26 +94,7 @@ fn ascii(body: &[u8], vertex: &Element, columns: &Columns, changes: &CloudChange
             .collect();
         words(line, |c| c.is_ascii_whitespace(), &new)
     };
-    while (points.len() as u64) < vertex.count {
-        let Some(line) = lines.next() else { break };
-        if line.trim_ascii().is_empty() {
-            out.extend_from_slice(line);
-            continue;
-        }
-        match rows.next(points.len()) {
-            Row::Stays => out.extend_from_slice(line),
-            Row::Moves(placed) => out.extend(placed_line(line, placed)),
-            Row::Goes => {}
-        }
-        points.push(line);
-    }
-    for placed in &changes.added {
-        if !out.ends_with(b"\n") {
-            out.push(b'\n');
-        }
-        out.extend(placed_line(points[placed.row], placed));
-    }
-    lines.for_each(|line| out.extend_from_slice(line));
+    text_rows(body, vertex.count, changes, placed_line, out);
 }
 
 fn binary(

@@ -1,0 +1,119 @@
+//! Strokes by hand as scripts say them.
+
+use glam::DVec3;
+
+use super::Pose;
+use crate::curve::Along;
+use crate::force::ForceTool;
+use crate::geometric::Motion;
+use crate::number::Point;
+use crate::session::Stroke;
+use crate::tool::{Tool, ToolError};
+
+impl Stroke {
+    /// Number of steps of a stroke that was made by hand.
+    pub fn step_count(&self) -> Option<usize> {
+        self.paced.then(|| self.poses().map_or(0, |poses| poses.len()))
+    }
+
+    /// Poses of the tool, one a step.
+    pub(crate) fn poses(&self) -> Result<Vec<Pose>, ToolError> {
+        let tool = self.tool().map_err(ToolError::Stroke)?;
+        let places = |along: &[Point]| along.iter().map(|p| Pose::at(p.0)).collect();
+        Ok(match tool {
+            Tool::Carve(tool) | Tool::Add(tool) => {
+                let turn = |n: usize| {
+                    tool.turn
+                        .get(n)
+                        .or(tool.turn.first())
+                        .map_or(DVec3::ZERO, |t| t.0)
+                };
+                let along = tool.along.iter().enumerate();
+                along
+                    .map(|(n, at)| Pose {
+                        at: at.0,
+                        turn: turn(n),
+                    })
+                    .collect()
+            }
+            Tool::Force(ForceTool::Chisel(tool) | ForceTool::Squirt(tool)) => places(by_points(&tool.along)?),
+            Tool::Force(ForceTool::Drill(tool) | ForceTool::Join(tool)) => places(by_points(&tool.along)?),
+            Tool::Force(ForceTool::Pull(tool)) => {
+                if tool.by.is_some() || tool.lift.is_some() {
+                    let why = "a pull by hand goes where the hand goes; write way, a vector for each step, and not by or lift";
+                    return Err(ToolError::Stroke(why.into()));
+                }
+                places(tool.way.as_deref().unwrap_or_default())
+            }
+            Tool::Smooth(tool) => places(&tool.along),
+            Tool::Inflate(tool) => places(&tool.along),
+            Tool::Paint(tool) => match &tool.brush {
+                Some(brush) => places(&brush.along),
+                None => return Err(not_by_hand(&Tool::Paint(tool))),
+            },
+            Tool::Move(tool) => match &tool.motion {
+                Motion::Grab { along, .. } => places(along),
+                _ => return Err(not_by_hand(&Tool::Move(tool))),
+            },
+            other => return Err(not_by_hand(&other)),
+        })
+    }
+
+    /// One pose more; a hand that grabs has the first and the last alone.
+    pub(super) fn push(&mut self, pose: Pose, turns: bool) {
+        let at = Point(pose.at);
+        for tool in [&mut self.carve, &mut self.add].into_iter().flatten() {
+            // Solids that were not turned so far have no turns.
+            if turns && (pose.turn != DVec3::ZERO || !tool.turn.is_empty()) {
+                tool.turn.resize(tool.along.len(), Point(DVec3::ZERO));
+                tool.turn.push(Point(pose.turn));
+            }
+            tool.along.push(at);
+        }
+        for tool in [&mut self.chisel, &mut self.squirt].into_iter().flatten() {
+            tool.along.push(at);
+        }
+        for tool in [&mut self.drill, &mut self.join].into_iter().flatten() {
+            tool.along.push(at);
+        }
+        if let Some(tool) = &mut self.pull {
+            tool.way.get_or_insert_default().push(at);
+        }
+        if let Some(tool) = &mut self.smooth {
+            tool.along.push(at);
+        }
+        if let Some(tool) = &mut self.inflate {
+            tool.along.push(at);
+        }
+        if let Some(brush) = self.paint.as_mut().and_then(|tool| tool.brush.as_mut()) {
+            brush.along.push(at);
+        }
+    }
+
+    /// A hand that grabs goes from place to place.
+    pub(super) fn grab(&mut self, places: [DVec3; 2]) {
+        if let Some(tool) = &mut self.motion
+            && let Motion::Grab { along, .. } = &mut tool.motion
+        {
+            *along = places.map(Point).to_vec();
+        }
+    }
+}
+
+pub fn not_by_hand(tool: &Tool) -> ToolError {
+    ToolError::Stroke(format!(
+        "{} goes nowhere by hand; use it in a stroke of its own, without paced",
+        tool.name()
+    ))
+}
+
+/// The places of a tool by hand: it has no other curves.
+fn by_points(along: &Along) -> Result<&[Point], ToolError> {
+    match along {
+        Along::Points(points) => Ok(points),
+        Along::Curve(_) => {
+            let why = "a tool by hand goes from point to point; write points for along, or leave paced out";
+            Err(ToolError::Stroke(why.into()))
+        }
+    }
+}
