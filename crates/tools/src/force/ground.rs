@@ -1,13 +1,11 @@
-use bspline::{Aabb, HierarchicalSpline, Real};
+use bspline::{HierarchicalSpline, Real};
 use dynamics::matter::{Matter, Quantity};
 use dynamics::region::{Cells, Region, RegionOptions};
 use dynamics::springs::Weights;
 use glam::DVec3;
 
 use super::ForceError;
-use super::holding::Holding;
 use super::target::Target;
-use super::within::FINER;
 use crate::paint::{self, Layers, Substance};
 
 /// Samples at most this share of a radius apart: coarser ones show in the result.
@@ -18,10 +16,6 @@ const SAMPLES_PER_CELL: f64 = 4.0 / 3.0;
 const ROOM: f64 = 4.0;
 /// Knot intervals that the rim takes from a region.
 const RIM: f64 = 0.58;
-/// Share of its way that limits have to let a tool go, or the region is finer than the tool asks for.
-const MOVING: f64 = 0.5;
-/// Parts of a knot interval over which the change fades beyond a border.
-const FADE: f64 = 0.25;
 /// Mass and damping over `K/(λr)²` and `K/(λr²)`.
 const MASS: f64 = 0.1;
 const DAMPING: f64 = 1.0;
@@ -32,8 +26,6 @@ pub struct Ground<'a, T> {
     pub field: &'a HierarchicalSpline<T>,
     /// What is painted on it.
     pub layers: &'a Layers,
-    /// What may not move.
-    pub holding: &'a Holding,
     pub radius: f64,
     /// Radii that a tool in a hand may go before the region is too small.
     pub roam: f64,
@@ -42,10 +34,7 @@ pub struct Ground<'a, T> {
 impl<T: Real> Ground<'_, T> {
     /// A region about paths, at rest, of matter that moves as wide as the tool is.
     pub fn cut(&self, targets: &[&Target]) -> Result<Region<T>, ForceError> {
-        let coarsest = level(self.field, self.radius)?;
-        // Narrow places move by narrow functions alone.
-        let level = (coarsest..coarsest + FINER).find(|level| self.gives_way(*level, targets));
-        let level = level.unwrap_or(coarsest + FINER);
+        let level = level(self.field, self.radius)?;
         let mut region = Region::new(
             self.field,
             self.cells(level, targets)?,
@@ -54,15 +43,6 @@ impl<T: Real> Ground<'_, T> {
         )?;
         self.paint(&mut region)?;
         Ok(region)
-    }
-
-    /// Whether paths that begin where limits allow it can go enough of their way.
-    fn gives_way(&self, level: usize, targets: &[&Target]) -> bool {
-        let limits = &self.holding.limits;
-        let is_free = |p: &DVec3| limits.is_free(&Aabb::new(*p, *p));
-        let starts = targets.iter().map(|t| t.path.at(0.0)).filter(is_free);
-        let open: Vec<f64> = starts.map(|p| self.holding.open(self.field, level, p)).collect();
-        open.iter().sum::<f64>() >= MOVING * open.len() as f64
     }
 
     /// The field with the change of a region, and one about other paths that goes on where it was.
@@ -118,7 +98,6 @@ impl<T: Real> Ground<'_, T> {
                 values.zip(factors).for_each(|(value, factor)| *value *= factor);
             }
         }
-        self.fade(region, &mut matter);
         if *region.patch().matter() != matter {
             region.patch_mut().set_matter(matter)?;
         }
@@ -128,30 +107,6 @@ impl<T: Real> Ground<'_, T> {
         };
         region.patch_mut().springs_mut().rest_mut().scale = scale;
         Ok(())
-    }
-
-    /// Holds what may not move: the change fades within a part of a knot interval.
-    fn fade(&self, region: &Region<T>, matter: &mut Matter) {
-        let (limits, cells) = (&self.holding.limits, region.cells());
-        let lattice = self.field.lattice();
-        let spacing = lattice.spacing(cells.level);
-        let [nx, ny, nz] = region.patch().lattice().sample_dims();
-        let corners = [[0; 3], [nx - 1, ny - 1, nz - 1]].map(|ijk| region.sample_position(ijk));
-        if limits.is_none()
-            || limits.is_free(&Aabb::new(corners[0].min(corners[1]), corners[0].max(corners[1])))
-        {
-            return;
-        }
-        let half = 0.5 / SAMPLES_PER_CELL * spacing;
-        let held = (FADE * spacing.min_element()).powi(-2);
-        let ground = |i: usize| {
-            let p = region.sample_position([i / nz / ny, i / nz % ny, i % nz]);
-            match limits.is_free(&Aabb::new(p - half, p + half)) {
-                true => 0.0,
-                false => held * matter.stiffness.at(i),
-            }
-        };
-        matter.ground = Quantity::PerSample((0..nx * ny * nz).map(ground).collect());
     }
 
     /// Cells about paths, with room on all sides.

@@ -9,7 +9,6 @@ use glam::DVec3;
 use super::ForceError;
 use super::row::Functions;
 use super::spread::axes;
-use super::within::free_share;
 use crate::hold::Held;
 use crate::limits::Limits;
 
@@ -37,15 +36,6 @@ impl Holding {
     /// Whether nothing is held.
     pub fn is_none(&self) -> bool {
         self.holds.is_empty() && self.limits.is_none()
-    }
-
-    /// How much of its way a stroke with functions of a level can bring the surface at a place, 0 to 1: towards what may not
-    /// change it fades as functions half as wide can.
-    pub(super) fn open<T: Real>(&self, field: &HierarchicalSpline<T>, level: usize, p: DVec3) -> f64 {
-        match self.limits.is_none() {
-            true => 1.0,
-            false => free_share(field, &self.limits, level + 1, p),
-        }
     }
 
     /// The constraints on a region that was cut from `field`.

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::quadrature::Node;
 
 /// The four cubic B-splines of uniform knots that are not 0 at `t` in their cell.
-pub fn basis(t: f64) -> [f64; 4] {
+fn basis(t: f64) -> [f64; 4] {
     let s = 1.0 - t;
     [
         s * s * s / 6.0,

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeSet;
 
-use bspline::Real;
+use bspline::{Aabb, Real};
 use glam::DVec3;
 
 use super::hand::Hand;
 use super::row::Functions;
-use super::stroke::{Acting, ForceStroke, LEAST_OPEN, STAGE};
+use super::stroke::{Acting, ForceStroke, STAGE};
 use super::target::Target;
 use super::{ForceError, Solid};
 
@@ -38,7 +38,6 @@ impl<T: Real> ForceStroke<T> {
 
     /// A path that begins to act.
     fn acting(&self, index: usize, age: usize) -> Acting {
-        let level = self.region.cells().level;
         let place = self.targets[index].path.at(0.0);
         Acting {
             index,
@@ -48,7 +47,7 @@ impl<T: Real> ForceStroke<T> {
             before: None,
             stiffness: 0.0,
             worth: 1.0,
-            open: self.holding.open(&self.field, level, place),
+            is_free: self.holding.limits.is_free(&Aabb::new(place, place)),
         }
     }
 
@@ -62,8 +61,8 @@ impl<T: Real> ForceStroke<T> {
             let Some(crossing) = a.crossing else { return true };
             let target = &self.targets[a.index];
             let length = target.path.length();
-            let ahead = self.ahead(target, crossing + (1.0 - a.open) * length);
-            if target.ends_early && ahead > 0.0 || a.open < LEAST_OPEN || a.stiffness == 0.0 {
+            let ahead = self.ahead(target, crossing);
+            if target.ends_early && ahead > 0.0 || !a.is_free || a.stiffness == 0.0 {
                 return true;
             }
             match (self.how.solid, a.before) {

@@ -11,7 +11,7 @@ use super::quadrature::Tolerance;
 use super::report::{Arrival, Told};
 use super::row::{Functions, Row};
 use super::spread::{Load, Part, Spread};
-use super::stroke::{ADVANCE, Acting, ForceStroke, LEAST_OPEN};
+use super::stroke::{ADVANCE, Acting, ForceStroke};
 use super::target::Span;
 use super::{ForceError, Rule, Solid, system};
 
@@ -145,7 +145,7 @@ impl<T: Real> ForceStroke<T> {
             a.age += 1;
             let part = (a.age as f64 / steps).min(1.0);
             all &= part == 1.0;
-            part * share * a.open * self.targets[a.index].path.length()
+            part * share * self.targets[a.index].path.length()
         });
         let goals = goals.collect();
         self.settled += usize::from(all && self.drawn.is_done());
@@ -166,7 +166,7 @@ impl<T: Real> ForceStroke<T> {
             let target = &self.targets[acting.index];
             let Some(span) = acting
                 .crossing
-                .filter(|_| acting.open >= LEAST_OPEN)
+                .filter(|_| acting.is_free)
                 .and_then(|at| target.span(&value, self.iso, at, *goal, step))
             else {
                 return Ok(None);

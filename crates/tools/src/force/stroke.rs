@@ -21,8 +21,6 @@ use crate::paint::Layers;
 pub(super) const STAGE: f64 = 6.0;
 /// Radii that the goal of the longest path advances in a step.
 pub(super) const ADVANCE: f64 = 0.3;
-/// Share of its length that limits have to let a path go, or it does nothing.
-pub(super) const LEAST_OPEN: f64 = 0.1;
 /// Radii that a region leaves a tool in a hand to go on.
 const ROAM: f64 = 3.0;
 
@@ -62,8 +60,8 @@ pub(super) struct Acting {
     pub(super) stiffness: f64,
     /// What it stands for.
     pub(super) worth: f64,
-    /// Share of its length that limits let it go.
-    pub(super) open: f64,
+    /// Whether it begins where limits allow it to act.
+    pub(super) is_free: bool,
 }
 
 /// A force tool at work on a field.
@@ -154,7 +152,6 @@ impl<T: Real> ForceStroke<T> {
         let ground = Ground {
             field,
             layers: &layers,
-            holding: &holding,
             radius,
             roam: 0.0,
         };
@@ -240,7 +237,6 @@ impl<T: Real> ForceStroke<T> {
         let ground = Ground {
             field: &self.field,
             layers: &self.layers,
-            holding: &self.holding,
             radius: self.radius,
             roam: ROAM,
         };
@@ -253,7 +249,6 @@ impl<T: Real> ForceStroke<T> {
         Ground {
             field: &self.field,
             layers: &self.layers,
-            holding: &self.holding,
             radius: self.radius,
             roam: if self.hand.is_some() { ROAM } else { 0.0 },
         }

@@ -6,14 +6,12 @@
 use std::collections::BTreeMap;
 
 use bspline::{HierarchicalSpline, Real};
-use glam::{DVec3, UVec3};
 
-use super::row::basis;
 use crate::coefficients::{Functions, changed, coefficient, support, with_functions};
 use crate::limits::Limits;
 
 /// Levels by which functions at a border may be finer.
-pub const FINER: usize = 2;
+const FINER: usize = 2;
 /// Shares of the five functions half as wide that one is made of, on an axis.
 const SHARES: [f64; 5] = [0.125, 0.5, 0.75, 0.5, 0.125];
 
@@ -75,28 +73,4 @@ fn halved(changes: &Changes, axis: usize, count: i64) -> Changes {
         }
     }
     finer
-}
-
-/// Share of the functions at a place, of a level, that are free.
-pub fn free_share<T: Real>(
-    field: &HierarchicalSpline<T>,
-    limits: &Limits,
-    level: usize,
-    place: DVec3,
-) -> f64 {
-    let at = field.lattice_from_world().transform_point3(place) * (1u64 << level) as f64;
-    let first = at.floor().as_uvec3();
-    let weights = at.fract().to_array().map(basis);
-    let mut sum = 0.0;
-    for (i, x) in weights[0].iter().enumerate() {
-        for (j, y) in weights[1].iter().enumerate() {
-            for (k, z) in weights[2].iter().enumerate() {
-                let function = (first + UVec3::new(i as u32, j as u32, k as u32)).to_array();
-                if limits.is_free(&support(field, level, function).1) {
-                    sum += x * y * z;
-                }
-            }
-        }
-    }
-    sum
 }
