@@ -1,7 +1,7 @@
 use std::sync::Arc;
 
+use super::block_edit::{BlockEdit, Change};
 use super::brick::{BRICK, BrickKey, Corrections, DenseCorrections};
-use super::edit::{BlockEdit, Change};
 use super::functions::EditError;
 use super::graft::Graft;
 use super::{HierarchicalSpline, Lattice};

@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use glam::DVec3;
 
+use super::bounds::lanes;
 use super::brick::{BRICK, HALO, HALO_LEN};
 use super::node::Node;
 use super::spline::HierarchicalSpline;
@@ -34,7 +35,7 @@ pub(super) fn frame_values<T: Real>(
         spline,
         axes: &axes,
         out,
-        scratch: Scratch::default(),
+        nodes: Nodes::default(),
     };
     let whole = axes.each_ref().map(|a| 0..a.cell.len());
     block.visit(&spline.root, whole);
@@ -86,16 +87,11 @@ struct Block<'a, T> {
     spline: &'a HierarchicalSpline<T>,
     axes: &'a [Axis; 3],
     out: &'a mut [f64],
-    scratch: Scratch<T>,
+    nodes: Nodes<T>,
 }
 
-/// Node positions and weights within the brick at hand, and partial sums.
-#[derive(Default)]
-struct Scratch<T> {
-    nodes: [Vec<(usize, [T; 4])>; 3],
-    plane: Vec<T>,
-    row: Vec<T>,
-}
+/// The cells of nodes within the brick at hand and their weights there, by axis.
+type Nodes<T> = [Vec<(usize, [T; 4])>; 3];
 
 impl<T: Real> Block<'_, T> {
     /// Evaluates the nodes `ranges`, all of which lie in `brick`.
@@ -130,7 +126,7 @@ impl<T: Real> Block<'_, T> {
         let scale = brick.scale();
         for a in 0..3 {
             let axis = &self.axes[a];
-            let nodes = &mut self.scratch.nodes[a];
+            let nodes = &mut self.nodes[a];
             nodes.clear();
             nodes.extend(ranges[a].clone().map(|i| {
                 let cell = axis.cell[i] >> shift;
@@ -142,11 +138,18 @@ impl<T: Real> Block<'_, T> {
             self.axes.each_ref().map(|a| a.cell.len()),
             ranges.map(|r| r.start),
         );
-        let (out, scratch) = (&mut *self.out, &mut self.scratch);
+        let (out, nodes) = (&mut *self.out, &self.nodes);
         let totals: &[T; HALO_LEN] = brick.own_totals();
+        let (first, end) = span(&nodes[2]);
         vectorized(
             #[inline(always)]
-            || tensor(totals, scratch, counts, offsets, out),
+            || {
+                if end - first <= 8 {
+                    tensor::<T, 8>(totals, nodes, counts, offsets, out);
+                } else {
+                    tensor::<T, 16>(totals, nodes, counts, offsets, out);
+                }
+            },
         );
     }
 
@@ -166,35 +169,24 @@ impl<T: Real> Block<'_, T> {
     }
 }
 
+/// `L` lanes along z, no fewer than the coefficients that the nodes read. What those beyond them find nobody looks at.
 #[inline(always)]
-fn tensor<T: Real>(
+fn tensor<T: Real, const L: usize>(
     totals: &[T; HALO_LEN],
-    scratch: &mut Scratch<T>,
+    [xs, ys, zs]: &Nodes<T>,
     counts: [usize; 3],
     offsets: [usize; 3],
     out: &mut [f64],
 ) {
-    let Scratch {
-        nodes: [xs, ys, zs],
-        plane,
-        row,
-    } = scratch;
-    let span = |nodes: &[(usize, [T; 4])]| (nodes[0].0, nodes[nodes.len() - 1].0 + 4);
-    let ((y0, y1), (z0, z1)) = (span(ys), span(zs));
-    let width = z1 - z0;
-    plane.clear();
-    plane.resize((y1 - y0) * width, T::zero());
-    row.clear();
-    row.resize(width, T::zero());
+    let ((y0, y1), (z0, _)) = (span(ys), span(zs));
+    let mut plane = [[T::zero(); L]; HALO];
     for (i, (cell, w)) in xs.iter().enumerate() {
         for y in y0..y1 {
-            let line = &mut plane[(y - y0) * width..][..width];
-            let at = |a: usize| &totals[((cell + a) * HALO + y) * HALO + z0..][..width];
-            blend(w, [at(0), at(1), at(2), at(3)], line);
+            let at = |a: usize| lanes::<T, L>(totals, ((cell + a) * HALO + y) * HALO + z0);
+            plane[y - y0] = blend(w, [at(0), at(1), at(2), at(3)]);
         }
         for (j, (cell, w)) in ys.iter().enumerate() {
-            let at = |b: usize| &plane[(cell + b - y0) * width..][..width];
-            blend(w, [at(0), at(1), at(2), at(3)], row);
+            let row = blend(w, [0, 1, 2, 3].map(|b| plane[cell + b - y0]));
             let start = ((offsets[0] + i) * counts[1] + offsets[1] + j) * counts[2] + offsets[2];
             for ((cell, w), value) in zs.iter().zip(&mut out[start..start + zs.len()]) {
                 let v = &row[cell - z0..cell - z0 + 4];
@@ -204,11 +196,13 @@ fn tensor<T: Real>(
     }
 }
 
+/// First coefficient that nodes read, and the one after the last.
 #[inline(always)]
-fn blend<T: Real>(w: &[T; 4], rows: [&[T]; 4], target: &mut [T]) {
-    let n = target.len();
-    let [a, b, c, d] = rows.map(|r| &r[..n]);
-    for z in 0..n {
-        target[z] = ((w[0] * a[z] + w[1] * b[z]) + w[2] * c[z]) + w[3] * d[z];
-    }
+fn span<T>(nodes: &[(usize, [T; 4])]) -> (usize, usize) {
+    (nodes[0].0, nodes[nodes.len() - 1].0 + 4)
+}
+
+#[inline(always)]
+fn blend<T: Real, const L: usize>(w: &[T; 4], [a, b, c, d]: [[T; L]; 4]) -> [T; L] {
+    std::array::from_fn(|z| ((w[0] * a[z] + w[1] * b[z]) + w[2] * c[z]) + w[3] * d[z])
 }

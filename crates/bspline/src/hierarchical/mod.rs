@@ -12,6 +12,7 @@
 
 mod along;
 mod batch;
+mod block_edit;
 mod bounds;
 mod brick;
 mod build;
@@ -39,11 +40,12 @@ mod versions;
 mod view;
 mod window;
 
+pub use block_edit::{BlockEdit, Change};
 pub use brick::{
     BRICK, BRICK_LEN, BrickKey, Corrections, DenseCorrections, HALO, HALO_LEN, LevelCorrections, active_slots,
 };
 pub use difference::{BrickChange, BrickDiff, DiffError};
-pub use edit::{BlockEdit, BrickEdit, Change, LevelEdit};
+pub use edit::{BrickEdit, LevelEdit};
 pub use functions::{EditError, MAX_LEVELS};
 pub use grown::shifted;
 pub use lattice::Lattice;

@@ -1,5 +1,6 @@
 use super::brick::{HALO, HALO_LEN};
 use crate::Real;
+use crate::vectorized::vectorized;
 
 /// Refines a block of `SPAN³` coefficients to the `OUT³` of the next level that it determines, `SPAN = OUT/2 + 2`
 /// for even `OUT`, `(OUT + 3)/2` for odd.
@@ -10,6 +11,7 @@ use crate::Real;
 ///
 /// # Panics
 /// If a slice is too short.
+#[inline(always)]
 pub fn refine_block<T: Real, const SPAN: usize, const OUT: usize>(
     source: &[T],
     work: &mut [T],
@@ -58,7 +60,10 @@ pub(crate) fn prolong<T: Real>(parent: &[T; HALO_LEN], octant: [usize; 3], child
         }
     }
     let mut work = [T::zero(); SPAN * SPAN * HALO + SPAN * HALO * HALO];
-    refine_block::<T, SPAN, HALO>(&source, &mut work, child);
+    vectorized(
+        #[inline(always)]
+        || refine_block::<T, SPAN, HALO>(&source, &mut work, child),
+    );
 }
 
 /// One of the totals that [`prolong`] makes, to the bit: number `at` of the child.

@@ -20,25 +20,24 @@ const SIDE_BY_SIDE: usize = 200;
 const READERS: usize = 3;
 
 /// The tree `old`, or one without functions, with `grafts` put in. Nodes that come out as they were are `old`'s. Bricks
-/// that no function reaches are left out, but for those of level 0.
+/// that no function reaches are left out, but for those of level 0. `count` totals are asked for here, not by the threads:
+/// so they take the place of what the caller has freed.
 pub(super) fn renewed<T: Real>(
     lattice: &Lattice,
     old: Option<&Arc<Node<T>>>,
     mut grafts: Vec<Graft<T>>,
+    count: usize,
 ) -> Arc<Node<T>> {
     Graft::sort(&mut grafts);
-    let mut root = Renewal {
+    let blank = Mutex::new((0..count).map(|_| Arc::new([T::zero(); HALO_LEN])).collect());
+    let root = Renewal {
         lattice,
-        blank: &Mutex::default(),
+        blank: &blank,
         old,
         place: (-crown(lattice), BrickKey([0; 3])),
         window: Window::root(old.map(|old| &**old), &grafts),
         parent: None,
     };
-    // A whole field's totals are asked for here, not by the threads: so they take the place of what the caller has freed.
-    let count = if old.is_none() { root.most_bricks() } else { 0 };
-    let blank = Mutex::new((0..count).map(|_| Arc::new([T::zero(); HALO_LEN])).collect());
-    root.blank = &blank;
     root.run(false).expect("level 0 has cells")
 }
 
@@ -113,15 +112,6 @@ impl<T: Real> Renewal<'_, T> {
                 || self.is_always_there()
                 || self.window.has_grafts_below()
                 || self.window.has_functions())
-    }
-
-    /// Bricks with totals here and below at most, where there is no old node.
-    fn most_bricks(&self) -> usize {
-        if self.window.is_quiet() && !self.is_always_there() {
-            return 0;
-        }
-        let below: usize = (0..8).map(|octant| self.child(octant, None).most_bricks()).sum();
-        below + usize::from(self.may_have_totals())
     }
 
     /// Totals of the brick, if it has cells, and whether they are others than in the old tree.

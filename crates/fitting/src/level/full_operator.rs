@@ -148,7 +148,7 @@ impl Operator<f64> {
             for j in 0..64 {
                 let mut column = [0.0; 64];
                 for row in &rows {
-                    for i in 0..64 {
+                    for i in j..64 {
                         column[i] += row[i] * row[j];
                     }
                 }

@@ -8,7 +8,10 @@
 //! surface face the way to `x`. In a hole neither is sure: `w` is between 0 and 1, or that of a part cut off, and the nearest
 //! samples are those of the rim. There the fit is left alone.
 
-use glam::DVec3;
+use std::collections::BTreeSet;
+
+use bspline::{Aabb, Field, Frame, HierarchicalSpline, Real};
+use glam::{DAffine3, DQuat, DVec3};
 
 use super::clusters::clusters;
 use super::samples::Samples;
@@ -26,6 +29,8 @@ const FACING: f64 = 0.6;
 /// of radius `R` it is larger.
 const MARGIN: f64 = 0.5;
 const CLOSING: f64 = 0.2;
+/// Share of the samples' diagonal that noisy solid may reach beyond their box before it is asked away.
+const BEYOND: f64 = 0.01;
 /// Winding numbers below `OUTSIDE` and above `INSIDE` are sure.
 const OUTSIDE: f64 = 0.1;
 const INSIDE: f64 = 0.7;
@@ -40,12 +45,9 @@ const RUN: usize = 16;
 pub(crate) fn settle(base: &mut FullGrid<f64>, samples: &Samples) -> usize {
     let data = clusters(samples, BASE_DEPTH);
     let sites = far_sites(data.iter().map(|c| c.position), base.n);
-    let numbers = winding_numbers(&data, &sites, base.n);
-    let (low, high) = data
-        .iter()
-        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), c| {
-            (low.min(c.position), high.max(c.position))
-        });
+    let places: Vec<DVec3> = sites.iter().map(|&site| site_position(site, base.n)).collect();
+    let numbers = winding_numbers(&data, &places);
+    let (low, high) = ends(data.iter().map(|c| c.position));
     let mut turned = 0;
     for (site, w) in sites.into_iter().zip(numbers) {
         let value = base.values[site];
@@ -97,6 +99,59 @@ pub(crate) fn turn_over(base: &mut FullGrid<f64>, samples: &Samples, conditions:
     }
 }
 
+/// Cells of width `h` that noise has left in the solid beyond the box of the samples, where it closes no hole: position and value asked
+/// for, both in the unit box.
+pub(crate) fn beyond<T: Real>(field: &HierarchicalSpline<T>, samples: &Samples, h: f64) -> Vec<(DVec3, f32)> {
+    let margin = BEYOND * samples.diagonal / samples.scale;
+    let (low, high) = ends(samples.live_points().map(|i| samples.positions[i]));
+    let n = (1.0 / h).round();
+    let to_world = |p: DVec3| samples.origin + samples.scale * p;
+    let mut found: BTreeSet<[usize; 3]> = BTreeSet::new();
+    for axis in 0..3 {
+        for (from, to) in [(0.0, low[axis] - margin), (high[axis] + margin, 1.0)] {
+            let [mut first, mut end] = [DVec3::ZERO, DVec3::splat(n)];
+            // Cells whose centres lie there.
+            (first[axis], end[axis]) = ((from / h - 0.5).ceil().max(0.0), (to / h + 0.5).floor().min(n));
+            let slab = Aabb {
+                min: to_world(first * h),
+                max: to_world(end * h),
+            };
+            if first[axis] >= end[axis] || field.bounds(&slab).hi <= 0.0 {
+                continue;
+            }
+            let count = (end - first).to_array().map(|c| c as usize);
+            let frame = Frame {
+                world_from_grid: DAffine3::from_scale_rotation_translation(
+                    DVec3::splat(samples.scale * h),
+                    DQuat::IDENTITY,
+                    to_world((first + 0.5) * h),
+                ),
+                cells: count.map(|c| c as u32),
+            };
+            let mut values = vec![0.0; count.iter().product()];
+            field.frame_values(&frame, [0; 3], count, &mut values);
+            let first = first.to_array().map(|c| c as usize);
+            let inside = (0..values.len()).filter(|i| values[*i] > 0.0);
+            found.extend(inside.map(|i| {
+                let at = [i / count[2] / count[1], i / count[2] % count[1], i % count[2]];
+                std::array::from_fn(|a| first[a] + at[a])
+            }));
+        }
+    }
+    let centre = |cell: &[usize; 3]| (DVec3::from_array(cell.map(|c| c as f64)) + 0.5) * h;
+    let places: Vec<DVec3> = found.iter().map(centre).collect();
+    let numbers = winding_numbers(&clusters(samples, BASE_DEPTH), &places);
+    let open = places.into_iter().zip(numbers).filter(|(_, w)| *w < CLOSING);
+    open.map(|(place, _)| (place, -h as f32)).collect()
+}
+
+/// Corners of the box of places.
+fn ends(places: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
+    places.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
+        (low.min(p), high.max(p))
+    })
+}
+
 /// Distance from `x` to the nearest cluster, and the mean cosine between the ways to `x` from the clusters that are hardly
 /// farther and their normals: near 1 before the outside of a closed surface, -1 before its inside, and 0 in a hole.
 fn way_to(data: &[Cluster], x: DVec3, n: usize) -> (f64, f64) {
@@ -139,7 +194,7 @@ fn far_sites(points: impl Iterator<Item = DVec3>, n: usize) -> Vec<usize> {
     (0..m * m * m).filter(|&s| !is_near[s]).collect()
 }
 
-fn winding_numbers(data: &[Cluster], sites: &[usize], n: usize) -> Vec<f64> {
+fn winding_numbers(data: &[Cluster], places: &[DVec3]) -> Vec<f64> {
     let areas = areas(data);
     let positions: Vec<[f32; 3]> = data.iter().map(|c| c.position.as_vec3().to_array()).collect();
     let strengths: Vec<[f32; 3]> = data
@@ -149,10 +204,10 @@ fn winding_numbers(data: &[Cluster], sites: &[usize], n: usize) -> Vec<f64> {
         .collect();
     let areas: Vec<f32> = areas.iter().map(|a| *a as f32).collect();
     let tree = Tree::new(positions, &areas);
-    let targets: Vec<Target> = sites
+    let targets: Vec<Target> = places
         .iter()
-        .map(|&site| Target {
-            position: site_position(site, n).as_vec3().to_array(),
+        .map(|place| Target {
+            position: place.as_vec3().to_array(),
             width: 0.0,
         })
         .collect();
@@ -226,26 +281,70 @@ fn add_up_3(values: &mut [f64], n: usize) {
 
 #[cfg(test)]
 mod tests {
+    use bspline::hierarchical::Lattice;
+
     use super::*;
     use crate::points::OrientedPoints;
+
+    /// Points all over a unit ball.
+    fn ball() -> Vec<DVec3> {
+        let place = |i: u32| {
+            let z = 1.0 - (2.0 * f64::from(i) + 1.0) / 400.0;
+            let (sin, cos) = libm::sincos(2.399_963_229_728_653 * f64::from(i));
+            let r = (1.0 - z * z).sqrt();
+            DVec3::new(r * cos, r * sin, z)
+        };
+        (0..400).map(place).collect()
+    }
+
+    fn prepared(points: &[DVec3]) -> Samples {
+        let cloud = OrientedPoints {
+            positions: points,
+            normals: points,
+            certainty: None,
+        };
+        Samples::prepare(cloud).expect("a ball")
+    }
+
+    /// A bump on a ball is found where it leaves the box of the samples; what closes a hole is not.
+    #[test]
+    fn solid_beyond_the_box_is_asked_away_but_over_a_hole() {
+        let whole = ball();
+        let cut: Vec<DVec3> = whole.iter().copied().filter(|p| p.z < 0.8).collect();
+        let (top, radius) = (DVec3::new(0.1, 0.0, 1.0), 0.12);
+        for (points, has_bump, expected) in
+            [(&whole, false, false), (&whole, true, true), (&cut, false, false)]
+        {
+            let samples = prepared(points);
+            let lattice = Lattice {
+                world_from_lattice: DAffine3::from_scale_rotation_translation(
+                    DVec3::splat(samples.scale / 64.0),
+                    DQuat::IDENTITY,
+                    samples.origin,
+                ),
+                cells: [64; 3],
+            };
+            let solid = |p: DVec3| {
+                let bump = if has_bump { radius - p.distance(top) } else { -1.0 };
+                bump.max(1.0 - p.length())
+            };
+            let field = HierarchicalSpline::<f32>::schoenberg(lattice, 1.0, solid).unwrap();
+            let found = beyond(&field, &samples, 1.0 / 128.0);
+            assert_eq!(!found.is_empty(), expected, "{has_bump} {}", points.len());
+            for (place, value) in found {
+                let world = samples.origin + samples.scale * place;
+                assert!(
+                    value < 0.0 && world.distance(top) < radius + 0.02 && world.z > 1.03,
+                    "{world}"
+                );
+            }
+        }
+    }
 
     /// Coefficients of the cells asked for turn over, but for those beside a point and those that are right already.
     #[test]
     fn a_pocket_away_from_all_points_turns_over() {
-        let normals: Vec<DVec3> = (0..400)
-            .map(|i| {
-                let z = 1.0 - (2.0 * f64::from(i) + 1.0) / 400.0;
-                let (sin, cos) = libm::sincos(2.399_963_229_728_653 * f64::from(i));
-                let r = (1.0 - z * z).sqrt();
-                DVec3::new(r * cos, r * sin, z)
-            })
-            .collect();
-        let cloud = OrientedPoints {
-            positions: &normals,
-            normals: &normals,
-            certainty: None,
-        };
-        let samples = Samples::prepare(cloud).expect("a ball");
+        let samples = prepared(&ball());
         let mut base = FullGrid::zeros(32);
         let site = |knot: [usize; 3]| ((knot[0] + 1) * 35 + knot[1] + 1) * 35 + knot[2] + 1;
         // The ball ends at knot 29.9 of each axis through its middle.

@@ -174,7 +174,10 @@ pub fn fit_points<T: Real>(
         let end = 0.9 - 0.3 * 0.5f64.powi(rounds);
         let cascade = cascade::run::<T>(&samples, &base, &plan, begin..end, control)?;
         let field = samples.field(&base, &cascade.levels);
-        let conditions = pieces::conditions(&field, &samples);
+        let mut conditions = pieces::conditions(&field, &samples);
+        if noise.is_some() {
+            conditions.extend(far_field::beyond(&field, &samples, 0.5 * pieces::width(&field)));
+        }
         if conditions.is_empty() || rounds == REPAIR_ROUNDS {
             break (cascade, field);
         }

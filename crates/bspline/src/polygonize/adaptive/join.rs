@@ -27,11 +27,11 @@ impl AdaptiveBlockMesh {
         for &(_, place) in &order {
             let own = parts.vertices_of(place);
             first[place.0][place.1 as usize] = made.keys.len() as u32;
-            let numbers = 0..own.keys.len();
+            let numbers = 0..own.names.len();
             made.mesh
                 .positions
-                .extend(numbers.map(|n| parts.position(place, n)));
-            made.keys.extend_from_slice(&own.keys);
+                .extend(numbers.clone().map(|n| parts.position(place, n)));
+            made.keys.extend(numbers.map(|n| parts.key(place, n)));
             made.fixed.extend_from_slice(&own.fixed);
             if made.keys.len() >= EXTRA as usize {
                 let vertices = made.keys.len() as u64;

@@ -35,7 +35,7 @@ use self::grid::Grids;
 use self::polygons::{BlockTriangles, EXTRA, ExtraKey, Numbered};
 use self::sample::{Judge, Sample};
 use self::tree::{Limits, Samples, Tree, Watch};
-use self::vertices::{BlockVertices, PLACE_BITS, Placer, STEPS};
+use self::vertices::{BlockVertices, PLACE_BITS, Placer, STEPS, key_of};
 use super::blocks::{BlockGrid, BlockKey, find_blocks};
 use super::settle::{SettleOptions, settle};
 use super::{Mesh, PolygonizeError, PolygonizeOptions};
@@ -299,8 +299,8 @@ fn report_of(tree: &Tree, options: &AdaptiveOptions, error: f64) -> AdaptiveRepo
 
 /// The triangles of an octree, block by block.
 struct Drawn {
-    /// Blocks in the order of space, so that what is close in it is close in the mesh: place, level, number.
-    order: Vec<(u64, usize, usize)>,
+    /// Blocks in the order of space, so that what is close in it is close in the mesh: place, level, number, key.
+    order: Vec<(u64, usize, usize, BlockKey)>,
     /// Vertices of all leaves.
     count: u64,
     parts: Vec<BlockTriangles>,
@@ -315,20 +315,20 @@ impl Drawn {
         open: bool,
     ) -> Result<Self, PolygonizeError> {
         let depth = placer.grids.depth();
-        let mut order: Vec<(u64, usize, usize)> = tree
+        let mut order: Vec<(u64, usize, usize, BlockKey)> = tree
             .iter()
             .enumerate()
             .flat_map(|(level, blocks)| {
                 blocks
                     .iter()
                     .enumerate()
-                    .map(move |(n, b)| (order_of(b.key, level, depth), level, n))
+                    .map(move |(n, b)| (order_of(b.key, level, depth), level, n, b.key))
             })
             .collect();
         order.sort_unstable();
         let mut first: Vec<Vec<u32>> = tree.iter().map(|blocks| vec![0; blocks.len()]).collect();
         let mut count: u64 = 0;
-        for &(_, level, n) in &order {
+        for &(_, level, n, _) in &order {
             first[level][n] = count as u32;
             count += vertices[level][n].positions.len() as u64;
         }
@@ -348,9 +348,10 @@ impl Drawn {
         let parts = order
             .par_iter()
             .with_min_len(4)
-            .map(|&(_, level, n)| {
+            .map(|&(_, level, n, _)| {
                 let mut out = BlockTriangles::default();
                 numbered.triangles(&Around::new(tree, level, &tree[level][n]), &mut out)?;
+                out.triangles.shrink_to_fit();
                 Ok(out)
             })
             .collect::<Result<_, PolygonizeError>>()?;
@@ -370,10 +371,13 @@ impl Drawn {
         made.mesh.positions.reserve_exact(count as usize);
         made.keys.reserve_exact(count as usize);
         made.fixed.reserve_exact(count as usize);
-        for &(_, level, n) in &order {
+        let depth = placer.grids.depth();
+        for &(_, level, n, key) in &order {
             let block = &vertices[level][n];
             made.mesh.positions.extend_from_slice(&block.positions);
-            made.keys.extend_from_slice(&block.keys);
+            let names = block.names.iter();
+            made.keys
+                .extend(names.map(|name| key_of(depth, level, key, *name)));
             made.fixed.extend_from_slice(&block.fixed);
         }
         let extras: Vec<_> = parts

@@ -13,7 +13,7 @@ use rustc_hash::FxHashMap;
 use super::grid::{Grids, NONE};
 use super::octree::Place;
 use super::order_of;
-use super::pieces::{ABOUT, Corner, Parts, corner};
+use super::pieces::{ABOUT, At, Corner, Parts, corner};
 use super::polygons::ExtraKey;
 use super::splice::Splice;
 use super::vertices::LOOP_BITS;
@@ -37,9 +37,6 @@ pub(super) struct Calming<'a> {
     pub error: f64,
     pub grids: &'a Grids,
 }
-
-/// A vertex of the mesh: its block and number there.
-pub(super) type At = (Place, usize);
 
 /// Settles what lies about the vertices `seeds`, or the whole mesh; tells how many triangles settled, those of vain
 /// attempts too, and the blocks whose settled triangles may have changed.
@@ -368,7 +365,7 @@ impl<'a> Patch<'a> {
         }
         let key = |v: u32| {
             let block = &self.blocks[self.vertices[v as usize].block as usize];
-            self.parts.vertices_of(block.place).keys[(v - block.first) as usize]
+            self.parts.key(block.place, (v - block.first) as usize)
         };
         // The triangles of a block follow each other.
         let mut blocks = self.blocks_of(&after.chosen);

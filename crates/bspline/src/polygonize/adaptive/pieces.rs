@@ -3,12 +3,15 @@
 use glam::{DAffine3, DVec3};
 
 use super::around::Around;
-use super::grid::NONE;
+use super::grid::{NONE, cell_index};
 use super::octree::{Octree, Place};
 use super::polygons::{BlockTriangles, EXTRA, ExtraKey, Numbered};
-use super::vertices::{BlockVertices, LOOP_BITS, PLACE_BITS};
+use super::vertices::{BlockVertices, LOOP_BITS, PLACE_BITS, key_of};
 use crate::polygonize::PolygonizeError;
 use crate::polygonize::blocks::CELLS;
+
+/// A vertex of the mesh: its block and number there.
+pub(super) type At = (Place, usize);
 
 /// Bits of a corner for the name of its vertex within its block.
 const NAME_BITS: u32 = 9 + LOOP_BITS;
@@ -164,6 +167,12 @@ impl Parts {
             .unwrap_or_else(|| &self.vertices_of(place).positions[number])
     }
 
+    /// Key of a block's vertex: its place in the octree, whatever its number.
+    pub fn key(&self, place: Place, number: usize) -> u64 {
+        let (octree, name) = (&self.octree, self.vertices_of(place).names[number]);
+        key_of(octree.tree.len() - 1, place.0, octree.block(place).key, name)
+    }
+
     /// Block and number of the vertex with that key.
     pub fn find(&self, key: u64) -> Option<(Place, usize)> {
         let depth = self.octree.tree.len() - 1;
@@ -177,8 +186,10 @@ impl Parts {
             let block = self.octree.block(place);
             let cell = at.map(|x| (x >> (depth - place.0)) as usize % CELLS);
             if !super::grid::holds(&block.split, cell) {
-                let vertices = self.vertices_of(place);
-                let found = vertices.keys.binary_search(&key).ok()?;
+                let number = (key & ((1 << LOOP_BITS) - 1)) as u16;
+                let name = (cell_index(cell) as u16) << LOOP_BITS | number;
+                let is_its = key_of(depth, place.0, block.key, name) == key;
+                let found = self.vertices_of(place).find(name).filter(|_| is_its)?;
                 return Some((place, found));
             }
             let next = block.children[super::grid::octant_with(cell)];

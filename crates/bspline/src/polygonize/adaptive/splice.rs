@@ -1,8 +1,7 @@
 use glam::DVec3;
 
 use super::octree::Place;
-use super::patch::At;
-use super::pieces::Parts;
+use super::pieces::{At, Parts};
 
 /// What has settled otherwise than before.
 #[derive(Default)]

@@ -8,7 +8,7 @@ use super::grid::{Cells, Grids, NODE_COUNT, bit, cell_index, each, holds, node_i
 use super::surface::{Crossing, LeafSurface, MARGIN, Segment, crossing_on, share};
 use super::tree::leaves;
 use crate::Field;
-use crate::polygonize::blocks::CELLS;
+use crate::polygonize::blocks::{BlockKey, CELLS};
 use crate::polygonize::table::edge_place;
 
 /// Bits of a vertex's key that number the loops of its leaf.
@@ -31,7 +31,6 @@ pub(super) struct BlockVertices {
     /// Segments of leaves that share their minimal face with another segment of the same loop, by leaf.
     pub twice: Vec<(u16, Segment)>,
     pub positions: Vec<DVec3>,
-    pub keys: Vec<u64>,
     /// Names within the block, rising: number of the leaf, then of the loop.
     pub names: Vec<u16>,
     /// Vertices on the cap, which stay where they are.
@@ -150,12 +149,10 @@ impl BlockVertices {
             let capped = border && (0..3).any(|a| cell[a] < 0 || cell[a] >= cells[a]);
             let case = cases::case(block.sample.case(c));
             let leaf = cell_index(c) as u16;
-            let key = key_of(grids, level, cell);
             if !capped && !holds(&beside, c) && case.loops == 1 && case.ambiguous == 0 {
                 made.holding[c[0]] |= bit(c);
                 made.push(
                     mean_of_edges(&block.sample.values, c, case.edges) + place(own),
-                    key,
                     leaf << LOOP_BITS,
                     false,
                 );
@@ -182,7 +179,7 @@ impl BlockVertices {
                     let count = own_segments().count() as f64;
                     points.map(|p| p.1).sum::<DVec3>() / count
                 };
-                made.push(at, key + n as u64, leaf << LOOP_BITS | n as u16, capped);
+                made.push(at, leaf << LOOP_BITS | n as u16, capped);
                 scratch.cells.push(cell);
             }
             if surface.loops > 1 {
@@ -203,7 +200,12 @@ impl BlockVertices {
         made.place(placer, level, scratch);
         match known {
             Some((known, stale)) => made.with_others(known, stale),
-            None => made,
+            None => {
+                made.positions.shrink_to_fit();
+                made.names.shrink_to_fit();
+                made.fixed.shrink_to_fit();
+                made
+            }
         }
     }
 
@@ -222,7 +224,7 @@ impl BlockVertices {
         from.extend((0..self.names.len()).map(|n| (&self, n)));
         from.sort_unstable_by_key(|(of, n)| of.names[*n]);
         for (of, n) in from {
-            both.push(of.positions[n], of.keys[n], of.names[n], of.fixed[n]);
+            both.push(of.positions[n], of.names[n], of.fixed[n]);
         }
         both.more = joined(&other.more, &self.more, |m| m.0, is_kept);
         both.crossings = joined(&other.crossings, &self.crossings, |c| c.0, is_kept);
@@ -230,9 +232,8 @@ impl BlockVertices {
         both
     }
 
-    fn push(&mut self, at: DVec3, key: u64, name: u16, fixed: bool) {
+    fn push(&mut self, at: DVec3, name: u16, fixed: bool) {
         self.positions.push(at);
-        self.keys.push(key);
         self.names.push(name);
         self.fixed.push(fixed);
     }
@@ -313,13 +314,15 @@ fn place(cell: [i32; 3]) -> DVec3 {
     DVec3::from_array(cell.map(f64::from))
 }
 
-/// Key of the first vertex of a leaf.
-fn key_of(grids: &Grids, level: usize, cell: [i32; 3]) -> u64 {
-    let depth = grids.depth();
-    cell.iter().fold(0, |key, c| {
-        let fine = (i64::from(*c) << (depth - level)) + (1 << depth);
-        key << PLACE_BITS | fine as u64
-    }) << LOOP_BITS
+/// Key of the vertex with that name in the block `key` of a level.
+pub(super) fn key_of(depth: usize, level: usize, key: BlockKey, name: u16) -> u64 {
+    let (leaf, number) = (name >> LOOP_BITS, name & ((1 << LOOP_BITS) - 1));
+    let cell = [leaf >> 6, leaf >> 3 & 7, leaf & 7];
+    let place = (0..3).fold(0, |place, a| {
+        let cell = i64::from(key[a]) * CELLS as i64 + i64::from(cell[a]);
+        place << PLACE_BITS | ((cell << (depth - level)) + (1 << depth)) as u64
+    });
+    place << LOOP_BITS | u64::from(number)
 }
 
 /// Mean of the crossings of a leaf's edges, from the block's first node.

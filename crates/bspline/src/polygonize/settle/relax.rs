@@ -49,7 +49,7 @@ fn reach(longest: &mut [f64], t: &[u32; 3], [p, q, r]: [DVec3; 3]) {
 /// One round: every free vertex moves to the mean of the centroids round it, weighted by area and the square root of the
 /// chord error, along its tangent plane, and onto the surface.
 pub(super) fn relax(field: &dyn Field, iso: f64, edges: &Edges, state: &mut State) {
-    let parts: Vec<(DVec3, f64)> = edges
+    let weights: Vec<f64> = edges
         .triangles
         .par_iter()
         .with_min_len(BATCH)
@@ -61,22 +61,23 @@ pub(super) fn relax(field: &dyn Field, iso: f64, edges: &Edges, state: &mut Stat
                 .max(sagitta(q, r, m, n))
                 .max(sagitta(r, p, n, l));
             let area = (q - p).cross(r - p).length();
-            let weight = area * (error + FLOOR * state.tolerance).sqrt();
-            ((p + q + r) * (weight / 3.0), weight)
+            area * (error + FLOOR * state.tolerance).sqrt()
         })
         .collect();
     // Triangle after triangle, so that sums round a vertex have one order.
     let mut sums = vec![(DVec3::ZERO, 0.0); state.positions.len()];
     let mut longest = vec![0.0; state.positions.len()];
-    for (t, (center, weight)) in edges.triangles.iter().zip(&parts) {
+    for (t, weight) in edges.triangles.iter().zip(&weights) {
+        let [p, q, r] = t.map(|v| state.positions[v as usize]);
+        let center = (p + q + r) * (weight / 3.0);
         for &v in t {
             let (sum, total) = &mut sums[v as usize];
-            *sum += *center;
+            *sum += center;
             *total += *weight;
         }
-        reach(&mut longest, t, t.map(|v| state.positions[v as usize]));
+        reach(&mut longest, t, [p, q, r]);
     }
-    drop(parts);
+    drop(weights);
     let targets = (0..state.positions.len())
         .map(|v| {
             let (p, n) = (state.positions[v], state.normals[v]);
@@ -101,40 +102,40 @@ fn normal(p: &[DVec3], a: u32, b: u32, c: u32) -> DVec3 {
 ///
 /// `longest` are the squares of the longest edges at each vertex.
 fn step(field: &dyn Field, iso: f64, edges: &Edges, state: &mut State, targets: Vec<DVec3>, longest: &[f64]) {
-    let mut moved: Vec<(DVec3, DVec3)> = vec![(DVec3::ZERO, DVec3::ZERO); targets.len()];
+    // The feet take the place of the targets.
+    let mut feet = targets;
+    let mut facing = vec![DVec3::ZERO; feet.len()];
     let State {
         positions,
         normals,
         held,
         ..
     } = state;
-    targets
-        .par_chunks(BATCH)
-        .zip(moved.par_chunks_mut(BATCH))
+    feet.par_chunks_mut(BATCH)
+        .zip(facing.par_chunks_mut(BATCH))
         .enumerate()
-        .for_each_init(Vec::new, |answers, (n, (points, moved))| {
-            answers.resize(points.len(), (0.0, DVec3::ZERO));
-            field.values_gradients(points, answers);
-            for (k, slot) in moved.iter_mut().enumerate() {
+        .for_each_init(Vec::new, |answers, (n, (feet, facing))| {
+            answers.resize(feet.len(), (0.0, DVec3::ZERO));
+            field.values_gradients(feet, answers);
+            for (k, (foot, to)) in feet.iter_mut().zip(facing).enumerate() {
                 let i = n * BATCH + k;
                 let (value, gradient) = answers[k];
                 let slope = gradient.length();
                 let distance = (value - iso) / slope;
                 // Not a number fails this test too.
-                *slot = if !held[i] && distance.abs() <= REACH * longest[i].sqrt() {
+                (*foot, *to) = if !held[i] && distance.abs() <= REACH * longest[i].sqrt() {
                     let normal = -gradient / slope;
-                    (points[k] + normal * distance, normal)
+                    (*foot + normal * distance, normal)
                 } else {
                     (positions[i], normals[i])
                 };
             }
         });
-    drop(targets);
-    let mut back = vec![false; moved.len()];
+    let mut back = vec![false; feet.len()];
     for round in 0..2 {
         let at = |v: u32| {
             let i = v as usize;
-            if back[i] { state.positions[i] } else { moved[i].0 }
+            if back[i] { state.positions[i] } else { feet[i] }
         };
         let turned: Vec<[u32; 3]> = edges
             .triangles
@@ -160,7 +161,7 @@ fn step(field: &dyn Field, iso: f64, edges: &Edges, state: &mut State, targets: 
             back[v as usize] = true;
         }
     }
-    for (i, (p, n)) in moved.into_iter().enumerate() {
+    for (i, (p, n)) in feet.into_iter().zip(facing).enumerate() {
         if !back[i] {
             (state.positions[i], state.normals[i]) = (p, n);
         }
