@@ -234,6 +234,12 @@ impl Limits {
         std::iter::once(*b).chain(other)
     }
 
+    /// Whether nothing in a world box may change.
+    pub fn is_shut(&self, part: &Aabb) -> bool {
+        let region = self.region.iter().any(|(_, solid)| solid.bounds(part).hi <= 0.0);
+        region || self.mask.iter().any(|mask| mask.bounds(part).hi <= 0.0)
+    }
+
     /// How much of a change happens at a place, 0 to 1.
     pub fn share(&self, p: DVec3) -> f64 {
         match (&self.weight, self.is_free(&Aabb { min: p, max: p })) {

@@ -2,8 +2,12 @@
 
 #[path = "force/areas.rs"]
 mod areas;
+#[path = "force/borders.rs"]
+mod borders;
 #[path = "force/holds.rs"]
 mod holds;
+#[path = "force/limits.rs"]
+mod limits;
 #[path = "force/shapes.rs"]
 mod shapes;
 

@@ -5,7 +5,9 @@ use serde::{Deserialize, Serialize};
 use super::path::Path;
 use super::stroke::{Extent, ForceStroke};
 use super::target::Target;
-use super::{ForceError, How, track};
+use super::track::Place;
+use super::tracked::Tracked;
+use super::{ForceError, How};
 use crate::curve::Along;
 use crate::number::Positive;
 
@@ -36,9 +38,7 @@ impl Chisel {
         iso: f64,
         grows: bool,
     ) -> Result<ForceStroke<T>, ForceError> {
-        let places = track::along(field, iso, &self.along, self.radius.0)?;
-        let targets: Result<Vec<_>, _> = places.iter().map(|place| self.target(place, grows)).collect();
-        ForceStroke::new(field, iso, targets?, Extent::Track, self.radius.0, &self.how)
+        self.tracked(iso, grows).begin(field)
     }
 
     /// Takes the tool in hand at a place, the first of its track.
@@ -52,12 +52,22 @@ impl Chisel {
         grows: bool,
         at: DVec3,
     ) -> Result<ForceStroke<T>, ForceError> {
-        let tool = self.clone();
-        let make = Box::new(move |place: &track::Place| tool.target(place, grows));
-        ForceStroke::walking(field, [iso, iso], make, at, self.radius.0, &self.how)
+        self.tracked(iso, grows).hold(field, at)
     }
 
-    fn target(&self, place: &track::Place, grows: bool) -> Result<Target, ForceError> {
+    fn tracked(&self, iso: f64, grows: bool) -> Tracked<'_> {
+        let tool = self.clone();
+        Tracked {
+            along: &self.along,
+            radius: self.radius.0,
+            how: &self.how,
+            extent: Extent::Track,
+            densities: [iso, iso],
+            make: Box::new(move |place| tool.target(place, grows)),
+        }
+    }
+
+    fn target(&self, place: &Place, grows: bool) -> Result<Target, ForceError> {
         let way = if grows { self.depth.0 } else { -self.depth.0 };
         Ok(Target {
             weight: place.weight,

@@ -5,7 +5,9 @@ use serde::{Deserialize, Serialize};
 use super::path::Path;
 use super::stroke::{Extent, ForceStroke};
 use super::target::Target;
-use super::{ForceError, How, track};
+use super::track::Place;
+use super::tracked::Tracked;
+use super::{ForceError, How};
 use crate::curve::Along;
 use crate::number::{Point, Positive};
 
@@ -39,10 +41,7 @@ impl Drill {
         iso: f64,
         grows: bool,
     ) -> Result<ForceStroke<T>, ForceError> {
-        let places = track::along(field, iso, &self.along, self.radius.0)?;
-        let targets: Result<Vec<_>, _> = places.iter().map(|place| self.target(place, grows)).collect();
-        let goal = self.goal(field, iso, grows);
-        ForceStroke::new(field, goal, targets?, Extent::Curve, self.radius.0, &self.how)
+        self.tracked(field, iso, grows).begin(field)
     }
 
     /// Takes the tool in hand at a place, the first of its track.
@@ -56,15 +55,19 @@ impl Drill {
         grows: bool,
         at: DVec3,
     ) -> Result<ForceStroke<T>, ForceError> {
-        let (tool, goal) = (self.clone(), self.goal(field, iso, grows));
-        let make = Box::new(move |place: &track::Place| {
-            let begins = place.along;
-            Ok(Target {
-                begins,
-                ..tool.target(place, grows)?
-            })
-        });
-        ForceStroke::walking(field, [iso, goal], make, at, self.radius.0, &self.how)
+        self.tracked(field, iso, grows).hold(field, at)
+    }
+
+    fn tracked<T: Real>(&self, field: &HierarchicalSpline<T>, iso: f64, grows: bool) -> Tracked<'_> {
+        let tool = self.clone();
+        Tracked {
+            along: &self.along,
+            radius: self.radius.0,
+            how: &self.how,
+            extent: Extent::Curve,
+            densities: [iso, self.goal(field, iso, grows)],
+            make: Box::new(move |place| tool.target(place, grows)),
+        }
     }
 
     /// Density beyond the surface by as much as the hole is to be wide.
@@ -73,7 +76,7 @@ impl Drill {
         if grows { iso + wider } else { iso - wider }
     }
 
-    fn target(&self, place: &track::Place, grows: bool) -> Result<Target, ForceError> {
+    fn target(&self, place: &Place, grows: bool) -> Result<Target, ForceError> {
         let inward = if grows { -place.normal } else { place.normal };
         if self.by.0.dot(inward) >= 0.0 {
             let way = if grows { "out of" } else { "into" };
@@ -85,6 +88,7 @@ impl Drill {
         }
         Ok(Target {
             weight: place.weight,
+            begins: place.along,
             ends_early: true,
             ..Target::single(Path::through([place.at, place.at + self.by.0])?, grows)
         })

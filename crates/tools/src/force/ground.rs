@@ -5,7 +5,6 @@ use dynamics::springs::Weights;
 use glam::DVec3;
 
 use super::ForceError;
-use super::holding::Holding;
 use super::target::Target;
 use crate::paint::{self, Layers, Substance};
 
@@ -17,8 +16,6 @@ const SAMPLES_PER_CELL: f64 = 4.0 / 3.0;
 const ROOM: f64 = 4.0;
 /// Knot intervals that the rim takes from a region.
 const RIM: f64 = 0.58;
-/// Levels by which a region may be finer than its tool asks for, where limits leave little room.
-const FINER: usize = 2;
 /// Mass and damping over `K/(λr)²` and `K/(λr²)`.
 const MASS: f64 = 0.1;
 const DAMPING: f64 = 1.0;
@@ -29,8 +26,6 @@ pub struct Ground<'a, T> {
     pub field: &'a HierarchicalSpline<T>,
     /// What is painted on it.
     pub layers: &'a Layers,
-    /// What may not move.
-    pub holding: &'a Holding,
     pub radius: f64,
     /// Radii that a tool in a hand may go before the region is too small.
     pub roam: f64,
@@ -39,21 +34,13 @@ pub struct Ground<'a, T> {
 impl<T: Real> Ground<'_, T> {
     /// A region about paths, at rest, of matter that moves as wide as the tool is.
     pub fn cut(&self, targets: &[&Target]) -> Result<Region<T>, ForceError> {
-        let coarsest = level(self.field, self.radius)?;
-        let cut = |level: usize| -> Result<Region<T>, ForceError> {
-            let options = RegionOptions::of(self.field, level);
-            let matter = matter(self.field, self.radius);
-            let cells = self.cells(level, targets)?;
-            Ok(self.holding.cut(self.field, cells, matter, &options)?)
-        };
-        let mut region = cut(coarsest)?;
-        // Narrow places move by narrow functions alone.
-        for finer in 1..=FINER {
-            if self.holding.gives_way(self.field, &region, targets) {
-                break;
-            }
-            region = cut(coarsest + finer)?;
-        }
+        let level = level(self.field, self.radius)?;
+        let mut region = Region::new(
+            self.field,
+            self.cells(level, targets)?,
+            matter(self.field, self.radius),
+            &RegionOptions::of(self.field, level),
+        )?;
         self.paint(&mut region)?;
         Ok(region)
     }

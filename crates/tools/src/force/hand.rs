@@ -4,30 +4,24 @@
 //! was when the stroke began, so that nothing goes deeper by standing still. It works in the stages of a track: a tool that goes
 //! faster than clay follows leaves its way to be done. A tool that *drags* takes hold once; its paths end where the hand is.
 
-use bspline::{HierarchicalSpline, Real};
 use glam::DVec3;
 
+use super::ForceError;
 use super::path::Path;
-use super::step::ADVANCE;
-use super::stroke::{Extent, ForceStroke};
 use super::target::Target;
-use super::track::{self, DENSITY, MOST, OPEN, Place};
-use super::{ForceError, How, Solid};
+use super::track::Place;
 
-/// Radii of the shortest path that a hand drags: it keeps its direction where it comes back to its start.
-const LEAST: f64 = 1e-3;
-
-type Make = Box<dyn Fn(&Place) -> Result<Target, ForceError> + Send + Sync>;
+pub type Make = Box<dyn Fn(&Place) -> Result<Target, ForceError> + Send + Sync>;
 
 /// What leads a stroke.
-pub(super) struct Hand {
-    way: Way,
-    is_let_go: bool,
+pub struct Hand {
+    pub way: Way,
+    pub is_let_go: bool,
     /// Places that no path could be made for, and why at the first.
-    missed: Option<(usize, ForceError)>,
+    pub missed: Option<(usize, ForceError)>,
 }
 
-enum Way {
+pub enum Way {
     Walk {
         make: Make,
         /// Density of the surface that paths begin on.
@@ -51,7 +45,7 @@ enum Way {
 }
 
 impl Hand {
-    fn new(way: Way) -> Self {
+    pub fn new(way: Way) -> Self {
         Self {
             way,
             is_let_go: false,
@@ -74,252 +68,8 @@ impl Hand {
     }
 }
 
-impl<T: Real> ForceStroke<T> {
-    /// In the hand of a tool that walks over the surface `iso` from a place; its paths, which `make` gives, end where the
-    /// field is `goal`.
-    pub(super) fn walking(
-        field: &HierarchicalSpline<T>,
-        [iso, goal]: [f64; 2],
-        make: Make,
-        at: DVec3,
-        radius: f64,
-        how: &How,
-    ) -> Result<Self, ForceError> {
-        if how.solid() == Solid::Elastic {
-            return Err(ForceError::tool(
-                "an elastic solid keeps no track; write how = { solid = \"clay\" }, or the whole track in a stroke that is not by hand",
-            ));
-        }
-        let (start, normal) = track::grabbed(field, iso, at, radius)?;
-        let first = make(&Place {
-            at: start,
-            normal,
-            weight: 2.0 * OPEN * radius,
-            along: 0.0,
-        })?;
-        let mut stroke = Self::new(field, goal, vec![first], Extent::Track, radius, how)?;
-        stroke.hand = Some(Hand::new(Way::Walk {
-            make,
-            iso,
-            at,
-            since: 0.0,
-            along: 0.0,
-            is_open: false,
-        }));
-        Ok(stroke)
-    }
-
-    /// In a hand that has taken hold at places and will drag them all alike.
-    pub(super) fn dragging(
-        field: &HierarchicalSpline<T>,
-        iso: f64,
-        from: Vec<Place>,
-        extent: Extent,
-        radius: f64,
-        how: &How,
-    ) -> Result<Self, ForceError> {
-        let direction = from.first().map_or(DVec3::Z, |place| place.normal);
-        let targets = dragged(&from, LEAST * radius * direction)?;
-        let mut stroke = Self::new(field, iso, targets, extent, radius, how)?;
-        stroke.hand = Some(Hand::new(Way::Drag {
-            from,
-            to: DVec3::ZERO,
-            reached: DVec3::ZERO,
-            direction,
-        }));
-        Ok(stroke)
-    }
-
-    /// Tells where the hand is: the place of a tool that walks, the way from where a tool took hold that drags. Nothing
-    /// moves before the next [`step`](Self::step).
-    ///
-    /// Where there is no surface, and beyond the field, nothing is done ([`missed`](Self::missed)).
-    ///
-    /// # Errors
-    /// [`ForceError::Tool`] for a pose that is not finite, or so far away that it would take too many paths; all is as before.
-    pub fn pose(&mut self, pose: DVec3) -> Result<(), ForceError> {
-        // Its square as well, or the hand is nowhere to be reached.
-        if !pose.length_squared().is_finite() {
-            return Err(ForceError::tool(format!(
-                "the hand cannot be at {pose}; give coordinates that are finite, and within reason"
-            )));
-        }
-        match self.hand.as_mut().map(|hand| &mut hand.way) {
-            Some(Way::Drag { to, .. }) => *to = pose,
-            Some(Way::Walk { at, since, .. }) => {
-                let (from, gap) = (*at, self.radius / DENSITY);
-                let length = from.distance(pose);
-                let first = gap - *since;
-                let count = ((length - first) / gap).floor() + 1.0;
-                if count + self.targets.len() as f64 > MOST {
-                    return Err(ForceError::tool(format!(
-                        "the tool would have {count:.0} more paths on its way to {pose}; make its radius larger"
-                    )));
-                }
-                (*at, *since) = (pose, *since + length - count.max(0.0) * gap);
-                for n in 0..count.max(0.0) as usize {
-                    let s = first + n as f64 * gap;
-                    self.begin_path(from + s / length * (pose - from), gap);
-                }
-            }
-            None => {}
-        }
-        Ok(())
-    }
-
-    /// Refuses a way of a hand that drags, on which paths would end beside the field.
-    ///
-    /// # Errors
-    /// [`ForceError::Outside`].
-    pub(crate) fn check_way(&self, to: DVec3) -> Result<(), ForceError> {
-        match self.hand.as_ref().map(|hand| &hand.way) {
-            Some(Way::Drag { from, .. }) => from
-                .iter()
-                .try_for_each(|place| track::within(&self.origin, place.at + to)),
-            _ => Ok(()),
-        }
-    }
-
-    /// Lets the tool go: what it has still to do is done in the steps to come.
-    pub fn let_go(&mut self) {
-        if let Some(hand) = &self.hand
-            && let Way::Walk { at, since, .. } = hand.way
-            && since > 0.1 * self.radius / DENSITY
-        {
-            self.begin_path(at, since);
-        }
-        if let Some(hand) = &mut self.hand {
-            hand.is_let_go = true;
-        }
-    }
-
-    /// Places of the way on which there was nothing to work on, and why at the first of them.
-    pub fn missed(&self) -> Option<&(usize, ForceError)> {
-        self.hand.as_ref()?.missed.as_ref()
-    }
-
-    /// What the tool does to the solid: the sum of its forces, each along its path.
-    pub fn force(&self) -> DVec3 {
-        let each = self.acting.iter().map(|acting| {
-            let target = &self.targets[acting.index];
-            let push = if target.grows { acting.force } else { -acting.force };
-            push * target.path.direction(acting.crossing.unwrap_or(0.0))
-        });
-        each.sum()
-    }
-
-    /// The field as it is now.
-    ///
-    /// # Errors
-    /// [`ForceError::Region`].
-    pub fn field(&self) -> Result<HierarchicalSpline<T>, ForceError> {
-        Ok(self.region.bake(&self.field)?)
-    }
-
-    /// Begins a path at a place of the way, `gap` behind the last.
-    fn begin_path(&mut self, p: DVec3, gap: f64) {
-        let Some(Hand {
-            way:
-                Way::Walk {
-                    make,
-                    iso,
-                    along,
-                    is_open,
-                    ..
-                },
-            missed,
-            ..
-        }) = &mut self.hand
-        else {
-            return;
-        };
-        *along += gap;
-        let open = OPEN * self.radius;
-        let weight = if *is_open { 2.0 * open } else { 0.5 * gap + open };
-        let target = track::grabbed(&self.origin, *iso, p, self.radius).and_then(|(at, normal)| {
-            let target = make(&Place {
-                at,
-                normal,
-                weight,
-                along: *along,
-            })?;
-            track::within(&self.origin, target.path.at(target.path.length()))?;
-            Ok(target)
-        });
-        match target {
-            Ok(target) => {
-                if let Some(last) = self.targets.last_mut().filter(|_| !*is_open) {
-                    last.weight += 0.5 * gap - open;
-                }
-                *is_open = false;
-                self.targets.push(target);
-                self.report.paths += 1;
-            }
-            Err(why) => {
-                *is_open = true;
-                count_missed(missed, why);
-            }
-        }
-    }
-
-    /// Lets the paths of a hand that drags grow towards it, and the region follow them.
-    pub(super) fn chase(&mut self) -> Result<(), ForceError> {
-        let Some(Hand {
-            way:
-                Way::Drag {
-                    from,
-                    to,
-                    reached,
-                    direction,
-                },
-            missed,
-            ..
-        }) = &mut self.hand
-        else {
-            return Ok(());
-        };
-        if to == reached {
-            return Ok(());
-        }
-        let (left, advance) = (*to - *reached, ADVANCE * self.radius);
-        let next = match left.length() <= advance {
-            true => *to,
-            false => *reached + advance * left.normalize(),
-        };
-        let way = match next.length() > LEAST * self.radius {
-            true => next,
-            false => LEAST * self.radius * *direction,
-        };
-        let targets = dragged(from, way)?;
-        let outside = targets
-            .iter()
-            .find_map(|t| track::within(&self.origin, t.path.at(t.path.length())).err());
-        if let Some(why) = outside {
-            count_missed(missed, why);
-            *to = *reached;
-            return Ok(());
-        }
-        (*reached, *direction) = (next, way.normalize());
-        self.targets = targets;
-        self.settled = 0;
-        if !self.targets.iter().all(|target| self.is_in_reach(target)) {
-            let targets: Vec<&Target> = self.targets.iter().collect();
-            if self.region.patch().mask().is_some() && !self.is_elastic() {
-                // These do not follow: the shape so far becomes the one at rest.
-                self.field = self.region.release_clay(&self.field)?;
-                self.region = self.ground().cut(&targets)?;
-            } else {
-                (self.field, self.region) = self.ground().follow(&self.region, &targets)?;
-            }
-            self.hold()?;
-            self.count_cut();
-        }
-        Ok(())
-    }
-}
-
 /// The paths of a tool that drags all places by a vector.
-fn dragged(from: &[Place], way: DVec3) -> Result<Vec<Target>, ForceError> {
+pub fn dragged(from: &[Place], way: DVec3) -> Result<Vec<Target>, ForceError> {
     let target = |place: &Place| {
         Ok(Target {
             weight: place.weight,
@@ -330,11 +80,4 @@ fn dragged(from: &[Place], way: DVec3) -> Result<Vec<Target>, ForceError> {
         })
     };
     from.iter().map(target).collect()
-}
-
-fn count_missed(missed: &mut Option<(usize, ForceError)>, why: ForceError) {
-    match missed {
-        Some((count, _)) => *count += 1,
-        None => *missed = Some((1, why)),
-    }
 }

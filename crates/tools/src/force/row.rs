@@ -68,10 +68,10 @@ impl<'a, T: Real> Functions<'a, T> {
         }
     }
 
-    /// Sum of the weights at a place of those functions that count.
-    pub fn weight(&self, at: DVec3, counts: impl Fn(usize) -> bool) -> f64 {
+    /// Sum of the weights at a place.
+    pub fn weight(&self, at: DVec3) -> f64 {
         let mut sum = 0.0;
-        self.each(at, |i, w| sum += if counts(i) { w } else { 0.0 });
+        self.each(at, |_, w| sum += w);
         sum
     }
 

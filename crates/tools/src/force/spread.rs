@@ -1,5 +1,6 @@
 use bspline::Real;
 use dynamics::lattice::{OnBox, SampleBox};
+use dynamics::matter::Quantity;
 use dynamics::region::Region;
 use glam::DVec3;
 
@@ -13,11 +14,16 @@ const PIECE: [(f64, f64); 3] = [
     (0.887_298_334_620_741_7, 5.0 / 18.0),
 ];
 
+/// Places of a path, and of what is before and behind it, whose matter counts as its own.
+const LINE: usize = 9;
+
 /// How a path's force is shared out over the samples near it: shares that add up to 1.
 #[derive(Clone, Debug)]
 pub struct Spread {
     pub at: SampleBox,
     pub shares: Vec<f64>,
+    /// Stiffness of what it moves: the harmonic mean over the shares.
+    pub stiffness: f64,
 }
 
 /// A part of a path whose force is spread.
@@ -44,6 +50,15 @@ impl Part<'_> {
             })
         };
         (0..count as usize).flat_map(piece).collect()
+    }
+
+    /// Places from a radius behind it to a radius beyond.
+    fn line(&self, radius: f64) -> impl Iterator<Item = DVec3> {
+        let length = self.to - self.from + 2.0 * radius;
+        (0..LINE).map(move |i| {
+            let share = (i as f64 + 0.5) / LINE as f64;
+            self.path.at(self.from - radius + share * length)
+        })
     }
 }
 
@@ -101,15 +116,65 @@ impl Spread {
             }
         }
         let sum: f64 = shares.iter().sum();
-        if sum > 0.0 && sum.is_finite() {
-            shares.iter_mut().for_each(|s| *s /= sum);
-            return Ok(Self { at, shares });
+        if !(sum > 0.0 && sum.is_finite()) {
+            return Ok(Self {
+                at: SampleBox::default(),
+                shares: Vec::new(),
+                stiffness: 1.0,
+            });
         }
+        shares.iter_mut().for_each(|s| *s /= sum);
+        let stiffness = match &region.patch().matter().stiffness {
+            Quantity::Constant(all) => *all,
+            Quantity::PerSample(each) => {
+                let own = part.line(radius).map(|p| read(region, each, p));
+                let own = own.sum::<f64>() / LINE as f64;
+                let near: Vec<f64> = at.indices(lattice.sample_dims()).map(|i| each[i]).collect();
+                yielding(&mut shares, &near, own)
+            }
+        };
         Ok(Self {
-            at: SampleBox::default(),
-            shares: Vec::new(),
+            at,
+            shares,
+            stiffness,
         })
     }
+}
+
+/// Takes from the shares of what is softer than a path's own matter, in which it lies, and gives the stiffness of what is moved: what
+/// moves a stiff solid by a little would carry soft matter beside it far beyond, where it tears off.
+fn yielding(shares: &mut [f64], near: &[f64], own: f64) -> f64 {
+    let less = |k: f64| if k < own { k / own } else { 1.0 };
+    let sum: f64 = shares.iter().zip(near).map(|(s, k)| s * less(*k)).sum();
+    if sum <= 0.0 {
+        return 1.0;
+    }
+    let mut gives = 0.0;
+    for (share, k) in shares.iter_mut().zip(near) {
+        *share *= less(*k) / sum;
+        if *share > 0.0 {
+            gives += *share / k;
+        }
+    }
+    1.0 / gives
+}
+
+/// A quantity at a place, linear between the samples of a region.
+fn read<T: Real>(region: &Region<T>, each: &[f64], p: DVec3) -> f64 {
+    let lattice = region.patch().lattice();
+    let (dims, local) = (lattice.sample_dims(), region.local(p));
+    let at: [(usize, f64); 3] = std::array::from_fn(|a| {
+        let x = (local[a] / lattice.spacing()[a]).clamp(0.0, (dims[a] - 1) as f64);
+        let below = (x as usize).min(dims[a] - 2);
+        (below, x - below as f64)
+    });
+    let corner = |n: usize| {
+        let upper = std::array::from_fn::<_, 3, _>(|a| n >> a & 1);
+        let i = (0..3).fold(0, |i, a| i * dims[a] + at[a].0 + upper[a]);
+        let weight = |a: usize| if upper[a] == 1 { at[a].1 } else { 1.0 - at[a].1 };
+        each[i] * weight(0) * weight(1) * weight(2)
+    };
+    (0..8).map(corner).sum()
 }
 
 /// Unit vectors of the axes of a region's samples.

@@ -2,6 +2,7 @@
 
 use bspline::Real;
 use dynamics::integrators::Integrator;
+use dynamics::matter::Quantity;
 use dynamics::region::Region;
 use dynamics::response::{Against, Response};
 use glam::DVec3;
@@ -10,18 +11,20 @@ use super::quadrature::Tolerance;
 use super::report::{Arrival, Told};
 use super::row::{Functions, Row};
 use super::spread::{Load, Part, Spread};
-use super::stroke::{Acting, ForceStroke};
+use super::stroke::{ADVANCE, Acting, ForceStroke};
 use super::target::Span;
 use super::{ForceError, Rule, Solid, system};
 
-/// Radii that the goal of the longest path advances in a step.
-pub(super) const ADVANCE: f64 = 0.3;
 /// Share of what is missing by which rest lengths follow in a step of clay, as an exponent: `λΔt`.
 const FLOW: f64 = 0.1;
 /// Steps, in `1/λ`, of elastic solids.
 const LONG: f64 = 10.0;
-/// Softness of paths that have to arrive, over their own stiffness.
+/// Softness of paths that have to arrive, over their own stiffness: of clay, and of elastic or painted matter.
 const SOFT: [f64; 2] = [0.01, 0.003];
+/// Share of its length that a path of clay may be off its goal for the solve of a step.
+const CLOSE: f64 = 0.002;
+/// Factor by which the matter under a path may become other before its softness does.
+const OTHER: f64 = 1.5;
 /// Of the integrals: over the value, and of the mean over the fall of the density in a radius.
 const EXACT: Tolerance = Tolerance {
     relative: 1e-4,
@@ -62,7 +65,7 @@ impl<T: Real> ForceStroke<T> {
             };
         }
         let mut solves = 1;
-        if self.scales {
+        if self.scales || self.are_elsewhere(&bearings) {
             self.scale(&bearings, dt)?;
             solves += 1;
         }
@@ -92,11 +95,14 @@ impl<T: Real> ForceStroke<T> {
         let diagonal: Vec<f64> = live
             .iter()
             .zip(&soft)
-            .map(|(&i, soft)| self.acting[i].stiffness / self.targets[self.acting[i].index].weight + soft)
+            .map(|(&i, soft)| self.acting[i].stiffness / self.acting[i].worth + soft)
             .collect();
+        let enough: Vec<f64> = live.iter().map(|&i| self.enough(&self.acting[i])).collect();
+        self.memory
+            .turn_to(live.iter().map(|&i| self.acting[i].index).collect());
         let most = self.extent.solves();
         let (region, solid) = (&mut self.region, self.how.solid());
-        let solved = system::solve(&right, &soft, &diagonal, most, 1e-4, |z| {
+        let solved = system::solve(&right, &soft, &diagonal, most, &enough, &mut self.memory, |z| {
             let of = live.iter().zip(z).map(|(&i, z)| (&bearing(i).spread, *z));
             let load = Load::<T>::of(of);
             let found = answer(region, solid, dt, &load)?;
@@ -160,6 +166,7 @@ impl<T: Real> ForceStroke<T> {
             let target = &self.targets[acting.index];
             let Some(span) = acting
                 .crossing
+                .filter(|_| acting.is_free)
                 .and_then(|at| target.span(&value, self.iso, at, *goal, step))
             else {
                 return Ok(None);
@@ -191,11 +198,42 @@ impl<T: Real> ForceStroke<T> {
         self.acting.iter().zip(goals).map(one).collect()
     }
 
-    /// How far each path goes by a unit of force on all, by their weights.
+    /// Density that a path may be short of after the solve of a step.
+    fn enough(&self, acting: &Acting) -> f64 {
+        match self.how.solid() {
+            Solid::Clay => CLOSE * self.whole(&self.targets[acting.index]) * self.field.slope(),
+            // They come to rest in balance.
+            Solid::Elastic => 0.0,
+        }
+    }
+
+    /// Whether paths have come to other matter.
+    fn are_elsewhere(&self, bearings: &[Option<Bearing>]) -> bool {
+        let mut both = self.acting.iter().zip(bearings);
+        both.any(|(acting, bearing)| {
+            let now = bearing.as_ref().map_or(acting.worth, |b| self.worth(acting, b));
+            !(1.0 / OTHER..=OTHER).contains(&(now / acting.worth))
+        })
+    }
+
+    /// What a path stands for: its weight, and the stiffness of what it moves. Forces in proportion to that move all paths
+    /// about as far, on both sides of a border.
+    fn worth(&self, acting: &Acting, bearing: &Bearing) -> f64 {
+        self.targets[acting.index].weight * bearing.spread.stiffness
+    }
+
+    /// How far each path goes by a unit of force on all, by what they stand for.
     fn scale(&mut self, bearings: &[Option<Bearing>], dt: f64) -> Result<(), ForceError> {
-        let targets = &self.targets;
-        let weights = self.acting.iter().map(|a| targets[a.index].weight);
-        let load = Load::<T>::of(pairs(bearings, weights));
+        for i in 0..self.acting.len() {
+            if let Some(bearing) = &bearings[i] {
+                let worth = self.worth(&self.acting[i], bearing);
+                let acting = &mut self.acting[i];
+                // What has come to softer matter needs less.
+                acting.force *= if acting.age > 1 { worth / acting.worth } else { 1.0 };
+                acting.worth = worth;
+            }
+        }
+        let load = Load::<T>::of(pairs(bearings, self.acting.iter().map(|a| a.worth)));
         let found = self
             .region
             .respond_as_step(Integrator::Paper, dt, &load.on_box())?;
@@ -215,12 +253,9 @@ impl<T: Real> ForceStroke<T> {
         let weight = |a: &Acting| self.targets[a.index].weight;
         match self.how.rule {
             Rule::Arrive => {
-                let soft = SOFT[usize::from(self.how.solid() == Solid::Elastic)];
-                Ok(self
-                    .acting
-                    .iter()
-                    .map(|a| soft * a.stiffness / weight(a))
-                    .collect())
+                let is_even = matches!(self.region.patch().matter().stiffness, Quantity::Constant(_));
+                let soft = SOFT[usize::from(self.how.solid() == Solid::Elastic || !is_even)];
+                Ok(self.acting.iter().map(|a| soft * a.stiffness / a.worth).collect())
             }
             Rule::Raw(alpha) => {
                 let of = |b: &Option<Bearing>| b.as_ref().map_or(1.0, |b| b.span.to - b.span.from);

@@ -1,5 +1,3 @@
-use std::collections::BTreeSet;
-
 use bspline::{Field, HierarchicalSpline, Real};
 use dynamics::lattice::OnBox;
 use dynamics::region::Region;
@@ -12,26 +10,19 @@ use super::holding::{Drawn, Holding};
 use super::report::{Arrival, ForceReport};
 use super::row::Functions;
 use super::spread::Load;
+use super::system::Memory;
 use super::target::Target;
+use super::within::within;
 use super::{ForceError, How, Rule, Solid, track};
 use crate::paint::Layers;
 
-/// Radii about the paths of a stage in which those of earlier ones go on acting.
-const TRAIL: f64 = 5.0;
 /// Radii of track that a tool goes on at once. Each time the shape so far becomes the one at rest: what is left behind
 /// would else spring back by what its springs have not yet followed.
-const STAGE: f64 = 6.0;
+pub(super) const STAGE: f64 = 6.0;
+/// Radii that the goal of the longest path advances in a step.
+pub(super) const ADVANCE: f64 = 0.3;
 /// Radii that a region leaves a tool in a hand to go on.
 const ROAM: f64 = 3.0;
-/// Share of its length that a path that has arrived may be off; after some steps with goals that stand still more is
-/// allowed, between neighbours it may not become less.
-const ARRIVED: f64 = 0.002;
-const ARRIVED_LATE: f64 = 0.01;
-const LATE: usize = 8;
-/// Share that an elastic path at rest moves in a step.
-const AT_REST: f64 = 1e-5;
-/// Steps with goals that stand still after which the next stage begins in any case.
-const PATIENCE: usize = 60;
 
 /// What the paths of a tool are together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,11 +36,11 @@ pub enum Extent {
 }
 
 impl Extent {
-    /// Solves of a step beside the first.
+    /// Most solves of a step beside the first.
     pub(super) fn solves(self) -> usize {
         match self {
-            Self::Curve | Self::Track => 3,
-            Self::Area => 5,
+            Self::Curve | Self::Track => 8,
+            Self::Area => 12,
         }
     }
 }
@@ -65,22 +56,14 @@ pub(super) struct Acting {
     pub(super) before: Option<f64>,
     /// Steps that it has acted.
     pub(super) age: usize,
-    /// What moves it by itself, a unit of force on all paths by their weights.
+    /// How far it goes by a unit of force on all paths, by what they stand for.
     pub(super) stiffness: f64,
+    /// What it stands for.
+    pub(super) worth: f64,
+    /// Whether it begins where limits allow it to act.
+    pub(super) is_free: bool,
 }
 
-impl Acting {
-    fn new(index: usize, age: usize) -> Self {
-        Self {
-            index,
-            age,
-            force: 0.0,
-            crossing: None,
-            before: None,
-            stiffness: 0.0,
-        }
-    }
-}
 /// A force tool at work on a field.
 pub struct ForceStroke<T> {
     /// The field when the stroke began.
@@ -109,11 +92,13 @@ pub struct ForceStroke<T> {
     pub(super) settled: usize,
     pub(super) scales: bool,
     /// Whether the paths move other matter from now on.
-    is_repainted: bool,
+    pub(super) is_repainted: bool,
     /// What leads it, if its way is not known beforehand.
     pub(super) hand: Option<Hand>,
     /// Forces of the last step.
     pub(super) load: Load<T>,
+    /// What they moved.
+    pub(super) memory: Memory,
     pub(super) report: ForceReport,
 }
 
@@ -167,7 +152,6 @@ impl<T: Real> ForceStroke<T> {
         let ground = Ground {
             field,
             layers: &layers,
-            holding: &holding,
             radius,
             roam: 0.0,
         };
@@ -199,6 +183,7 @@ impl<T: Real> ForceStroke<T> {
             is_repainted: false,
             hand: None,
             load: Load::of(std::iter::empty()),
+            memory: Memory::default(),
             report: ForceReport {
                 paths: targets.len(),
                 steps: 0,
@@ -252,7 +237,6 @@ impl<T: Real> ForceStroke<T> {
         let ground = Ground {
             field: &self.field,
             layers: &self.layers,
-            holding: &self.holding,
             radius: self.radius,
             roam: ROAM,
         };
@@ -265,7 +249,6 @@ impl<T: Real> ForceStroke<T> {
         Ground {
             field: &self.field,
             layers: &self.layers,
-            holding: &self.holding,
             radius: self.radius,
             roam: if self.hand.is_some() { ROAM } else { 0.0 },
         }
@@ -287,7 +270,17 @@ impl<T: Real> ForceStroke<T> {
     /// # Errors
     /// [`ForceError::Region`].
     pub fn baked(&self) -> Result<HierarchicalSpline<T>, ForceError> {
-        Ok(self.region.bake(&self.field)?)
+        Ok(self.left(&self.region.bake(&self.field)?))
+    }
+
+    /// What limits leave of a field that the stroke has moved.
+    fn left(&self, moved: &HierarchicalSpline<T>) -> HierarchicalSpline<T> {
+        within(
+            &self.origin,
+            moved,
+            &self.holding.limits,
+            self.region.cells().level,
+        )
     }
 
     /// What it has done so far.
@@ -310,51 +303,19 @@ impl<T: Real> ForceStroke<T> {
         self.load.on_box()
     }
 
-    /// Share of the work that is done, about.
-    pub fn progress(&self) -> f64 {
-        let stage = (self.settled as f64 / LATE as f64).min(0.9);
-        (self.begun as f64 - (1.0 - stage) * self.acting.len() as f64).max(0.0) / self.targets.len() as f64
-    }
-
-    /// Whether all paths have arrived, or have had their time. A tool in a hand has to be let go before.
-    pub fn is_over(&self) -> bool {
-        let is_led = self.hand.as_ref().is_some_and(Hand::leads);
-        !is_led && self.begun == self.targets.len() && self.is_stage_over()
-    }
-
     /// How far the surface at an arc length is beyond the end of a path, as a share of what it has to go.
     pub(super) fn ahead(&self, target: &Target, crossing: f64) -> f64 {
+        (crossing - target.path.length()) / self.whole(target)
+    }
+
+    /// Length that errors on a path count by: a hand may end where it began.
+    pub(super) fn whole(&self, target: &Target) -> f64 {
         let length = target.path.length();
-        // A hand may end where it began.
-        let whole = if self.hand.is_some() {
+        if self.hand.is_some() {
             length.max(self.radius)
         } else {
             length
-        };
-        (crossing - length) / whole
-    }
-
-    fn is_stage_over(&self) -> bool {
-        if self.settled == 0 {
-            return self.acting.is_empty() && self.report.steps > 0;
         }
-        let is_late = self.settled >= LATE && self.acting.len() > 1;
-        let off = if is_late { ARRIVED_LATE } else { ARRIVED };
-        let is_there = |a: &Acting| {
-            let Some(crossing) = a.crossing else { return true };
-            let target = &self.targets[a.index];
-            let length = target.path.length();
-            let ahead = self.ahead(target, crossing);
-            if target.ends_early && ahead > 0.0 || a.stiffness == 0.0 {
-                return true;
-            }
-            match (self.how.solid(), a.before) {
-                (Solid::Clay, _) => ahead.abs() <= off,
-                (Solid::Elastic, Some(before)) => (crossing - before).abs() <= AT_REST * length,
-                (Solid::Elastic, None) => false,
-            }
-        };
-        self.settled >= PATIENCE || (self.settled > 1 && self.acting.iter().all(is_there))
     }
 
     /// Share of its path to which a surface is brought.
@@ -381,8 +342,8 @@ impl<T: Real> ForceStroke<T> {
     /// [`ForceError::Region`].
     pub fn release(mut self) -> Result<(HierarchicalSpline<T>, ForceReport), ForceError> {
         let field = match self.how.solid() {
-            Solid::Clay => self.region.release_clay(&self.field)?,
-            Solid::Elastic => self.field.clone(),
+            Solid::Clay => self.baked()?,
+            Solid::Elastic => self.origin.clone(),
         };
         self.report.arrival = self.arrival(|t| {
             let value = |p| match self.how.solid() {
@@ -391,10 +352,6 @@ impl<T: Real> ForceStroke<T> {
             };
             t.crossing(&value, self.iso, self.radius, self.look())
         });
-        let field = match self.how.solid() {
-            Solid::Clay => field,
-            Solid::Elastic => self.origin,
-        };
         Ok((field, self.report))
     }
 
@@ -409,92 +366,5 @@ impl<T: Real> ForceStroke<T> {
             least: all.least.min(s),
             most: all.most.max(s),
         })
-    }
-
-    /// Lets the tool go on along its track where it is done so far: its shape becomes the one at rest, the oldest paths end
-    /// and the next begin.
-    pub(super) fn advance(&mut self) -> Result<(), ForceError> {
-        if self.report.steps > 0 && self.begun < self.targets.len() && self.is_stage_over() {
-            self.field = self.region.release_clay(&self.field)?;
-            let from = match self.hand {
-                Some(_) => self.targets[self.begun].begins,
-                None => self.gone,
-            };
-            self.gone = from + STAGE * self.radius;
-            let targets = &self.targets;
-            let next = targets[self.begun..].partition_point(|t| t.begins <= self.gone);
-            let next = &targets[self.begun..][..next];
-            let far = (TRAIL * self.radius).powi(2);
-            let is_near = |t: &Target| {
-                next.iter()
-                    .any(|n| n.path.at(0.0).distance_squared(t.path.at(0.0)) <= far)
-            };
-            let kept = (0..self.begun).filter(|i| is_near(&targets[*i]));
-            // What they had to hold is at rest now.
-            self.acting = kept.map(|i| Acting::new(i, usize::MAX / 2)).collect();
-            let paths: Vec<&Target> = self
-                .acting
-                .iter()
-                .map(|a| &targets[a.index])
-                .chain(next)
-                .collect();
-            self.region = self.ground().cut(&paths)?;
-            self.hold()?;
-            self.count_cut();
-        }
-        self.report.steps += 1;
-        self.scales = std::mem::take(&mut self.is_repainted);
-        while self
-            .targets
-            .get(self.begun)
-            .is_some_and(|t| t.begins <= self.gone && self.is_in_reach(t))
-        {
-            self.acting.push(Acting::new(self.begun, 0));
-            self.begun += 1;
-            self.scales = true;
-        }
-        if self.scales && self.hand.is_some() {
-            self.settled = 0;
-            self.remember();
-        }
-        if self.scales {
-            self.look_up();
-        }
-        Ok(())
-    }
-
-    /// Begins to count the steps of a region anew.
-    pub(super) fn count_cut(&mut self) {
-        self.settled = 0;
-        self.report.cuts += 1;
-        let samples = self.region.patch().lattice().sample_count();
-        self.report.samples = self.report.samples.max(samples);
-    }
-
-    /// Whether the region at hand will do for a path.
-    pub(super) fn is_in_reach(&self, target: &Target) -> bool {
-        self.hand.is_none() || self.ground().has_room(&self.region, target)
-    }
-
-    /// Lets earlier paths act again that the region of a hand reaches. A hand that dawdles has time to lift what it let go
-    /// near by: 2.6 % of the depth, where paths ended five radii behind.
-    fn remember(&mut self) {
-        let acting: BTreeSet<usize> = self.acting.iter().map(|a| a.index).collect();
-        let back = (0..self.begun).filter(|i| !acting.contains(i) && self.is_in_reach(&self.targets[*i]));
-        let back: Vec<Acting> = back.map(|i| Acting::new(i, usize::MAX / 2)).collect();
-        self.acting.extend(back);
-    }
-
-    /// Looks where the surface is now.
-    pub(super) fn look_up(&mut self) {
-        let functions = Functions::of(&self.field, &self.region);
-        let p = &self.region.patch().state().p;
-        let value = |at: DVec3| functions.value(p, at);
-        let step = self.look();
-        for acting in &mut self.acting {
-            let target = &self.targets[acting.index];
-            acting.before = acting.crossing;
-            acting.crossing = target.crossing(&value, self.iso, self.radius, step);
-        }
     }
 }

@@ -11,8 +11,8 @@ use fitting::Control;
 use glam::DVec3;
 
 use super::path::{Path, first_crossing};
-use super::step::ADVANCE;
-use super::stroke::{Extent, ForceStroke};
+
+use super::stroke::{ADVANCE, Extent, ForceStroke};
 use super::target::Target;
 use super::track::{DENSITY, few};
 use super::{ForceError, Holding, How, Solid};

@@ -1,0 +1,79 @@
+//! Strokes that only part of space is open to.
+
+use super::*;
+use bspline::Aabb;
+use tools::force::Holding;
+use tools::limits::{Limits, Mask};
+
+/// A region finer than the tool costs 8 times as much, or 64.
+#[test]
+fn strokes_across_a_border_of_limits_cost_what_others_do() {
+    let field = block::<f32>(24);
+    let whole = field.lattice().world_box();
+    for mask in [
+        "boxes = [{ min = [1, 1, 1], max = [12.6, 23, 23] }]",
+        "formula = '20.3 - x - 0.6*y'",
+        "formula = '(x - 12)^2 + (y - 9)^2 - 6'",
+    ] {
+        let mask: Mask = toml::from_str(mask).unwrap();
+        let limits = Limits::new(None, Some(&mask), &Default::default(), &whole).unwrap();
+        let is_free = |p: DVec3, room: f64| limits.is_free(&Aabb::new(p - room, p + room));
+        let holding = Holding {
+            iso: ISO,
+            holds: Vec::new(),
+            limits: limits.clone(),
+        };
+        for by_hand in [false, true] {
+            let d = 1.2;
+            let done = |held: Option<&Holding>| {
+                let tool = pull(&format!(
+                    "along = [[12, 12, 12]]\ndisc = 1.8\n{}radius = {R}",
+                    if by_hand { "" } else { "lift = 1.2\n" }
+                ));
+                let stroke = match by_hand {
+                    true => tool.hold(&field, ISO),
+                    false => tool.begin(&field, ISO),
+                };
+                let mut stroke = stroke.unwrap();
+                if let Some(held) = held {
+                    stroke = stroke.held(held).unwrap();
+                }
+                if by_hand {
+                    for i in 1..=6 {
+                        stroke.pose(d * f64::from(i) / 6.0 * DVec3::Z).unwrap();
+                        stroke.step().unwrap();
+                    }
+                    stroke.let_go();
+                }
+                finished(stroke)
+            };
+            let (_, free) = done(None);
+            let (after, held) = done(Some(&holding));
+            let what = format!("{mask:?} {by_hand}: {held:?} {free:?}");
+            assert!(held.samples <= free.samples, "{what}");
+            assert!(held.solves <= 3 * free.solves, "{what}");
+            let (mut inside, mut border) = (0, 0);
+            for i in 0..40 {
+                for j in 0..40 {
+                    let [x, y] = [i, j].map(|n| 6.05 + 0.3 * f64::from(n));
+                    for z in [10.7, 12.0, 13.1] {
+                        let p = DVec3::new(x, y, z);
+                        if !is_free(p, 0.0) {
+                            border += 1;
+                            assert_eq!(after.value(p), field.value(p), "{what} {p}");
+                        }
+                    }
+                    // Nothing swells at the border; what lies in the disc, away from it, arrives.
+                    let p = DVec3::new(x, y, 12.0);
+                    let share = height(&after, x, y) / d;
+                    assert!((-0.05..1.05).contains(&share), "{what} {p}: {share}");
+                    if is_free(p, 1.5) && (p - 12.0).length() < 1.7 {
+                        inside += 1;
+                        assert!((share - 1.0).abs() < 0.025, "{what} {p}: {share}");
+                    }
+                }
+            }
+            assert!(inside > 2 && border > 200, "{inside} {border}");
+        }
+    }
+}
