@@ -71,7 +71,7 @@ pub(crate) fn largest_frequency<T: Real>(
         samples: [vec![T::zero(); samples], vec![T::zero(); samples]],
         workspace: TensorWorkspace::new(),
     };
-    lanczos.largest(&mut system, LANCZOS_STEPS).sqrt()
+    lanczos.ends(&mut system, LANCZOS_STEPS)[1].sqrt()
 }
 
 impl<T: Real> Patch<T> {

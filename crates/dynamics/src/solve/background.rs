@@ -95,8 +95,7 @@ impl<T: Real> Background<T> {
             self.cycle.prepare(matrix)?;
             self.stale = false;
         }
-        self.cycle.refresh(matrix);
-        Ok(())
+        self.cycle.refresh(matrix)
     }
 
     /// The cycle, while it solves.
@@ -134,9 +133,17 @@ impl<T: Real> Background<T> {
         self.cycle.estimates()
     }
 
-    /// After a solve: the next part of the work on the factor of `matrix`, which it was prepared for.
+    /// Whether the smoother of the cycle solves, alone.
+    pub fn is_smoothed(&self) -> bool {
+        !self.is_done() && self.cycle.is_alone()
+    }
+
+    /// After a solve: the next part of the work on the factor of `matrix`, which it was prepared for. There is none where the
+    /// smoother solves alone, which takes less time than to read a factor.
     pub fn advance(&mut self, matrix: &StepMatrix<T>) {
-        self.work = self.next(matrix);
+        if !self.cycle.is_alone() {
+            self.work = self.next(matrix);
+        }
     }
 
     /// What follows on the work that is next now, which is done where it is not yet.
@@ -174,14 +181,23 @@ impl<T: Real> Background<T> {
     }
 
     /// Goes to where another one was.
-    pub fn resume(&mut self, matrix: &StepMatrix<T>, work: Work, estimates: &Estimates) {
-        self.cycle.resume(estimates);
+    ///
+    /// # Errors
+    /// [`NotPositive`] if the V-cycle cannot be prepared.
+    pub fn resume(
+        &mut self,
+        matrix: &StepMatrix<T>,
+        work: Work,
+        estimates: &Estimates,
+    ) -> Result<(), NotPositive> {
+        self.cycle.resume(matrix, estimates)?;
         if let Work::Wait(_) = work {
             self.work = work;
         }
         while self.work < work && !matches!(self.work, Work::Done | Work::Impossible) {
             self.work = self.next(matrix);
         }
+        Ok(())
     }
 }
 

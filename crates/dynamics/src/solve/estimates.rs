@@ -1,4 +1,4 @@
-//! When the largest eigenvalues of a smoother under the brush are estimated, and what is known of them.
+//! When the extreme eigenvalues of a smoother under the brush are estimated, and what is known of them.
 //!
 //! A dab changes them little after the first, an estimate has a tenth to spare, and costs more than a solve. One that has become
 //! too low makes the cycle a bad preconditioner, or none: then a solve fails, and begins again with a new estimate.
@@ -17,15 +17,15 @@ pub(super) fn after(dabs: usize) -> usize {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Estimates {
     dabs: usize,
-    /// Of the smoother and of the blocks on each level, as bits: some formats round.
-    levels: Vec<[u64; 2]>,
+    /// Largest of the smoother and of the blocks on each level, and the least of the smoother, as bits: some formats round.
+    levels: Vec<[u64; 3]>,
 }
 
 impl Estimates {
-    pub fn new(dabs: usize, levels: impl Iterator<Item = [f64; 2]>) -> Self {
+    pub fn new(dabs: usize, levels: impl Iterator<Item = [f64; 3]>) -> Self {
         Self {
             dabs,
-            levels: levels.map(|pair| pair.map(f64::to_bits)).collect(),
+            levels: levels.map(|all| all.map(f64::to_bits)).collect(),
         }
     }
 
@@ -34,8 +34,8 @@ impl Estimates {
         self.dabs
     }
 
-    /// Of the smoother and of the blocks on each level.
-    pub fn levels(&self) -> impl Iterator<Item = [f64; 2]> + '_ {
-        self.levels.iter().map(|pair| pair.map(f64::from_bits))
+    /// Largest of the smoother and of the blocks on each level, and the least of the smoother.
+    pub fn levels(&self) -> impl Iterator<Item = [f64; 3]> + '_ {
+        self.levels.iter().map(|all| all.map(f64::from_bits))
     }
 }

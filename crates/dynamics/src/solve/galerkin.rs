@@ -396,6 +396,7 @@ impl Galerkin {
     }
 
     /// The diagonal of `AᵀSA`, of a plan for the diagonal.
+    #[cfg(feature = "study")]
     pub fn diagonal_of<T: Real>(&mut self, s: &StepMatrix<T>) -> &[f64] {
         self.accumulate(s);
         &self.sums

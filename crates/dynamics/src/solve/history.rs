@@ -101,9 +101,9 @@ impl<T: Real> StepSolver<T> {
         self.prepare(&s)?;
         match (&mut self.painted, &history.progress, &history.estimates) {
             (Painted::Background(background), Some((work, estimates)), _) => {
-                background.resume(&s, *work, estimates);
+                background.resume(&s, *work, estimates)?;
             }
-            (Painted::VCycle(cycle), _, Some(estimates)) => cycle.resume(estimates),
+            (Painted::VCycle(cycle), _, Some(estimates)) => cycle.resume(&s, estimates)?,
             _ => (),
         }
         self.slow = history.slow;

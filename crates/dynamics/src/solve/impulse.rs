@@ -149,6 +149,8 @@ impl<T: Real> StepSolver<T> {
     /// Residual at which steps stop.
     pub(crate) fn tolerance(&self) -> f64 {
         self.options.tolerance.unwrap_or(match self.method {
+            // A cycle more leaves a twentieth, so that what cycles leave is mostly far less than they may.
+            Method::VCycle if self.painted.is_smoothed() => 0.25 * ITERATED,
             Method::VCycle | Method::SampleMultigrid => ITERATED,
             Method::Direct if matches!(self.painted, Painted::Background(_)) => ITERATED,
             // Double precision is for references: there coefficients that hardly move a sample count too.

@@ -1,4 +1,4 @@
-//! Largest eigenvalue of a preconditioned operator, from the coefficients of conjugate gradients.
+//! Extreme eigenvalues of a preconditioned operator, from the coefficients of conjugate gradients.
 
 use bspline::Real;
 
@@ -25,9 +25,9 @@ impl<T: Real> Lanczos<T> {
         }
     }
 
-    /// An estimate, from below, of the largest eigenvalue of `B H`, where `precondition` applies `B`. The start is
-    /// rough and always the same: a smooth one would hide the largest eigenvalues.
-    pub fn largest(&mut self, system: &mut impl System<T>, steps: usize) -> f64 {
+    /// Estimates of the least and the largest eigenvalue of `B H`, where `precondition` applies `B`, from within. The start
+    /// is rough and always the same: a smooth one would hide the largest eigenvalues.
+    pub fn ends(&mut self, system: &mut impl System<T>, steps: usize) -> [f64; 2] {
         let Self { r, z, p, q } = self;
         let mut seed = 0x9E37_79B9_7F4A_7C15_u64;
         for v in r.iter_mut() {
@@ -60,7 +60,9 @@ impl<T: Real> Lanczos<T> {
             add_scaled(r, T::from_f64(-alpha), q);
             (before, last_alpha) = (rz, alpha);
         }
-        largest_of_tridiagonal(&diagonal, &off)
+        let negated: Vec<f64> = diagonal.iter().map(|d| -d).collect();
+        let least = -largest_of_tridiagonal(&negated, &off);
+        [least, largest_of_tridiagonal(&diagonal, &off)]
     }
 }
 

@@ -74,6 +74,15 @@ impl<T: Real> Painted<T> {
         }
     }
 
+    /// Whether the smoother of a cycle solves, alone.
+    pub fn is_smoothed(&self) -> bool {
+        match self {
+            Self::Background(background) => background.is_smoothed(),
+            Self::VCycle(cycle) => cycle.is_alone(),
+            _ => false,
+        }
+    }
+
     /// The factor on the coefficients, if there is one, and what assembles it.
     pub fn factor(&mut self) -> Option<(&mut Galerkin, &mut BandCholesky<T>)> {
         match self {

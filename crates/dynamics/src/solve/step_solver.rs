@@ -131,7 +131,7 @@ impl<T: Real> StepSolver<T> {
         } else if let (Painted::Background(background), false) = (&mut self.painted, self.begun) {
             background.begin_again(s)?;
         } else if let Some(cycle) = self.painted.cycle() {
-            cycle.refresh(s);
+            cycle.refresh(s)?;
         }
         self.begun = true;
         self.settle_method();

@@ -1,4 +1,7 @@
 //! The V-cycle for painted material: scaled fast diagonalization as smoother, every other knot as coarse space.
+//!
+//! Where mass and damping of a short step, or a low contrast, leave the smoother well conditioned, it solves without the rest:
+//! coarse levels would cost more than they save, and are not even made.
 
 use bspline::Real;
 use serde::{Deserialize, Serialize};
@@ -12,11 +15,15 @@ use super::lanczos::Lanczos;
 use super::mean::GeometricMean;
 use super::pcg::{CoefficientSystem, Preconditioner, add_scaled};
 use super::schwarz::Schwarz;
-use crate::lattice::{Lattice, SampleBox, TensorProduct, TensorWorkspace};
-use crate::springs::{StepMatrix, Weights};
+use crate::lattice::{Banded, Lattice, SampleBox, TensorProduct, TensorWorkspace};
+use crate::springs::StepMatrix;
 
 /// Where the Chebyshev polynomials begin, relative to the largest eigenvalue.
 const LOWER: f64 = 1.0 / 12.0;
+
+/// Ratios of the extreme eigenvalues of a smoother that solves alone up to which one and two steps of its polynomial do, for
+/// some six iterations.
+const STEPS: [f64; 2] = [2.5, 6.0];
 
 /// How a [`VCycle`] is made.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -40,6 +47,9 @@ pub struct VCycleOptions {
     pub block_onset: f64,
     /// Coefficients of the finest level up to which it has blocks: their matrix takes 3 kB a coefficient.
     pub block_limit: usize,
+    /// Ratio of the extreme eigenvalues of the smoother, to spare included, up to which it solves alone, 0 for never: with three
+    /// steps of its polynomial it then takes as many products as cycles do, and below ever fewer.
+    pub alone: f64,
 }
 
 impl Default for VCycleOptions {
@@ -54,6 +64,7 @@ impl Default for VCycleOptions {
             block_contrast: 3.0,
             block_onset: 200.0,
             block_limit: 20_000,
+            alone: 12.0,
         }
     }
 }
@@ -67,6 +78,8 @@ struct Level<T> {
     /// Diagonal of `H` for unit mass, and for unit springs along each axis.
     unit_diagonals: [Vec<f64>; 4],
     largest_eigenvalue: f64,
+    /// Of the finest level; 0 where it is not known.
+    least_eigenvalue: f64,
     /// Actual diagonal over that of constant material.
     variation: Vec<f64>,
     all: Option<Galerkin>,
@@ -90,6 +103,8 @@ pub struct VCycle<T> {
     factor: BandCholesky<T>,
     /// By which share the diagonal of the factor was raised.
     raised: f64,
+    /// Whether coarse levels and blocks are of the matrix at hand.
+    is_whole: bool,
     /// Of the mass, and of the springs of each direction.
     means: Vec<GeometricMean>,
     right: Vec<Vec<T>>,
@@ -110,27 +125,12 @@ impl<T: Real> VCycle<T> {
             let Some(half) = here.half() else { break };
             let [prolong, restrict] = here.prolongation(&half);
             let n = here.coefficient_count();
-            let mut diagonal = Galerkin::diagonal(&here, &steps[..3]);
-            let unit = |which: usize, diagonal: &mut Galerkin| {
-                let weight = |k: usize| Weights::Constant(if k == which { T::one() } else { T::zero() });
-                let springs = crate::springs::Neighbours::Six.directions();
-                let springs =
-                    springs
-                        .iter()
-                        .enumerate()
-                        .map(|(k, &direction)| crate::springs::SpringWeights {
-                            direction,
-                            weights: weight(k + 1),
-                        });
-                let s = StepMatrix::new(here.sample_dims(), weight(0), springs.collect());
-                diagonal.diagonal_of(&s).to_vec()
-            };
-            let unit_diagonals = std::array::from_fn(|which| unit(which, &mut diagonal));
             levels.push(Level {
                 smoother: FastDiagonalization::new(&here),
                 diagonal: Galerkin::diagonal(&here, steps),
-                unit_diagonals,
+                unit_diagonals: unit_diagonals(&here),
                 largest_eigenvalue: 1.0,
+                least_eigenvalue: 0.0,
                 variation: vec![1.0; n],
                 // What blocks are for, material that changes within a few splines, coarse levels do not see.
                 all: (levels.is_empty() && options.blocks > 0 && n <= options.block_limit)
@@ -165,6 +165,7 @@ impl<T: Real> VCycle<T> {
             assembly,
             factor,
             raised: 0.0,
+            is_whole: false,
             dabs: 0,
             means: vec![GeometricMean::default(); steps.len() + 1],
         }
@@ -205,16 +206,24 @@ impl<T: Real> VCycle<T> {
     }
 
     /// Estimates eigenvalues that are those of a matrix before; all is then as after [`prepare`](Self::prepare).
-    pub(super) fn refresh(&mut self, s: &StepMatrix<T>) {
+    ///
+    /// # Errors
+    /// [`NotPositive`] as there.
+    pub(super) fn refresh(&mut self, s: &StepMatrix<T>) -> Result<(), NotPositive> {
         if self.is_rough() {
-            for l in 0..self.levels.len() {
-                self.levels[l].largest_eigenvalue = self.largest_eigenvalue(s, l, false);
-                if self.levels[l].schwarz.is_some() {
-                    self.levels[l].schwarz_eigenvalue = self.largest_eigenvalue(s, l, true);
+            self.estimate(s);
+            if self.is_whole {
+                for l in 1..self.levels.len() {
+                    self.levels[l].largest_eigenvalue = self.ends(s, l, false)[1];
+                }
+                if self.levels.first().is_some_and(|l| l.schwarz.is_some()) {
+                    self.levels[0].schwarz_eigenvalue = self.ends(s, 0, true)[1];
                 }
             }
+            self.complete(s)?;
         }
         self.dabs = 0;
+        Ok(())
     }
 
     /// The eigenvalues in use.
@@ -222,49 +231,117 @@ impl<T: Real> VCycle<T> {
         let levels = self.levels.iter();
         Estimates::new(
             self.dabs,
-            levels.map(|l| [l.largest_eigenvalue, l.schwarz_eigenvalue]),
+            levels.map(|l| [l.largest_eigenvalue, l.schwarz_eigenvalue, l.least_eigenvalue]),
         )
     }
 
-    /// Takes the eigenvalues of another cycle of this kind.
-    pub(super) fn resume(&mut self, estimates: &Estimates) {
+    /// Takes the eigenvalues of another cycle of this kind, which was of the matrix at hand too.
+    ///
+    /// # Errors
+    /// [`NotPositive`] as [`prepare`](Self::prepare).
+    pub(super) fn resume(&mut self, s: &StepMatrix<T>, estimates: &Estimates) -> Result<(), NotPositive> {
+        let take = |levels: &mut [Level<T>]| {
+            for (level, [all, blocks, least]) in levels.iter_mut().zip(estimates.levels()) {
+                (level.largest_eigenvalue, level.schwarz_eigenvalue) = (all, blocks);
+                level.least_eigenvalue = least;
+            }
+        };
         self.dabs = estimates.dabs();
-        for (level, [all, blocks]) in self.levels.iter_mut().zip(estimates.levels()) {
-            (level.largest_eigenvalue, level.schwarz_eigenvalue) = (all, blocks);
-        }
+        take(&mut self.levels);
+        self.complete(s)?;
+        take(&mut self.levels);
+        Ok(())
+    }
+
+    /// Whether the smoother of the finest level solves alone.
+    pub(super) fn is_alone(&self) -> bool {
+        let few = |l: &Level<T>| l.largest_eigenvalue <= self.options.alone * l.least_eigenvalue;
+        self.levels.first().is_some_and(few)
     }
 
     fn fit(&mut self, s: &StepMatrix<T>, at: SampleBox, estimate: bool) -> Result<(), NotPositive> {
+        let material = self.material(s, at);
+        if !self.levels.is_empty() {
+            self.fit_smoother(s, 0, &material, at);
+            if estimate {
+                self.estimate(s);
+            }
+        }
+        if self.is_alone() {
+            self.is_whole = false;
+            self.levels[0].schwarz = None;
+            return Ok(());
+        }
+        self.fit_rest(s, &material, at, estimate)
+    }
+
+    /// Makes what the smoother needs beside itself, if it is not there.
+    fn complete(&mut self, s: &StepMatrix<T>) -> Result<(), NotPositive> {
+        if self.is_alone() || self.is_whole {
+            return Ok(());
+        }
+        let all = SampleBox::all(s.dims());
+        let material = self.material(s, all);
+        self.fit_rest(s, &material, all, true)
+    }
+
+    /// Means of the mass, and of the springs along each axis.
+    fn material(&mut self, s: &StepMatrix<T>, at: SampleBox) -> [f64; 4] {
+        let dims = s.dims();
+        let mut all = [self.means[0].of(&s.mass, dims, at), 0.0, 0.0, 0.0];
+        for (spring, mean) in s.springs.iter().zip(&mut self.means[1..]) {
+            let b = mean.of(&spring.weights, dims, at);
+            for (a, step) in all[1..].iter_mut().zip(spring.direction.step) {
+                *a += b * (step * step) as f64;
+            }
+        }
+        all
+    }
+
+    fn fit_smoother(&mut self, s: &StepMatrix<T>, l: usize, material: &[f64; 4], at: SampleBox) {
+        let level = &mut self.levels[l];
+        let [mass, along @ ..] = *material;
+        level.smoother.set(mass, along);
+        level.diagonal.accumulate_on(s, at);
+        let actual = level.diagonal.sums();
+        for (i, scale) in level.smoother.scale_mut().iter_mut().enumerate() {
+            let unit = &level.unit_diagonals;
+            let constant =
+                mass * unit[0][i] + along[0] * unit[1][i] + along[1] * unit[2][i] + along[2] * unit[3][i];
+            level.variation[i] = actual[i] / constant;
+            *scale = T::from_f64((constant / actual[i]).sqrt());
+        }
+    }
+
+    /// The coarse levels, their factor and the blocks.
+    fn fit_rest(
+        &mut self,
+        s: &StepMatrix<T>,
+        material: &[f64; 4],
+        at: SampleBox,
+        estimate: bool,
+    ) -> Result<(), NotPositive> {
+        // Sums that were not kept up are of a matrix before.
+        let at = if self.is_whole {
+            at
+        } else {
+            SampleBox::all(s.dims())
+        };
+        self.is_whole = false;
         let first = self.assembly.accumulate_on(s, at);
         let first = if self.raised == 0.0 { first } else { 0 };
         self.raised = f64::INFINITY;
         self.raised = self.assembly.factorize_sums(&mut self.factor, first)?;
-        let dims = s.dims();
-        let mass = self.means[0].of(&s.mass, dims, at);
-        let mut along = [0.0; 3];
-        for (spring, mean) in s.springs.iter().zip(&mut self.means[1..]) {
-            let b = mean.of(&spring.weights, dims, at);
-            for (a, step) in along.iter_mut().zip(spring.direction.step) {
-                *a += b * (step * step) as f64;
-            }
-        }
         for l in 0..self.levels.len() {
-            let level = &mut self.levels[l];
-            level.smoother.set(mass, along);
-            level.diagonal.accumulate_on(s, at);
-            let actual = level.diagonal.sums();
-            for (i, scale) in level.smoother.scale_mut().iter_mut().enumerate() {
-                let unit = &level.unit_diagonals;
-                let constant =
-                    mass * unit[0][i] + along[0] * unit[1][i] + along[1] * unit[2][i] + along[2] * unit[3][i];
-                level.variation[i] = actual[i] / constant;
-                *scale = T::from_f64((constant / actual[i]).sqrt());
-            }
-            if estimate {
-                self.levels[l].largest_eigenvalue = self.largest_eigenvalue(s, l, false);
+            if l > 0 {
+                self.fit_smoother(s, l, material, at);
+                if estimate {
+                    self.levels[l].largest_eigenvalue = self.ends(s, l, false)[1];
+                }
             }
             self.fit_blocks(s, l, at, estimate);
         }
+        self.is_whole = true;
         Ok(())
     }
 
@@ -291,12 +368,19 @@ impl<T: Real> VCycle<T> {
         let blocks = Schwarz::new(all, size, stride, &level.variation, options.block_contrast, kept);
         level.schwarz = (blocks.block_count() > 0).then_some(blocks);
         if level.schwarz.is_some() && (estimate || before.is_none()) {
-            self.levels[l].schwarz_eigenvalue = self.largest_eigenvalue(s, l, true);
+            self.levels[l].schwarz_eigenvalue = self.ends(s, l, true)[1];
         }
     }
 
-    /// Of the smoother, or of the blocks, times `H`; 10 % above the estimate.
-    fn largest_eigenvalue(&mut self, s: &StepMatrix<T>, l: usize, blocks: bool) -> f64 {
+    /// Estimates the eigenvalues of the smoother of the finest level.
+    fn estimate(&mut self, s: &StepMatrix<T>) {
+        let [least, largest] = self.ends(s, 0, false);
+        let level = &mut self.levels[0];
+        (level.least_eigenvalue, level.largest_eigenvalue) = (least, largest);
+    }
+
+    /// The extreme eigenvalues of the smoother, or of the blocks, times `H`; 10 % beyond the estimates.
+    fn ends(&mut self, s: &StepMatrix<T>, l: usize, blocks: bool) -> [f64; 2] {
         let level = &mut self.levels[l];
         let mut system = CoefficientSystem {
             lattice: &level.lattice,
@@ -308,7 +392,8 @@ impl<T: Real> VCycle<T> {
             samples: &mut self.samples,
             workspace: &mut self.workspace,
         };
-        1.1 * level.lanczos.largest(&mut system, self.options.eigenvalue_steps)
+        let [least, largest] = level.lanczos.ends(&mut system, self.options.eigenvalue_steps);
+        [0.9 * least, 1.1 * largest]
     }
 
     /// Solves level `l` for its right-hand side by one cycle.
@@ -374,12 +459,14 @@ impl<T: Real> VCycle<T> {
         } else {
             self.residual(s, l);
         }
+        let is_alone = self.is_alone();
         let degree = self.options.degree + usize::from(self.levels[0].schwarz.is_none());
         let Level {
             lattice,
             smoother,
             schwarz,
             largest_eigenvalue,
+            least_eigenvalue,
             schwarz_eigenvalue,
             r,
             d,
@@ -388,16 +475,21 @@ impl<T: Real> VCycle<T> {
             ..
         } = &mut self.levels[l];
         let x = &mut self.solution[l];
-        let (degree, largest) = if blocks {
-            (self.options.block_degree, *schwarz_eigenvalue)
+        let (degree, largest, least) = if blocks {
+            let largest = *schwarz_eigenvalue;
+            (self.options.block_degree, largest, LOWER * largest)
+        } else if is_alone {
+            let ratio = *largest_eigenvalue / *least_eigenvalue;
+            let degree = 1 + STEPS.iter().filter(|most| ratio > **most).count();
+            (degree, *largest_eigenvalue, *least_eigenvalue)
         } else {
-            (degree, *largest_eigenvalue)
+            (degree, *largest_eigenvalue, LOWER * *largest_eigenvalue)
         };
         let mut smoother = Smoothing {
             diagonalization: smoother,
             blocks: schwarz.as_mut().filter(|_| blocks),
         };
-        let (theta, delta) = (largest * (1.0 + LOWER) / 2.0, largest * (1.0 - LOWER) / 2.0);
+        let (theta, delta) = ((largest + least) / 2.0, (largest - least) / 2.0);
         for (step, (keep, take)) in Chebyshev::new(theta, delta).take(degree).enumerate() {
             smoother.apply(s, r, z);
             let (keep, take) = (T::from_f64(keep), T::from_f64(take));
@@ -417,6 +509,27 @@ impl<T: Real> VCycle<T> {
             }
         }
     }
+}
+
+/// The diagonals of `H` for unit mass, and for unit springs along each axis, which are products of those of the axes.
+fn unit_diagonals<T: Real>(lattice: &Lattice<T>) -> [Vec<f64>; 4] {
+    let squares = |a: &Banded<f64>| -> Vec<f64> {
+        let a = a.transposed();
+        let row = |i: usize| a.row(i).1.iter().map(|w| w * w).sum();
+        (0..a.rows()).map(row).collect()
+    };
+    let axes = lattice.axes().each_ref().map(|axis| axis.collocation());
+    let (masses, springs) = (
+        axes.each_ref().map(squares),
+        axes.each_ref().map(|a| squares(&a.differences())),
+    );
+    let [nx, ny, nz] = lattice.coefficient_dims();
+    std::array::from_fn(|which| {
+        let along = |a: usize| if which == a + 1 { &springs[a] } else { &masses[a] };
+        let (x, y, z) = (along(0), along(1), along(2));
+        let at = |i: usize| x[i / nz / ny] * y[i / nz % ny] * z[i % nz];
+        (0..nx * ny * nz).map(at).collect()
+    })
 }
 
 /// One of the two smoothers.
@@ -452,7 +565,11 @@ fn operator<T: Real>(
 impl<T: Real> Preconditioner<T> for VCycle<T> {
     fn apply(&mut self, s: &StepMatrix<T>, r: &[T], z: &mut [T]) {
         self.right[0].copy_from_slice(r);
-        self.cycle(s, 0);
+        if self.is_alone() {
+            self.smooth(s, 0, true);
+        } else {
+            self.cycle(s, 0);
+        }
         z.copy_from_slice(&self.solution[0]);
     }
 }

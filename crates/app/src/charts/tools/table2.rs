@@ -1,12 +1,12 @@
 //! The rows of \[Hua04 table 2\]: a point tool on a tensor-product patch with free ends, half full, on clamped knots.
 
-use ::tools::force::quadrature::Tolerance;
+use ::tools::force::quadrature::{Node, Tolerance};
 use ::tools::force::{Path, Target};
 use bspline::polygonize::{BlockMesh, PolygonizeOptions};
 use bspline::tensor::TensorSpline;
-use bspline::{Aabb, Field, Frame, KnotVector};
+use bspline::{Aabb, Basis, Field, Frame, KnotVector};
 use dynamics::integrators::Integrator;
-use dynamics::lattice::{Lattice, OnBox, Rim};
+use dynamics::lattice::{Lattice, OnBox, Rim, SampleBox};
 use dynamics::matter::{Matter, Quantity};
 use dynamics::region::{TensorOptions, TensorRegion};
 use dynamics::solve::SolverOptions;
@@ -168,15 +168,7 @@ impl Pull {
         let short = integral.value / (to - from);
         let (at, kernel) = self.kernel(from, to);
         let load = |force: f64| kernel.iter().map(|j| (force * j) as f32).collect::<Vec<f32>>();
-        // What a change of the coefficients is worth to the mean over the path.
-        let mean = |field: &TensorSpline<f32>, change: &[f32]| {
-            let change = field.with_coefficients(change.to_vec()).expect("finite changes");
-            let nodes = integral.nodes.iter();
-            nodes
-                .map(|n| n.weight * change.value(self.target.path.at(n.at)))
-                .sum::<f64>()
-                / (to - from)
-        };
+        let row = self.row(&integral.nodes);
         self.force *= libm::exp(-FLOW);
         let before = self.region.patch().state().p.clone();
         let values = load(self.force);
@@ -185,19 +177,11 @@ impl Pull {
         patch.step(Integrator::Paper, FLOW)?;
         let moved: Vec<f32> = patch.state().p.iter().zip(&before).map(|(a, b)| a - b).collect();
         let values = load(1.0);
-        let answer = patch.respond(Integrator::Paper, FLOW, &[OnBox { at, values: &values }])?;
-        let stiffness = mean(&self.field, &answer[0].p);
-        let more =
-            (short - mean(&self.field, &moved) - SOFT * stiffness * self.force) / (stiffness * (1.0 + SOFT));
+        let answer = patch.respond_as_step(Integrator::Paper, FLOW, &OnBox { at, values: &values })?;
+        let stiffness = worth(&row, &answer.p);
+        let more = (short - worth(&row, &moved) - SOFT * stiffness * self.force) / (stiffness * (1.0 + SOFT));
         self.force += more;
-        let add = |to: &[f32], factor: f64| -> Vec<f32> {
-            let sums = to.iter().zip(&answer[0].p);
-            sums.map(|(a, c)| (f64::from(*a) + factor * more * f64::from(*c)) as f32)
-                .collect()
-        };
-        let state = patch.state();
-        let (p, v) = (add(&state.p, 1.0), add(&state.v, 1.0 / FLOW));
-        patch.set_state(&p, &v)?;
+        patch.add_responses(&[(more, answer)], FLOW)?;
         let d = patch.state().d.clone();
         patch.springs_mut().relax(&d, -libm::expm1(-FLOW));
         self.field = self.region.bake()?;
@@ -212,29 +196,68 @@ impl Pull {
         Ok(())
     }
 
-    /// Shares of the samples in the force of a path, adding up to 1.
-    fn kernel(&self, from: f64, to: f64) -> (dynamics::lattice::SampleBox, Vec<f64>) {
-        let lattice: &Lattice<f32> = self.region.patch().lattice();
-        let places = NODES.map(|(share, weight)| {
-            let p = self.target.path.at(from + share * (to - from));
-            (lattice.gaussian(p.to_array(), RADIUS), weight)
-        });
-        let at = places.iter().fold(
-            Default::default(),
-            |all: dynamics::lattice::SampleBox, ((b, _), _)| all.joined(*b),
-        );
-        let mut sums = vec![0.0; lattice.sample_count()];
-        let dims = lattice.sample_dims();
-        for ((b, shares), weight) in &places {
-            b.indices(dims)
-                .zip(shares)
-                .for_each(|(i, s)| sums[i] += weight * s);
+    /// What a change of each coefficient is worth to the mean over the nodes of an integral.
+    fn row(&self, nodes: &[Node]) -> Vec<(usize, f64)> {
+        let whole: f64 = nodes.iter().map(|n| n.weight).sum();
+        let to_parameter = self.field.world_from_parameter().inverse();
+        let [_, ny, nz] = self.field.shape();
+        let mut row = Vec::with_capacity(64 * nodes.len());
+        for node in nodes {
+            let at = to_parameter
+                .transform_point3(self.target.path.at(node.at))
+                .to_array();
+            let [x, y, z]: [Basis<f64>; 3] =
+                std::array::from_fn(|a| Basis::at(&self.field.knots()[a], at[a], 0));
+            for (i, wx) in x.values().iter().enumerate() {
+                for (j, wy) in y.values().iter().enumerate() {
+                    let line = ((x.first() + i) * ny + y.first() + j) * nz + z.first();
+                    let weight = wx * wy * node.weight / whole;
+                    row.extend(
+                        z.values()
+                            .iter()
+                            .enumerate()
+                            .map(|(k, wz)| (line + k, weight * wz)),
+                    );
+                }
+            }
         }
-        let kernel = at.indices(dims).map(|i| sums[i]).collect();
-        (at, kernel)
+        row
+    }
+
+    /// Shares of the samples in the force of a path, adding up to 1.
+    fn kernel(&self, from: f64, to: f64) -> (SampleBox, Vec<f64>) {
+        let lattice: &Lattice<f32> = self.region.patch().lattice();
+        let places = NODES.map(|(share, weight)| (self.target.path.at(from + share * (to - from)), weight));
+        let reach = 4.0 * RADIUS;
+        let at = places.iter().fold(SampleBox::default(), |all, (p, _)| {
+            all.joined(lattice.samples_near(p.to_array(), reach))
+        });
+        let mut sums = vec![0.0; at.len()];
+        for (p, weight) in places {
+            let along = |a: usize| -> Vec<f64> {
+                let fall = |i: usize| {
+                    let away = ((at.first[a] + i) as f64 * lattice.spacing()[a] - p[a]) / RADIUS;
+                    libm::exp(-0.5 * away * away)
+                };
+                (0..at.count[a]).map(fall).collect()
+            };
+            let [x, y, z] = [0, 1, 2].map(along);
+            let rows = x.iter().flat_map(|x| y.iter().map(move |y| weight * x * y));
+            for (line, factor) in sums.chunks_exact_mut(z.len().max(1)).zip(rows) {
+                line.iter_mut().zip(&z).for_each(|(sum, z)| *sum += factor * z);
+            }
+        }
+        let whole: f64 = sums.iter().sum();
+        sums.iter_mut().for_each(|s| *s /= whole);
+        (at, sums)
     }
 
     fn arrival(&self) -> f64 {
         self.crossing / self.target.path.length()
     }
+}
+
+/// What a change of the coefficients is worth to a row.
+fn worth(row: &[(usize, f64)], change: &[f32]) -> f64 {
+    row.iter().map(|(i, w)| w * f64::from(change[*i])).sum()
 }
