@@ -182,11 +182,19 @@ fn tensor<T: Real, const L: usize>(
     let mut plane = [[T::zero(); L]; HALO];
     for (i, (cell, w)) in xs.iter().enumerate() {
         for y in y0..y1 {
-            let at = |a: usize| lanes::<T, L>(totals, ((cell + a) * HALO + y) * HALO + z0);
-            plane[y - y0] = blend(w, [at(0), at(1), at(2), at(3)]);
+            // Written out: a closure handed on is compiled for the baseline, and called.
+            let at = (cell * HALO + y) * HALO + z0;
+            plane[y - y0] = blend(
+                w,
+                &lanes(totals, at),
+                &lanes(totals, at + HALO * HALO),
+                &lanes(totals, at + 2 * HALO * HALO),
+                &lanes(totals, at + 3 * HALO * HALO),
+            );
         }
         for (j, (cell, w)) in ys.iter().enumerate() {
-            let row = blend(w, [0, 1, 2, 3].map(|b| plane[cell + b - y0]));
+            let rows = &plane[cell - y0..cell - y0 + 4];
+            let row = blend(w, &rows[0], &rows[1], &rows[2], &rows[3]);
             let start = ((offsets[0] + i) * counts[1] + offsets[1] + j) * counts[2] + offsets[2];
             for ((cell, w), value) in zs.iter().zip(&mut out[start..start + zs.len()]) {
                 let v = &row[cell - z0..cell - z0 + 4];
@@ -203,6 +211,10 @@ fn span<T>(nodes: &[(usize, [T; 4])]) -> (usize, usize) {
 }
 
 #[inline(always)]
-fn blend<T: Real, const L: usize>(w: &[T; 4], [a, b, c, d]: [[T; L]; 4]) -> [T; L] {
-    std::array::from_fn(|z| ((w[0] * a[z] + w[1] * b[z]) + w[2] * c[z]) + w[3] * d[z])
+fn blend<T: Real, const L: usize>(w: &[T; 4], a: &[T; L], b: &[T; L], c: &[T; L], d: &[T; L]) -> [T; L] {
+    let mut sum = [T::zero(); L];
+    for z in 0..L {
+        sum[z] = ((w[0] * a[z] + w[1] * b[z]) + w[2] * c[z]) + w[3] * d[z];
+    }
+    sum
 }

@@ -15,8 +15,10 @@ pub struct Mesh {
 
 impl Mesh {
     /// Corner positions of triangle `index`.
+    #[inline]
     pub fn corners(&self, index: usize) -> [DVec3; 3] {
-        self.triangles[index].map(|v| self.positions[v as usize])
+        let ([a, b, c], p) = (self.triangles[index], &self.positions);
+        [p[a as usize], p[b as usize], p[c as usize]]
     }
 
     /// Smallest box round all vertices, `None` without vertices.

@@ -107,16 +107,17 @@ fn gain(edges: &Edges, state: &State, rule: Rule, h: u32) -> f32 {
         return 0.0;
     }
     let (c, d) = (edges.apex(h), edges.apex(g));
-    let all = [a, b, c, d].map(|v| v as usize);
-    if all.iter().any(|&v| state.held[v]) {
+    let [a, b, c, d] = [a as usize, b as usize, c as usize, d as usize];
+    let (p, n) = (&*state.positions, &state.normals);
+    if state.held[a] || state.held[b] || state.held[c] || state.held[d] {
         return 0.0;
     }
-    let [pa, pb, pc, pd] = all.map(|v| state.positions[v]);
+    let [pa, pb, pc, pd] = [p[a], p[b], p[c], p[d]];
     // Both angles across are acute: the usual case.
     if rule == Rule::Delaunay && (pa - pc).dot(pb - pc) >= 0.0 && (pa - pd).dot(pb - pd) >= 0.0 {
         return 0.0;
     }
-    let [na, nb, nc, nd] = all.map(|v| state.normals[v]);
+    let [na, nb, nc, nd] = [n[a], n[b], n[c], n[d]];
     let (now, then) = (sagitta(pa, pb, na, nb), sagitta(pc, pd, nc, nd));
     let gain = match rule {
         Rule::Delaunay => {
