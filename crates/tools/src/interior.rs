@@ -297,7 +297,7 @@ impl Grid {
         }
         for axis in 0..3 {
             let (mut line, mut out) = (vec![0.0; count[axis]], vec![0.0; count[axis]]);
-            let starts = (0..squares.len()).filter(|i| i / strides[axis] % count[axis] == 0);
+            let starts = (0..squares.len()).filter(|i| (i / strides[axis]).is_multiple_of(count[axis]));
             for start in starts {
                 for (n, value) in line.iter_mut().enumerate() {
                     *value = squares[start + n * strides[axis]];

@@ -43,10 +43,6 @@ impl Extrude {
         holding: &Holding,
         control: &mut Control,
     ) -> Result<(HierarchicalSpline<T>, Vec<String>), ForceError> {
-        let length = self.by.0.length();
-        let way = self.by.0.try_normalize().ok_or_else(|| {
-            ForceError::tool("by has no length; write the direction and how far the area is to go")
-        })?;
         let radius = self.radius.0;
         let mut line = self
             .area
@@ -56,6 +52,10 @@ impl Extrude {
             super::track::within(field, *p)?;
             super::track::within(field, *p + self.by.0)?;
         }
+        let length = self.by.0.length();
+        let way = self.by.0.try_normalize().ok_or_else(|| {
+            ForceError::tool("by has no length; write the direction and how far the area is to go")
+        })?;
         let zone = line.iter().fold(None, |b: Option<Aabb>, p| {
             let (low, high) = (p.min(*p + self.by.0), p.max(*p + self.by.0));
             Some(b.map_or(Aabb::new(low, high), |b| {

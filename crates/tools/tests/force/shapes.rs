@@ -74,7 +74,7 @@ fn what_is_extruded_keeps_its_section() {
         (&low, 5.5, square(1.25), [0.0, 0.0, 12.5], 0.6),
         (&low, 5.5, round, [1.5, 0.0, 6.0], 1.2),
         (&low, 5.5, hooked, [0.0, 0.0, 3.0], 0.75),
-        (&dome, 9.0, square(2.6), [0.0, 0.0, 6.0], 1.2),
+        (&dome, 9.0, square(2.6), [0.0, 0.0, 6.0], 1.0),
     ] {
         let outline: Vec<[f64; 2]> = outline.iter().map(|p| p.map(|c| c + 12.0)).collect();
         let area: Vec<[f64; 3]> = outline.iter().map(|[x, y]| [*x, *y, base]).collect();

@@ -98,7 +98,7 @@ fn below_a_wall_the_outer_surface_stays_to_the_bit() {
             None,
         ),
         (
-            "chisel = { along = [[14, 16, 12], [16, 16, 12]], depth = 0.5, radius = 0.8 }",
+            "chisel = { along = [[15, 7.5, 12], [14, 7.5, 12]], depth = 0.5, radius = 0.8 }",
             None,
         ),
         ("inflate = { along = [[12, 12, 7]], radius = 5, by = 0.4 }", None),
