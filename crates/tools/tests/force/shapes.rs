@@ -155,7 +155,9 @@ fn whole_surfaces_keep_to_limits() {
         for y in [8.0, 12.0, 15.5] {
             for z in [11.0, 12.0, 13.0, 14.0] {
                 let p = DVec3::new(14.5, y, z);
-                assert_eq!(kept.value(p).to_bits(), field.value(p).to_bits(), "{tool}: {p}");
+                // No coefficient changes; finer bricks beside it round sums in another order.
+                let off = (kept.value(p) - field.value(p)).abs();
+                assert!(off < 1e-6 * ISO, "{tool}: {p}: {off}");
             }
         }
         let pool = rayon::ThreadPoolBuilder::new().num_threads(8).build().unwrap();
@@ -183,7 +185,7 @@ fn whole_surfaces_that_make_no_sense_are_refused() {
         (format!("extrude = {{ {square}, by = [0, 0, 2], radius = 2 }}"), "radii across"),
         (format!("extrude = {{ {square}, by = [0, 0, 1e300], radius = 1 }}"), "stay within"),
         (
-            "extrude = { area = [[9, 9, 12], [15, 15, 12], [15, 9, 12], [9, 15, 12]], by = [0, 0, 2], radius = 1 }".into(),
+            "extrude = { area = [[9, 9, 12], [15, 15, 12], [15, 9, 12], [9, 12, 12]], by = [0, 0, 2], radius = 1 }".into(),
             "crosses itself",
         ),
         (
