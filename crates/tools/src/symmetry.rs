@@ -7,7 +7,8 @@ use glam::{DAffine3, DVec3};
 use serde::{Deserialize, Serialize};
 
 use crate::coefficients::{Functions, changed, coefficient, with_functions};
-use crate::geometric::reflection;
+use crate::force::ForceError;
+use crate::geometric::{GeometricError, reflection};
 use crate::number::Point;
 use crate::tool::{Canvas, Tool, ToolError};
 
@@ -69,7 +70,8 @@ impl Symmetry {
             ));
         }
         let lattice = field.lattice().world_from_lattice;
-        let (other, notes) = once(one.placed(mirror * lattice, &mirror))?;
+        let (other, notes) =
+            once(one.placed(mirror * lattice, &mirror)).map_err(|e| there(e, &mirror, field))?;
         let mut both = other.placed(lattice, &mirror);
         if !matches!(tool, Tool::Move(_)) {
             both.holds = one.holds;
@@ -79,6 +81,27 @@ impl Symmetry {
             both.field = even;
         }
         Ok((both, notes))
+    }
+}
+
+/// An error of the other side, where that side is.
+fn there(error: ToolError, mirror: &DAffine3, field: &HierarchicalSpline<f32>) -> ToolError {
+    let to = |at: [f64; 3]| mirror.transform_point3(DVec3::from_array(at)).to_array();
+    let whole = field.lattice().world_box();
+    let own = [whole.min.to_array(), whole.max.to_array()];
+    match error {
+        ToolError::Force(ForceError::Outside { at, .. }) => ForceError::Outside {
+            at: to(at),
+            field: own,
+        }
+        .into(),
+        ToolError::Force(ForceError::Nowhere { at, reach }) => {
+            ForceError::Nowhere { at: to(at), reach }.into()
+        }
+        ToolError::Geometric(GeometricError::Leaves { at, face }) => {
+            GeometricError::Leaves { at: to(at), face }.into()
+        }
+        other => other,
     }
 }
 

@@ -254,3 +254,12 @@ fn strokes_ask_the_object_what_stays() {
     let again = "[[stroke]]\nmaterial = { solid = 'clay' }\n";
     assert!((rise(&format!("{elastic}{again}{}", pull(""))) - 1.0).abs() < 0.02);
 }
+
+/// What cannot be done on the other side of a plane is told where that side is.
+#[test]
+fn the_other_side_is_refused_where_it_is() {
+    let field = block::<f32>(24);
+    let pull = "[[stroke]]\nsymmetry = { at = [14, 12, 12], normal = [1, 0, 0] }\npull = { along = [[3, 12, 12]], lift = 1, radius = 1.5 }\n";
+    let told = played(&field, pull).map(|_| ()).unwrap_err().to_string();
+    assert!(told.contains("goes to [25.0"), "{told}");
+}
