@@ -1,9 +1,9 @@
 //! Objects as tools see them, and what tools leave of them.
 
 use glam::DAffine3;
+use tools::canvas::Canvas;
+use tools::canvas::Placement;
 use tools::others::Others;
-use tools::place::Placement;
-use tools::tool::Canvas;
 
 use crate::{CommandError, Object, State};
 

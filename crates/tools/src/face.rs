@@ -89,3 +89,30 @@ impl Face {
         })
     }
 }
+
+/// Says where a tool has widened the solid at a face that had cut it off before; elsewhere it would have left its box, which is refused.
+pub fn cut_off(
+    before: &HierarchicalSpline<f32>,
+    after: &HierarchicalSpline<f32>,
+    iso: f64,
+) -> Option<String> {
+    let lattice = after.lattice();
+    let changed = after.changed_boxes(before, &lattice.world_box());
+    let changed = changed
+        .into_iter()
+        .reduce(|a, b| Aabb::new(a.min.min(b.min), a.max.max(b.max)))?;
+    let within = changed.transformed(after.lattice_from_world());
+    let level = after.level_count() - 1;
+    let step = 1.0 / (1u64 << level) as f64;
+    let rim = lattice.spacing(level).max_element() * after.slope();
+    Face::ALL.into_iter().find_map(|face| {
+        let nodes = face.nodes(lattice, &within, step)?;
+        let [now, then] = [after, before].map(|field| nodes.values(field));
+        let mut both = now.iter().zip(&then);
+        let n = both.position(|(now, then)| *now > iso + rim && *then < iso - rim)?;
+        Some(format!(
+            "the solid goes on beyond the box of its field at {:?}, where it was cut off before; it is cut off there too",
+            nodes.place(n).to_array()
+        ))
+    })
+}

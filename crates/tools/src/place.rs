@@ -3,20 +3,9 @@
 use glam::{DAffine3, DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
+use crate::canvas::{Canvas, Placement};
 use crate::geometric::rotation_of;
 use crate::number::{Point, Positive};
-use crate::tool::Canvas;
-
-/// Where the world of an object lies in that of its parent, or in the world that all objects without a parent share.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Placement {
-    /// Map from the object's own world to that of its parent. Finite, invertible.
-    pub map: DAffine3,
-    /// Map from the parent's world to the shared one; the identity without a parent.
-    pub shared_from_parent: DAffine3,
-    /// The object that it moves with.
-    pub parent: Option<String>,
-}
 
 /// Puts the whole object elsewhere, without a change of its field. Lengths and places are those of its parent's world.
 ///

@@ -4,6 +4,7 @@ use bspline::HierarchicalSpline;
 use fitting::Control;
 use serde::{Deserialize, Serialize};
 
+use crate::canvas::Canvas;
 use crate::force::{Bend, Chisel, Drill, Extrude, ForceTool, Pull};
 use crate::geometric::{
     Copy, Cut, Geometric, Inflate, Move, Paste, Refine, Simplify, Smooth, Sweep, reflection,
@@ -16,7 +17,7 @@ use crate::paint::Paint;
 use crate::place::Place;
 use crate::room::MOST_GROWTHS;
 use crate::symmetry::Symmetry;
-use crate::tool::{Canvas, Tool, ToolError};
+use crate::tool::{Tool, ToolError};
 
 /// What a session file says.
 #[derive(Clone, Debug, PartialEq, Deserialize)]

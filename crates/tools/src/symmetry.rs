@@ -6,11 +6,12 @@ use bspline::HierarchicalSpline;
 use glam::{DAffine3, DVec3};
 use serde::{Deserialize, Serialize};
 
+use crate::canvas::Canvas;
 use crate::coefficients::{Functions, changed, coefficient, with_functions};
 use crate::force::ForceError;
 use crate::geometric::{GeometricError, reflection};
 use crate::number::Point;
-use crate::tool::{Canvas, Tool, ToolError};
+use crate::tool::{Tool, ToolError};
 
 /// A plane on both sides of which a stroke happens.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

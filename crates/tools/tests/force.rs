@@ -22,10 +22,10 @@ use dynamics::response::Against;
 use fitting::Control;
 use glam::{DAffine3, DVec3};
 use std::sync::Arc;
+use tools::canvas::Canvas;
 use tools::force::quadrature::Tolerance;
 use tools::force::{Chisel, Drill, Extent, ForceReport, ForceStroke, How, Path, Pull, Rule, Solid, Target};
 use tools::session::Session;
-use tools::tool::Canvas;
 
 /// Density of the surface, and its fall: tools work in lengths on any field.
 const ISO: f64 = 300.0;

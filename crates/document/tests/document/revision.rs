@@ -8,10 +8,10 @@ use fitting::Control;
 use formats::Unit;
 use formats::volumes::{Orientation, Volume, VolumeHeader, VoxelType};
 use glam::{DAffine3, DMat3, DVec3};
+use tools::canvas::Canvas;
 use tools::geometric::{Geometric, Operation};
 use tools::limits::Limits;
 use tools::others::Others;
-use tools::tool::Canvas;
 
 use super::common::Draw;
 

@@ -16,10 +16,11 @@ use bspline::{Aabb, Field, HierarchicalSpline};
 use fitting::Control;
 use glam::DVec3;
 
+use crate::canvas::Canvas;
 use crate::paint::Paint;
 use crate::room::MOST_GROWTHS;
 use crate::session::{During, Stroke};
-use crate::tool::{Canvas, ToolError};
+use crate::tool::ToolError;
 
 use work::{Work, check_during};
 

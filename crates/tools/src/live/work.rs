@@ -5,13 +5,14 @@ use glam::DVec3;
 
 use super::Pose;
 use super::script::not_by_hand;
+use crate::canvas::Canvas;
 use crate::force::{ForceError, ForceStroke, ForceTool, released};
 use crate::geometric::{Geometric, GeometricError};
 use crate::limits::Limits;
 use crate::number::Point;
 use crate::paint::{Paint, PaintError};
 use crate::session::{During, Stroke};
-use crate::tool::{Canvas, Tool, ToolError};
+use crate::tool::{Tool, ToolError};
 
 /// A tool at work on a canvas, step by step.
 pub(crate) struct Work {

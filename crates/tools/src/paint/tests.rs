@@ -209,14 +209,14 @@ fn strokes_that_make_no_sense_say_why() {
 
 #[test]
 fn a_move_carries_what_is_painted() {
-    let canvas = crate::tool::Canvas {
+    let canvas = crate::canvas::Canvas {
         layers: laid(
             &STROKE.replace("[4, 4, 4]", "[10, 10, 10]"),
             &ball(40),
             &Layers::new(),
         )
         .unwrap(),
-        ..crate::tool::Canvas::alone(ball(40), 0.0, 0)
+        ..crate::canvas::Canvas::alone(ball(40), 0.0, 0)
     };
     let text =
         "[move.motion.shift]\nregion = { min = [7, 7, 7], max = [13, 13, 13] }\nby = [2, 0, 0]\nblend = 6";

@@ -16,11 +16,11 @@ use bspline::polygonize::{PolygonizeOptions, check_mesh, polygonize};
 use bspline::{Aabb, Field, Frame};
 use fitting::Control;
 use glam::{DAffine3, DVec3};
+use tools::canvas::Canvas;
 use tools::geometric::{Geometric, GeometricError, Operation, block as block_of};
 use tools::limits::Limits;
 use tools::others::Others;
 use tools::session::{Session, Stroke};
-use tools::tool::Canvas;
 
 /// Cells of the block's box, half a world length each.
 const CELLS: u32 = 48;

@@ -4,7 +4,7 @@ use bspline::Field;
 use bspline::hierarchical::HierarchicalSpline;
 use fitting::Control;
 use glam::{DAffine3, DVec3};
-use tools::tool::Canvas;
+use tools::canvas::Canvas;
 
 use super::{ISO, apply, block, canvas, random, refused, stroke};
 
