@@ -144,7 +144,7 @@ fn tools_arrive_by_default_whatever_the_sampling_and_the_number_of_paths() {
                 arrived += 1;
                 // Seven paths are farther apart than half a radius.
                 let limits = if line["paths"] == 7 {
-                    [0.02, 0.04]
+                    [0.02, 0.045]
                 } else {
                     [0.01, 0.02]
                 };
