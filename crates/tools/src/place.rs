@@ -53,8 +53,9 @@ impl Place {
             after.map = DAffine3::from_mat3_translation(DMat3::from_cols(x.0, y.0, z.0), origin.0);
         }
         if self.is_turning() {
-            let whole = canvas.field.lattice().world_box();
-            let middle = after.map.transform_point3(0.5 * (whole.min + whole.max));
+            let middle = after
+                .map
+                .transform_point3(canvas.field.lattice().world_box().center());
             let about = self.about.map_or(middle, |p| p.0);
             let turn = rotation_of(self.turn.map_or(DVec3::ZERO, |turn| turn.0));
             let turn = DMat3::from_quat(turn) * self.scale.map_or(1.0, |scale| scale.0);
