@@ -2,7 +2,7 @@
 
 use std::io::Cursor;
 
-use laz::laszip::{LasZipDecompressor, LazVlr};
+use laz::laszip::{LasZipCompressor, LasZipDecompressor, LazVlr};
 use laz::record::{LayeredPointRecordDecompressor, RecordDecompressor};
 
 use super::header::{Header, u16_at, u32_at};
@@ -25,17 +25,44 @@ const MODELS: u64 = 1 << 22;
 /// Points unpacked at once, in bytes.
 const BATCH: usize = 1 << 16;
 
+/// The record that says how the points are compressed.
+fn scheme<'a>(header: &Header<'a>) -> Result<&'a [u8], Fault> {
+    header
+        .record("laszip encoded", 22204)
+        .ok_or_else(|| Fault::Damaged {
+            what: "the record that says how the points are compressed is missing".into(),
+        })
+}
+
+/// `head`, which is all that stands before the points, with `points` compressed behind it as a record of `header` says.
+///
+/// # Errors
+/// [`Fault::Value`] for the first scheme of LAZ, without chunks, which nobody writes any more.
+pub(in crate::points) fn pack(head: &[u8], points: &[u8], header: &Header) -> Result<Vec<u8>, Fault> {
+    let no = |e: String| Fault::Value {
+        what: "the compression of the scan",
+        value: e,
+        remedy: "it is read and not written: unpack the scan to .las and fit that",
+    };
+    let vlr = LazVlr::from_buffer(scheme(header)?).map_err(|e| no(e.to_string()))?;
+    let mut out = Cursor::new(head.to_vec());
+    out.set_position(head.len() as u64);
+    let mut compressor = LasZipCompressor::new(&mut out, vlr).map_err(|e| no(e.to_string()))?;
+    let packed = compressor.compress_many(points).and_then(|()| compressor.done());
+    packed.map_err(|e| no(e.to_string()))?;
+    drop(compressor);
+    Ok(out.into_inner())
+}
+
 /// Calls `each` with the bytes of every point.
-pub(super) fn unpack(
+pub(in crate::points) fn unpack(
     bytes: &[u8],
     header: &Header,
     budget: &mut Budget,
     mut each: impl FnMut(&[u8], &mut Budget) -> Result<(), Fault>,
 ) -> Result<(), Fault> {
     let damaged = |what: String| Fault::Damaged { what };
-    let data = header
-        .record("laszip encoded", 22204)
-        .ok_or_else(|| damaged("the record that says how the points are compressed is missing".into()))?;
+    let data = scheme(header)?;
     if data.len() < 34 {
         return Err(damaged(format!(
             "the record of the compression has {} bytes of 34 at least",

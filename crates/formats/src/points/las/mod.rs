@@ -4,7 +4,7 @@
 //! compression is crate laz.
 
 pub(super) mod header;
-mod laz;
+pub(super) mod laz;
 pub(super) mod unit;
 mod write;
 

@@ -2,11 +2,14 @@ use glam::DVec3;
 
 use super::{CloudChanges, Placed, Row, Rows};
 use crate::Fault;
+use crate::limits::Budget;
 use crate::points::las::header::{self, Header, u32_at, u64_at};
+use crate::points::las::laz;
 use crate::points::las::unit;
 
 /// Places in the header [ASPRS, LAS Specification 1.4-R15, table 3].
 const VERSION: usize = 25;
+const FORMAT: usize = 104;
 const OLD_COUNT: usize = 107;
 const OLD_RETURNS: usize = 111;
 const BOUNDS: usize = 179;
@@ -14,21 +17,34 @@ const WAVEFORMS: usize = 227;
 const RECORDS: usize = 235;
 const COUNT: usize = 247;
 const RETURNS: usize = 255;
+/// Mark of compressed points in the byte of the format [Isenburg, LASzip, 2013].
+const COMPRESSED: u8 = 0xc0;
 
-/// The bytes of the file with its changes. Rows are those of points that are not withheld; the others stay.
-pub fn revised(bytes: &[u8], changes: &CloudChanges) -> Result<Vec<u8>, Fault> {
-    let header = header::read(bytes)?;
-    if header.is_compressed {
-        return Err(Fault::Value {
-            what: "the format of the scan",
-            value: "compressed points (LAZ)".into(),
-            remedy: "edited points are written uncompressed: unpack the scan to .las and fit that",
-        });
+/// What a file of these bytes is called: `laz` if its points are compressed.
+pub fn extension(bytes: &[u8]) -> &'static str {
+    match bytes[FORMAT] & COMPRESSED {
+        0 => "las",
+        _ => "laz",
     }
+}
+
+/// The bytes of the file with its changes, compressed if it is. Rows are those of points that are not withheld; the others stay.
+pub fn revised(bytes: &[u8], changes: &CloudChanges, budget: &mut Budget) -> Result<Vec<u8>, Fault> {
+    let header = header::read(bytes)?;
     if *changes == CloudChanges::default() {
         return Ok(bytes.to_vec());
     }
-    let grid = Grid::of(&header);
+    if !header.is_compressed {
+        return edited(bytes, &header, changes);
+    }
+    let plain = unpacked(bytes, &header, budget)?;
+    let new = edited(&plain, &header::read(&plain)?, changes)?;
+    packed(&new, bytes[FORMAT] & COMPRESSED)
+}
+
+/// The same for points that are not compressed.
+fn edited(bytes: &[u8], header: &Header, changes: &CloudChanges) -> Result<Vec<u8>, Fault> {
+    let grid = Grid::of(header);
     let end = header.points_at + header.point_count as usize * header.record_bytes;
     let mut out = bytes[..header.points_at].to_vec();
     let mut rows = Rows::of(changes);
@@ -48,7 +64,8 @@ pub fn revised(bytes: &[u8], changes: &CloudChanges) -> Result<Vec<u8>, Fault> {
     for placed in &changes.added {
         out.extend(grid.placed(points[placed.row], placed)?);
     }
-    put_header(&mut out, &header, bytes)?;
+    put_header(&mut out, header)?;
+    move_tail(&mut out, end);
     out.extend_from_slice(&bytes[end..]);
     Ok(out)
 }
@@ -96,8 +113,8 @@ impl Grid {
     }
 }
 
-/// Puts counts, bounds and the places of what follows the points into the header of `out`, which ends with the points.
-fn put_header(out: &mut [u8], header: &Header, old: &[u8]) -> Result<(), Fault> {
+/// Puts counts and bounds into the header of `out`, which ends with the points.
+fn put_header(out: &mut [u8], header: &Header) -> Result<(), Fault> {
     let (head, points) = out.split_at_mut(header.points_at);
     let (mut count, mut returns) = (0u64, [0u64; 15]);
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
@@ -112,9 +129,10 @@ fn put_header(out: &mut [u8], header: &Header, old: &[u8]) -> Result<(), Fault> 
         (low, high) = (low.min(p), high.max(p));
     }
     let is_1_4 = head[VERSION] >= 4;
+    let has_old_count = u32_at(head, OLD_COUNT) > 0;
     let mut put = |at: usize, bytes: &[u8]| head[at..at + bytes.len()].copy_from_slice(bytes);
     // Files of 1.4 leave the old places empty where they have no room, or no meaning.
-    if !is_1_4 || u32_at(old, OLD_COUNT) > 0 {
+    if !is_1_4 || has_old_count {
         let narrow = |n: u64| {
             u32::try_from(n).map_err(|_| Fault::Value {
                 what: "the number of points",
@@ -131,19 +149,7 @@ fn put_header(out: &mut [u8], header: &Header, old: &[u8]) -> Result<(), Fault> 
         put(BOUNDS + 16 * axis, &high[axis].to_le_bytes());
         put(BOUNDS + 16 * axis + 8, &low[axis].to_le_bytes());
     }
-    let old_end = header.points_at as u64 + header.point_count * header.record_bytes as u64;
-    let new_end = header.points_at as u64 + count * header.record_bytes as u64;
-    let mut moved = |at: usize| {
-        let place = u64_at(old, at);
-        if place >= old_end {
-            put(at, &(place - old_end + new_end).to_le_bytes());
-        }
-    };
-    if head_has(old, WAVEFORMS + 8) && old[VERSION] >= 3 {
-        moved(WAVEFORMS);
-    }
     if is_1_4 {
-        moved(RECORDS);
         put(COUNT, &count.to_le_bytes());
         for (slot, n) in returns.iter().enumerate() {
             put(RETURNS + 8 * slot, &n.to_le_bytes());
@@ -152,7 +158,54 @@ fn put_header(out: &mut [u8], header: &Header, old: &[u8]) -> Result<(), Fault> 
     Ok(())
 }
 
-/// Whether the header reaches so far.
-fn head_has(bytes: &[u8], end: usize) -> bool {
-    usize::from(header::u16_at(bytes, 94)) >= end
+/// Where the header says what stands behind the points: wave forms, and records of 1.4.
+fn places_behind(head: &[u8]) -> impl Iterator<Item = usize> + use<> {
+    let wave_forms = head[VERSION] >= 3 && usize::from(header::u16_at(head, 94)) >= WAVEFORMS + 8;
+    let places = [(wave_forms, WAVEFORMS), (head[VERSION] >= 4, RECORDS)];
+    places.into_iter().filter(|p| p.0).map(|p| p.1)
 }
+
+/// Tells the header that what stood behind the points, at `from` and beyond, follows `out` now.
+fn move_tail(out: &mut [u8], from: usize) {
+    let to = out.len() as u64;
+    for at in places_behind(out) {
+        let place = u64_at(out, at);
+        if let Some(beyond) = place.checked_sub(from as u64).filter(|_| place > 0) {
+            out[at..at + 8].copy_from_slice(&(to + beyond).to_le_bytes());
+        }
+    }
+}
+
+/// The file without compression. What stands behind the compressed points is kept where the header says that there is something.
+fn unpacked(bytes: &[u8], header: &Header, budget: &mut Budget) -> Result<Vec<u8>, Fault> {
+    let behind = places_behind(bytes).map(|at| u64_at(bytes, at));
+    let tail = behind
+        .filter(|place| (header.points_at as u64..bytes.len() as u64).contains(place))
+        .min()
+        .map_or(bytes.len(), |place| place as usize);
+    budget.reserve("the points, not compressed", header.point_count, header.record_bytes)?;
+    let mut out = bytes[..header.points_at].to_vec();
+    laz::unpack(bytes, header, budget, |point, _| {
+        out.extend_from_slice(point);
+        Ok(())
+    })?;
+    out[FORMAT] &= !COMPRESSED;
+    move_tail(&mut out, tail);
+    out.extend_from_slice(&bytes[tail..]);
+    Ok(out)
+}
+
+/// The file with its points compressed as it says, marked by `mark`.
+fn packed(plain: &[u8], mark: u8) -> Result<Vec<u8>, Fault> {
+    let header = header::read(plain)?;
+    let (head, rest) = plain.split_at(header.points_at);
+    let (points, tail) = rest.split_at(header.point_count as usize * header.record_bytes);
+    let mut out = laz::pack(head, points, &header)?;
+    out[FORMAT] |= mark;
+    move_tail(&mut out, plain.len() - tail.len());
+    out.extend_from_slice(tail);
+    Ok(out)
+}
+
+#[cfg(test)]
+mod tests;

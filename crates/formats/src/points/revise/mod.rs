@@ -41,11 +41,11 @@ pub struct CloudChanges {
     pub added: Vec<Placed>,
 }
 
-/// Writes the cloud `like` (PLY, PCD, LAS, OBJ or XYZ) to `output`, of the same format, with `changes`. New points follow the last one.
+/// Writes the cloud `like` (PLY, PCD, LAS, LAZ, OBJ or XYZ) to `output`, of the same format, with `changes`. New points follow the last one.
 /// LAS has whole multiples of its step: edited points are rounded to them.
 ///
 /// # Errors
-/// Those of [`read`](super::read); [`Fault::Value`] for what is not written back: E57 and LAZ, coordinates that are whole numbers,
+/// Those of [`read`](super::read); [`Fault::Value`] for what is not written back: E57, coordinates that are whole numbers,
 /// points that come or go where others name them by number, or in a raster; I/O. The target is whole or untouched.
 ///
 /// # Panics
@@ -66,12 +66,14 @@ pub fn save_revised(
             Kind::Cloud(PointFormat::Pcd) => (pcd::revised(&bytes, changes)?, "pcd"),
             Kind::Cloud(PointFormat::Obj) => (obj::revised(&bytes, changes)?, "obj"),
             #[cfg(feature = "lidar")]
-            Kind::Cloud(PointFormat::Las) => (las::revised(&bytes, changes)?, "las"),
+            Kind::Cloud(PointFormat::Las) => {
+                (las::revised(&bytes, changes, &mut budget)?, las::extension(&bytes))
+            }
             other => {
                 return Err(Fault::Value {
                     what: "the format of the scan",
                     value: other.to_string(),
-                    remedy: "edited clouds are written as PLY, PCD, LAS, OBJ or XYZ; convert the scan to .ply and fit that",
+                    remedy: "edited clouds are written as PLY, PCD, LAS, LAZ, OBJ or XYZ; convert the scan to .ply and fit that",
                 });
             }
         };
@@ -81,7 +83,7 @@ pub fn save_revised(
             return Err(Fault::Value {
                 what: "the name of the output",
                 value: output.display().to_string(),
-                remedy: "an edited cloud is written in the format of the scan, not compressed",
+                remedy: "an edited cloud is written in the format of the scan, and not as .gz",
             });
         }
         Ok(revised)

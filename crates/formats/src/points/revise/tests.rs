@@ -3,7 +3,7 @@ use std::fs;
 use super::*;
 use crate::points;
 
-fn changes() -> CloudChanges {
+pub(super) fn changes() -> CloudChanges {
     let placed = |row, x: f64| Placed {
         row,
         position: DVec3::new(x, 0.25, -1.5),
@@ -16,7 +16,7 @@ fn changes() -> CloudChanges {
     }
 }
 
-fn revised(name: &str, bytes: &[u8], changes: &CloudChanges) -> (Vec<u8>, points::PointCloud) {
+pub(super) fn revised(name: &str, bytes: &[u8], changes: &CloudChanges) -> (Vec<u8>, points::PointCloud) {
     let directory = tempfile::tempdir().unwrap();
     let (like, output) = (
         directory.path().join(name),
@@ -219,65 +219,6 @@ fn other_formats_follow_too() {
         },
     );
     assert!(e.unwrap_err().to_string().contains("raster"));
-}
-
-/// Two points of LAS 1.2 and one that is withheld, at steps of a hundredth; the second is a second return.
-#[cfg(feature = "lidar")]
-#[test]
-fn las_keeps_records_attributes_and_what_is_withheld() {
-    let cloud = points::PointCloud {
-        positions: vec![
-            DVec3::new(1.5, 2.0, 3.0),
-            DVec3::new(4.0, 5.0, 6.0),
-            DVec3::new(7.0, 8.0, 9.5),
-            DVec3::ONE,
-        ],
-        ..Default::default()
-    };
-    let directory = tempfile::tempdir().unwrap();
-    let path = directory.path().join("a.las");
-    points::save(&path, &cloud).unwrap();
-    let mut bytes = fs::read(&path).unwrap();
-    let at = u32::from_le_bytes(bytes[96..100].try_into().unwrap()) as usize;
-    for (n, point) in bytes[at..].chunks_exact_mut(20).enumerate() {
-        point[12] = 50 + n as u8;
-        point[14] = if n == 2 { 0b010_010 } else { 0b001_001 };
-        point[15] = if n == 3 { 0x80 } else { 0 };
-    }
-    bytes.extend(b"what follows the points");
-    fs::write(&path, &bytes).unwrap();
-    assert_eq!(revised("a.las", &bytes, &CloudChanges::default()).0, bytes);
-    let (new, cloud) = revised("a.las", &bytes, &changes());
-    for (found, expected) in
-        cloud
-            .positions
-            .iter()
-            .zip([[7.0, 0.25, -1.5], [7.0, 8.0, 9.5], [9.0, 0.25, -1.5]])
-    {
-        assert!(found.distance(expected.into()) < 1e-6, "{found}");
-    }
-    let points: Vec<&[u8]> = new[at..].chunks_exact(20).take(4).collect();
-    assert_eq!(
-        points[1],
-        &bytes[at + 40..at + 60],
-        "what was not edited stays to the bit"
-    );
-    assert_eq!(points[2], &bytes[at + 60..at + 80], "what is withheld stays");
-    let told: Vec<u8> = points.iter().map(|p| p[12]).collect();
-    assert_eq!(told, [51, 52, 53, 52]);
-    let count = |at: usize| u32::from_le_bytes(new[at..at + 4].try_into().unwrap());
-    assert_eq!([count(107), count(111), count(115)], [4, 2, 2]);
-    let high = f64::from_le_bytes(new[179..187].try_into().unwrap());
-    assert!((high - 9.0).abs() < 1e-6 && new.ends_with(b"what follows the points"));
-    // Compressed points are refused.
-    points::save(&directory.path().join("a.laz"), &cloud).unwrap();
-    let e = save_revised(
-        &directory.path().join("a.laz"),
-        &changes(),
-        &directory.path().join("b.laz"),
-        &ReadLimits::default(),
-    );
-    assert!(e.unwrap_err().to_string().contains("unpack the scan to .las"));
 }
 
 #[test]
