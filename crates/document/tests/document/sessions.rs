@@ -5,7 +5,6 @@ use fitting::Control;
 use tempfile::tempdir;
 
 use super::clay::{again, block, height, plate, state_of};
-use super::common::Draw;
 
 fn commands(script: &str) -> Result<Vec<Command>, CommandError> {
     Command::of_script(script, |_| Ok("clay".into()))
@@ -93,84 +92,6 @@ material = { solid = "elastic" }
     for hash in &hashes[1..] {
         assert_eq!(document.redo(1).unwrap(), 1);
         assert_eq!(document.state().sha256(), *hash);
-    }
-}
-
-/// The tools whose strokes are not those of a scene, in any order, with undos between them.
-#[test]
-fn strokes_in_any_order_are_undone_to_the_first_hash() {
-    for seed in [1, 2] {
-        let directory = tempdir().unwrap();
-        let path = directory.path().join("a.isoclay");
-        let mut document = Document::create(&path, plate(), Options::default()).unwrap();
-        let mut draw = Draw(seed);
-        let mut hashes = vec![document.state().sha256()];
-        let mut used = std::collections::BTreeSet::new();
-        for n in 0..16 {
-            let mut number = |low: f64, high: f64| low + (high - low) * f64::from(draw.below(1001)) / 1000.0;
-            let (x, y, d) = (number(7.0, 13.0), number(7.0, 13.0), number(0.3, 0.9));
-            let (far, wide) = (x + 5.0, y + 5.0);
-            let strokes = [
-                format!(
-                    "extrude = {{ area = [[{x}, {y}, 13.6], [{far}, {y}, 13.6], [{far}, {wide}, 13.6]], by = [0, 0, {d}], radius = 0.8 }}"
-                ),
-                format!(
-                    "bend = {{ at = [12, 12, 12], axis = [0, -1, 0], direction = [1, 0, 0], angle = {}, length = 6, radius = 1.2, region = {{ min = [8, 9, 10], max = [18, 15, 16] }} }}",
-                    4.0 * d
-                ),
-                format!(
-                    "sweep = {{ operation = 'add', shape = {{ sphere = {{ radius = {d} }} }}, along = {{ spline = {{ through = [[{x}, {y}, 13], [12, 12, 14], [15, {y}, 13]] }} }} }}"
-                ),
-                format!(
-                    "wall = 0.4\ncarve = {{ shape = {{ sphere = {{ radius = {d} }} }}, along = [[{x}, {y}, 12]] }}"
-                ),
-                format!(
-                    "place = {{ turn = [0, {x}, 0], by = [{d}, 0, {y}], scale = {} }}",
-                    1.0 + d
-                ),
-                format!(
-                    "material = {{ solid = '{}' }}",
-                    if d > 0.6 { "elastic" } else { "clay" }
-                ),
-                format!(
-                    "push = {{ along = [[{x}, {y}, 13.6], [{y}, {x}, 13.6]], radius = 2, speed = {}, force = {}, steps = 3 }}",
-                    0.3 * d,
-                    if x > y { 1 } else { -1 }
-                ),
-                format!(
-                    "paced = true\npush = {{ along = [[{x}, {y}, 13.6], [{x}, 12, 13.6]], radius = 2, speed = 0.2, force = [1, {d}] }}"
-                ),
-            ];
-            let kind = (n + draw.below(2)) as usize % strokes.len();
-            let text = &strokes[kind];
-            for command in commands(&format!("[[stroke]]\n{text}")).unwrap() {
-                let made = command.apply(document.state(), &mut Control::default());
-                let (next, _) = made.unwrap_or_else(|e| panic!("{text}: {e}"));
-                if document
-                    .commit(&command.title(), command.to_value(), next)
-                    .unwrap()
-                {
-                    hashes.push(document.state().sha256());
-                    used.insert(kind);
-                }
-            }
-            if draw.below(4) == 0 {
-                // What comes next takes the place of these.
-                let count = document.undo(1 + draw.below(2) as usize).unwrap();
-                hashes.truncate(hashes.len() - count);
-                assert_eq!(document.state().sha256(), *hashes.last().unwrap());
-            }
-        }
-        assert!(used.len() > 6, "seed {seed}: {used:?}");
-        let count = hashes.len() - 1;
-        let last = document.state().sha256();
-        assert_eq!(again(&mut document, 2).sha256(), last);
-        drop(document);
-        let mut document = Document::open(&path, Options::default()).unwrap().document;
-        assert_eq!(document.undo(usize::MAX).unwrap(), count);
-        assert_eq!(document.state().sha256(), hashes[0]);
-        assert_eq!(document.redo(usize::MAX).unwrap(), count);
-        assert_eq!(document.state().sha256(), last);
     }
 }
 

@@ -86,9 +86,11 @@ fn pushes_are_lengths_on_any_density() {
             "push = {{ along = [{:?}], radius = 2, speed = 0.08, force = {force}, steps = 10 }}",
             at.to_array()
         );
-        let depth = -height(&done(&ball, &text), TOP + 7.0 * way, way) / (0.8 * force);
+        // Splines through a quadratic lie a little beside it.
+        let [before, left] = [&ball, &done(&ball, &text)].map(|f| height(f, TOP + 7.0 * way, way));
+        let depth = (before - left) / (0.8 * force);
         println!("{way:.3} {depth:.4}");
-        assert!((depth - 1.0).abs() < 0.02, "{text}: {depth}");
+        assert!((depth - 1.0).abs() < 0.01, "{text}: {depth}");
     }
 }
 
