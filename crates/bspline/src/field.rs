@@ -20,6 +20,25 @@ impl Aabb {
         Self { min, max }
     }
 
+    /// Smallest box about points; none about none.
+    pub fn about(points: impl IntoIterator<Item = DVec3>) -> Option<Self> {
+        let boxes = points.into_iter().map(|p| Self { min: p, max: p });
+        boxes.reduce(Self::hull)
+    }
+
+    /// Smallest box about two.
+    pub fn hull(self, other: Self) -> Self {
+        Self {
+            min: self.min.min(other.min),
+            max: self.max.max(other.max),
+        }
+    }
+
+    /// The box with `by` more on every side.
+    pub fn widened(self, by: f64) -> Self {
+        Self::new(self.min - by, self.max + by)
+    }
+
     /// Middle of the box.
     pub fn center(&self) -> DVec3 {
         (self.min + self.max) * 0.5
