@@ -202,6 +202,24 @@ pub trait Field: Send + Sync {
         values_node_by_node(self, frame, lo, count, out);
     }
 
+    /// [`Field::frame_values`] of a field that has `known` among its branches, whose `values` at these nodes are given: so
+    /// that field need not be asked again. The same values, to the bit; or nothing is done and the answer is false.
+    ///
+    /// # Panics
+    /// As [`Field::frame_values`]; `values` has to be as long as `out`.
+    fn frame_values_from(
+        &self,
+        known: &dyn Field,
+        values: &[f64],
+        frame: &Frame,
+        lo: [i64; 3],
+        count: [usize; 3],
+        out: &mut [f64],
+    ) -> bool {
+        let _ = (known, values, frame, lo, count, out);
+        false
+    }
+
     /// [`Field::bounds`] over the cells of `frame` from node `lo` to node `hi`.
     fn frame_bounds(&self, frame: &Frame, lo: [i64; 3], hi: [i64; 3]) -> Interval {
         self.bounds(&frame.world_box(lo, hi))
