@@ -10,15 +10,23 @@ mod cpu_time;
 #[path = "common/scans.rs"]
 mod scans;
 
+use criterion::measurement::Measurement;
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use tools::study::{Looped, PatchPull, StrokeKind, TABLE_2, half_painted, mesh_about};
 
-use cpu_time::{CpuTime, spent};
+use cpu_time::CpuTime;
 
 /// Loops of a pull on the patches of table 2.
 const PULLS: u64 = 40;
 /// Loops of a stroke on a scan, if it does not end before.
 const LOOPS: u64 = 60;
+
+/// Nanoseconds of processor time that something takes.
+fn spent(work: impl FnOnce()) -> f64 {
+    let start = CpuTime.start();
+    work();
+    CpuTime.end(start)
+}
 
 fn table_2(c: &mut Criterion<CpuTime>) {
     let mut group = c.benchmark_group("Hua04 Table 2");

@@ -11,13 +11,6 @@ fn now() -> f64 {
     t.tv_sec as f64 * 1e9 + t.tv_nsec as f64
 }
 
-/// Nanoseconds that something takes.
-pub fn spent(work: impl FnOnce()) -> f64 {
-    let start = now();
-    work();
-    now() - start
-}
-
 impl Measurement for CpuTime {
     type Intermediate = f64;
     type Value = f64;
