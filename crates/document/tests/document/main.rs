@@ -4,6 +4,7 @@ mod clay;
 mod cloud;
 mod common;
 mod live;
+mod preview;
 mod revision;
 mod sessions;
 
