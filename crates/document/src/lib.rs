@@ -9,6 +9,7 @@
 //! [`Document::commit`] finds out what differs. A [`Command`] is what was asked for; the journal keeps it beside the edit.
 //! A [`Live`] stroke is made step by step, by a hand, and becomes a command at its end.
 
+mod body;
 mod bulk;
 mod canvas;
 mod change;

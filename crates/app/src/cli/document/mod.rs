@@ -3,6 +3,7 @@
 pub mod export;
 pub mod history;
 pub mod info;
+mod knots;
 mod like;
 pub mod new;
 pub mod replay;
