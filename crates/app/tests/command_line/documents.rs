@@ -260,7 +260,9 @@ fn a_block_is_made_from_nothing_and_shaped() {
 #[test]
 fn a_block_on_knots_of_its_own_is_kept_asked_and_shaped() {
     let bench = Bench::new();
-    let first = bench.json("new block.isoclay --box 10,6,4 --spacing 0.5 --unit mm --knots x=2..5.5/14;z=1,1.2,1.4..2.6/6");
+    let first = bench.json(
+        "new block.isoclay --box 10,6,4 --spacing 0.5 --unit mm --knots x=2..5.5/14;z=1,1.2,1.4..2.6/6",
+    );
     let hash = |v: &serde_json::Value| v["field_sha256"]["block"].as_str().unwrap().to_string();
     let info = bench.json("info block.isoclay");
     let shape: Vec<u64> = serde_json::from_value(info["objects"][0]["knots"].clone()).unwrap();
@@ -273,22 +275,40 @@ fn a_block_on_knots_of_its_own_is_kept_asked_and_shaped() {
     bench.write("at.xyz", "0 0 1.5\n0 0 2.5\n".into());
     bench.json("eval block.isoclay --points at.xyz -o values.csv");
     let script = |name: &str, text: &str| bench.write(name, text.into());
-    script("finer.toml", "[[stroke]]\nrefine = { along = [[4, 2, 2]], radius = 0.5 }\n[[stroke]]\nplace = { by = [0, 0, 9] }\n");
+    script(
+        "finer.toml",
+        "[[stroke]]\nrefine = { along = [[4, 2, 2]], radius = 0.5 }\n[[stroke]]\nplace = { by = [0, 0, 9] }\n",
+    );
     let finer = bench.json("sculpt block.isoclay --script finer.toml");
     assert!(finer["notes"].as_array().is_none_or(Vec::is_empty), "{finer}");
     assert_ne!(hash(&finer), hash(&first));
     let higher = bench.json("mesh block.isoclay -o higher.ply --check");
-    assert!((number(&higher["quality"], "volume") - volume).abs() < 0.01 * volume, "{higher}");
-    script("carve.toml", "[[stroke]]\ncarve = { shape = { sphere = { radius = 1 } }, along = [[3, 1, 2]] }\n");
+    assert!(
+        (number(&higher["quality"], "volume") - volume).abs() < 0.01 * volume,
+        "{higher}"
+    );
+    script(
+        "carve.toml",
+        "[[stroke]]\ncarve = { shape = { sphere = { radius = 1 } }, along = [[3, 1, 2]] }\n",
+    );
     let carved = bench.json("sculpt block.isoclay --script carve.toml");
-    assert!(carved["notes"][0].as_str().unwrap().contains("knots were given up"), "{carved}");
+    assert!(
+        carved["notes"][0]
+            .as_str()
+            .unwrap()
+            .contains("knots were given up"),
+        "{carved}"
+    );
     for threads in [1, 2, 8] {
         let replayed = bench.json(&format!("replay block.isoclay --threads {threads}"));
         assert_eq!(hash(&replayed), hash(&carved));
     }
     bench.json("undo block.isoclay");
     let out = bench.json("export block.isoclay -o block.iclay");
-    assert!(out["notes"][0].as_str().unwrap().contains("knots were given up"), "{out}");
+    assert!(
+        out["notes"][0].as_str().unwrap().contains("knots were given up"),
+        "{out}"
+    );
     assert_eq!(hash(&bench.json("undo block.isoclay 2")), hash(&first));
     let check = bench.run("check block.isoclay at.xyz --anyway");
     assert_ne!(check.code, 0);

@@ -1,7 +1,7 @@
 //! Solids of a density that falls by 40 a length, as tools find them.
 
-use bspline::hierarchical::{HierarchicalSpline, Lattice};
 use bspline::AnyField;
+use bspline::hierarchical::{HierarchicalSpline, Lattice};
 use document::{Command, Document, Object, State};
 use fitting::Control;
 use formats::field::FieldMeta;

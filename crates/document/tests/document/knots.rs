@@ -26,7 +26,9 @@ fn state_of(field: TensorSpline<f32>) -> State {
         iso: Some(0.0),
         ..FieldMeta::default()
     };
-    State::new().with("block", Object::of(field.into(), meta)).unwrap()
+    State::new()
+        .with("block", Object::of(field.into(), meta))
+        .unwrap()
 }
 
 fn commands(session: &str) -> Vec<Command> {
@@ -38,7 +40,11 @@ fn sculpted(document: &mut Document, session: &str) -> Vec<String> {
     let mut told = Vec::new();
     for command in commands(session) {
         let (next, notes) = command.apply(document.state(), &mut Control::default()).unwrap();
-        assert!(document.commit(&command.title(), command.to_value(), next).unwrap());
+        assert!(
+            document
+                .commit(&command.title(), command.to_value(), next)
+                .unwrap()
+        );
         told.extend(notes);
     }
     told
@@ -92,7 +98,8 @@ fn knots_stay_where_tools_work_on_them_as_they_are() {
 #[test]
 fn knots_are_put_in_without_a_change_of_values() {
     let mut draw = Draw(5);
-    let mut number = |low: f64, high: f64| low + (high - low) * f64::from(draw.below(1 << 20)) / f64::from(1 << 20);
+    let mut number =
+        |low: f64, high: f64| low + (high - low) * f64::from(draw.below(1 << 20)) / f64::from(1 << 20);
     for seed in 0..20 {
         let at: [f64; 3] = [number(-6.0, 6.0), number(-5.0, 5.0), number(-4.0, 4.0)];
         let session = format!(
@@ -101,7 +108,9 @@ fn knots_are_put_in_without_a_change_of_values() {
             1 + seed % 3
         );
         let old = state_of(uneven());
-        let (new, told) = commands(&session)[0].apply(&old, &mut Control::default()).unwrap();
+        let (new, told) = commands(&session)[0]
+            .apply(&old, &mut Control::default())
+            .unwrap();
         assert_eq!(told, [""; 0]);
         let [old, new] = [&old, &new].map(|s| body(s).knots().unwrap().clone());
         for axis in 0..3 {
@@ -112,7 +121,10 @@ fn knots_are_put_in_without_a_change_of_values() {
         for _ in 0..400 {
             let p = DVec3::new(number(-9.0, 9.0), number(-8.0, 8.0), number(-7.0, 7.0));
             let off = (old.value(p) - new.value(p)).abs();
-            assert!(off <= 1e-6 * old.value(p).abs().max(1.0), "{session} {p}: {off:e}");
+            assert!(
+                off <= 1e-6 * old.value(p).abs().max(1.0),
+                "{session} {p}: {off:e}"
+            );
         }
     }
 }
@@ -140,7 +152,10 @@ fn other_tools_get_levels_and_say_so() {
     // Beside the ball, at the surface.
     for i in 0..400 {
         let [u, v] = [f64::from(i / 20) / 10.0 - 1.0, f64::from(i % 20) / 10.0 - 1.0];
-        for p in [DVec3::new(2.5 * u, 2.5 * v, 2.0), DVec3::new(-4.0, 2.5 * u, 1.5 * v)] {
+        for p in [
+            DVec3::new(2.5 * u, 2.5 * v, 2.0),
+            DVec3::new(-4.0, 2.5 * u, 1.5 * v),
+        ] {
             let off = (levels.value(p) - knots.value(p)).abs();
             assert!(off <= 0.02 * 0.2, "{p}: {off}");
         }
@@ -195,23 +210,37 @@ fn what_cannot_be_done_says_why() {
     };
     for (session, part) in [
         ("[[stroke]]\nrefine = { along = [[30, 0, 0]], radius = 1 }", "30"),
-        ("[[stroke]]\nrefine = { along = [[0, 0, 0]], radius = 1, finer = 9 }", "1 to 8"),
-        ("[[stroke]]\nrefine = { along = [[0, 0, 0]], radius = 3, finer = 8 }", "smaller brush"),
+        (
+            "[[stroke]]\nrefine = { along = [[0, 0, 0]], radius = 1, finer = 9 }",
+            "1 to 8",
+        ),
+        (
+            "[[stroke]]\nrefine = { along = [[0, 0, 0]], radius = 3, finer = 8 }",
+            "smaller brush",
+        ),
         (
             "[[stroke]]\nrefine = { along = [[0, 0, 0]], radius = 1 }\nwithin = { min = [0, 0, 0], max = [1, 1, 1] }",
             "leave within",
         ),
-        ("[[stroke]]\nhold = { name = 'a', points = [[0, 0, 0]] }", "give a spring"),
+        (
+            "[[stroke]]\nhold = { name = 'a', points = [[0, 0, 0]] }",
+            "give a spring",
+        ),
         ("[[stroke]]\nfree = { name = 'a' }", "no hold"),
     ] {
         let why = refused(session);
         assert!(why.contains(part), "{session}: {why}");
     }
     let wrong = |size: [f64; 3], spacing: f64, x: &[f64]| {
-        block(DVec3::from_array(size), spacing, [x, &[], &[]]).expect_err("refused").to_string()
+        block(DVec3::from_array(size), spacing, [x, &[], &[]])
+            .expect_err("refused")
+            .to_string()
     };
     for (why, part) in [
-        (wrong([1.0; 3], 0.1, &[1.0, 0.5]), "axis x: the knot 0.5 follows 1"),
+        (
+            wrong([1.0; 3], 0.1, &[1.0, 0.5]),
+            "axis x: the knot 0.5 follows 1",
+        ),
         (wrong([1.0; 3], 0.1, &[0.5, 0.5]), "write each once"),
         (wrong([1.0; 3], 0.1, &[0.5]), "two at least"),
         (wrong([1.0; 3], 0.1, &[5.0, 6.0]), "some within"),

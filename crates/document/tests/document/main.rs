@@ -501,7 +501,13 @@ fn edits_of_a_field_take_the_bytes_of_what_they_change() {
         change: BlockChange::Deactivate,
     };
     let mut object = document.state().object("a").unwrap().clone();
-    object.field = object.field.levels().unwrap().edited_blocks(&[block]).unwrap().into();
+    object.field = object
+        .field
+        .levels()
+        .unwrap()
+        .edited_blocks(&[block])
+        .unwrap()
+        .into();
     let next = document.state().with("a", object).unwrap();
     document.commit("fewer", Value::Null, next.clone()).unwrap();
     drop(document);

@@ -3,8 +3,8 @@ use glam::{DAffine3, DVec3};
 
 use super::*;
 use crate::ReadLimits;
-use crate::field::SourceKind;
 use crate::Unit;
+use crate::field::SourceKind;
 
 fn sample() -> (TensorSpline<f32>, FieldMeta) {
     let knots = [
@@ -71,12 +71,18 @@ fn damaged_bytes_are_refused() {
         assert!(decode_knots::<f32>(&flipped, &limits).is_err(), "{n}");
     }
     for n in 0..diff.len() {
-        assert!(decode_knots_difference::<f32>(&diff[..n], &limits).is_err(), "{n}");
+        assert!(
+            decode_knots_difference::<f32>(&diff[..n], &limits).is_err(),
+            "{n}"
+        );
         let mut flipped = diff.clone();
         flipped[n] ^= 0x10;
         assert!(decode_knots_difference::<f32>(&flipped, &limits).is_err(), "{n}");
     }
     let little = ReadLimits { max_bytes: 500 };
-    assert!(matches!(decode_knots::<f32>(&whole, &little), Err(Fault::Limit { .. })));
+    assert!(matches!(
+        decode_knots::<f32>(&whole, &little),
+        Err(Fault::Limit { .. })
+    ));
     assert!(decode_knots::<f64>(&whole, &limits).is_err());
 }

@@ -59,7 +59,8 @@ fn on_axis(name: &str, given: &[f64], reach: f64, spacing: f64) -> Result<KnotVe
         [first, .., last] => [*first, *last],
         [only] => [*only; 2],
     };
-    if given.len() == 1 || ends[0] >= reach || ends[1] <= -reach {
+    let is_beside = !given.is_empty() && (ends[0] >= reach || ends[1] <= -reach);
+    if given.len() == 1 || is_beside {
         return wrong(format!(
             "its knots run from {} to {}, and the block's box from {} to {reach}; give two at least, and some within",
             ends[0], ends[1], -reach
@@ -92,7 +93,8 @@ fn on_axis(name: &str, given: &[f64], reach: f64, spacing: f64) -> Result<KnotVe
 }
 
 /// Coefficients of about these values at the Greville abscissae. The values themselves are coefficients of a field that is
-/// right where it is linear; what that is off by is added to them some times, which halves it at least each time.
+/// right where it is linear. What that is off by is added to them some times: waves of many intervals are met at once, those of
+/// two, which would ring, hardly.
 fn interpolating(knots: &[KnotVector; 3], shape: [usize; 3], wanted: &[f64]) -> Vec<f64> {
     let rows: [BandedRows<f64>; 3] = std::array::from_fn(|a| {
         BandedRows::collocation(&knots[a], knots[a].greville_abscissae().collect::<Vec<_>>(), 0)

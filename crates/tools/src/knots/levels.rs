@@ -26,8 +26,8 @@ pub fn in_levels(
     };
     let (levels, _, _) = fit_field(field, &coarse, &lattice.world_box(), &options, control)?;
     let note = format!(
-        "the tool works by levels, so the object's knots were given up for {} levels; its surface is within {tolerance:.2e} of \
-         what it was",
+        "this works by levels, so the object's knots were given up for {} of them; its surface is within {tolerance:.2e} of what it \
+         was",
         levels.level_count()
     );
     Ok((levels, note))

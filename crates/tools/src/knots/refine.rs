@@ -30,9 +30,8 @@ impl Refine {
         }
         let (_, reach) = band(&self.along, self.radius.0)?;
         let local = reach.transformed(field.parameter_from_world());
-        let new: [Vec<f64>; 3] = std::array::from_fn(|a| {
-            halved(&field.knots()[a], [local.min[a], local.max[a]], self.finer)
-        });
+        let new: [Vec<f64>; 3] =
+            std::array::from_fn(|a| halved(&field.knots()[a], [local.min[a], local.max[a]], self.finer));
         if new.iter().any(Vec::is_empty) {
             let whole = field.world_box();
             let corners = |b: &bspline::Aabb| [b.min.to_array(), b.max.to_array()];
@@ -55,7 +54,9 @@ impl Refine {
 /// What splits the intervals that share more than an end with a range, each into `2^finer`.
 fn halved(knots: &KnotVector, [from, to]: [f64; 2], finer: u8) -> Vec<f64> {
     let inner = &knots.knots()[knots.degree()..=knots.coefficient_count()];
-    let met = inner.windows(2).filter(|w| w[0] < w[1] && w[1] > from && w[0] < to);
+    let met = inner
+        .windows(2)
+        .filter(|w| w[0] < w[1] && w[1] > from && w[0] < to);
     let parts = 1u32 << finer;
     let splits = |w: &[f64]| {
         let [start, length] = [w[0], w[1] - w[0]];

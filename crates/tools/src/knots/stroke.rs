@@ -54,11 +54,7 @@ impl Stroke {
 
 impl Tool<'_> {
     /// What the tool leaves of a canvas on knots of its own; none if it works by levels.
-    fn on_knots(
-        &self,
-        canvas: Uneven,
-        limits: &Limits,
-    ) -> Result<Option<Uneven>, ToolError> {
+    fn on_knots(&self, canvas: Uneven, limits: &Limits) -> Result<Option<Uneven>, ToolError> {
         let mut left = canvas;
         match self {
             Self::Place(place) => left.placement = place.apply(&left).map_err(ToolError::Stroke)?,
