@@ -22,7 +22,16 @@ pub(crate) fn decode(bytes: &[u8], path: &Path, limits: &ReadLimits) -> Result<O
     let wrong = |f| fault(path, f);
     if bytes.starts_with(&KNOTS_MAGIC) {
         let (field, meta) = field::decode_knots(bytes, limits).map_err(wrong)?;
-        return Ok(Object::of(Body::Knots(field), meta));
+        let body = Body::Knots(field);
+        let lattice = body.lattice();
+        let map = lattice.world_from_lattice;
+        if !map.is_finite() || !map.inverse().is_finite() || lattice.cells.contains(&0) {
+            return Err(damaged(
+                path,
+                "the box of a spline is too small, or too large, for numbers",
+            ));
+        }
+        return Ok(Object::of(body, meta));
     }
     let loaded = field::decode(bytes, limits).map_err(wrong)?;
     Object::new(&loaded.field, loaded.meta).map_err(|e| damaged(path, e.to_string()))
