@@ -272,9 +272,9 @@ fn a_block_on_knots_of_its_own_is_kept_asked_and_shaped() {
     // 240, less what the rounding of the edges takes: 0.75 mm.
     assert!((volume - 231.0).abs() < 2.0, "{mesh}");
     bench.json("picture block.isoclay -o block.png --size 64");
-    bench.write("at.xyz", "0 0 1.5\n0 0 2.5\n".into());
+    bench.write("at.xyz", "0 0 1.5\n0 0 2.5\n");
     bench.json("eval block.isoclay --points at.xyz -o values.csv");
-    let script = |name: &str, text: &str| bench.write(name, text.into());
+    let script = |name: &str, text: &str| bench.write(name, text);
     script(
         "finer.toml",
         "[[stroke]]\nrefine = { along = [[4, 2, 2]], radius = 0.5 }\n[[stroke]]\nplace = { by = [0, 0, 9] }\n",

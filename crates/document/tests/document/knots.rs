@@ -209,7 +209,10 @@ fn what_cannot_be_done_says_why() {
         applied.expect_err(session).to_string()
     };
     for (session, part) in [
-        ("[[stroke]]\nrefine = { along = [[30, 0, 0]], radius = 1 }", "30"),
+        (
+            "[[stroke]]\nrefine = { along = [[30, 0, 0]], radius = 1 }",
+            "move the tool",
+        ),
         (
             "[[stroke]]\nrefine = { along = [[0, 0, 0]], radius = 1, finer = 9 }",
             "1 to 8",

@@ -200,7 +200,7 @@ fn raw<T: Real>(values: &[T]) -> Vec<u8> {
 }
 
 fn values<T: Stored>(raw: &[u8], budget: &mut Budget) -> Result<Vec<T>, Fault> {
-    if raw.len() % T::BYTES != 0 {
+    if !raw.len().is_multiple_of(T::BYTES) {
         return Err(damaged("a list ends within a number"));
     }
     let count = raw.len() / T::BYTES;
