@@ -20,6 +20,25 @@ impl Aabb {
         Self { min, max }
     }
 
+    /// Smallest box about points; none about none.
+    pub fn about(points: impl IntoIterator<Item = DVec3>) -> Option<Self> {
+        let boxes = points.into_iter().map(|p| Self { min: p, max: p });
+        boxes.reduce(Self::hull)
+    }
+
+    /// Smallest box about two.
+    pub fn hull(self, other: Self) -> Self {
+        Self {
+            min: self.min.min(other.min),
+            max: self.max.max(other.max),
+        }
+    }
+
+    /// The box with `by` more on every side.
+    pub fn widened(self, by: f64) -> Self {
+        Self::new(self.min - by, self.max + by)
+    }
+
     /// Middle of the box.
     pub fn center(&self) -> DVec3 {
         (self.min + self.max) * 0.5
@@ -181,6 +200,24 @@ pub trait Field: Send + Sync {
     /// If `out` is not `count[0]·count[1]·count[2]` long.
     fn frame_values(&self, frame: &Frame, lo: [i64; 3], count: [usize; 3], out: &mut [f64]) {
         values_node_by_node(self, frame, lo, count, out);
+    }
+
+    /// [`Field::frame_values`] of a field that has `known` among its branches, whose `values` at these nodes are given: so
+    /// that field need not be asked again. The same values, to the bit; or nothing is done and the answer is false.
+    ///
+    /// # Panics
+    /// As [`Field::frame_values`]; `values` has to be as long as `out`.
+    fn frame_values_from(
+        &self,
+        known: &dyn Field,
+        values: &[f64],
+        frame: &Frame,
+        lo: [i64; 3],
+        count: [usize; 3],
+        out: &mut [f64],
+    ) -> bool {
+        let _ = (known, values, frame, lo, count, out);
+        false
     }
 
     /// [`Field::bounds`] over the cells of `frame` from node `lo` to node `hi`.

@@ -5,8 +5,10 @@ mod common;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use bspline::csg::Rounding;
+use bspline::hierarchical::{Lattice, LevelEdit};
 use bspline::primitives::{Capsule, Cuboid, Cylinder, Gyroid, PiercedTetrahedron, Sphere, Torus};
-use bspline::{Aabb, Csg, CsgError, Field, Frame, Interval, Jet};
+use bspline::{Aabb, Csg, CsgError, Field, Frame, HierarchicalSpline, Interval, Jet};
 use common::{Options, Random, field_conformance};
 use glam::{DAffine3, DMat3, DQuat, DVec3, dvec3};
 
@@ -264,6 +266,83 @@ fn far_branches_are_not_evaluated() {
     assert_eq!((block.take(), tool.take()), (512, 0));
     carved.frame_values(&small(1.4), [0; 3], [8; 3], &mut values);
     assert_eq!((block.take(), tool.take()), (0, 512));
+}
+
+/// A tree whose first leaf is a field of which the values are known does not ask it again, and has the values of the
+/// whole; a version that is another, or stands elsewhere in the tree, is of no use.
+#[test]
+fn values_from_a_known_field_are_those_of_the_whole() {
+    let lattice = Lattice {
+        world_from_lattice: DAffine3::from_scale_rotation_translation(
+            DVec3::splat(0.5),
+            DQuat::IDENTITY,
+            DVec3::splat(-3.0),
+        ),
+        cells: [12; 3],
+    };
+    let ball = |p: DVec3| 1.8 - p.length() + 0.1 * (3.0 * p.x).sin();
+    let field = HierarchicalSpline::<f32>::schoenberg(lattice, 1.0, ball).unwrap();
+    let edit = LevelEdit {
+        level: 1,
+        function: [9, 12, 12],
+        delta: 0.1,
+    };
+    let other = field.edited(&[edit]).unwrap();
+    let shared = || Arc::new(field.clone()) as Shared;
+    let tool = || sphere(0.8, 0.9, 0.4, 1.1);
+    let carved = Csg::difference(shared(), vec![tool()], 0.05).unwrap();
+    let plain = |tree: Csg| Arc::new(tree) as Shared;
+    let blend = |range: f64| Rounding::Bounded { range };
+    let far = || sphere(2.5, 2.5, 2.5, 0.2);
+    let trees: Vec<(&str, Shared)> = vec![
+        (
+            "union",
+            plain(Csg::union(vec![shared(), tool(), torus(), far()]).unwrap()),
+        ),
+        (
+            "intersection",
+            plain(Csg::intersection(vec![shared(), cuboid()]).unwrap()),
+        ),
+        (
+            "nested",
+            plain(Csg::union(vec![plain(carved.clone()), torus()]).unwrap()),
+        ),
+        ("difference", plain(carved)),
+        (
+            "blend",
+            Csg::smooth_union(vec![shared(), tool()], blend(0.4), 0.05).unwrap(),
+        ),
+        (
+            "far blend",
+            Csg::smooth_difference(shared(), vec![far()], blend(0.1), 0.3).unwrap(),
+        ),
+    ];
+    let frame = Frame::over(&REGION, [24; 3]);
+    for (lo, count) in [
+        ([0, 0, 0], [25; 3]),
+        ([-3, 5, 20], [7, 1, 12]),
+        ([0, 0, 0], [0, 3, 2]),
+    ] {
+        let blank = || vec![f64::NAN; count.iter().product()];
+        let (mut known, mut whole) = (blank(), blank());
+        field.frame_values(&frame, lo, count, &mut known);
+        for (name, tree) in &trees {
+            tree.frame_values(&frame, lo, count, &mut whole);
+            let mut from = blank();
+            assert!(
+                tree.frame_values_from(&field, &known, &frame, lo, count, &mut from),
+                "{name}"
+            );
+            let bits = |values: &[f64]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+            assert_eq!(bits(&from), bits(&whole), "{name} at {lo:?}");
+            let mut untouched = blank();
+            assert!(!tree.frame_values_from(&other, &known, &frame, lo, count, &mut untouched));
+            assert!(untouched.iter().all(|v| v.is_nan()), "{name}");
+        }
+        let behind = Csg::union(vec![tool(), shared()]).unwrap();
+        assert!(!behind.frame_values_from(&field, &known, &frame, lo, count, &mut blank()));
+        assert!(!cuboid().frame_values_from(&field, &known, &frame, lo, count, &mut blank()));
+    }
 }
 
 #[test]

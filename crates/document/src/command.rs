@@ -131,6 +131,13 @@ impl Command {
         }
     }
 
+    /// The object that it works on.
+    pub fn object(&self) -> &str {
+        match self {
+            Self::Scene { object, .. } | Self::Stroke { object, .. } => object,
+        }
+    }
+
     /// As the journal keeps it.
     pub fn to_value(&self) -> serde_json::Value {
         serde_json::to_value(self).expect("a command is plain values with text for keys")
@@ -141,7 +148,7 @@ impl Command {
     /// # Errors
     /// Any [`CommandError`].
     pub fn apply(&self, state: &State, control: &mut Control) -> Result<(State, Vec<String>), CommandError> {
-        let (Self::Scene { object: name, .. } | Self::Stroke { object: name, .. }) = self;
+        let name = self.object();
         match self {
             Self::Scene { script, .. } => {
                 let mut object = state.object(name)?.clone();

@@ -7,7 +7,8 @@
 //!
 //! A [`State`] is a value: cheap to copy, and copies share all that is equal. An edit makes a new one;
 //! [`Document::commit`] finds out what differs. A [`Command`] is what was asked for; the journal keeps it beside the edit.
-//! A [`Live`] stroke is made step by step, by a hand, and becomes a command at its end.
+//! A [`Live`] stroke is made step by step, by a hand, and becomes a command at its end. A [`Preview`] shows what a command
+//! would leave before it is made.
 
 mod body;
 mod bulk;
@@ -22,6 +23,7 @@ mod layers;
 mod layout;
 mod live;
 mod object;
+mod preview;
 mod records;
 mod revision;
 mod state;
@@ -34,5 +36,6 @@ pub use error::DocumentError;
 pub use journal::is_document;
 pub use live::Live;
 pub use object::{Object, Properties};
+pub use preview::Preview;
 pub use revision::{CloudError, Journey, VolumeRevision, revise_cloud, revise_volume};
 pub use state::State;

@@ -143,6 +143,17 @@ impl Body {
         }
     }
 
+    /// Boxes of its own world outside of which its values are as in an earlier version; of knots of its own the whole, where
+    /// anything differs.
+    pub fn changed_boxes(&self, before: &Self) -> Vec<Aabb> {
+        let whole = self.world_box();
+        match (self, before) {
+            (Self::Levels(now), Self::Levels(before)) => now.changed_boxes(before, &whole),
+            _ if self.difference(before).is_some_and(|diff| diff.is_empty()) => Vec::new(),
+            _ => vec![whole],
+        }
+    }
+
     /// What leads to another version; none where they are not versions of one field on the same lattice or knots.
     pub fn difference(&self, new: &Self) -> Option<BodyDiff> {
         match (self, new) {

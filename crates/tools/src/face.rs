@@ -98,9 +98,7 @@ pub fn cut_off(
 ) -> Option<String> {
     let lattice = after.lattice();
     let changed = after.changed_boxes(before, &lattice.world_box());
-    let changed = changed
-        .into_iter()
-        .reduce(|a, b| Aabb::new(a.min.min(b.min), a.max.max(b.max)))?;
+    let changed = changed.into_iter().reduce(Aabb::hull)?;
     let within = changed.transformed(after.lattice_from_world());
     let level = after.level_count() - 1;
     let step = 1.0 / (1u64 << level) as f64;

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::canvas::Canvas;
 use crate::force::{Bend, Chisel, Drill, Extrude, ForceTool, Pull};
 use crate::geometric::{
-    Copy, Cut, Geometric, Inflate, Move, Paste, Refine, Simplify, Smooth, Sweep, reflection,
+    Copy, Cut, Geometric, Inflate, Move, Paste, Push, Refine, Simplify, Smooth, Sweep, reflection,
 };
 use crate::hold::{Free, Hold};
 use crate::limits::{Limits, Mask, Region};
@@ -83,6 +83,9 @@ pub struct Stroke {
     /// Lifts or lowers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inflate: Option<Inflate>,
+    /// Pushes in or draws out, step by step.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub push: Option<Push>,
     /// Keeps a copy.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub copy: Option<Copy>,
@@ -163,6 +166,7 @@ impl Stroke {
             self.motion.as_ref().map(Tool::Move),
             self.smooth.as_ref().map(Tool::Smooth),
             self.inflate.as_ref().map(Tool::Inflate),
+            self.push.as_ref().map(Tool::Push),
             self.copy.as_ref().map(Tool::Copy),
             self.cut.as_ref().map(Tool::Cut),
             self.paste.as_ref().map(Tool::Paste),

@@ -99,6 +99,9 @@ fn there(error: ToolError, mirror: &DAffine3, field: &HierarchicalSpline<f32>) -
         ToolError::Force(ForceError::Nowhere { at, reach }) => {
             ForceError::Nowhere { at: to(at), reach }.into()
         }
+        ToolError::Geometric(GeometricError::Nowhere { at, reach }) => {
+            GeometricError::Nowhere { at: to(at), reach }.into()
+        }
         ToolError::Geometric(GeometricError::Leaves { at, face }) => {
             GeometricError::Leaves { at: to(at), face }.into()
         }

@@ -8,8 +8,8 @@ use crate::canvas::Canvas;
 use crate::face::cut_off;
 use crate::force::{Bend, Extrude, ForceError, ForceTool};
 use crate::geometric::{
-    Copy, Cut, Geometric, GeometricError, Inflate, Move, Operation, Origin, Paste, Refine, Simplify, Smooth,
-    Sweep,
+    Copy, Cut, Geometric, GeometricError, Inflate, Move, Operation, Origin, Paste, Push, Refine, Simplify,
+    Smooth, Sweep,
 };
 use crate::hold::{Free, Hold};
 use crate::limits::Limits;
@@ -38,6 +38,8 @@ pub enum Tool<'a> {
     Smooth(&'a Smooth),
     /// Lifts or lowers.
     Inflate(&'a Inflate),
+    /// Pushes in or draws out, step by step.
+    Push(&'a Push),
     /// Keeps a copy.
     Copy(&'a Copy),
     /// Takes a box out.
@@ -90,12 +92,12 @@ impl ToolError {
 
 impl Tool<'_> {
     /// Names of all tools, as sessions write them.
-    pub const NAMES: [&'static str; 23] = {
+    pub const NAMES: [&'static str; 24] = {
         let [pull, chisel, squirt, drill, join] = ForceTool::NAMES;
         [
             "carve", "add", "sweep", pull, chisel, squirt, drill, join, "extrude", "bend", "move", "smooth",
-            "inflate", "copy", "cut", "paste", "refine", "simplify", "paint", "hold", "free", "place",
-            "material",
+            "inflate", "push", "copy", "cut", "paste", "refine", "simplify", "paint", "hold", "free",
+            "place", "material",
         ]
     };
 
@@ -111,6 +113,7 @@ impl Tool<'_> {
             Self::Move(_) => "move",
             Self::Smooth(_) => "smooth",
             Self::Inflate(_) => "inflate",
+            Self::Push(_) => "push",
             Self::Copy(_) => "copy",
             Self::Cut(_) => "cut",
             Self::Paste(_) => "paste",
@@ -201,6 +204,7 @@ impl Tool<'_> {
             Self::Sweep(tool) => tool.apply(old, *iso, limits, control)?,
             Self::Smooth(tool) => tool.apply(old, *iso, limits, control)?,
             Self::Inflate(tool) => tool.apply(old, *iso, limits, control)?,
+            Self::Push(tool) => tool.apply(old, *iso, limits, control)?,
             Self::Cut(tool) => {
                 copies.extend(tool.to.clone());
                 tool.apply(old, *iso, limits, control)?

@@ -209,7 +209,7 @@ impl Command {
             Self::Picture(a) => (a.json, is_stdout(&a.output)),
             Self::Simulate(a) => (a.json, is_stdout(&a.output)),
             Self::New(a) => (a.json, false),
-            Self::Sculpt(a) => (a.json, false),
+            Self::Sculpt(a) => (a.json, a.preview.as_deref().is_some_and(is_stdout)),
             Self::History(a) => (a.json, false),
             Self::Undo(a) | Self::Redo(a) => (a.json, false),
             Self::Replay(a) => (a.json, false),

@@ -42,7 +42,23 @@ fn a_document_is_edited_undone_done_again_and_replayed() {
         fields(&first),
         bench.json("info ball.iclay")["field_sha256"].as_str().unwrap()
     );
+    // Shown, and not made.
+    let bytes = || std::fs::read(bench.path("clay.isoclay")).unwrap();
+    let before = bytes();
+    let shown = bench.json("sculpt clay.isoclay --script out.toml --preview shown.iclay");
+    assert_eq!((bytes(), shown["done"].as_u64()), (before, Some(0)));
+    assert_eq!(
+        bench.json("info shown.iclay")["field_sha256"].as_str().unwrap(),
+        fields(&shown)
+    );
+    // The box about the pull, and no more than its region.
+    let corner = |n: usize, axis: usize| shown["changed"]["ball"][n][axis].as_f64().unwrap();
+    let is_about = |axis: usize| corner(0, axis) < 0.0 && corner(1, axis) > 0.0;
+    assert!(is_about(0) && is_about(1) && corner(1, 2) > 1.0, "{shown}");
+    assert!(corner(0, 0) > -1.0 && corner(0, 2) > 0.0, "{shown}");
     let out = bench.json("sculpt clay.isoclay --script out.toml --threads 1");
+    assert_eq!(fields(&out), fields(&shown));
+    assert_eq!(out["state_sha256"], shown["state_sha256"]);
     let both = bench.json("sculpt clay.isoclay --script in.toml --threads 8");
     assert_ne!(fields(&out), fields(&first));
     assert_ne!(fields(&both), fields(&out));

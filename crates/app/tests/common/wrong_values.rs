@@ -87,6 +87,7 @@ pub const ROWS: &[Row] = &[
     ("sculpt", "--script", "clay.isoclay --script *nowhere.toml", "check the path"),
     ("sculpt", "--script", "clay.isoclay --script *notes.docx", "line 1"),
     ("sculpt", "--object", "clay.isoclay --script scene.toml --object *cow", "field"),
+    ("sculpt", "--preview", "clay.isoclay --script scene.toml --preview *out.ply", ".iclay"),
     ("export", "--object", "clay.isoclay -o out.iclay --object *cow", "field"),
     ("mesh picture info", "--object", "clay.isoclay --object *cow @out", "field"),
     ("check", "--object", "clay.isoclay cloud.ply --object *cow", "field"),

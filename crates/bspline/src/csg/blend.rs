@@ -442,6 +442,40 @@ impl Field for Blend {
         }
     }
 
+    /// Where the first branch is known.
+    fn frame_values_from(
+        &self,
+        known: &dyn Field,
+        values: &[f64],
+        frame: &Frame,
+        lo: [i64; 3],
+        count: [usize; 3],
+        out: &mut [f64],
+    ) -> bool {
+        let [first, second] = &self.branches;
+        if !first.frame_values_from(known, values, frame, lo, count, out) {
+            return false;
+        }
+        if out.is_empty() {
+            return true;
+        }
+        let mut other = vec![0.0; out.len()];
+        second.frame_values(frame, lo, count, &mut other);
+        // Where one branch alone counts, as in the whole, rounding leaves its bits.
+        let hi = std::array::from_fn(|a| lo[a] + count[a] as i64 - 1);
+        let ranges = self.branches.each_ref().map(|b| b.frame_bounds(frame, lo, hi));
+        match self.only(ranges) {
+            Some(only) if std::ptr::addr_eq(only, first.as_ref()) => {}
+            Some(_) => out.copy_from_slice(&other),
+            None => {
+                for (o, g) in out.iter_mut().zip(other) {
+                    *o = self.mix(*o, g).value;
+                }
+            }
+        }
+        true
+    }
+
     fn frame_bounds(&self, frame: &Frame, lo: [i64; 3], hi: [i64; 3]) -> Interval {
         self.combine(self.branches.each_ref().map(|b| b.frame_bounds(frame, lo, hi)))
     }

@@ -269,11 +269,30 @@ impl Boolean {
     ) {
         let (first, rest) = live.split_first().expect("a branch lives everywhere");
         first.field.frame_values(frame, lo, count, out);
-        out.iter_mut().for_each(|v| *v = first.map(*v));
+        let rest = rest.iter().copied();
+        self.add_branches(first, rest, live.len() == 2, frame, lo, count, out, term);
+    }
+
+    /// The values of one block where `out` holds those of the `first` branch's field; `prunes` says whether others are left
+    /// out by their bounds.
+    fn add_branches<'a>(
+        &self,
+        first: &Branch,
+        rest: impl IntoIterator<Item = &'a Branch>,
+        prunes: bool,
+        frame: &Frame,
+        lo: [i64; 3],
+        count: [usize; 3],
+        out: &mut [f64],
+        term: &mut Vec<f64>,
+    ) {
+        if first.twice_iso.is_some() {
+            out.iter_mut().for_each(|v| *v = first.map(*v));
+        }
         let hi = std::array::from_fn(|a| lo[a] + count[a] as i64 - 1);
         for branch in rest {
             let range = || branch.map_interval(branch.field.frame_bounds(frame, lo, hi));
-            if live.len() == 2 && self.is_beaten(range(), out) {
+            if prunes && self.is_beaten(range(), out) {
                 continue;
             }
             term.resize(out.len(), 0.0);
@@ -424,6 +443,26 @@ impl Field for Boolean {
             term: Vec::new(),
         };
         self.fill(&all, &mut grid, [0; 3], count);
+    }
+
+    /// Where the first branch is known.
+    fn frame_values_from(
+        &self,
+        known: &dyn Field,
+        values: &[f64],
+        frame: &Frame,
+        lo: [i64; 3],
+        count: [usize; 3],
+        out: &mut [f64],
+    ) -> bool {
+        let (first, rest) = self.branches.split_first().expect("a Boolean has a branch");
+        let is_known = first
+            .field
+            .frame_values_from(known, values, frame, lo, count, out);
+        if is_known && !out.is_empty() {
+            self.add_branches(first, rest, true, frame, lo, count, out, &mut Vec::new());
+        }
+        is_known
     }
 
     fn frame_bounds(&self, frame: &Frame, lo: [i64; 3], hi: [i64; 3]) -> Interval {

@@ -241,6 +241,18 @@ impl Field for Csg {
     fn frame_values(&self, frame: &Frame, lo: [i64; 3], count: [usize; 3], out: &mut [f64]) {
         self.node().frame_values(frame, lo, count, out);
     }
+    fn frame_values_from(
+        &self,
+        known: &dyn Field,
+        values: &[f64],
+        frame: &Frame,
+        lo: [i64; 3],
+        count: [usize; 3],
+        out: &mut [f64],
+    ) -> bool {
+        self.node()
+            .frame_values_from(known, values, frame, lo, count, out)
+    }
     fn frame_bounds(&self, frame: &Frame, lo: [i64; 3], hi: [i64; 3]) -> Interval {
         self.node().frame_bounds(frame, lo, hi)
     }

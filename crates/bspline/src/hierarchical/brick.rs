@@ -106,6 +106,15 @@ impl<T: Real> Corrections<T> {
         self.is_active(slot).then(|| self.values[self.rank(slot)])
     }
 
+    /// The first active slot whose coefficient is no number, with it.
+    pub(super) fn unfit(&self) -> Option<(usize, T)> {
+        // Most are fit, and that is told faster without their slots.
+        match self.values.iter().all(|value| value.is_finite()) {
+            true => None,
+            false => self.iter().find(|(_, value)| !value.is_finite()),
+        }
+    }
+
     /// Numbers of the active slots with their coefficients, in order.
     pub fn iter(&self) -> impl Iterator<Item = (usize, T)> {
         active_slots(&self.mask).zip(self.values.iter().copied())
@@ -142,6 +151,14 @@ impl<T: Real> Corrections<T> {
             if there == 0 {
                 values.extend_from_slice(a);
                 return 0;
+            }
+            if here == there {
+                let start = values.len();
+                values.extend(a.iter().zip(b).map(|(a, b)| *a + *b));
+                let pairs = bits(here).zip(a.iter().zip(&values[start..]));
+                return pairs.fold(0, |changed, (slot, (old, new))| {
+                    changed | u64::from(old != new) << slot
+                });
             }
             let (mut a, mut b) = (a.iter(), b.iter());
             let next = |values: &mut std::slice::Iter<T>, word: u64, slot: usize| {
@@ -240,7 +257,14 @@ impl<T: Real> DenseCorrections<T> {
 
     /// The active functions alone.
     pub fn pack(&self) -> Corrections<T> {
-        let values = active_slots(&self.mask).map(|slot| self.values[slot]).collect();
+        let count: u32 = self.mask.iter().map(|w| w.count_ones()).sum();
+        let mut values = Vec::with_capacity(count as usize);
+        for (word, row) in self.mask.iter().zip(self.values.as_chunks::<64>().0) {
+            match *word {
+                u64::MAX => values.extend_from_slice(row),
+                word => values.extend(bits(word).map(|bit| row[bit])),
+            }
+        }
         Corrections::new(self.mask, values)
     }
 }

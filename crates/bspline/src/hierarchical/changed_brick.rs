@@ -45,7 +45,7 @@ impl<T: Real> ChangedBrick<T> {
     pub fn add(&mut self, add: &Corrections<T>) -> Result<(), EditError> {
         let old = std::mem::replace(&mut self.functions, Functions::Packed(Corrections::empty()));
         let (sum, changed) = old.packed().plus(add);
-        if let Some((slot, value)) = sum.iter().find(|(_, value)| !value.is_finite()) {
+        if let Some((slot, value)) = sum.unfit() {
             let at = [slot / BRICK / BRICK, slot / BRICK % BRICK, slot % BRICK];
             let function = std::array::from_fn(|a| self.key.0[a] * BRICK as u32 + at[a] as u32);
             return Err(self.not_finite(function, value));

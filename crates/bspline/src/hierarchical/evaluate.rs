@@ -62,6 +62,24 @@ impl<T: Real> Field for HierarchicalSpline<T> {
         grid::frame_values(self, frame, lo, count, out);
     }
 
+    /// Where `known` is the same version.
+    fn frame_values_from(
+        &self,
+        known: &dyn Field,
+        values: &[f64],
+        _: &Frame,
+        _: [i64; 3],
+        _: [usize; 3],
+        out: &mut [f64],
+    ) -> bool {
+        let known = known.as_any().and_then(|any| any.downcast_ref::<Self>());
+        let is_same = known.is_some_and(|known| self.is_same_version(known));
+        if is_same {
+            out.copy_from_slice(values);
+        }
+        is_same
+    }
+
     fn frame_bounds(&self, frame: &Frame, lo: [i64; 3], hi: [i64; 3]) -> Interval {
         bounds::over_lattice_box(self.roots(), &self.place.frame_box(frame, lo, hi), None)
     }

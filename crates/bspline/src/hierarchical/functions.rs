@@ -88,20 +88,19 @@ pub(super) fn check_functions<T: Real>(
         let at = [slot / BRICK / BRICK, slot / BRICK % BRICK, slot % BRICK];
         std::array::from_fn(|a| key.0[a].saturating_mul(BRICK as u32).saturating_add(at[a] as u32))
     };
-    let mut last = [0; 3];
-    for (slot, value) in functions.iter() {
-        let at = function(slot);
-        last = std::array::from_fn(|a| at[a].max(last[a]));
-        if !value.is_finite() {
-            return Err(EditError::NotFinite {
-                level,
-                function: at,
-                value: value.as_f64(),
-            });
-        }
+    if let Some((slot, value)) = functions.unfit() {
+        return Err(EditError::NotFinite {
+            level,
+            function: function(slot),
+            value: value.as_f64(),
+        });
     }
-    match functions.count() {
-        0 => Ok(()),
-        _ => check_function(lattice, level, last),
-    }
+    let Some(x) = functions.mask().iter().rposition(|word| *word != 0) else {
+        return Ok(());
+    };
+    // The last row and the last place in one: of all planes, and of all rows, laid on each other.
+    let plane = functions.mask().iter().fold(0, |all, word| all | word);
+    let row = plane.to_le_bytes().into_iter().fold(0, |all, row| all | row);
+    let [y, z] = [plane.ilog2() as usize / BRICK, row.ilog2() as usize];
+    check_function(lattice, level, function((x * BRICK + y) * BRICK + z))
 }

@@ -29,6 +29,15 @@ pub(super) fn changed_boxes<T: Real>(
     changes.boxes
 }
 
+impl<T: Real> HierarchicalSpline<T> {
+    /// Whether both are one version of a field: at once, and at times no where yes.
+    pub(super) fn is_same_version(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.root, &other.root)
+            && self.lattice() == other.lattice()
+            && self.slope() == other.slope()
+    }
+}
+
 struct Changes<'a, T> {
     spline: &'a HierarchicalSpline<T>,
     /// How far a change at the lattice's faces reaches outside, in lattice coordinates.

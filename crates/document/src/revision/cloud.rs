@@ -85,11 +85,7 @@ pub fn revise_cloud(
         }
     }
     let boxes = now.changed_boxes(fitted, &whole);
-    let Some(reach) = boxes
-        .iter()
-        .copied()
-        .reduce(|a, b| Aabb::new(a.min.min(b.min), a.max.max(b.max)))
-    else {
+    let Some(reach) = boxes.iter().copied().reduce(Aabb::hull) else {
         return Ok(changes);
     };
     let reach = Aabb {

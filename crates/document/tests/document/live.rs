@@ -75,6 +75,8 @@ fn strokes_by_hand_and_their_scripts_leave_the_same() {
         "paint = { layer = 'stiffness', brush = { along = [], radius = 1.5, value = 5, rate = 0.3 } }".into(),
         "smooth = { along = [], radius = 2, level = 2 }".into(),
         "inflate = { along = [], radius = 2, by = 0.1 }\ncoarse = 0".into(),
+        "push = { along = [], radius = 2, speed = 0.1 }".into(),
+        "push = { along = [], radius = 2, speed = 0.1, force = -2 }\nsymmetry = { at = [12, 12, 12], normal = [0, 1, 0] }".into(),
         "move = { motion = { grab = { along = [], radius = 4 } } }".into(),
     ];
     for (n, text) in tools.iter().enumerate() {
@@ -84,6 +86,7 @@ fn strokes_by_hand_and_their_scripts_leave_the_same() {
         let mut poses = wandering(n as u64, 12.2, 8);
         for (n, pose) in poses.iter_mut().enumerate() {
             pose.turn = DVec3::new(0.0, 3.0, 10.0 * n as f64);
+            pose.force = 0.3 * n as f64;
         }
         made(&mut document, text, &poses);
         let left = document.state().sha256();
@@ -328,6 +331,36 @@ fn the_surface_follows_a_hand_that_pulls() {
     );
     let left = height(document.state(), 11.0, 12.0);
     assert!(left.abs() < 0.02, "{left}");
+}
+
+/// Each step shows a surface between the one before and the next, as much farther as the hand pushes then.
+#[test]
+fn a_push_goes_as_fast_as_the_hand_is_strong() {
+    let directory = tempdir().unwrap();
+    let mut document = document(directory.path(), &block());
+    let control = &mut Control::default();
+    let mut live = begun(document.state(), "push = { along = [], radius = 3, speed = 0.1 }");
+    let (mut depth, at) = (0.0, DVec3::new(12.0, 12.0, 12.1));
+    for force in [0.5, 1.0, 3.0, 6.0, 0.0, 2.0, -4.0, -1.0] {
+        // The hand goes with the surface, or stays behind it.
+        let at = at - DVec3::Z * depth;
+        live.step(
+            Pose {
+                force,
+                ..Pose::at(at)
+            },
+            control,
+        )
+        .unwrap();
+        depth += 0.1 * force;
+        let (now, _) = live.look().unwrap();
+        let found = -height(&now, 12.0, 12.0);
+        assert!((found - depth).abs() < 0.02, "{force}: {found} of {depth}");
+    }
+    assert!(live.end(&mut document, control).unwrap().0);
+    assert_eq!(again(&mut document, 2).sha256(), document.state().sha256());
+    let command = document.command(0).unwrap();
+    assert_eq!(command["stroke"]["push"]["force"].as_array().unwrap().len(), 8);
 }
 
 #[test]

@@ -5,6 +5,7 @@ mod cloud;
 mod common;
 mod knots;
 mod live;
+mod preview;
 mod revision;
 mod sessions;
 

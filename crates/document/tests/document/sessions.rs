@@ -52,9 +52,19 @@ extrude = { area = [[4, 12, 13.6], [9, 12, 13.6], [9, 17, 13.6], [4, 17, 13.6]],
 bend = { at = [12, 12, 12], axis = [0, -1, 0], direction = [1, 0, 0], angle = 4, length = 6, radius = 1.2, region = { min = [8, 9, 10], max = [18, 15, 16] } }
 [[stroke]]
 sweep = { operation = "carve", shape = { box = { size = [1, 1, 1] } }, along = { spline = { through = [[6, 6, 12], [12, 8, 12.2], [18, 6, 12]] } }, follow = true }
+[[stroke]]
+push = { along = [[15, 16, 13.6], [17, 18, 13.6]], radius = 2, speed = 0.1, force = -1, steps = 4 }
+[[stroke]]
+wall = 0.4
+carve = { shape = { sphere = { radius = 1 } }, along = [[17, 17, 12]] }
+[[stroke]]
+place = { turn = [0, 0, 30], by = [1, 2, 3] }
+[[stroke]]
+material = { solid = "elastic" }
 "#;
     let commands = commands(script).unwrap();
-    assert_eq!(commands.len(), 13);
+    assert_eq!(commands.len(), 17);
+    let mut hashes = vec![document.state().sha256()];
     for command in &commands {
         let (next, _) = command
             .apply(document.state(), &mut Control::default())
@@ -66,6 +76,7 @@ sweep = { operation = "carve", shape = { box = { size = [1, 1, 1] } }, along = {
             "{}",
             command.title()
         );
+        hashes.push(document.state().sha256());
     }
     for threads in [1, 2, 8] {
         let again = again(&mut document, threads);
@@ -73,6 +84,15 @@ sweep = { operation = "carve", shape = { box = { size = [1, 1, 1] } }, along = {
     }
     let history = document.history().unwrap();
     assert_eq!(history[8].title, "chisel on clay by hand, 3 steps");
+    // One edit back after the other, and forth again.
+    for hash in hashes.iter().rev().skip(1) {
+        assert_eq!(document.undo(1).unwrap(), 1);
+        assert_eq!(document.state().sha256(), *hash);
+    }
+    for hash in &hashes[1..] {
+        assert_eq!(document.redo(1).unwrap(), 1);
+        assert_eq!(document.state().sha256(), *hash);
+    }
 }
 
 /// Longer springs make a stroke swell what it moves, shorter ones make it shrink; what was asked for arrives all the same.
@@ -256,6 +276,38 @@ const REFUSED: &[(&str, &[&str])] = &[
     (
         "smooth = { along = [[12, 12, 12]], radius = 3, level = 99 }",
         &["1 to 10"],
+    ),
+    (
+        "push = { along = [[12, 12, 12]], radius = 3, speed = 1e30 }",
+        &["push less hard"],
+    ),
+    (
+        "push = { along = [[12, 12, 12]], radius = 3, speed = 0 }",
+        &["line 2", "above 0"],
+    ),
+    (
+        "push = { along = [[12, 12, 12]], radius = 3, speed = 0.1, force = nan }",
+        &["line 2", "finite"],
+    ),
+    (
+        "push = { along = [[12, 12, 12]], radius = 3, speed = 0.1, force = 'hard' }",
+        &["line 2", "a number or a list"],
+    ),
+    (
+        "push = { along = [[12, 12, 12]], radius = 3, speed = 0.1, steps = 1.5 }",
+        &["line 2", "u32"],
+    ),
+    (
+        "push = { along = [[12, 12, 12]], radius = 3, speed = 0.1, steps = 99999 }",
+        &["1 to 10000"],
+    ),
+    (
+        "push = { along = [[1, 12, 12], [23, 12, 12]], radius = 0.001, speed = 1e-4 }",
+        &["wider brush"],
+    ),
+    (
+        "paced = true\npush = { along = [[12, 12, 12]], radius = 3, speed = 0.1, force = [1, 2] }",
+        &["1 places and 2 forces"],
     ),
     (
         "paint = { layer = 'stiffness', brush = { along = [[12, 12, 12]], radius = 3, value = 1e9 } }",

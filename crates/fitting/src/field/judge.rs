@@ -130,7 +130,7 @@ impl Judge {
     fn slopes_squared(&self, tiles: &Tiles, tile: usize, asked: &Mask, target: &[Values]) -> Values {
         const WIDE: usize = TILE + 2;
         let rows = Rows::of(asked);
-        let padded = tiles.padded(tile, &rows, target, Some(f64::NAN));
+        let padded = tiles.padded(tile, &rows, target);
         let m = self.metric;
         let (xx, yy, zz) = (m.x_axis.x, m.y_axis.y, m.z_axis.z);
         let (xy, xz, yz) = (2.0 * m.x_axis.y, 2.0 * m.x_axis.z, 2.0 * m.y_axis.z);

@@ -11,7 +11,7 @@ use super::FieldFitOptions;
 use super::judge::{Judge, Left, between_knots, children};
 use super::region::Region;
 use super::sample::sample;
-use super::tiles::{Mask, NONE, Rows, TILE, TileKey, Tiles, Values, between, places, stencil};
+use super::tiles::{Mask, NONE, Rows, TILE, TileKey, Tiles, Values, between, places};
 use crate::FitError;
 
 /// Side and middle of the cubic B-spline at the knots.
@@ -73,11 +73,19 @@ impl<T: Real> LevelFit<'_, T> {
         let takes_part: Vec<Mask> = (spread.iter().zip(&tiles.keys))
             .map(|(spread, key)| self.free(*key, and(spread, &between(*key, first, last))))
             .collect();
-        let coefficients = self.coefficients(tiles, rest, &takes_part);
+        let open = self.open(&samples, &judge, &spread);
+        let Samples {
+            tiles,
+            target,
+            rest,
+            count,
+        } = samples;
+        // What was asked of the target makes room.
+        let coefficients = self.coefficients(&tiles, &rest, &takes_part, target);
         Ok(Round {
             edits: self.edits(&tiles.keys, &takes_part, &coefficients),
-            open: self.open(&samples, &judge, &spread),
-            samples: samples.count,
+            open,
+            samples: count,
         })
     }
 
@@ -164,19 +172,26 @@ impl<T: Real> LevelFit<'_, T> {
     /// The quasi-interpolant of the rest, and of what that leaves at the knots, in the functions that take part.
     ///
     /// Only the sum is cut off where functions do not take part: where all that reach a point do, it is interpolated as
-    /// if there were no cut.
-    fn coefficients(&self, tiles: &Tiles, rest: &[Values], takes_part: &[Mask]) -> Vec<Values> {
+    /// if there were no cut. `left` is room.
+    fn coefficients(
+        &self,
+        tiles: &Tiles,
+        rest: &[Values],
+        takes_part: &[Mask],
+        mut left: Vec<Values>,
+    ) -> Vec<Values> {
         let (first, last) = self.region.sampled();
         let convolved = |i: usize, values: &[Values], weights: [f64; 2], out: &mut Values| {
             let rows = Rows::of(&between(tiles.keys[i], first, last));
-            stencil(&tiles.padded(i, &rows, values, None), &rows, weights, out);
+            tiles.convolved(i, &rows, values, weights, out);
         };
         let mut once = tiles.fill(|i, out| {
             if tiles.is_any_near(i, takes_part) {
                 convolved(i, rest, QUASI, out);
             }
         });
-        let left = tiles.fill(|i, out| {
+        tiles.change(&mut left, |i, out| {
+            out.fill(0.0);
             if tiles.is_any_near(i, takes_part) {
                 convolved(i, &once, SAMPLES, out);
                 out.iter_mut().zip(&rest[i]).for_each(|(o, r)| *o = r - *o);
@@ -203,17 +218,23 @@ impl<T: Real> LevelFit<'_, T> {
             }
             for n in 0..8 {
                 let [xs, ys, zs] = [n >> 2, n >> 1 & 1, n & 1].map(|part: usize| PARTS[part].clone());
-                let places = xs.flat_map(|x| {
-                    let (ys, zs) = (ys.clone(), zs.clone());
-                    ys.flat_map(move |y| zs.clone().map(move |z| (x * TILE + y) * TILE + z))
-                });
-                let mut taken = places.filter(|at| mask[at / 64] >> (at % 64) & 1 == 1).peekable();
-                let Some(first) = taken.peek() else { continue };
+                let in_part = ((1u64 << zs.len()) - 1) << zs.start;
+                let rows = xs.flat_map(|x| ys.clone().map(move |y| [x, y]));
+                let taken = |[x, y]: [usize; 2]| mask[x] >> (TILE * y) & in_part;
+                let mut rows = rows.filter(|row| taken(*row) != 0).peekable();
+                let Some([x, y]) = rows.peek() else { continue };
                 let function = |at| knot_of(*key, at).map(|k| (k + 1).max(0) as u32);
-                let brick = bricks.entry(BrickKey::of(function(*first)));
+                let start = |[x, y]: [usize; 2]| (x * TILE + y) * TILE + zs.start;
+                let brick = bricks.entry(BrickKey::of(function(start([*x, *y]))));
                 let brick = brick.or_insert_with(DenseCorrections::empty);
-                for at in taken {
-                    brick.set(function(at).map(|f| f as usize % BRICK), T::from_f64(values[at]));
+                for row in rows {
+                    let (at, taken) = (start(row), taken(row) >> zs.start);
+                    let [i, j, k] = function(at).map(|f| f as usize % BRICK);
+                    for (z, value) in values[at..at + zs.len()].iter().enumerate() {
+                        if taken >> z & 1 == 1 {
+                            brick.set([i, j, k + z], T::from_f64(*value));
+                        }
+                    }
                 }
             }
         }

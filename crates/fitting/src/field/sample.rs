@@ -1,5 +1,7 @@
 //! Target and field at the knots of tiles.
 
+use std::ops::Range;
+
 use bspline::Field;
 
 use super::region::Region;
@@ -34,8 +36,11 @@ pub(super) fn sample(
     room.resize(2 * len, 0.0);
     let (target_values, field_values) = room.split_at_mut(len);
     let frame = region.frame();
-    target.frame_values(&frame, from, count, target_values);
     field.frame_values(&frame, from, count, field_values);
+    // Most targets are this field and a tool.
+    if !target.frame_values_from(field, field_values, &frame, from, count, target_values) {
+        target.frame_values(&frame, from, count, target_values);
+    }
     let at = |i: [i64; 3]| {
         let [x, y, z]: [usize; 3] = std::array::from_fn(|a| (i[a] - from[a]) as usize);
         (x * count[1] + y) * count[2] + z
@@ -71,16 +76,31 @@ pub(super) fn sample(
 
 /// Beside what is sampled, `start ..= end` of the tile that begins at `first`, the rest goes on as it is.
 fn go_on(first: [i64; 3], start: [i64; 3], end: [i64; 3], rests: &mut Values) {
-    if (0..3).all(|a| start[a] == first[a] && end[a] == first[a] + TILE as i64 - 1) {
+    const PLANE: usize = TILE * TILE;
+    let [xs, ys, zs] = [0, 1, 2].map(|a| (start[a] - first[a]) as usize..(end[a] + 1 - first[a]) as usize);
+    if [&xs, &ys, &zs].iter().all(|range| range.len() == TILE) {
         return;
     }
-    for i in 0..rests.len() {
-        let at = [i / TILE / TILE, i / TILE % TILE, i % TILE];
-        let [x, y, z] = std::array::from_fn(|a| {
-            let knot = first[a] + at[a] as i64;
-            (knot.clamp(start[a], end[a]) - first[a]) as usize
-        });
-        rests[i] = rests[(x * TILE + y) * TILE + z];
+    for x in xs.clone() {
+        let plane = &mut rests[x * PLANE..][..PLANE];
+        for y in ys.clone() {
+            let row = &mut plane[y * TILE..][..TILE];
+            let ends = [row[zs.start], row[zs.end - 1]];
+            row[..zs.start].fill(ends[0]);
+            row[zs.end..].fill(ends[1]);
+        }
+        beside(plane, TILE, &ys);
+    }
+    beside(rests, PLANE, &xs);
+}
+
+/// Copies the first and the last of the parts `known`, each `len` long, to those before and behind.
+fn beside(values: &mut [f64], len: usize, known: &Range<usize>) {
+    for part in 0..known.start {
+        values.copy_within(known.start * len..(known.start + 1) * len, part * len);
+    }
+    for part in known.end..values.len() / len {
+        values.copy_within((known.end - 1) * len..known.end * len, part * len);
     }
 }
 

@@ -62,14 +62,17 @@ pub(super) struct Tiles {
 impl Tiles {
     /// Of `keys`, sorted.
     pub fn new(keys: Vec<TileKey>) -> Self {
-        let neighbours = each(keys.len(), |i| {
+        // The tile from which on those of each column about the last one stand: it only moves on.
+        let mut starts = [0; 9];
+        let neighbours = keys.iter().map(|&[x, y, z]| {
             let mut all = [ABSENT; 27];
-            for (column, row) in all.chunks_exact_mut(3).enumerate() {
-                let [x, y, z] = keys[i];
+            for (column, (row, start)) in all.chunks_exact_mut(3).zip(&mut starts).enumerate() {
                 let at = [x + column as i32 / 3 - 1, y + column as i32 % 3 - 1];
                 let first = [at[0], at[1], z - 1];
-                let start = keys.partition_point(|k| *k < first);
-                for (n, key) in keys.iter().enumerate().skip(start).take(3) {
+                while *start < keys.len() && keys[*start] < first {
+                    *start += 1;
+                }
+                for (n, key) in keys.iter().enumerate().skip(*start).take(3) {
                     let ahead = i64::from(key[2]) - i64::from(first[2]);
                     if [key[0], key[1]] == at && (0..3).contains(&ahead) {
                         row[ahead as usize] = n as u32;
@@ -78,6 +81,7 @@ impl Tiles {
             }
             all
         });
+        let neighbours = neighbours.collect();
         Self { keys, neighbours }
     }
 
@@ -141,38 +145,113 @@ impl Tiles {
         known.into_iter().any(|n| masks[*n as usize] != NONE)
     }
 
-    /// Values of the rows of a tile and one knot beside them. Where there is no tile the values at its face go on, or it
-    /// says `absent`.
-    pub fn padded(&self, tile: usize, rows: &Rows, values: &[Values], absent: Option<f64>) -> Padded {
-        let mut out = [absent.unwrap_or(0.0); PADDED * PADDED * PADDED];
-        let neighbours = &self.neighbours[tile];
+    /// Values of the rows of a tile and one knot beside them; NaN where there is no tile.
+    pub fn padded(&self, tile: usize, rows: &Rows, values: &[Values]) -> Padded {
+        let mut out = [f64::NAN; PADDED * PADDED * PADDED];
         for x in rows.x.start..rows.x.end + 2 {
             for y in rows.y.start..rows.y.end + 2 {
-                let row = &mut out[(x * PADDED + y) * PADDED..][..PADDED];
-                // The row itself, or the nearest one of a tile that there is.
-                let [inner_x, inner_y] = [x, y].map(|p| p.clamp(1, TILE));
-                let places = [[x, y], [inner_x, y], [x, inner_y], [inner_x, inner_y]];
-                let tried = if absent.is_some() { 1 } else { places.len() };
-                for [x, y] in &places[..tried] {
-                    let ((dx, sx), (dy, sy)) = (split(*x), split(*y));
-                    let [before, own, behind] = [0, 1, 2].map(|z| neighbours[(dx * 3 + dy) * 3 + z]);
-                    if own == ABSENT {
-                        continue;
-                    }
-                    let at = (sx * TILE + sy) * TILE;
-                    let of = |n: u32| &values[n as usize][at..at + TILE];
-                    row[1..=TILE].copy_from_slice(of(own));
-                    let beside = |n: u32, place: usize, face: f64| match n {
-                        ABSENT => absent.unwrap_or(face),
-                        n => of(n)[place],
-                    };
-                    row[0] = beside(before, TILE - 1, row[1]);
-                    row[PADDED - 1] = beside(behind, 0, row[TILE]);
-                    break;
+                if let Some(row) = self.row(tile, [x, y], values, Some(f64::NAN)) {
+                    out[(x * PADDED + y) * PADDED..][..PADDED].copy_from_slice(&row);
                 }
             }
         }
         out
+    }
+
+    /// One row of a tile with those about it, numbered as they lie in [`Padded`], if its tile is there. Where there is no
+    /// tile before or behind it stands `absent`, or the value at the face.
+    #[inline(always)]
+    fn row(
+        &self,
+        tile: usize,
+        [x, y]: [usize; 2],
+        values: &[Values],
+        absent: Option<f64>,
+    ) -> Option<[f64; PADDED]> {
+        let ((dx, sx), (dy, sy)) = (split(x), split(y));
+        let first = (dx * 3 + dy) * 3;
+        let [before, own, behind]: [u32; 3] = self.neighbours[tile][first..first + 3]
+            .try_into()
+            .expect("three tiles along z");
+        if own == ABSENT {
+            return None;
+        }
+        let at = (sx * TILE + sy) * TILE;
+        let of = |n: u32| -> &[f64; TILE] {
+            values[n as usize][at..at + TILE]
+                .try_into()
+                .expect("eight values")
+        };
+        let mut row = [0.0; PADDED];
+        row[1..=TILE].copy_from_slice(of(own));
+        row[0] = match before {
+            ABSENT => absent.unwrap_or(row[1]),
+            before => of(before)[TILE - 1],
+        };
+        row[PADDED - 1] = match behind {
+            ABSENT => absent.unwrap_or(row[TILE]),
+            behind => of(behind)[0],
+        };
+        Some(row)
+    }
+
+    /// A row where there is no tile: the nearest of a tile that there is.
+    #[cold]
+    fn nearest_row(&self, tile: usize, [x, y]: [usize; 2], values: &[Values]) -> [f64; PADDED] {
+        let [inner_x, inner_y] = [x, y].map(|p| p.clamp(1, TILE));
+        [[inner_x, y], [x, inner_y], [inner_x, inner_y]]
+            .into_iter()
+            .find_map(|at| self.row(tile, at, values, None))
+            .expect("the tile itself")
+    }
+
+    /// `weights[0]·v_{i-1} + weights[1]·v_i + weights[0]·v_{i+1}` on each axis, in these rows of a tile; the others stay.
+    /// Where there is no tile the values at its face go on.
+    pub fn convolved(
+        &self,
+        tile: usize,
+        rows: &Rows,
+        values: &[Values],
+        weights: [f64; 2],
+        out: &mut Values,
+    ) {
+        vectorized(
+            #[inline(always)]
+            || {
+                let [side, own] = weights;
+                const PLANE: usize = TILE * TILE;
+                let (xs, ys) = (rows.x.clone(), rows.y.clone());
+                // The last three planes, done along z and y.
+                let mut planes = [[0.0; PLANE]; 3];
+                for x in xs.start..xs.end + 2 {
+                    let mut along_z = [[0.0; TILE]; PADDED];
+                    for y in ys.start..ys.end + 2 {
+                        let row = match self.row(tile, [x, y], values, None) {
+                            Some(row) => row,
+                            None => self.nearest_row(tile, [x, y], values),
+                        };
+                        for z in 0..TILE {
+                            along_z[y][z] = own * row[z + 1] + side * (row[z] + row[z + 2]);
+                        }
+                    }
+                    let to = &mut planes[x % 3];
+                    for y in ys.clone() {
+                        for z in 0..TILE {
+                            to[y * TILE + z] =
+                                own * along_z[y + 1][z] + side * (along_z[y][z] + along_z[y + 2][z]);
+                        }
+                    }
+                    if x < xs.start + 2 {
+                        continue;
+                    }
+                    let [before, own_plane, behind] = [1, 2, 0].map(|n| &planes[(x + n) % 3]);
+                    let to = &mut out[(x - 2) * PLANE..][..PLANE];
+                    for i in ys.start * TILE..ys.end * TILE {
+                        to[i] = own * own_plane[i] + side * (before[i] + behind[i]);
+                    }
+                }
+            },
+        );
     }
 
     /// Knots of a tile, or beside it by one on any axis, at which a mask is set: its rows grown by `reach` (1 or 2).
@@ -240,37 +319,6 @@ fn spread(reach: usize, masks: impl Fn(usize) -> Option<Mask>) -> Mask {
         });
         u64::from_le_bytes(bytes)
     })
-}
-
-/// `weights[0]·v_{i-1} + weights[1]·v_i + weights[0]·v_{i+1}` on each axis.
-/// Of these rows; the others stay.
-pub(super) fn stencil(padded: &Padded, rows: &Rows, weights: [f64; 2], out: &mut Values) {
-    vectorized(
-        #[inline(always)]
-        || {
-            let [side, own] = weights;
-            const PLANE: usize = TILE * TILE;
-            let (xs, ys) = (rows.x.clone(), rows.y.clone());
-            let mut along_y = [0.0; PADDED * PLANE];
-            for x in xs.start..xs.end + 2 {
-                let mut along_z = [0.0; PADDED * TILE];
-                for y in ys.start..ys.end + 2 {
-                    let row = &padded[(x * PADDED + y) * PADDED..][..PADDED];
-                    let to = &mut along_z[y * TILE..][..TILE];
-                    for z in 0..TILE {
-                        to[z] = own * row[z + 1] + side * (row[z] + row[z + 2]);
-                    }
-                }
-                let to = &mut along_y[x * PLANE..][..PLANE];
-                for i in ys.start * TILE..ys.end * TILE {
-                    to[i] = own * along_z[i + TILE] + side * (along_z[i] + along_z[i + 2 * TILE]);
-                }
-            }
-            for i in xs.start * PLANE..xs.end * PLANE {
-                out[i] = own * along_y[i + PLANE] + side * (along_y[i] + along_y[i + 2 * PLANE]);
-            }
-        },
-    );
 }
 
 /// The knots `lo ..= hi` of a tile.

@@ -56,15 +56,8 @@ impl Extrude {
         let way = self.by.0.try_normalize().ok_or_else(|| {
             ForceError::tool("by has no length; write the direction and how far the area is to go")
         })?;
-        let zone = line.iter().fold(None, |b: Option<Aabb>, p| {
-            let (low, high) = (p.min(*p + self.by.0), p.max(*p + self.by.0));
-            Some(b.map_or(Aabb::new(low, high), |b| {
-                Aabb::new(b.min.min(low), b.max.max(high))
-            }))
-        });
-        let zone = zone.expect("a curve has a place");
-        let room = 2.0 * STAGE * radius;
-        let zone = Aabb::new(zone.min - room, zone.max + room);
+        let zone = Aabb::about(line.iter().flat_map(|p| [*p, *p + self.by.0]));
+        let zone = zone.expect("a curve has a place").widened(2.0 * STAGE * radius);
         // Seen along the way.
         let middle = line.iter().sum::<DVec3>() / line.len() as f64;
         for p in &mut line {

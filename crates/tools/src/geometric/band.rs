@@ -9,7 +9,7 @@ use crate::mix::Faded;
 use crate::number::Point;
 
 /// Share of the radius of a brush within which it acts with all its strength.
-const FULL: f64 = 0.5;
+pub(super) const FULL: f64 = 0.5;
 
 /// What a round brush covers on its way: 1 within half its radius, 0 beyond it; and a box about it.
 ///
@@ -17,7 +17,7 @@ const FULL: f64 = 0.5;
 /// [`GeometricError::Shape`] for a way without a place.
 pub(crate) fn band(along: &[Point], radius: f64) -> Result<(Faded, Aabb), GeometricError> {
     let places: Vec<DVec3> = along.iter().map(|p| p.0).collect();
-    let Some(first) = places.first() else {
+    let Some(&first) = places.first() else {
         let why = "along has no place; write at least one point";
         return Err(GeometricError::Shape(why.into()));
     };
@@ -28,14 +28,10 @@ pub(crate) fn band(along: &[Point], radius: f64) -> Result<(Faded, Aabb), Geomet
     }
     if solids.is_empty() {
         solids.push(Arc::new(
-            Sphere::new(*first, radius).map_err(GeometricError::shape)?,
+            Sphere::new(first, radius).map_err(GeometricError::shape)?,
         ));
     }
     let cover = Csg::union(solids).map_err(GeometricError::shape)?;
-    let low = places.iter().fold(*first, |a, b| a.min(*b)) - radius;
-    let high = places.iter().fold(*first, |a, b| a.max(*b)) + radius;
-    Ok((
-        Faded::new(Arc::new(cover), 0.0, (1.0 - FULL) * radius),
-        Aabb::new(low, high),
-    ))
+    let reach = Aabb::about(places).expect("a place").widened(radius);
+    Ok((Faded::new(Arc::new(cover), 0.0, (1.0 - FULL) * radius), reach))
 }

@@ -10,6 +10,7 @@ mod chain;
 mod detail;
 mod motion;
 mod paste;
+mod push;
 mod shape;
 mod smooth;
 mod sweep;
@@ -31,6 +32,7 @@ pub(crate) use block::{ROOM, rounded};
 pub use detail::{Refine, Simplify};
 pub use motion::{Motion, Move, Origin, reflection};
 pub use paste::{Copy, Cut, Paste};
+pub use push::Push;
 pub use shape::Shape;
 pub use smooth::{Inflate, Smooth};
 pub use sweep::Sweep;
@@ -106,6 +108,14 @@ pub enum GeometricError {
         at: [f64; 3],
         /// Through which face.
         face: Face,
+    },
+    /// A brush is far from the surface that it is to act on.
+    #[error("no surface lies within {reach} of {at:?}; bring the brush to the surface, or take a wider one")]
+    Nowhere {
+        /// Where it is.
+        at: [f64; 3],
+        /// How far it looks.
+        reach: f64,
     },
     /// A motion makes no sense.
     #[error(transparent)]
@@ -196,7 +206,7 @@ impl Combined {
         control: &mut Control,
     ) -> Result<(HierarchicalSpline<T>, FieldFitReport), GeometricError> {
         let Writer { field, iso, .. } = *writer;
-        let reach = Aabb::new(self.reach.min - self.blend, self.reach.max + self.blend);
+        let reach = self.reach.widened(self.blend);
         let within = writer.within(&reach)?;
         let slope = field.slope();
         let solid: Arc<dyn Field> = Arc::new(field.clone());

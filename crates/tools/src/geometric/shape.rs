@@ -102,10 +102,6 @@ impl Shape {
             return Err("along has no place; write at least one point".into());
         };
         let mut solids: Vec<Arc<dyn Field>> = Vec::new();
-        let mut reach = Aabb {
-            min: DVec3::INFINITY,
-            max: DVec3::NEG_INFINITY,
-        };
         let legs = poses.windows(2).filter(|leg| leg[0] != leg[1]);
         if is_each || first == last && legs.clone().next().is_none() {
             for pose in poses {
@@ -123,10 +119,8 @@ impl Shape {
             }
             _ => DVec3::splat(size),
         };
-        for pose in poses {
-            reach.min = reach.min.min(pose.at - half);
-            reach.max = reach.max.max(pose.at + half);
-        }
+        let ends = poses.iter().flat_map(|pose| [pose.at - half, pose.at + half]);
+        let reach = Aabb::about(ends).expect("a place");
         match reach.min.is_finite() && reach.max.is_finite() {
             true => Ok((solids, reach)),
             false => Err("the tool reaches beyond all numbers; make it smaller".into()),
@@ -262,7 +256,7 @@ fn at_places(field: &Arc<dyn Field>, b: &Aabb, poses: &[Pose], is_each: bool) ->
         let placed = Csg::affine(field.clone(), pose.map()).map_err(|e| e.to_string())?;
         solids.push(Arc::new(placed));
         let own = b.transformed(&pose.map());
-        reach = Some(reach.map_or(own, |r| Aabb::new(r.min.min(own.min), r.max.max(own.max))));
+        reach = Some(reach.map_or(own, |r| r.hull(own)));
     }
     let reach = reach.ok_or("along has no place; write at least one point")?;
     Ok((solids, reach))

@@ -92,10 +92,8 @@ impl Sweep {
             };
             let (legs, size) = self.shape.legs(&poses).map_err(GeometricError::Shape)?;
             solids.push(Arc::new(Chain::new(legs, size)));
-            for p in &line {
-                let own = Aabb::new(*p - size, *p + size);
-                reach = Some(reach.map_or(own, |r| Aabb::new(r.min.min(own.min), r.max.max(own.max))));
-            }
+            let own = Aabb::about(line).map(|b| b.widened(size));
+            reach = reach.into_iter().chain(own).reduce(Aabb::hull);
         }
         let combined = Combined {
             operation: self.operation,

@@ -70,6 +70,17 @@ impl<T: Real> Writer<'_, T> {
         self.field.lattice().spacing(self.detail()).min_element()
     }
 
+    /// A fineness that adds the levels that its feature asks for, and none where the object's own detail shows it, unless it is told.
+    pub fn shown(&self, fineness: &Fineness) -> Fineness {
+        let is_shown = fineness
+            .feature
+            .is_some_and(|feature| ACROSS * self.spacing() <= feature);
+        Fineness {
+            finer: fineness.finer.or(is_shown.then_some(0)),
+            ..*fineness
+        }
+    }
+
     /// Distance that may stay where a tool makes the field as fine as it asks for.
     pub fn tolerance(&self, fineness: &Fineness) -> f64 {
         let lattice = self.field.lattice();

@@ -25,20 +25,34 @@ use crate::tool::ToolError;
 use work::{Work, check_during};
 
 /// Where a tool is.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
     /// Its middle, in the world of the object.
     pub at: DVec3,
     /// How it is turned, of solids: the axis of the turn, as long as its angle in degrees.
     pub turn: DVec3,
+    /// How hard it is pushed, of `push`.
+    pub force: f64,
 }
 
 impl Pose {
-    /// A tool at a place that is not turned.
+    /// A tool at a place that is not turned, under a force of 1.
     pub fn at(at: DVec3) -> Self {
         Self {
             at,
             turn: DVec3::ZERO,
+            force: 1.0,
+        }
+    }
+
+    /// Refuses numbers that are not finite.
+    pub(crate) fn check(&self) -> Result<(), ToolError> {
+        match self.at.is_finite() && self.turn.is_finite() && self.force.is_finite() {
+            true => Ok(()),
+            false => Err(ToolError::Stroke(format!(
+                "the hand cannot be at {}, turned by {}, and push by {}; give finite numbers",
+                self.at, self.turn, self.force
+            ))),
         }
     }
 }
@@ -55,6 +69,8 @@ pub struct LiveStroke {
     first: Option<Pose>,
     /// Of solids, how they are turned all the way, if that was said.
     turn: Option<DVec3>,
+    /// Of `push`, how hard it is pushed all the way, if that was said.
+    force: Option<f64>,
     seen: HierarchicalSpline<f32>,
 }
 
@@ -87,6 +103,14 @@ impl LiveStroke {
                 return Err(ToolError::Stroke(why.into()));
             }
         };
+        let force = match stroke.push.as_ref().map_or(&[][..], |tool| &tool.force.0) {
+            [] => None,
+            [one] => Some(one.0),
+            _ => {
+                let why = "a stroke in a hand has one force, or those of its poses; write at most one";
+                return Err(ToolError::Stroke(why.into()));
+            }
+        };
         Ok(Self {
             work: Work::new(&stroke, &canvas)?,
             stroke,
@@ -96,6 +120,7 @@ impl LiveStroke {
             growths: 0,
             first: None,
             turn,
+            force,
         })
     }
 
@@ -108,12 +133,11 @@ impl LiveStroke {
     /// [`ToolError`]. After one for a pose that makes no sense the stroke goes on as if it had not been told; after any
     /// other it cannot go on.
     pub fn step(&mut self, pose: Pose, control: &mut Control) -> Result<DVec3, ToolError> {
-        if !(pose.at.is_finite() && pose.turn.is_finite()) {
-            return Err(ToolError::Stroke(format!(
-                "the hand cannot be at {}, turned by {}; give finite numbers",
-                pose.at, pose.turn
-            )));
-        }
+        pose.check()?;
+        let pose = Pose {
+            force: self.force.unwrap_or(pose.force),
+            ..pose
+        };
         let first = self.first.unwrap_or(pose);
         let here = pose;
         let pose = match (&self.stroke.pull, self.turn) {
@@ -136,7 +160,8 @@ impl LiveStroke {
             }
         };
         self.first.get_or_insert(here);
-        self.stroke.push(pose, self.turn.is_none());
+        self.stroke
+            .add_pose(pose, self.turn.is_none(), self.force.is_none());
         Ok(force)
     }
 

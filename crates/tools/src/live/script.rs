@@ -5,8 +5,8 @@ use glam::DVec3;
 use super::Pose;
 use crate::curve::Along;
 use crate::force::ForceTool;
-use crate::geometric::Motion;
-use crate::number::Point;
+use crate::geometric::{Motion, Push};
+use crate::number::{Finite, Numbers, Point};
 use crate::session::Stroke;
 use crate::tool::{Tool, ToolError};
 
@@ -31,11 +31,12 @@ impl Stroke {
                 let along = tool.along.iter().enumerate();
                 along
                     .map(|(n, at)| Pose {
-                        at: at.0,
                         turn: turn(n),
+                        ..Pose::at(at.0)
                     })
                     .collect()
             }
+            Tool::Push(tool) => forced(tool)?,
             Tool::Force(ForceTool::Chisel(tool) | ForceTool::Squirt(tool)) => places(by_points(&tool.along)?),
             Tool::Force(ForceTool::Drill(tool) | ForceTool::Join(tool)) => places(by_points(&tool.along)?),
             Tool::Force(ForceTool::Pull(tool)) => {
@@ -59,8 +60,8 @@ impl Stroke {
         })
     }
 
-    /// One pose more; a hand that grabs has the first and the last alone.
-    pub(super) fn push(&mut self, pose: Pose, turns: bool) {
+    /// One pose more, with its turn and its force where these are the hand's; a hand that grabs has the first and the last alone.
+    pub(super) fn add_pose(&mut self, pose: Pose, turns: bool, forces: bool) {
         let at = Point(pose.at);
         for tool in [&mut self.carve, &mut self.add].into_iter().flatten() {
             // Solids that were not turned so far have no turns.
@@ -85,9 +86,44 @@ impl Stroke {
         if let Some(tool) = &mut self.inflate {
             tool.along.push(at);
         }
+        if let Some(tool) = &mut self.push {
+            // A hand that always pushed by 1 has no forces.
+            if forces && (pose.force != 1.0 || !tool.force.is_empty()) {
+                tool.force.0.resize(tool.along.len(), Finite(1.0));
+                tool.force.0.push(Finite(pose.force));
+            }
+            tool.along.push(at);
+        }
         if let Some(brush) = self.paint.as_mut().and_then(|tool| tool.brush.as_mut()) {
             brush.along.push(at);
         }
+    }
+
+    /// Puts a solid or a brush to one place, in place of its way.
+    ///
+    /// # Errors
+    /// [`ToolError::Stroke`] for a place that makes no sense, and for a tool that has none.
+    pub fn put(&mut self, pose: Pose) -> Result<(), ToolError> {
+        pose.check()?;
+        let at = vec![Point(pose.at)];
+        if let Some(tool) = self.carve.as_mut().or(self.add.as_mut()) {
+            (tool.along, tool.turn) = (at, vec![Point(pose.turn)]);
+        } else if let Some(tool) = &mut self.smooth {
+            tool.along = at;
+        } else if let Some(tool) = &mut self.inflate {
+            tool.along = at;
+        } else if let Some(tool) = &mut self.push {
+            (tool.along, tool.force) = (at, Numbers(vec![Finite(pose.force)]));
+        } else if let Some(brush) = self.paint.as_mut().and_then(|tool| tool.brush.as_mut()) {
+            brush.along = at;
+        } else {
+            let tool = self.tool().map_err(ToolError::Stroke)?;
+            return Err(ToolError::Stroke(format!(
+                "{} is not put in place; write where it acts",
+                tool.name()
+            )));
+        }
+        Ok(())
     }
 
     /// A hand that grabs goes from place to place.
@@ -98,6 +134,26 @@ impl Stroke {
             *along = places.map(Point).to_vec();
         }
     }
+}
+
+/// Poses of a brush that pushes, with their forces.
+fn forced(tool: &Push) -> Result<Vec<Pose>, ToolError> {
+    let (places, forces) = (tool.along.len(), tool.force.0.len());
+    if forces > 1 && forces != places {
+        return Err(ToolError::Stroke(format!(
+            "there are {places} places and {forces} forces; write one force for all, or one for each place"
+        )));
+    }
+    if tool.steps.is_some() {
+        let why = "by hand every place is a step; leave steps out, or paced";
+        return Err(ToolError::Stroke(why.into()));
+    }
+    let force = |n: usize| tool.force.0.get(n).or(tool.force.0.first()).map_or(1.0, |f| f.0);
+    let pose = |(n, at): (usize, &Point)| Pose {
+        force: force(n),
+        ..Pose::at(at.0)
+    };
+    Ok(tool.along.iter().enumerate().map(pose).collect())
 }
 
 pub fn not_by_hand(tool: &Tool) -> ToolError {

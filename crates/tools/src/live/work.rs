@@ -9,7 +9,7 @@ use crate::canvas::Canvas;
 use crate::force::{ForceError, ForceStroke, ForceTool, released};
 use crate::geometric::{Geometric, GeometricError};
 use crate::limits::Limits;
-use crate::number::Point;
+use crate::number::{Finite, Numbers, Point};
 use crate::paint::{Paint, PaintError};
 use crate::session::{During, Stroke};
 use crate::tool::{Tool, ToolError};
@@ -247,7 +247,7 @@ impl Work {
         let is_beside = match why {
             // There the box can grow.
             ToolError::Geometric(GeometricError::Leaves { .. }) => self.before.face_for(&why).is_none(),
-            ToolError::Geometric(GeometricError::Outside { .. })
+            ToolError::Geometric(GeometricError::Outside { .. } | GeometricError::Nowhere { .. })
             | ToolError::Force(ForceError::Nowhere { .. } | ForceError::Outside { .. })
             | ToolError::Paint(PaintError::Outside(..)) => true,
             _ => false,
@@ -324,6 +324,11 @@ fn between<R>(
             let mut tool = tool.clone();
             tool.along = along;
             apply(&Tool::Inflate(&tool))
+        }
+        Tool::Push(tool) => {
+            let mut tool = tool.clone();
+            (tool.along, tool.force) = (along, Numbers(vec![Finite(to.force)]));
+            apply(&Tool::Push(&tool))
         }
         Tool::Paint(tool) => {
             let mut tool = tool.clone();

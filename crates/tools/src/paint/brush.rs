@@ -33,10 +33,9 @@ impl Brush {
                 return Err(format!("{name} is {part}; it is at most 1"));
             }
         }
-        let places = self.along.iter().map(|p| Aabb::new(p.0, p.0));
-        let path = places.reduce(|a, b| Aabb::new(a.min.min(b.min), a.max.max(b.max)));
+        let path = Aabb::about(self.along.iter().map(|p| p.0));
         let path = path.ok_or("the brush has no place; write at least one under along")?;
-        Ok(Aabb::new(path.min - self.radius.0, path.max + self.radius.0))
+        Ok(path.widened(self.radius.0))
     }
 
     /// Part of the way to the value that it goes at a place, 0 to 1.

@@ -213,9 +213,7 @@ impl Warp {
     /// A box outside which nothing moves; infinite where a motion has no end.
     pub fn reach(&self) -> Aabb {
         let boxes = self.steps.iter().map(|step| step.zone.reach());
-        boxes
-            .reduce(|a, b| Aabb::new(a.min.min(b.min), a.max.max(b.max)))
-            .expect("a motion has a step")
+        boxes.reduce(Aabb::hull).expect("a motion has a step")
     }
 
     /// A box that holds `w⁻¹` of all of `b`; `b` itself where nothing moves.

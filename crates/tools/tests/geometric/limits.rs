@@ -14,7 +14,7 @@ use super::{ISO, block, canvas, done, random, refused, stroke};
 fn no_tool_changes_what_is_masked_out() {
     let field = block();
     let mut changes = 0;
-    for seed in 0..24 {
+    for seed in 0..27 {
         let mut draw = random(seed);
         let mut place = |from: f64, to: f64| [draw(8.0, 16.0), draw(8.0, 16.0), draw(from, to)];
         let (a, b, low) = (place(11.5, 12.5), place(11.5, 12.5), place(7.0, 9.0));
@@ -28,6 +28,7 @@ fn no_tool_changes_what_is_masked_out() {
             format!("add = {{ shape = {{ box = {{ size = [4.0, 3.0, 2.0] }} }}, along = [{a:?}] }}"),
             format!("move = {{ motion = {{ grab = {{ along = [{a:?}, {b:?}], radius = 4.0 }} }} }}"),
             format!("inflate = {{ along = [{a:?}, {b:?}], radius = 3.0, by = 0.6 }}"),
+            format!("push = {{ along = [{a:?}, {b:?}], radius = 3.0, speed = 0.2, steps = 2 }}"),
             format!("refine = {{ along = [{a:?}, {b:?}], radius = 1.5 }}"),
             "cut = { region = { min = [9, 9, 10], max = [15, 15, 13] } }".into(),
             format!("simplify = {{ along = [{a:?}, {b:?}], radius = 3.0, tolerance = 0.2 }}"),
@@ -52,7 +53,7 @@ fn no_tool_changes_what_is_masked_out() {
             changes += usize::from(count > 0);
         }
     }
-    assert!(changes > 40, "{changes} of 72 strokes changed something");
+    assert!(changes > 40, "{changes} of 81 strokes changed something");
 }
 
 /// Asserts that functions whose supports are not free kept their coefficients; gives the number of those that changed.

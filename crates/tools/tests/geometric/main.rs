@@ -5,6 +5,7 @@ mod interior;
 mod limits;
 mod moves;
 mod parts;
+mod push;
 mod sweeps;
 mod symmetry;
 

@@ -13,6 +13,7 @@ pub mod undo;
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use bspline::{Aabb, Field};
 use document::{CommandError, Document, DocumentError, Object, Options, State};
 use formats::Fault;
 use formats::field::FieldMeta;
@@ -20,6 +21,7 @@ use serde::Serialize;
 
 use super::failure::{Failure, Outcome};
 use super::input::limits;
+use super::output::Output;
 use super::quantity::{human_bytes, human_count};
 use super::summary::{self, hex, table};
 
@@ -111,6 +113,9 @@ struct Told {
     forgotten: u64,
     /// Bytes of the file.
     bytes: u64,
+    /// Of a preview: corners of the box, of its own world, in which the field of each object would change.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    changed: BTreeMap<String, [[f64; 3]; 2]>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     notes: Vec<String>,
 }
@@ -133,12 +138,38 @@ impl Told {
             undone: counts.undone,
             forgotten: counts.forgotten,
             bytes: document.size(),
+            changed: BTreeMap::new(),
             notes,
         })
     }
 
+    /// Tells of a state that is shown in place of the document's own.
+    fn show(&mut self, before: &State, shown: &State) {
+        let objects = shown.objects().iter();
+        self.field_sha256 = objects
+            .map(|(name, o)| (name.clone(), hex(&o.field.sha256())))
+            .collect();
+        self.state_sha256 = hex(&shown.sha256());
+        for (name, object) in shown.objects() {
+            let whole = object.field.world_box();
+            let boxes = before
+                .objects()
+                .get(name)
+                .map_or(vec![whole], |old| object.field.changed_boxes(&old.field));
+            if let Some(b) = boxes.into_iter().reduce(Aabb::hull) {
+                self.changed
+                    .insert(name.clone(), [b.min.to_array(), b.max.to_array()]);
+            }
+        }
+    }
+
     fn print(&self, json: bool) -> Outcome {
         summary::print(&self.text(json), false)
+    }
+
+    fn print_after(&self, output: &Output, json: bool) -> Outcome {
+        output.finish()?;
+        summary::print(&self.text(json), output.is_stdout())
     }
 
     fn text(&self, json: bool) -> String {
@@ -155,6 +186,9 @@ impl Told {
             .field_sha256
             .iter()
             .map(|(name, hash)| ("object", format!("{name}  {hash}")));
-        table(rows.into_iter().chain(objects), &self.notes)
+        let changed = self.changed.iter();
+        let changed =
+            changed.map(|(name, [min, max])| ("would change", format!("{name}  {min:?} to {max:?}")));
+        table(rows.into_iter().chain(objects).chain(changed), &self.notes)
     }
 }

@@ -2,14 +2,16 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use document::Command;
+use fitting::Control;
 
-use super::{Told, chosen, failure, open};
+use super::{Told, chosen, edited_meta, failure, open};
 use crate::cli::failure::{Failure, Outcome};
+use crate::cli::output::Output;
 use crate::cli::progress::Bar;
 use crate::cli::quantity::threads;
 use crate::cli::simulate;
 use crate::cli::source::Source;
-use crate::cli::{interrupt, set_threads};
+use crate::cli::{field, interrupt, set_threads};
 
 /// Arguments of `isoclay sculpt`.
 #[derive(clap::Args)]
@@ -22,6 +24,9 @@ pub struct Args {
     /// Object to work on, where there are several and the script names none
     #[arg(long, value_name = "NAME")]
     object: Option<String>,
+    /// Write what the script would leave of its object as a field (.iclay), and leave the document as it is
+    #[arg(long, value_name = "OUT")]
+    pub preview: Option<PathBuf>,
     /// Threads to work with [default: all cores]
     #[arg(long, value_name = "N", value_parser = threads)]
     threads: Option<NonZeroUsize>,
@@ -30,12 +35,15 @@ pub struct Args {
     pub json: bool,
 }
 
-/// Runs a script on a document: a scene is one edit, of a session every stroke.
+/// Runs a script on a document: a scene is one edit, of a session every stroke. A preview is no edit.
 pub fn run(args: &Args) -> Outcome {
     let cancel = interrupt::cancel();
     let script = Source::open(&args.script, Some("toml"), "scripts .toml", &cancel)?.under("--script");
     let text = simulate::text(&script)?;
     set_threads(args.threads)?;
+    let preview = args.preview.as_ref();
+    let preview = preview.map(|path| Output::check("--preview", path, &["iclay"], None, &[&script]));
+    let preview = preview.transpose()?;
     let mut notes = Vec::new();
     let mut document = open(&args.document, &mut notes)?;
     let file = args.script.file_name().unwrap_or_default().to_string_lossy();
@@ -47,19 +55,31 @@ pub fn run(args: &Args) -> Outcome {
     let commands = Command::of_script(&text, named).map_err(about)?;
     let bar = Bar::new();
     let mut control = bar.control(&cancel);
+    let mut shown = document.state().clone();
     for command in &commands {
         let title = format!("{} ({file})", command.title());
         let (next, told) = command
-            .apply(document.state(), &mut control)
+            .apply(&shown, &mut control)
             .map_err(|e| about(Failure::from(e).about(&title)))?;
         notes.extend(told.into_iter().map(|note| format!("{title}: {note}")));
-        if !document
-            .commit(&title, command.to_value(), next)
-            .map_err(failure)?
+        shown = next;
+        if preview.is_none()
+            && !document
+                .commit(&title, command.to_value(), shown.clone())
+                .map_err(failure)?
         {
             notes.push(format!("{title}: changes nothing; no edit was made"));
         }
     }
     bar.clear();
-    Told::of(&mut document, notes)?.print(args.json)
+    let mut told = Told::of(&mut document, notes)?;
+    if let (Some(output), Some(last)) = (&preview, commands.last()) {
+        let object = shown.object(last.object()).map_err(failure)?;
+        let (levels, note) = object.in_levels(last.object(), &mut Control::default())?;
+        field::save_as(output, &levels, &edited_meta(object))?;
+        told.notes.extend(note);
+        told.show(document.state(), &shown);
+        return told.print_after(output, args.json);
+    }
+    told.print(args.json)
 }

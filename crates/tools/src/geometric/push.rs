@@ -1,0 +1,352 @@
+//! A surface pushed in or drawn out by a brush, as fast as the force says \[Kim03 §6.2.1\].
+//!
+//! Each step makes an intermediate surface: what lies under the brush moves along its normal, and the next step begins on what that one
+//! left. The paper lets densities approach those of a ball at the tool's tip; here the way of a step is a length, speed times force.
+
+use bspline::{Aabb, Field, Frame, HierarchicalSpline, Interval, Jet, Real};
+use fitting::Control;
+use fitting::field::FieldFitReport;
+use glam::{DMat3, DVec3};
+use serde::{Deserialize, Serialize};
+
+use super::GeometricError;
+use super::band::FULL;
+use super::write::{Fineness, TOLERANCE, Writer};
+use crate::fade::fade;
+use crate::force::{Path, nearest_surface};
+use crate::limits::Limits;
+use crate::number::{Numbers, Point, Positive};
+
+/// Radii in which a place has to have the surface.
+const NEAR: f64 = 2.0;
+
+/// Radii between places at which the brush acts on its way through a step.
+const APART: f64 = 0.25;
+
+/// Share of a step that may be lost: functions that change by less are left out.
+const LOST: f64 = 0.0025;
+
+/// Knot intervals of the object's detail that a step moves the surface by at least, or it does nothing: single precision has no more.
+const LEAST: f64 = 1e-4;
+
+/// Most steps of a stroke, and most places of a step.
+const MOST: u32 = 10_000;
+
+/// Moves a surface along its normal, step by step.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Push {
+    /// The brush's way; each place is drawn to the surface as it is then.
+    pub along: Vec<Point>,
+    /// It acts whole within half of this, and not at all beyond.
+    pub radius: Positive,
+    /// Length that a force of 1 moves the surface by in one step.
+    pub speed: Positive,
+    /// How hard it is pushed, into the solid, or out of it if negative; 1 if missing. By hand one for all steps, or one a step.
+    #[serde(default, skip_serializing_if = "Numbers::is_empty")]
+    pub force: Numbers,
+    /// Steps of equal length that the way takes; one if missing. By hand each place is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub steps: Option<u32>,
+    /// As for [`Geometric`](super::Geometric); a 400th of the way of a step at most.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tolerance: Option<Positive>,
+    /// Levels finer than the object's detail that may be added; as many as show the brush if missing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub finer: Option<u8>,
+}
+
+impl Push {
+    /// What the last step leaves of a field whose surface lies at `iso`, and how close it is to the surface moved.
+    ///
+    /// # Errors
+    /// Any [`GeometricError`].
+    pub fn apply<T: Real>(
+        &self,
+        field: &HierarchicalSpline<T>,
+        iso: f64,
+        limits: &Limits,
+        control: &mut Control,
+    ) -> Result<(HierarchicalSpline<T>, FieldFitReport), GeometricError> {
+        let count = self.steps.unwrap_or(1);
+        if !(1..=MOST).contains(&count) {
+            return wrong(format!("steps is {count}; write 1 to {MOST}"));
+        }
+        let force = match self.force.0[..] {
+            [] => 1.0,
+            [one] => one.0,
+            _ => {
+                return wrong(
+                    "a force for each place is that of a hand; write one force, or paced = true".into(),
+                );
+            }
+        };
+        let by = -force * self.speed.0;
+        if by.abs() > FULL * self.radius.0 {
+            return wrong(format!(
+                "a force of {force} moves the surface by {} in a step, more than half the radius {}; push less hard, or in more steps",
+                by.abs(),
+                self.radius.0
+            ));
+        }
+        let mut way = Way::through(&self.along)?;
+        let mut left = (field.clone(), FieldFitReport::default());
+        for step in 0..count {
+            control.step("pushing", f64::from(step) / f64::from(count))?;
+            let writer = Writer {
+                field: &left.0,
+                iso,
+                limits,
+            };
+            if by.abs() < LEAST * writer.spacing() {
+                break;
+            }
+            let part = [step, step + 1].map(|n| f64::from(n) / f64::from(count));
+            let (places, drawn) = self.drawn(&writer, &way.part(part, APART * self.radius.0)?)?;
+            if let Way::Place(at) = &mut way {
+                // It stays on the surface that it moves.
+                let (_, slope) = left.0.value_gradient(drawn[0]);
+                *at = drawn[0] - by * slope.normalize_or_zero();
+            }
+            let cover = Cover {
+                share: 1.0 / places as f64,
+                places: drawn,
+                radius: self.radius.0,
+            };
+            left = self.stepped(&writer, cover, by, control)?;
+        }
+        Ok(left)
+    }
+
+    /// The number of places, and those of them that have a surface, there.
+    fn drawn<T: Real>(
+        &self,
+        writer: &Writer<T>,
+        places: &[DVec3],
+    ) -> Result<(usize, Vec<DVec3>), GeometricError> {
+        writer.within(&self.about(places))?;
+        let reach = NEAR * self.radius.0;
+        let drawn = places
+            .iter()
+            .map(|p| nearest_surface(writer.field, writer.iso, *p, reach));
+        // Where the brush goes over an edge the rest of it acts.
+        let drawn: Vec<DVec3> = drawn.filter_map(Result::ok).collect();
+        match drawn.is_empty() {
+            true => Err(GeometricError::Nowhere {
+                at: places[0].to_array(),
+                reach,
+            }),
+            false => Ok((places.len(), drawn)),
+        }
+    }
+
+    fn about(&self, places: &[DVec3]) -> Aabb {
+        let about = Aabb::about(places.iter().copied());
+        about.expect("a place").widened(self.radius.0)
+    }
+
+    /// One intermediate surface.
+    fn stepped<T: Real>(
+        &self,
+        writer: &Writer<T>,
+        cover: Cover,
+        by: f64,
+        control: &mut Control,
+    ) -> Result<(HierarchicalSpline<T>, FieldFitReport), GeometricError> {
+        let within = writer.within(&self.about(&cover.places))?;
+        let moved = Moved {
+            field: writer.field,
+            by,
+            flat: 1e-6 * writer.field.slope(),
+            cover,
+        };
+        let tolerance = self.tolerance.map_or(TOLERANCE * writer.spacing(), |t| t.0);
+        let fineness = writer.shown(&Fineness {
+            tolerance: Some(Positive(tolerance.min(LOST * by.abs()))),
+            finer: self.finer,
+            feature: Some(FULL * self.radius.0),
+        });
+        writer.written(&moved, &within, &fineness, control)
+    }
+}
+
+fn wrong<R>(why: String) -> Result<R, GeometricError> {
+    Err(GeometricError::Shape(why))
+}
+
+/// Where a brush goes.
+enum Way {
+    /// Nowhere.
+    Place(DVec3),
+    Path(Path),
+}
+
+impl Way {
+    fn through(along: &[Point]) -> Result<Self, GeometricError> {
+        let places = along.iter().map(|p| p.0);
+        let Some(first) = places.clone().next() else {
+            return wrong("along has no place; write at least one point".into());
+        };
+        Ok(match Path::through(places) {
+            Ok(path) => Self::Path(path),
+            // Points of a script are finite, so they are all one.
+            Err(_) => Self::Place(first),
+        })
+    }
+
+    /// Middles of equal pieces of a part of it, told by shares of its length.
+    fn part(&self, [from, to]: [f64; 2], apart: f64) -> Result<Vec<DVec3>, GeometricError> {
+        let path = match self {
+            Self::Place(at) => return Ok(vec![*at]),
+            Self::Path(path) => path,
+        };
+        let count = ((to - from) * path.length() / apart).ceil().max(1.0);
+        if count > f64::from(MOST) {
+            return wrong(format!(
+                "a step would go over {count} places; take a wider brush, or go a shorter way"
+            ));
+        }
+        let share = |n: u32| from + (to - from) * (f64::from(n) + 0.5) / count;
+        Ok((0..count as u32)
+            .map(|n| path.at(share(n) * path.length()))
+            .collect())
+    }
+}
+
+/// Share of a step's time, and of its strength, in which a brush acts on a place: 0 to 1.
+struct Cover {
+    places: Vec<DVec3>,
+    /// Of the time, at each of them.
+    share: f64,
+    radius: f64,
+}
+
+impl Cover {
+    fn at(&self, p: DVec3) -> f64 {
+        let weight = |place: &DVec3| {
+            let beyond = p.distance(*place) / self.radius - FULL;
+            fade(beyond / (1.0 - FULL))[0]
+        };
+        self.share * self.places.iter().map(weight).sum::<f64>()
+    }
+
+    fn reaches(&self, b: &Aabb) -> bool {
+        let radius = self.radius * self.radius;
+        let near = |place: &DVec3| place.distance_squared(place.clamp(b.min, b.max)) < radius;
+        self.places.iter().any(near)
+    }
+}
+
+/// `f(x + h·w·∇f/|∇f|)`: every place takes the value that lies `h·w` deeper. The surface moves out by `h·w` along its normal, on
+/// densities that are no distances too.
+struct Moved<'a> {
+    field: &'a dyn Field,
+    /// `h`.
+    by: f64,
+    /// Slope below which there is no direction.
+    flat: f64,
+    /// `w`.
+    cover: Cover,
+}
+
+impl Field for Moved<'_> {
+    fn value(&self, p: DVec3) -> f64 {
+        let weight = self.cover.at(p);
+        if weight == 0.0 {
+            return self.field.value(p);
+        }
+        let (_, slope) = self.field.value_gradient(p);
+        let length = slope.length().max(self.flat);
+        self.field.value(p + self.by * weight / length * slope)
+    }
+
+    /// By central differences.
+    fn value_gradient(&self, p: DVec3) -> (f64, DVec3) {
+        let step = 1e-4 * self.cover.radius;
+        let slope = DVec3::AXES.map(|a| (self.value(p + step * a) - self.value(p - step * a)) / (2.0 * step));
+        (self.value(p), DVec3::from_array(slope))
+    }
+
+    fn jet(&self, p: DVec3) -> Jet {
+        let (value, gradient) = self.value_gradient(p);
+        Jet {
+            value,
+            gradient,
+            hessian: DMat3::ZERO,
+        }
+    }
+
+    fn bounds(&self, b: &Aabb) -> Interval {
+        match self.cover.reaches(b) {
+            true => {
+                let reach = self.by.abs() * (1.0 + 1e-12);
+                self.field.bounds(&Aabb::new(b.min - reach, b.max + reach))
+            }
+            false => self.field.bounds(b),
+        }
+    }
+
+    fn frame_values(&self, frame: &Frame, lo: [i64; 3], count: [usize; 3], out: &mut [f64]) {
+        if count.contains(&0) {
+            return;
+        }
+        let last = std::array::from_fn(|a| lo[a] + count[a] as i64 - 1);
+        if !self.cover.reaches(&frame.world_box(lo, last)) {
+            return self.field.frame_values(frame, lo, count, out);
+        }
+        for (n, value) in out.iter_mut().enumerate() {
+            let at = [n / count[2] / count[1], n / count[2] % count[1], n % count[2]];
+            *value = self.value(frame.node(std::array::from_fn(|a| lo[a] + at[a] as i64)));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::number::Finite;
+
+    /// However the time of a way is cut into steps, a brush acts as long on every place of it.
+    #[test]
+    fn steps_share_the_time_of_a_way() {
+        let along = [[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [3.0, 4.0, 0.0]].map(|p| Point(p.into()));
+        let way = Way::through(&along).unwrap();
+        let radius = 1.0;
+        let acted = |count: u32, p: DVec3| -> f64 {
+            let steps = (0..count).map(|n| {
+                let part = [n, n + 1].map(|n| f64::from(n) / f64::from(count));
+                let places = way.part(part, APART * radius).unwrap();
+                let share = 1.0 / places.len() as f64;
+                let cover = Cover {
+                    places,
+                    share,
+                    radius,
+                };
+                cover.at(p) / f64::from(count)
+            });
+            steps.sum()
+        };
+        for p in [[1.5, 0.0, 0.0], [1.5, 0.6, 0.0], [3.0, 2.0, 0.3]].map(DVec3::from) {
+            let all = acted(1, p);
+            for count in [2, 7, 50] {
+                assert!((acted(count, p) - all).abs() < 0.005 * all, "{count} {p}");
+            }
+        }
+        // Full over one radius, fading over half a radius before and behind, of a way of seven.
+        let middle = acted(1, DVec3::new(1.5, 0.0, 0.0));
+        assert!((middle - 1.5 / 7.0).abs() < 0.005 * middle, "{middle}");
+        assert_eq!(acted(3, DVec3::new(1.5, 1.0, 0.0)), 0.0);
+    }
+
+    #[test]
+    fn forces_are_one_number_or_many() {
+        let text = "along = [[0, 0, 0]]\nradius = 1\nspeed = 0.1\n";
+        let read = |force: &str| toml::from_str::<Push>(&format!("{text}{force}"));
+        assert_eq!(read("").unwrap().force, Numbers::default());
+        assert_eq!(read("force = -2").unwrap().force, Numbers(vec![Finite(-2.0)]));
+        assert_eq!(read("force = [1, 2.5]").unwrap().force.0.len(), 2);
+        for bad in ["force = nan", "force = 'hard'", "force = [[1]]"] {
+            assert!(read(bad).unwrap_err().to_string().contains("line 4"), "{bad}");
+        }
+    }
+}
