@@ -13,7 +13,7 @@ pub mod undo;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use bspline::{Aabb, Field};
+use bspline::Aabb;
 use document::{CommandError, Document, DocumentError, Object, Options, State};
 use formats::Fault;
 use formats::field::FieldMeta;
