@@ -287,9 +287,10 @@ fn a_block_on_knots_of_its_own_is_kept_asked_and_shaped() {
     let volume = number(&mesh["quality"], "volume");
     // 240, less what the rounding of the edges takes: 0.75 mm.
     assert!((volume - 231.0).abs() < 2.0, "{mesh}");
-    bench.json("picture block.isoclay -o block.png --size 64");
+    bench.json("picture block.isoclay -o block.png --size 64x64");
     bench.write("at.xyz", "0 0 1.5\n0 0 2.5\n");
-    bench.json("eval block.isoclay --points at.xyz -o values.csv");
+    let run = bench.run("eval block.isoclay --points at.xyz");
+    assert_eq!(run.code, 0, "{}", run.stderr);
     let script = |name: &str, text: &str| bench.write(name, text);
     script(
         "finer.toml",
