@@ -25,6 +25,8 @@ pub mod place;
 mod room;
 pub mod scene;
 pub mod session;
+#[cfg(feature = "study")]
+pub mod study;
 pub mod symmetry;
 pub mod tool;
 pub mod warp;

@@ -6,16 +6,10 @@ mod loops;
 mod strokes;
 mod table2;
 
-use ::tools::force::ForceError;
-use ::tools::paint::PaintError;
-use bspline::HierarchicalSpline;
-use bspline::hierarchical::EditError;
-use bspline::polygonize::PolygonizeError;
-use dynamics::lattice::LatticeError;
-use dynamics::patch::PatchError;
-use dynamics::region::RegionError;
+use ::tools::study::StudyError;
 use serde::Serialize;
 
+pub use ::tools::study::Sculpture;
 pub use integrals::Quadrature;
 
 /// A tool at work, or a part of one, and what it did.
@@ -79,43 +73,21 @@ enum Place {
 /// Why there is no chart.
 #[derive(Debug, thiserror::Error)]
 pub enum ToolsError {
-    /// A force tool.
+    /// A stroke, or its loop.
     #[error(transparent)]
-    Force(#[from] ForceError),
-    /// A region.
-    #[error(transparent)]
-    Region(#[from] RegionError),
-    /// A step.
-    #[error(transparent)]
-    Step(#[from] PatchError),
-    /// Samples of a patch.
-    #[error(transparent)]
-    Lattice(#[from] LatticeError),
-    /// A mesh.
-    #[error(transparent)]
-    Mesh(#[from] PolygonizeError),
-    /// Paint.
-    #[error(transparent)]
-    Paint(#[from] PaintError),
-    /// A field.
-    #[error(transparent)]
-    Field(#[from] EditError),
-    /// Nothing to take hold of.
-    #[error("{0}: no surface about the middle of its box; name another field")]
-    NoSurface(String),
+    Study(StudyError),
     /// The user said stop.
     #[error("cancelled")]
     Cancelled,
 }
 
-/// A fitted field to work on.
-pub struct Sculpture {
-    /// Its name.
-    pub name: String,
-    /// The field.
-    pub field: HierarchicalSpline<f32>,
-    /// Density of its surface.
-    pub iso: f64,
+impl<E> From<E> for ToolsError
+where
+    StudyError: From<E>,
+{
+    fn from(error: E) -> Self {
+        Self::Study(error.into())
+    }
 }
 
 /// What a sweep runs with.
