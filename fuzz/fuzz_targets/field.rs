@@ -1,5 +1,5 @@
 #![no_main]
-//! Any chunks: an error, a field or a difference of fields, within the ceiling.
+//! Any chunks: an error, a field, a spline on knots of its own, or a difference of either, within the ceiling.
 //!
 //! Checksums are set right first: behind wrong ones the fuzzer would never get.
 
@@ -26,6 +26,8 @@ fn checked(bytes: &[u8], mut at: usize) -> Vec<u8> {
 fuzz_target!(|bytes: &[u8]| {
     let limits = ReadLimits { max_bytes: 1 << 24 };
     let _ = field::decode(&checked(bytes, 12), &limits);
+    let _ = field::decode_knots::<f32>(&checked(bytes, 12), &limits);
+    let _ = field::decode_knots_difference::<f32>(&checked(bytes, 8), &limits);
     let lattice = Lattice {
         world_from_lattice: Default::default(),
         cells: [40, 30, 20],

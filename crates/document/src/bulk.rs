@@ -1,9 +1,9 @@
 use std::path::Path;
 
 use formats::ReadLimits;
-use formats::field::decode;
 
-use crate::error::{damaged, fault};
+use crate::body;
+use crate::error::damaged;
 use crate::{DocumentError, Object, Properties};
 
 /// The second part of a record, read from its start in pieces that the first part tells the lengths of.
@@ -27,9 +27,8 @@ impl<'a> Bulk<'a> {
 
     /// The object whose field takes so many bytes, without its layers.
     pub fn object(&mut self, count: u64, properties: &Properties) -> Result<Object, DocumentError> {
-        let loaded = decode(self.take(count)?, self.limits).map_err(|f| fault(self.path, f))?;
-        let object =
-            Object::new(&loaded.field, loaded.meta).map_err(|e| damaged(self.path, e.to_string()))?;
+        let path = self.path;
+        let object = body::decode(self.take(count)?, path, self.limits)?;
         Ok(Object {
             properties: properties.clone(),
             ..object

@@ -1,14 +1,14 @@
 //! Objects as tools see them, and what tools leave of them.
 
 use glam::DAffine3;
-use tools::canvas::Canvas;
-use tools::canvas::Placement;
+use tools::body::Body;
+use tools::canvas::{Canvas, Placement};
 use tools::others::Others;
 
 use crate::{CommandError, Object, State};
 
 /// An object as a tool sees it, with all others beside it.
-pub fn canvas(state: &State, name: &str) -> Result<Canvas, CommandError> {
+pub fn canvas(state: &State, name: &str) -> Result<Canvas<Body>, CommandError> {
     let object = state.object(name)?;
     let iso = object.meta.iso;
     Ok(Canvas {
@@ -25,7 +25,7 @@ pub fn canvas(state: &State, name: &str) -> Result<Canvas, CommandError> {
 }
 
 /// The state with what a tool left of an object, and with the copies that it made of it.
-pub fn left(state: &State, name: &str, canvas: Canvas) -> Result<State, CommandError> {
+pub fn left(state: &State, name: &str, canvas: Canvas<Body>) -> Result<State, CommandError> {
     let object = state.object(name)?;
     let mut next = state.clone();
     for copy in canvas.copies {

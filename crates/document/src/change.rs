@@ -4,10 +4,11 @@ use std::path::Path;
 use std::sync::Arc;
 
 use bspline::hierarchical::BrickDiff;
-use formats::field::{decode_difference, encode, encode_difference};
 use serde::{Deserialize, Serialize};
+use tools::body::BodyDiff;
 use tools::paint::{Layer, Substance};
 
+use crate::body;
 use crate::bulk::Bulk;
 use crate::error::{damaged, fault};
 use crate::layers::{self, LayerHead};
@@ -30,12 +31,12 @@ pub enum Change {
         /// All of it.
         old: Object,
     },
-    /// Changes bricks of its field.
+    /// Changes its field.
     Field {
         /// Its name.
         object: String,
-        /// The bricks.
-        diff: BrickDiff<f32>,
+        /// The bricks, or the coefficients on knots of its own.
+        diff: BodyDiff,
     },
     /// Changes bricks of what is painted on it.
     Layer {
@@ -107,9 +108,9 @@ impl Change {
                 changes.push(removed(object));
                 continue;
             };
-            // Fields on other lattices, or with another origin, have no bricks in common.
+            // Fields on other lattices or knots, or with another origin, have nothing in common.
             let is_same = Arc::ptr_eq(&before.meta, &after.meta) || before.meta == after.meta;
-            let Some(diff) = before.field.difference(&after.field).ok().filter(|_| is_same) else {
+            let Some(diff) = before.field.difference(&after.field).filter(|_| is_same) else {
                 changes.push(removed(object.clone()));
                 later.push(Self::Added {
                     object,
@@ -117,7 +118,7 @@ impl Change {
                 });
                 continue;
             };
-            if !diff.bricks.is_empty() {
+            if !diff.is_empty() {
                 later.push(Self::Field {
                     object: object.clone(),
                     diff,
@@ -187,7 +188,7 @@ impl Change {
             } => {
                 let mut changed = state.object(object).map_err(|e| e.to_string())?.clone();
                 let old = changed.layers.remove(layer).filter(|old| old.level() == *level);
-                let old = old.unwrap_or_else(|| Layer::empty(changed.field.lattice(), *level));
+                let old = old.unwrap_or_else(|| Layer::empty(&changed.field.lattice(), *level));
                 let new = layers::followed(&old, diff)?;
                 if !new.is_empty() {
                     changed.layers.insert(*layer, new);
@@ -211,23 +212,23 @@ impl Change {
             Ok::<_, DocumentError>(part.len() as u64)
         };
         let painted =
-            |of: &Object, bytes: &mut Vec<u8>| layers::write(&of.layers, of.field.lattice(), path, bytes);
+            |of: &Object, bytes: &mut Vec<u8>| layers::write(&of.layers, &of.field.lattice(), path, bytes);
         Ok(match self {
             Self::Added { object, new } => ChangeHead::Added {
                 object: object.clone(),
                 properties: new.properties.clone(),
-                bytes: put(encode(&new.field, &new.meta), bytes)?,
+                bytes: put(body::encode(&new.field, &new.meta), bytes)?,
                 layers: painted(new, bytes)?,
             },
             Self::Removed { object, old } => ChangeHead::Removed {
                 object: object.clone(),
                 properties: old.properties.clone(),
-                bytes: put(encode(&old.field, &old.meta), bytes)?,
+                bytes: put(body::encode(&old.field, &old.meta), bytes)?,
                 layers: painted(old, bytes)?,
             },
             Self::Field { object, diff } => ChangeHead::Field {
                 object: object.clone(),
-                bytes: put(encode_difference(diff), bytes)?,
+                bytes: put(body::encode_difference(diff), bytes)?,
             },
             Self::Layer {
                 object,
@@ -271,7 +272,7 @@ impl Change {
                 let known = beside
                     .object(object)
                     .map_err(|e| damaged(bulk.path, e.to_string()))?;
-                let diff = decode_difference(bulk.take(*bytes)?, known.field.lattice(), bulk.limits)
+                let diff = body::decode_difference(bulk.take(*bytes)?, &known.field, bulk.limits)
                     .map_err(|f| fault(bulk.path, f))?;
                 Self::Field {
                     object: object.clone(),
@@ -286,7 +287,7 @@ impl Change {
                     object: object.clone(),
                     layer: of.layer,
                     level: of.level,
-                    diff: layers::read_difference(of, bulk, known.field.lattice())?,
+                    diff: layers::read_difference(of, bulk, &known.field.lattice())?,
                 }
             }
             ChangeHead::Properties { object, old, new } => Self::Properties {
@@ -300,7 +301,7 @@ impl Change {
 
 /// What leads from the layers of one version of an object to those of another, in the order of substances.
 fn layers_between(object: &str, before: &Object, after: &Object, changes: &mut Vec<Change>) {
-    let lattice = before.field.lattice();
+    let lattice = &before.field.lattice();
     let mut add = |substance: Substance, old: &Layer, new: &Layer| {
         let diff = old
             .tree()

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use bspline::HierarchicalSpline;
 use fitting::{Control, FitError};
 use serde::{Deserialize, Serialize};
+use tools::body::Body;
 use tools::paint::Layers;
 use tools::scene::{Scene, SimulateError, Simulation};
 use tools::session::{Session, Stroke};
@@ -153,12 +154,13 @@ impl Command {
                 let mut object = state.object(name)?.clone();
                 let scene: Scene = parsed(script)?;
                 let iso = scene.iso.map(|i| i.0).or(object.meta.iso);
-                let notes;
-                (object.field, notes) = played(&scene, object.field, iso, &object.layers, control)?;
-                Ok((state.with(name, object)?, notes))
+                let (field, told) = object.in_levels(name, control)?;
+                let (field, notes) = played(&scene, field, iso, &object.layers, control)?;
+                object.field = Body::Levels(field);
+                Ok((state.with(name, object)?, told.into_iter().chain(notes).collect()))
             }
             Self::Stroke { stroke, .. } => {
-                let (canvas, notes) = stroke.apply(canvas(state, name)?, control)?;
+                let (canvas, notes) = stroke.applied(canvas(state, name)?, control)?;
                 Ok((left(state, name, canvas)?, notes))
             }
         }

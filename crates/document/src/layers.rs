@@ -53,7 +53,7 @@ pub(crate) fn write_difference(
 
 /// Reads the layers of an object that was read before.
 pub(crate) fn read(object: Object, heads: &[LayerHead], bulk: &mut Bulk) -> Result<Object, DocumentError> {
-    let lattice = object.field.lattice();
+    let lattice = &object.field.lattice();
     let layers = heads.iter().map(|head| {
         let difference = read_difference(head, bulk, lattice)?;
         let empty = Layer::empty(lattice, head.level);

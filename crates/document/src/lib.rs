@@ -10,6 +10,7 @@
 //! A [`Live`] stroke is made step by step, by a hand, and becomes a command at its end. A [`Preview`] shows what a command
 //! would leave before it is made.
 
+mod body;
 mod bulk;
 mod canvas;
 mod change;

@@ -18,10 +18,12 @@ pub struct Live {
     object: String,
     before: State,
     stroke: LiveStroke,
+    /// What was done to the object before, if anything.
+    told: Option<String>,
 }
 
 impl Live {
-    /// Begins a stroke on an object, see [`LiveStroke::begin`]. What the stroke says of an object does not count.
+    /// Begins a stroke on an object, see [`LiveStroke::begin`]; a field on knots of its own is written in levels for it. What the stroke says of an object does not count.
     ///
     /// # Errors
     /// Any [`CommandError`].
@@ -30,10 +32,12 @@ impl Live {
             object: None,
             ..stroke
         };
+        let (canvas, told) = canvas(state, object)?.in_levels(&mut Control::default())?;
         Ok(Self {
             object: object.into(),
             before: state.clone(),
-            stroke: LiveStroke::begin(stroke, canvas(state, object)?)?,
+            stroke: LiveStroke::begin(stroke, canvas)?,
+            told,
         })
     }
 
@@ -59,7 +63,7 @@ impl Live {
     /// [`CommandError`].
     pub fn look(&mut self) -> Result<(State, Vec<Aabb>), CommandError> {
         let (canvas, boxes) = self.stroke.look()?;
-        Ok((left(&self.before, &self.object, canvas)?, boxes))
+        Ok((left(&self.before, &self.object, canvas.into())?, boxes))
     }
 
     /// Lets the tool go, does what it has still to do, and makes it an edit of the document: whether anything changed, and
@@ -77,12 +81,12 @@ impl Live {
             return Err(CommandError::Changed(self.object));
         }
         let (canvas, stroke, notes) = self.stroke.end(control)?;
-        let next = left(&self.before, &self.object, canvas)?;
+        let next = left(&self.before, &self.object, canvas.into())?;
         let command = Command::Stroke {
             object: self.object,
             stroke: Box::new(stroke),
         };
         let is_changed = document.commit(&command.title(), command.to_value(), next)?;
-        Ok((is_changed, notes))
+        Ok((is_changed, self.told.into_iter().chain(notes).collect()))
     }
 }

@@ -2,19 +2,25 @@ use std::sync::Arc;
 
 use bspline::hierarchical::EditError;
 use bspline::{AnyField, HierarchicalSpline};
+use fitting::Control;
 use formats::field::FieldMeta;
 use glam::{DAffine3, DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
+use tools::body::Body;
 use tools::hold::Held;
+use tools::knots;
 use tools::material::Material;
 use tools::paint::Layers;
+use tools::tool::ToolError;
+
+use crate::CommandError;
 
 /// A solid of a document. Cheap to copy.
 #[derive(Clone, Debug)]
 pub struct Object {
     /// The field whose surface it has.
-    pub field: HierarchicalSpline<f32>,
+    pub field: Body,
     /// What came with the field: unit, iso value, report of the fit.
     pub meta: Arc<FieldMeta>,
     /// What is painted on it; layers on which nothing is painted are missing.
@@ -88,9 +94,13 @@ impl Object {
     /// # Errors
     /// [`EditError::NotFinite`] for a coefficient beyond single precision.
     pub fn new(field: &AnyField, meta: FieldMeta) -> Result<Self, EditError> {
-        let field = field.to_single()?;
+        Ok(Self::of(Body::Levels(field.to_single()?), meta))
+    }
+
+    /// An object where its field is, whatever that is made of.
+    pub fn of(field: Body, meta: FieldMeta) -> Self {
         let detail = Some(field.level_count() - 1);
-        Ok(Self {
+        Self {
             field,
             meta: Arc::new(meta),
             layers: Layers::new(),
@@ -98,12 +108,12 @@ impl Object {
                 detail,
                 ..Properties::default()
             },
-        })
+        }
     }
 
     /// The object with another version of its field, perhaps in a box that has grown, and with what is painted on that.
-    pub(crate) fn with_shape(mut self, field: HierarchicalSpline<f32>, layers: Layers) -> Self {
-        let growth = self.field.lattice().growth_to(field.lattice());
+    pub(crate) fn with_shape(mut self, field: Body, layers: Layers) -> Self {
+        let growth = self.field.lattice().growth_to(&field.lattice());
         if let Some([before, _]) = growth.filter(|[before, _]| *before != [0; 3]) {
             // Leaves are counted from the corner of the box.
             let meta = Arc::make_mut(&mut self.meta);
@@ -120,13 +130,36 @@ impl Object {
 
     /// The object in the larger box of a later version of it; as it is where that has no such box.
     pub fn in_box_of(&self, later: &Self) -> Self {
-        let growth = self.field.lattice().growth_to(later.field.lattice());
-        let grown = growth.and_then(|[before, behind]| self.field.grown(before, behind).ok());
+        let growth = self.field.lattice().growth_to(&later.field.lattice());
+        let levels = growth.zip(self.field.levels());
+        let grown = levels.and_then(|([before, behind], field)| field.grown(before, behind).ok());
         match grown {
-            Some(field) if field.lattice() != self.field.lattice() => {
-                self.clone().with_shape(field, self.layers.clone())
+            Some(field) if *field.lattice() != self.field.lattice() => {
+                self.clone().with_shape(Body::Levels(field), self.layers.clone())
             }
             _ => self.clone(),
+        }
+    }
+
+    /// Its field in levels, and a sentence where it was not; `name` is for the message.
+    ///
+    /// # Errors
+    /// [`CommandError::NoSurface`], and what keeps it from being written so.
+    pub fn in_levels(
+        &self,
+        name: &str,
+        control: &mut Control,
+    ) -> Result<(HierarchicalSpline<f32>, Option<String>), CommandError> {
+        match &self.field {
+            Body::Levels(field) => Ok((field.clone(), None)),
+            Body::Knots(field) => {
+                let iso = self
+                    .meta
+                    .iso
+                    .ok_or_else(|| CommandError::NoSurface(name.into()))?;
+                let (field, told) = knots::in_levels(field, iso, control).map_err(ToolError::from)?;
+                Ok((field, Some(told)))
+            }
         }
     }
 

@@ -1,6 +1,6 @@
 //! Edits that are shown before they are made: block sculpting \[Kim03 §6.2.2\].
 
-use bspline::{Aabb, Field};
+use bspline::Aabb;
 use fitting::Control;
 use tools::live::Pose;
 
@@ -66,8 +66,7 @@ impl Preview {
     pub fn changed(&self) -> Result<Vec<Aabb>, CommandError> {
         let [before, after] = [&self.before, &self.after].map(|state| state.object(self.command.object()));
         let (before, after) = (&before?.field, &after?.field);
-        let whole = after.lattice().world_box();
-        Ok(after.changed_boxes(before, &whole))
+        Ok(after.changed_boxes(before))
     }
 
     /// Makes it an edit of the document: whether anything changed.

@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use formats::ReadLimits;
-use formats::field::encode;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
+use crate::body;
 use crate::bulk::Bulk;
 use crate::entry::{EditHead, ObjectHead, SnapshotHead, hex};
 use crate::error::{damaged, fault};
@@ -19,10 +19,10 @@ pub(crate) fn snapshot(path: &Path, state: &State, forgotten: u64) -> Result<Par
     let mut bulk = Vec::new();
     let mut objects = Vec::new();
     for (name, object) in state.objects() {
-        let bytes = encode(&object.field, &object.meta).map_err(|f| fault(path, f))?;
+        let bytes = body::encode(&object.field, &object.meta).map_err(|f| fault(path, f))?;
         let count = bytes.len() as u64;
         bulk.extend(bytes);
-        let layers = layers::write(&object.layers, object.field.lattice(), path, &mut bulk)?;
+        let layers = layers::write(&object.layers, &object.field.lattice(), path, &mut bulk)?;
         objects.push(ObjectHead::new(name, object, count, layers));
     }
     let sha256 = hex(state.sha256());

@@ -12,9 +12,9 @@ use crate::paint::Layers;
 
 /// What a tool works on. Cheap to copy.
 #[derive(Clone, Debug)]
-pub struct Canvas {
+pub struct Canvas<F = HierarchicalSpline<f32>> {
     /// The field.
-    pub field: HierarchicalSpline<f32>,
+    pub field: F,
     /// Density of its surface.
     pub iso: f64,
     /// Level of the field that the object is shaped to.
@@ -63,6 +63,34 @@ impl Canvas {
                 .map(|held| held.carried(|p| map.transform_point3(p)))
                 .collect(),
             ..self.clone()
+        }
+    }
+}
+
+impl<F> Canvas<F> {
+    /// The canvas with another field.
+    pub fn with_field<G>(self, field: G) -> Canvas<G> {
+        let Self {
+            iso,
+            detail,
+            layers,
+            holds,
+            placement,
+            material,
+            others,
+            copies,
+            ..
+        } = self;
+        Canvas {
+            field,
+            iso,
+            detail,
+            layers,
+            holds,
+            placement,
+            material,
+            others,
+            copies,
         }
     }
 

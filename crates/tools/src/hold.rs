@@ -1,11 +1,11 @@
 //! Constraints of an object: points and curves that later force tools keep on the surface.
 
-use bspline::{Field, HierarchicalSpline, Real};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use crate::curve::Along;
 use crate::force::{Path, nearest_surface};
+use crate::malleable::Malleable;
 use crate::number::{Finite, Point, Positive};
 
 /// Finest knot intervals that a surface may lie beside a place that is held where it is.
@@ -70,11 +70,11 @@ impl Hold {
     ///
     /// # Errors
     /// A sentence.
-    pub fn on<T: Real>(&self, field: &HierarchicalSpline<T>, iso: f64) -> Result<Held, String> {
+    pub fn on<F: Malleable>(&self, field: &F, iso: f64) -> Result<Held, String> {
         if self.name.trim().is_empty() {
             return Err("a hold needs a name; free takes it off by that".into());
         }
-        let whole = field.lattice().world_box();
+        let whole = field.whole();
         let lines = match (&self.points, &self.along, &self.sketch) {
             (Some(points), None, None) => points.iter().map(|p| vec![p.0]).collect(),
             (None, Some(along), None) => along.lines(&whole)?,
@@ -102,8 +102,8 @@ impl Hold {
             if self.depth.is_some() {
                 return Err("depth asks for a spring; without one the density stays as it is".into());
             }
-            let far = |p: &DVec3| (field.value(*p) - iso).abs() / field.slope();
-            let near = NEAR * finest(field);
+            let far = |p: &DVec3| (field.value(*p) - iso).abs() / field.steepness();
+            let near = NEAR * field.shortest();
             if let Some((p, far)) = places().map(|p| (p, far(p))).find(|(_, far)| *far > near) {
                 return Err(format!(
                     "hold {:?} would keep the surface where it is, and at {:?} it is about {far:.3} away; give a spring, which draws \
@@ -126,12 +126,7 @@ impl Hold {
     ///
     /// # Errors
     /// A sentence.
-    pub fn joined<T: Real>(
-        &self,
-        field: &HierarchicalSpline<T>,
-        iso: f64,
-        holds: &[Held],
-    ) -> Result<Vec<Held>, String> {
+    pub fn joined<F: Malleable>(&self, field: &F, iso: f64, holds: &[Held]) -> Result<Vec<Held>, String> {
         if holds.iter().any(|h| h.name == self.name) {
             return Err(format!(
                 "there is a hold {:?} already; free it first, or take another name",
@@ -173,13 +168,9 @@ impl Free {
     }
 }
 
-fn finest<T: Real>(field: &HierarchicalSpline<T>) -> f64 {
-    field.lattice().spacing(field.level_count() - 1).min_element()
-}
-
 /// Points of a line, close to each other, on the nearest surface.
-fn sketched<T: Real>(field: &HierarchicalSpline<T>, iso: f64, line: &[DVec3]) -> Result<Vec<DVec3>, String> {
-    let size = field.lattice().world_box().size();
+fn sketched<F: Malleable>(field: &F, iso: f64, line: &[DVec3]) -> Result<Vec<DVec3>, String> {
+    let size = field.whole().size();
     let reach = REACH * size.max_element();
     let drawn = |p: DVec3| {
         nearest_surface(field, iso, p, reach).map_err(|_| {
@@ -194,7 +185,7 @@ fn sketched<T: Real>(field: &HierarchicalSpline<T>, iso: f64, line: &[DVec3]) ->
     }
     let path = Path::through(line.iter().copied()).map_err(|e| e.to_string())?;
     let length = path.length();
-    let count = (length / (length / MOST).max(APART * finest(field))).ceil();
+    let count = (length / (length / MOST).max(APART * field.shortest())).ceil();
     let drawn = (0..=count as usize).map(|i| drawn(path.at(length * i as f64 / count)));
     let mut drawn: Vec<DVec3> = drawn.collect::<Result<_, _>>()?;
     drawn.dedup();

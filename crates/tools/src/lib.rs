@@ -1,6 +1,7 @@
 //! What a hand can do to a field: scripted [scenes](scene) of forces, matter and constraints, and [geometric] tools that carve,
 //! add and [carry along](warp). A [session] is a row of strokes; each uses one [tool], within [limits]. Haptics are not built yet.
 
+pub mod body;
 pub mod canvas;
 pub mod coefficients;
 pub mod curve;
@@ -11,8 +12,10 @@ mod formula_solid;
 pub mod geometric;
 pub mod hold;
 mod interior;
+pub mod knots;
 pub mod limits;
 pub mod live;
+pub mod malleable;
 pub mod material;
 pub mod mix;
 pub mod number;

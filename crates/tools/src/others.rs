@@ -7,6 +7,8 @@ use std::sync::Arc;
 use bspline::{Aabb, Csg, CsgError, Field, HierarchicalSpline};
 use glam::DAffine3;
 
+use crate::body::Body;
+
 /// Objects by name, each about as the distance from its surface, positive inside, in the world of the canvas.
 #[derive(Clone, Default)]
 pub struct Others(BTreeMap<String, Other>);
@@ -16,7 +18,7 @@ struct Other {
     distance: Arc<dyn Field>,
     reach: Aabb,
     canvas_from_object: DAffine3,
-    /// The field itself and its iso-value, where it lies as the canvas does.
+    /// The field itself and its iso-value, where it lies as the canvas does and has levels.
     own: Option<(HierarchicalSpline<f32>, f64)>,
 }
 
@@ -34,12 +36,12 @@ impl Others {
     pub fn put(
         &mut self,
         name: &str,
-        field: &HierarchicalSpline<f32>,
+        body: &Body,
         iso: f64,
         canvas_from_object: DAffine3,
     ) -> Result<(), CsgError> {
-        let steep = 1.0 / field.slope();
-        let distance = Csg::sum(vec![(steep, Arc::new(field.clone()))], -iso * steep)?;
+        let steep = 1.0 / body.slope();
+        let distance = Csg::sum(vec![(steep, body.shared())], -iso * steep)?;
         let is_beside = canvas_from_object == DAffine3::IDENTITY;
         let distance: Arc<dyn Field> = match is_beside {
             true => Arc::new(distance),
@@ -52,15 +54,18 @@ impl Others {
         };
         let other = Other {
             distance,
-            reach: field.lattice().world_box().transformed(&canvas_from_object),
+            reach: body.world_box().transformed(&canvas_from_object),
             canvas_from_object,
-            own: is_beside.then(|| (field.clone(), iso)),
+            own: body
+                .levels()
+                .filter(|_| is_beside)
+                .map(|field| (field.clone(), iso)),
         };
         self.0.insert(name.into(), other);
         Ok(())
     }
 
-    /// The field of an object and its iso-value, if it lies as the canvas does.
+    /// The field of an object and its iso-value, if it lies as the canvas does and has levels.
     pub(crate) fn own(&self, name: &str) -> Option<&(HierarchicalSpline<f32>, f64)> {
         self.0.get(name)?.own.as_ref()
     }

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::canvas::{Canvas, Placement};
 use crate::geometric::rotation_of;
+use crate::malleable::Malleable;
 use crate::number::{Point, Positive};
 
 /// Puts the whole object elsewhere, without a change of its field. Lengths and places are those of its parent's world.
@@ -38,7 +39,7 @@ impl Place {
     ///
     /// # Errors
     /// A sentence.
-    pub fn apply(&self, canvas: &Canvas) -> Result<Placement, String> {
+    pub fn apply<F: Malleable>(&self, canvas: &Canvas<F>) -> Result<Placement, String> {
         if self.parent.is_none() && self.map.is_none() && self.by.is_none() && !self.is_turning() {
             return Err("place says nothing; write one of by, turn, scale, map and parent".into());
         }
@@ -53,9 +54,7 @@ impl Place {
             after.map = DAffine3::from_mat3_translation(DMat3::from_cols(x.0, y.0, z.0), origin.0);
         }
         if self.is_turning() {
-            let middle = after
-                .map
-                .transform_point3(canvas.field.lattice().world_box().center());
+            let middle = after.map.transform_point3(canvas.field.whole().center());
             let about = self.about.map_or(middle, |p| p.0);
             let turn = rotation_of(self.turn.map_or(DVec3::ZERO, |turn| turn.0));
             let turn = DMat3::from_quat(turn) * self.scale.map_or(1.0, |scale| scale.0);
@@ -70,7 +69,7 @@ impl Place {
     }
 
     /// The same place, with the parent that is asked for.
-    fn hung(&self, canvas: &Canvas) -> Result<Placement, String> {
+    fn hung<F>(&self, canvas: &Canvas<F>) -> Result<Placement, String> {
         let before = &canvas.placement;
         let shared = before.shared_from_parent * before.map;
         Ok(match self.parent.as_deref() {

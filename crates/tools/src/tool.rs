@@ -14,7 +14,7 @@ use crate::geometric::{
 use crate::hold::{Free, Hold};
 use crate::limits::Limits;
 use crate::material::Material;
-use crate::paint::{Layer, Layers, Paint, PaintError};
+use crate::paint::{Layers, Paint, PaintError};
 use crate::place::Place;
 
 /// A tool with all that it is told.
@@ -161,7 +161,7 @@ impl Tool<'_> {
                 return Ok((moved, notes));
             }
             Self::Paint(paint) => {
-                let layer = painted(paint, &canvas, limits)?;
+                let layer = paint.laid_on(&canvas, limits)?;
                 let mut canvas = canvas;
                 canvas.layers.insert(paint.layer, layer);
                 return Ok((canvas, Vec::new()));
@@ -241,17 +241,6 @@ fn carried(origin: &Origin, canvas: &Canvas, limits: &Limits) -> Result<Layers, 
         ))
     });
     layers.collect()
-}
-
-/// A layer with paint laid on, as far as the limits allow.
-fn painted(paint: &Paint, canvas: &Canvas, limits: &Limits) -> Result<Layer, ToolError> {
-    let field = &canvas.field;
-    let whole = limits.cut(&field.lattice().world_box());
-    let layer = paint.apply(field, &canvas.layers, canvas.detail, &whole)?;
-    let before = canvas.layers.get(&paint.layer).cloned();
-    let before = before.unwrap_or_else(|| Layer::empty(field.lattice(), canvas.detail));
-    let kept = limits.kept(before.tree(), layer.tree());
-    Ok(layer.with_tree(kept).expect("some of the nodes painted"))
 }
 
 /// Says what was too thin for the field, or beyond it.

@@ -27,7 +27,7 @@ pub fn is_of_mesh(open: &OpenField) -> bool {
 }
 
 fn stored(open: &OpenField) -> Value {
-    serde_json::from_str(&open.loaded().meta.provenance).unwrap_or_default()
+    serde_json::from_str(&open.meta().provenance).unwrap_or_default()
 }
 
 /// Refuses an input that `open` was not fitted to, as far as the field tells.
@@ -35,13 +35,7 @@ fn stored(open: &OpenField) -> Value {
 /// # Errors
 /// Exit code 2 with what differs: the kind, the samples, or, where a field remembers no samples, the box.
 pub fn check(open: &OpenField, field: &str, input: &Input, name: &str) -> Outcome {
-    let differs = differs(
-        &open.loaded().meta,
-        &open.lattice().world_box(),
-        field,
-        input,
-        name,
-    );
+    let differs = differs(open.meta(), &open.lattice().world_box(), field, input, name);
     differs.map_or(Ok(()), |differs| {
         Err(Failure::usage(format!(
             "{differs}; give its own input with the options that it was read with, or --anyway to measure all the same"

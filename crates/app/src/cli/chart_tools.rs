@@ -35,7 +35,7 @@ pub fn run(args: &Args, cancel: &Cancel) -> Outcome {
         let source = Source::open(path, None, FIELDS, cancel)?;
         let open = OpenField::load(&source)?;
         let iso = open.iso_or(None, &source)?;
-        let field = match &open.loaded().field {
+        let field = match open.levels()? {
             AnyField::F32(field) => field.clone(),
             AnyField::F64(_) => {
                 return Err(Failure::input(format!(

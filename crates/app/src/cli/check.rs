@@ -99,7 +99,7 @@ pub fn run(args: &Args) -> Outcome {
     let measured = match &input {
         Input::Cloud(cloud) => {
             let left_out = if is_own { &open.report().left_out[..] } else { &[] };
-            measure_cloud(&open, &cloud.positions, left_out)
+            measure_cloud(&open, &cloud.positions, left_out)?
         }
         Input::Mesh(mesh) => measure_triangles(&open, mesh)?,
         Input::Volume(volume) => measure_volume(&open, volume, args.output.is_some())?,
@@ -171,7 +171,7 @@ pub fn run(args: &Args) -> Outcome {
 }
 
 /// Measures all points but those `left_out`, which no figure of the fit counts either.
-fn measure_cloud(open: &OpenField, positions: &[DVec3], left_out: &[u32]) -> Measured {
+fn measure_cloud(open: &OpenField, positions: &[DVec3], left_out: &[u32]) -> Outcome<Measured> {
     let leaves = &open.report().leaves;
     let index = LeafIndex::new(open.lattice(), leaves);
     let mut counts = vec![true; positions.len()];
@@ -181,13 +181,14 @@ fn measure_cloud(open: &OpenField, positions: &[DVec3], left_out: &[u32]) -> Mea
         }
     }
     let in_leaf = |i: usize| index.find(positions[i]);
-    let errors = either!(&open.loaded().field, f => measure_points(f, positions, |i| counts[i], in_leaf, leaves.len()));
+    let errors =
+        either!(open.levels()?, f => measure_points(f, positions, |i| counts[i], in_leaf, leaves.len()));
     let of_leaves = errors.leaves.iter().map(|l| (l.count, l.rms));
     let audit = audit_leaves(leaves, of_leaves, open.report().tolerance);
     let counted = (0..positions.len()).filter(|&i| counts[i]);
     let (positions, distances): (Vec<DVec3>, Vec<f64>) =
         counted.map(|i| (positions[i], errors.distances[i])).unzip();
-    Measured {
+    Ok(Measured {
         statistics: ErrorStatistics {
             rms: errors.rms,
             p95: errors.p95,
@@ -204,7 +205,7 @@ fn measure_cloud(open: &OpenField, positions: &[DVec3], left_out: &[u32]) -> Mea
         unit: open.unit().to_string(),
         positions,
         errors: distances,
-    }
+    })
 }
 
 /// Measures as the fit did, and also the way back and the sign.
@@ -212,7 +213,7 @@ fn measure_triangles(open: &OpenField, mesh: &TriangleMesh) -> Outcome<Measured>
     let (solid, _) = MeshDistance::new(&mesh.vertices, &mesh.triangles)?;
     let spacing = open.lattice().spacing(open.level_count() - 1).min_element();
     let report = open.report();
-    let found = either!(&open.loaded().field, f => measure_mesh(f, &solid, &report.leaves));
+    let found = either!(open.levels()?, f => measure_mesh(f, &solid, &report.leaves));
     let errors = found.errors;
     let of_leaves = errors.leaves.iter().map(|l| (l.count, l.rms));
     Ok(Measured {
@@ -270,7 +271,7 @@ fn measure_volume(open: &OpenField, volume: &Volume, pictures: bool) -> Outcome<
         values: &volume.values,
         world_from_voxel: header.world_from_voxel,
     };
-    let own = either!(&open.loaded().field, f => fitting::volume::measure_volume(f, &view))?;
+    let own = either!(open.levels()?, f => fitting::volume::measure_volume(f, &view))?;
     let mut measured = if own.is_none() || pictures {
         measure_voxels(open, volume)
     } else {

@@ -2,13 +2,15 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use bspline::hierarchical::Lattice;
-use bspline::{Field, Frame, HierarchicalSpline, Real};
+use bspline::{Field, Frame, HierarchicalSpline, Real, TensorSpline};
 use fitting::orient::Route;
 use fitting::{Cancel, FitReport, Leaf, SignReport, StopReason};
-use formats::field::{AnyField, FieldMeta, LeafRecord, LoadedField, SourceKind};
+use formats::field::{AnyField, FieldMeta, LeafRecord, SourceKind};
 use formats::{Fault, FormatError, Kind, Unit};
 use glam::DAffine3;
 use serde::{Deserialize, Serialize};
+use tools::body::Body;
+use tools::malleable::Malleable;
 
 use super::failure::{Failure, Outcome};
 use super::input::limits;
@@ -44,15 +46,62 @@ impl FieldArgs {
     }
 }
 
-/// A field file that was read.
+/// Asks whatever the field is made of.
+macro_rules! ask {
+    ($solid:expr, $f:ident => $ask:expr) => {
+        match $solid {
+            Solid::Levels(AnyField::F32($f)) => $ask,
+            Solid::Levels(AnyField::F64($f)) => $ask,
+            Solid::Knots($f) => $ask,
+        }
+    };
+}
+
+/// A field that was read.
 pub struct OpenField {
-    loaded: LoadedField,
+    field: Solid,
+    meta: FieldMeta,
     report: FitReport,
     /// Where its document places it.
     placement: DAffine3,
-    /// The field as it is asked, and the lengths there over its own.
-    asked: AnyField,
+    /// The field as it is asked, its grids, and the lengths there over its own.
+    asked: Solid,
+    lattice: Lattice,
     stretch: f64,
+}
+
+/// A field of a file, or of an object of a document.
+#[derive(Clone)]
+enum Solid {
+    /// In levels, of either precision.
+    Levels(AnyField),
+    /// On knots of its own.
+    Knots(TensorSpline<f32>),
+}
+
+impl Solid {
+    fn of(body: &Body) -> Self {
+        match body {
+            Body::Levels(field) => Self::Levels(AnyField::F32(field.clone())),
+            Body::Knots(field) => Self::Knots(field.clone()),
+        }
+    }
+
+    fn placed(&self, map: DAffine3) -> Self {
+        match self {
+            Self::Levels(AnyField::F32(f)) => {
+                Self::Levels(AnyField::F32(f.placed(map * f.lattice().world_from_lattice)))
+            }
+            Self::Levels(AnyField::F64(f)) => {
+                Self::Levels(AnyField::F64(f.placed(map * f.lattice().world_from_lattice)))
+            }
+            Self::Knots(f) => Self::Knots(f.placed(map * *f.world_from_parameter())),
+        }
+    }
+
+    fn lattice(&self) -> Lattice {
+        ask!(self, f => f.grids())
+    }
 }
 
 /// The figures of a [`FitReport`] as they stand in the file; leaves and notes have places of their own.
@@ -104,11 +153,12 @@ impl OpenField {
 
     /// Reads a field file, or an object of a document: the only one, or that of a name.
     pub fn load_object(source: &Source, named: Option<&str>) -> Outcome<Self> {
-        let (loaded, placement) = match (document::is_document(source.path()), named) {
+        let (field, meta, placement) = match (document::is_document(source.path()), named) {
             (true, named) => of_document(source, named)?,
             (false, None) => {
                 let loaded = formats::field::load(source.path(), &limits(None));
-                (loaded.map_err(|e| not_loaded(source, e))?, DAffine3::IDENTITY)
+                let loaded = loaded.map_err(|e| not_loaded(source, e))?;
+                (Solid::Levels(loaded.field), loaded.meta, DAffine3::IDENTITY)
             }
             (false, Some(name)) => {
                 return Err(Failure::usage(format!(
@@ -117,14 +167,13 @@ impl OpenField {
                 )));
             }
         };
-        let stored: StoredReport = serde_json::from_str(&loaded.meta.report).map_err(|e| {
+        let stored: StoredReport = serde_json::from_str(&meta.report).map_err(|e| {
             Failure::input(format!(
                 "{}: its fit report cannot be read ({e}); fit the input again",
                 source.name()
             ))
         })?;
-        let leaves = loaded
-            .meta
+        let leaves = meta
             .leaves
             .iter()
             .map(leaf)
@@ -138,7 +187,10 @@ impl OpenField {
         let report = FitReport {
             input_count: stored.input_count,
             used_count: stored.used_count,
-            coefficients: either!(&loaded.field, f => f.coefficient_count()),
+            coefficients: match &field {
+                Solid::Levels(field) => either!(field, f => f.coefficient_count()),
+                Solid::Knots(field) => field.coefficients().len(),
+            },
             depth: stored.depth,
             rms: stored.rms,
             p95: stored.p95,
@@ -155,16 +207,18 @@ impl OpenField {
                     Some(*at)
                 })
                 .collect(),
-            signs: stored.signs.map(|s| signs(s, &loaded.meta.sign_confidence)),
+            signs: stored.signs.map(|s| signs(s, &meta.sign_confidence)),
             leaves,
             solves: stored.solves.into_iter().map(Into::into).collect(),
-            notes: loaded.meta.notes.clone(),
+            notes: meta.notes.clone(),
         };
         Ok(Self {
             placement,
-            asked: loaded.field.clone(),
+            asked: field.clone(),
+            lattice: field.lattice(),
             stretch: 1.0,
-            loaded,
+            field,
+            meta,
             report,
         })
     }
@@ -174,11 +228,8 @@ impl OpenField {
         if self.placement == DAffine3::IDENTITY {
             return self;
         }
-        let world_from_lattice = self.placement * self.lattice().world_from_lattice;
-        self.asked = match &self.loaded.field {
-            AnyField::F32(f) => AnyField::F32(f.placed(world_from_lattice)),
-            AnyField::F64(f) => AnyField::F64(f.placed(world_from_lattice)),
-        };
+        self.asked = self.field.placed(self.placement);
+        self.lattice = self.asked.lattice();
         let stretch = self.placement.matrix3.determinant().abs().cbrt();
         self.stretch = stretch;
         // Errors of volumes are densities.
@@ -205,19 +256,41 @@ impl OpenField {
         self
     }
 
-    /// The file as it was read.
-    pub fn loaded(&self) -> &LoadedField {
-        &self.loaded
+    /// What stands beside the field.
+    pub fn meta(&self) -> &FieldMeta {
+        &self.meta
+    }
+
+    /// The field as it was read, in levels.
+    ///
+    /// # Errors
+    /// If it is on knots of its own.
+    pub fn levels(&self) -> Outcome<&AnyField> {
+        match &self.field {
+            Solid::Levels(field) => Ok(field),
+            Solid::Knots(_) => Err(Failure::input(
+                "this works on the levels of a field, and the object is on knots of its own; write it in levels first: isoclay \
+                 export DOC -o FIELD.iclay",
+            )),
+        }
+    }
+
+    /// The field as it was read, if it is on knots of its own.
+    pub fn knots(&self) -> Option<&TensorSpline<f32>> {
+        match &self.field {
+            Solid::Levels(_) => None,
+            Solid::Knots(field) => Some(field),
+        }
     }
 
     /// The field, to be asked.
     pub fn field(&self) -> &dyn Field {
-        self.asked.as_field()
+        ask!(&self.asked, f => f)
     }
 
-    /// The field, to be part of others; its bricks are shared.
+    /// The field, to be part of others; what it is made of is shared.
     pub fn shared_field(&self) -> Arc<dyn Field> {
-        either!(&self.asked, f => Arc::new(f.clone()))
+        ask!(&self.asked, f => Arc::new(f.clone()))
     }
 
     /// What the fit said of itself.
@@ -225,19 +298,19 @@ impl OpenField {
         &self.report
     }
 
-    /// Grids the field stands on.
+    /// Grids the field stands on; of one on knots of its own those that stand for them.
     pub fn lattice(&self) -> &Lattice {
-        either!(&self.asked, f => f.lattice())
+        &self.lattice
     }
 
     /// Median slope of the field, density per world length.
     pub fn slope(&self) -> f64 {
-        either!(&self.asked, f => f.slope()) / self.stretch
+        ask!(&self.asked, f => f.slope()) / self.stretch
     }
 
     /// Number of levels.
     pub fn level_count(&self) -> usize {
-        either!(&self.loaded.field, f => f.level_count())
+        ask!(&self.field, f => f.depth())
     }
 
     /// Active functions.
@@ -245,47 +318,32 @@ impl OpenField {
         self.report.coefficients
     }
 
-    /// Active functions on each level.
-    pub fn per_level(&self) -> Vec<usize> {
-        either!(&self.loaded.field, f => f.coefficient_counts())
-    }
-
-    /// Bricks over all levels.
-    pub fn brick_count(&self) -> usize {
-        either!(&self.loaded.field, f => f.brick_count())
-    }
-
-    /// Bytes that evaluation reads.
-    pub fn totals_bytes(&self) -> usize {
-        either!(&self.loaded.field, f => f.totals_bytes())
-    }
-
     /// SHA-256 of the field as it was read, hexadecimal.
     pub fn sha256(&self) -> String {
-        hex(&either!(&self.loaded.field, f => f.sha256()))
+        hex(&ask!(&self.field, f => f.sha256()))
     }
 
     /// Name of the coefficients' precision.
     pub fn precision(&self) -> &'static str {
-        match &self.loaded.field {
-            AnyField::F32(_) => <f32 as Real>::NAME,
-            AnyField::F64(_) => <f64 as Real>::NAME,
+        match &self.field {
+            Solid::Levels(AnyField::F32(_)) | Solid::Knots(_) => <f32 as Real>::NAME,
+            Solid::Levels(AnyField::F64(_)) => <f64 as Real>::NAME,
         }
     }
 
     /// What it was fitted to.
     pub fn source(&self) -> SourceKind {
-        self.loaded.meta.source
+        self.meta.source
     }
 
     /// Unit of lengths.
     pub fn unit(&self) -> Unit {
-        self.loaded.meta.unit
+        self.meta.unit
     }
 
     /// Iso-value at which the surface is meant to lie, if there is one.
     pub fn iso(&self) -> Option<f64> {
-        self.loaded.meta.iso
+        self.meta.iso
     }
 
     /// The iso-value that the user `asked` for, or the field's own.
@@ -341,7 +399,7 @@ impl OpenField {
 }
 
 /// The field of an object of a document, in the object's own world, and where the document places that.
-fn of_document(source: &Source, named: Option<&str>) -> Outcome<(LoadedField, DAffine3)> {
+fn of_document(source: &Source, named: Option<&str>) -> Outcome<(Solid, FieldMeta, DAffine3)> {
     let document = super::document::open(source.path(), &mut Vec::new())?;
     let state = document.state();
     let names: Vec<_> = state.objects().keys().map(String::as_str).collect();
@@ -362,15 +420,9 @@ fn of_document(source: &Source, named: Option<&str>) -> Outcome<(LoadedField, DA
         .object(name)
         .map_err(|e| Failure::usage(format!("--object: {e}")))?;
     let placement = state.placement(name);
-    let loaded = LoadedField {
-        field: AnyField::F32(object.field.clone()),
-        meta: super::document::edited_meta(object),
-        skipped_chunks: Vec::new(),
-    };
-    Ok((
-        loaded,
-        placement.map_err(|e| Failure::usage(format!("--object: {e}")))?,
-    ))
+    let placement = placement.map_err(|e| Failure::usage(format!("--object: {e}")))?;
+    let meta = super::document::edited_meta(object);
+    Ok((Solid::of(&object.field), meta, placement))
 }
 
 /// What is wrong with a file that is no field: one of another kind has to be fitted first.

@@ -3,12 +3,13 @@ use std::path::PathBuf;
 
 use fitting::Cancel;
 use formats::Kind;
+use formats::field::AnyField;
 use formats::points::{NormalSource, PointCloud};
 use formats::volumes::{VolumeHeader, VolumeOptions};
 use serde_json::{Map, Value, json};
 
 use super::failure::{OrFail, Outcome};
-use super::field::OpenField;
+use super::field::{OpenField, either};
 use super::input::{self, bounding_box, limits};
 use super::quantity::{Memory, human_bytes, human_count, human_number};
 use super::source::{ANYTHING, Source, input_formats};
@@ -233,11 +234,22 @@ fn of_volume(source: &Source, args: &Args, part: &VolumeOptions) -> Outcome<(Vec
     Ok((entries, preview.notes))
 }
 
-fn of_field(open: &OpenField) -> Vec<Entry> {
-    let (lattice, report) = (open.lattice(), open.report());
+/// What a field is made of.
+fn made_of(open: &OpenField) -> Vec<Entry> {
+    let coefficients = count("coefficients", "coefficients", open.coefficient_count());
+    let Ok(field) = open.levels() else {
+        let shape = open.knots().map(|spline| spline.shape()).unwrap_or_default();
+        let each = shape.map(|n| n.to_string()).join(" × ");
+        return vec![
+            entry("knots", "on knots of its own", each, json!(shape)),
+            coefficients,
+        ];
+    };
+    let lattice = open.lattice();
     let spacing = lattice.spacing(open.level_count() - 1);
-    let mut entries = vec![
-        entry("precision", "precision", open.precision(), open.precision()),
+    let per_level = either!(field, f => f.coefficient_counts());
+    let totals = either!(field, f => f.totals_bytes());
+    vec![
         count("levels", "levels", open.level_count()),
         entry(
             "cells",
@@ -255,24 +267,32 @@ fn of_field(open: &OpenField) -> Vec<Entry> {
             ),
             json!(spacing.to_array()),
         ),
-        count("coefficients", "coefficients", open.coefficient_count()),
+        coefficients,
         entry(
             "coefficients_per_level",
             "  on each level",
-            open.per_level()
-                .into_iter()
-                .map(human_count)
+            per_level
+                .iter()
+                .map(|n| human_count(*n))
                 .collect::<Vec<_>>()
                 .join(", "),
-            json!(open.per_level()),
+            json!(per_level),
         ),
-        count("bricks", "bricks", open.brick_count()),
-        entry(
-            "totals_bytes",
-            "totals",
-            human_bytes(open.totals_bytes() as u64),
-            open.totals_bytes(),
-        ),
+        count("bricks", "bricks", either!(field, f => f.brick_count())),
+        entry("totals_bytes", "totals", human_bytes(totals as u64), totals),
+    ]
+}
+
+fn of_field(open: &OpenField) -> Vec<Entry> {
+    let (lattice, report) = (open.lattice(), open.report());
+    let mut entries = vec![entry(
+        "precision",
+        "precision",
+        open.precision(),
+        open.precision(),
+    )];
+    entries.extend(made_of(open));
+    entries.extend([
         corners(&lattice.world_box()),
         entry("unit", "unit", open.unit().symbol(), open.unit().symbol()),
         entry(
@@ -299,7 +319,7 @@ fn of_field(open: &OpenField) -> Vec<Entry> {
             report.bound,
         ),
         count("leaves", "leaves", report.leaves.len()),
-    ];
+    ]);
     // An interpolating fit aims at none.
     if report.tolerance > 0.0 {
         let above = report.leaves.iter().filter(|l| l.is_above(report.tolerance));

@@ -119,7 +119,7 @@ pub fn run(args: &Args) -> Outcome {
         cancel: &cancel,
         bar: Bar::new(),
     };
-    let total = either!(&open.loaded().field, f => stage.play(f.clone()))?;
+    let total = either!(open.levels()?, f => stage.play(f.clone()))?;
     stage.bar.clear();
     if let Some(mesh) = &mesh {
         mesh.finish()?;
@@ -262,7 +262,7 @@ impl Stage<'_> {
 
     /// Writes the field with what is known of the one it was made from; returns its SHA-256.
     fn save<T: Stored>(&self, field: &HierarchicalSpline<T>) -> Outcome<String> {
-        let before = &self.open.loaded().meta;
+        let before = self.open.meta();
         let options: Vec<String> = std::env::args().skip(1).collect();
         let mut notes = before.notes.clone();
         notes.push("moved by a scene; its errors and leaves are those of the fit before".into());

@@ -271,6 +271,81 @@ fn a_block_is_made_from_nothing_and_shaped() {
     assert!(!bench.path("a.isoclay").exists());
 }
 
+/// A block on knots of its own is asked for whatever a field is asked for, keeps its knots where tools can, and is written in
+/// levels, with a word, where they cannot.
+#[test]
+fn a_block_on_knots_of_its_own_is_kept_asked_and_shaped() {
+    let bench = Bench::new();
+    let first = bench.json(
+        "new block.isoclay --box 10,6,4 --spacing 0.5 --unit mm --knots x=2..5.5/14;z=1,1.2,1.4..2.6/6",
+    );
+    let hash = |v: &serde_json::Value| v["field_sha256"]["block"].as_str().unwrap().to_string();
+    let info = bench.json("info block.isoclay");
+    let shape: Vec<u64> = serde_json::from_value(info["objects"][0]["knots"].clone()).unwrap();
+    assert!(shape[0] > shape[1], "{info}");
+    let mesh = bench.json("mesh block.isoclay -o block.ply --check");
+    let volume = number(&mesh["quality"], "volume");
+    // 240, less what the rounding of the edges takes: 0.75 mm.
+    assert!((volume - 231.0).abs() < 2.0, "{mesh}");
+    bench.json("picture block.isoclay -o block.png --size 64x64");
+    bench.write("at.xyz", "0 0 1.5\n0 0 2.5\n");
+    let run = bench.run("eval block.isoclay --points at.xyz");
+    assert_eq!(run.code, 0, "{}", run.stderr);
+    let script = |name: &str, text: &str| bench.write(name, text);
+    script(
+        "finer.toml",
+        "[[stroke]]\nrefine = { along = [[4, 2, 2]], radius = 0.5 }\n[[stroke]]\nplace = { by = [0, 0, 9] }\n",
+    );
+    let finer = bench.json("sculpt block.isoclay --script finer.toml");
+    assert!(finer["notes"].as_array().is_none_or(Vec::is_empty), "{finer}");
+    assert_ne!(hash(&finer), hash(&first));
+    let higher = bench.json("mesh block.isoclay -o higher.ply --check");
+    assert!(
+        (number(&higher["quality"], "volume") - volume).abs() < 0.01 * volume,
+        "{higher}"
+    );
+    script(
+        "carve.toml",
+        "[[stroke]]\ncarve = { shape = { sphere = { radius = 1 } }, along = [[3, 1, 2]] }\n",
+    );
+    let carved = bench.json("sculpt block.isoclay --script carve.toml");
+    assert!(
+        carved["notes"][0]
+            .as_str()
+            .unwrap()
+            .contains("knots were given up"),
+        "{carved}"
+    );
+    for threads in [1, 2, 8] {
+        let replayed = bench.json(&format!("replay block.isoclay --threads {threads}"));
+        assert_eq!(hash(&replayed), hash(&carved));
+    }
+    bench.json("undo block.isoclay");
+    let out = bench.json("export block.isoclay -o block.iclay");
+    assert!(
+        out["notes"][0].as_str().unwrap().contains("knots were given up"),
+        "{out}"
+    );
+    assert_eq!(hash(&bench.json("undo block.isoclay 2")), hash(&first));
+    let check = bench.run("check block.isoclay at.xyz --anyway");
+    assert_ne!(check.code, 0);
+    let like = bench.run("export block.isoclay --like at.xyz -o out.xyz");
+    assert_ne!(like.code, 0);
+    bench.json("new twice.isoclay block.isoclay");
+    let again = bench.json("info twice.isoclay");
+    assert_eq!(again["objects"][0]["field_sha256"], hash(&first));
+    for (knots, part) in [
+        ("x=40,41", "some within"),
+        ("x=1", "two at least"),
+        ("x=0..1/60000", "are handled"),
+    ] {
+        let run = bench.run(&format!("new a.isoclay --box 10 --spacing 1 --knots {knots}"));
+        assert_eq!(run.code, 2, "{knots}");
+        assert!(run.stderr.contains(part), "{knots}: {}", run.stderr);
+    }
+    assert_eq!(bench.run("new a.isoclay --knots x=1,2").code, 2);
+}
+
 #[test]
 fn a_scan_comes_back_with_the_edits_of_its_object() {
     let bench = Bench::new();

@@ -20,10 +20,13 @@
 //! ```
 
 mod bounds;
+mod difference;
 mod evaluate;
 mod grid;
+mod identity;
 mod kernel;
 mod refine;
 mod spline;
 
+pub use difference::{TensorDiff, TensorDiffError};
 pub use spline::{TensorError, TensorSpline};

@@ -1,7 +1,7 @@
 //! Solids of a density that falls by 40 a length, as tools find them.
 
+use bspline::AnyField;
 use bspline::hierarchical::{HierarchicalSpline, Lattice};
-use bspline::{AnyField, Field};
 use document::{Command, Document, Object, State};
 use fitting::Control;
 use formats::field::FieldMeta;
@@ -41,7 +41,7 @@ pub fn plate() -> State {
 
 /// Height of the surface over `(x, y)`, from 12 up.
 pub fn height(state: &State, x: f64, y: f64) -> f64 {
-    let field = &state.object("clay").unwrap().field;
+    let field = state.object("clay").unwrap().field.as_field();
     let (mut low, mut high) = (3.0, 21.0);
     for _ in 0..60 {
         let z = 0.5 * (low + high);

@@ -137,7 +137,7 @@ fn holes_and_bridges_by_hand_and_their_scripts_are_the_same() {
         let directory = tempdir().unwrap();
         let mut document = document(directory.path(), &first);
         made(&mut document, tool, &poses);
-        let field = &document.state().object("clay").unwrap().field;
+        let field = document.state().object("clay").unwrap().field.as_field();
         let is_solid = field.value(DVec3::new(11.0, 12.0, middle)) > ISO;
         assert_eq!(is_solid, tool.starts_with("join"), "{tool}");
         let left = document.state().sha256();
@@ -187,7 +187,7 @@ fn boxes_grow_with_strokes_by_hand() {
         let (state, boxes) = live.look().unwrap();
         let seen = &state.object("clay").unwrap().field;
         assert!(boxes.iter().any(|b| b.max.z >= 24.0), "{text}: {boxes:?}");
-        assert!(seen.lattice().world_box().max.z > 25.0, "{text}");
+        assert!(seen.world_box().max.z > 25.0, "{text}");
         let far = live.step(Pose::at(DVec3::splat(1e300)), control);
         assert!(far.is_err() || text.starts_with("add"), "{text}");
         let (is_edit, notes) = live.end(&mut document, control).unwrap();
@@ -195,7 +195,7 @@ fn boxes_grow_with_strokes_by_hand() {
             is_edit && notes.iter().any(|n| n.contains("has grown")),
             "{text}: {notes:?}"
         );
-        let field = &document.state().object("clay").unwrap().field;
+        let field = document.state().object("clay").unwrap().field.as_field();
         assert!(field.value(DVec3::new(12.0, 12.0, end - 0.2)) > ISO, "{text}");
         for threads in [1, 8] {
             let again = again(&mut document, threads);
@@ -309,7 +309,7 @@ fn the_surface_follows_a_hand_that_pulls() {
         let notes = made(&mut document, text, &poses);
         assert!(notes.is_empty(), "{notes:?}");
         // Along the way of the hand the surface is at its end.
-        let field = &document.state().object("clay").unwrap().field;
+        let field = document.state().object("clay").unwrap().field.as_field();
         let [before, behind] = [0.97, 1.03].map(|t| field.value(from + t * end) > ISO);
         assert_eq!(
             [before, behind],
@@ -379,7 +379,7 @@ fn a_stroke_that_is_not_ended_leaves_the_document_as_it_was() {
         assert!(n > 0 && n < 25 || force.z > 0.0, "{n}: {force}");
         if n % 3 == 0 {
             let (now, boxes) = live.look().unwrap();
-            let [old, new] = [&seen, &now].map(|s| &s.object("clay").unwrap().field);
+            let [old, new] = [&seen, &now].map(|s| s.object("clay").unwrap().field.levels().unwrap());
             assert!(!boxes.is_empty());
             for i in 0..2000 {
                 let p = DVec3::new(

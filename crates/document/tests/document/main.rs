@@ -3,6 +3,7 @@
 mod clay;
 mod cloud;
 mod common;
+mod knots;
 mod live;
 mod preview;
 mod revision;
@@ -489,7 +490,7 @@ fn edits_of_a_field_take_the_bytes_of_what_they_change() {
         delta: 0.5,
     };
     let mut object = document.state().object("a").unwrap().clone();
-    object.field = object.field.edited(&[edit]).unwrap();
+    object.field = object.field.levels().unwrap().edited(&[edit]).unwrap().into();
     let next = document.state().with("a", object).unwrap();
     document.commit("one", Value::Null, next).unwrap();
     let one = document.size() - whole;
@@ -501,7 +502,13 @@ fn edits_of_a_field_take_the_bytes_of_what_they_change() {
         change: BlockChange::Deactivate,
     };
     let mut object = document.state().object("a").unwrap().clone();
-    object.field = object.field.edited_blocks(&[block]).unwrap();
+    object.field = object
+        .field
+        .levels()
+        .unwrap()
+        .edited_blocks(&[block])
+        .unwrap()
+        .into();
     let next = document.state().with("a", object).unwrap();
     document.commit("fewer", Value::Null, next.clone()).unwrap();
     drop(document);
@@ -573,8 +580,8 @@ step = 0.05
     let pulled = |state: &State| {
         let command = document::Command::of_script(scene, named).unwrap().remove(0);
         let (next, _) = command.apply(state, &mut fitting::Control::default()).unwrap();
-        let moved = &next.objects()["ball"].field;
-        let before = &state.objects()["ball"].field;
+        let moved = next.objects()["ball"].field.as_field();
+        let before = state.objects()["ball"].field.as_field();
         let top = DVec3::new(20.0, 20.0, 36.0);
         bspline::Field::value(moved, top) - bspline::Field::value(before, top)
     };
@@ -651,7 +658,7 @@ fn holds_are_kept_with_the_object_and_undone() {
         document.state().object("a").unwrap().properties.holds[0].name,
         "rim"
     );
-    let held = &document.state().object("a").unwrap().field;
+    let held = document.state().object("a").unwrap().field.as_field();
     let on_curve = bspline::Field::value(held, DVec3::new(15.0, 12.0, 12.0));
     assert!(on_curve.abs() < 0.01, "{on_curve}");
     assert_eq!(document.undo(2).unwrap(), 2);

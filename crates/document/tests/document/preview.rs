@@ -54,7 +54,7 @@ fn what_is_shown_is_what_the_document_gets() {
             preview.put(pose, control).unwrap();
             // Nothing of where it was before is left, and what is shown changes within the boxes told.
             let boxes = preview.changed().unwrap();
-            let [old, new] = [&before, preview.state()].map(|s| &s.object("clay").unwrap().field);
+            let [old, new] = [&before, preview.state()].map(|s| s.object("clay").unwrap().field.levels().unwrap());
             for _ in 0..300 {
                 let p = DVec3::new(number(2.0, 22.0), number(2.0, 22.0), number(8.0, 16.0));
                 let is_told = boxes.iter().any(|b| p.cmpge(b.min).all() && p.cmple(b.max).all());

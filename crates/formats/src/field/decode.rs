@@ -6,13 +6,13 @@ use glam::DAffine3;
 
 use super::chunk::Chunk;
 use super::cursor::Cursor;
-use super::kinds::{END, HEADER, LEAVES, LEVEL, NOTES, PROVENANCE, REPORT, SIGNS};
+use super::kinds::{HEADER, LEAVES, LEVEL, SIGNS};
 use super::levels::{self, Level};
-use super::valid::{self, Wrong, written_wrongly};
-use super::{AnyField, FieldMeta, LeafRecord, LoadedField, MAGIC, SourceKind, Stored, VERSION};
+use super::valid::{self, written_wrongly};
+use super::{AnyField, FieldMeta, LeafRecord, LoadedField, MAGIC, Stored, VERSION, beside};
 use crate::error::excerpt;
 use crate::limits::Budget;
-use crate::{Fault, ReadLimits, Unit};
+use crate::{Fault, ReadLimits};
 
 /// Reads the bytes of a field file.
 ///
@@ -40,44 +40,12 @@ pub(super) fn decode_within(bytes: &[u8], budget: &mut Budget) -> Result<LoadedF
         });
     }
     rest = &rest[4..];
-    let mut at = (MAGIC.len() + 4) as u64;
-    let mut take = || {
-        let chunk = Chunk::take(&mut rest, at)?;
-        at += chunk.stored_length();
-        Ok(chunk)
-    };
-    let first: Chunk = take()?;
-    if first.kind != HEADER {
-        return Err(Fault::Damaged {
-            what: format!("the first chunk is {}, not \"HEAD\"", excerpt(&first.kind)),
-        });
-    }
+    let chunks = beside::chunks(rest, (MAGIC.len() + 4) as u64, budget)?;
+    let (first, others) = beside::header(&chunks, HEADER)?;
     let header = Header::read(&first.unpack(budget)?)?;
-    let mut chunks = vec![first];
-    let end = loop {
-        let chunk = take()?;
-        if chunk.kind == END {
-            break chunk;
-        }
-        chunks.push(chunk);
-    };
-    if !rest.is_empty() {
-        return Err(Fault::Damaged {
-            what: format!("{} bytes follow the last chunk", rest.len()),
-        });
-    }
-    let raw = end.unpack(budget)?;
-    let mut cursor = Cursor::new(&raw, "the last chunk");
-    let count = cursor.u32()? as usize;
-    cursor.end()?;
-    if count != chunks.len() {
-        return Err(Fault::Damaged {
-            what: format!("{} chunks are there, {count} are stated", chunks.len()),
-        });
-    }
     match header.bytes_per_value {
-        4 => assemble::<f32>(header, &chunks[1..], budget),
-        _ => assemble::<f64>(header, &chunks[1..], budget),
+        4 => assemble::<f32>(header, others, budget),
+        _ => assemble::<f64>(header, others, budget),
     }
 }
 
@@ -91,9 +59,8 @@ struct Header {
 
 impl Header {
     fn read(raw: &[u8]) -> Result<Self, Fault> {
-        let bad = |what, value| Err(written_wrongly(Wrong { what, value }));
         let mut c = Cursor::new(raw, "the header");
-        let [bytes_per_value, source, unit, has_iso] = [c.u8()?, c.u8()?, c.u8()?, c.u8()?];
+        let marks = [c.u8()?, c.u8()?, c.u8()?, c.u8()?];
         let level_count = c.u32()?;
         let cells = [c.u32()?, c.u32()?, c.u32()?];
         let mut map = [0.0; 12];
@@ -103,33 +70,16 @@ impl Header {
         let (slope, iso) = (c.f64()?, c.f64()?);
         let density_unit = c.text()?;
         c.end()?;
-        if !matches!(bytes_per_value, 4 | 8) {
-            return bad("the precision (bytes of a value)", bytes_per_value.to_string());
-        }
-        let source = match source {
-            0 => SourceKind::Cloud,
-            1 => SourceKind::Volume,
-            2 => SourceKind::Other,
-            other => return bad("the kind of source", other.to_string()),
-        };
-        let Some(unit) = Unit::from_code(unit) else {
-            return bad("the unit of length", unit.to_string());
-        };
-        if has_iso > 1 {
-            return bad("the mark of the iso-value", has_iso.to_string());
-        }
+        let (bytes_per_value, meta, has_iso) = beside::of_marks(marks)?;
         let lattice = Lattice {
             world_from_lattice: DAffine3::from_cols_array(&map),
             cells,
         };
         valid::frame(&lattice, level_count.into(), slope, Some(iso)).map_err(written_wrongly)?;
-        let iso = (has_iso == 1).then_some(iso);
         let meta = FieldMeta {
-            source,
-            unit,
             density_unit,
-            iso,
-            ..Default::default()
+            iso: has_iso.then_some(iso),
+            ..meta
         };
         Ok(Self {
             bytes_per_value,
@@ -170,24 +120,16 @@ fn assemble<T: Stored>(header: Header, chunks: &[Chunk], budget: &mut Budget) ->
             }
             LEAVES => meta.leaves = leaves(&chunk.unpack(budget)?, budget)?,
             SIGNS => meta.sign_confidence = confidences(&chunk.unpack(budget)?, budget)?,
-            REPORT => meta.report = text(chunk.unpack(budget)?)?,
-            PROVENANCE => meta.provenance = text(chunk.unpack(budget)?)?,
-            NOTES => {
-                let raw = chunk.unpack(budget)?;
-                let mut cursor = Cursor::new(&raw, "the notes");
-                // A note takes at least the four bytes of its length.
-                budget.reserve("the notes", raw.len() as u64 / 4, size_of::<String>())?;
-                for _ in 0..cursor.u32()? {
-                    meta.notes.push(cursor.text()?);
-                }
-                cursor.end()?;
-            }
             HEADER => {
                 return Err(Fault::Damaged {
                     what: "a second header".into(),
                 });
             }
-            other => skipped_chunks.push(String::from_utf8_lossy(&other).into_owned()),
+            other => {
+                if !beside::take_text(&mut meta, chunk, budget)? {
+                    skipped_chunks.push(String::from_utf8_lossy(&other).into_owned());
+                }
+            }
         }
     }
     if levels.len() != level_count as usize {
@@ -245,12 +187,6 @@ fn reserve_totals<T: Stored>(levels: &[Level<T>], budget: &mut Budget) -> Result
 /// Bytes of a brick of totals with its key, hull and links.
 fn brick_bytes<T: Stored>() -> usize {
     HALO_LEN * T::BYTES + 128
-}
-
-fn text(raw: Vec<u8>) -> Result<String, Fault> {
-    String::from_utf8(raw).map_err(|_| Fault::Damaged {
-        what: "a text chunk is no UTF-8".into(),
-    })
 }
 
 fn confidences(raw: &[u8], budget: &mut Budget) -> Result<Vec<f32>, Fault> {

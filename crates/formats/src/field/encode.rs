@@ -5,10 +5,10 @@ use std::io::{self, Write};
 use bspline::HierarchicalSpline;
 
 use super::chunk::{self, Kind};
-use super::kinds::{END, HEADER, LEAVES, LEVEL, NOTES, PROVENANCE, REPORT, SIGNS};
+use super::kinds::{END, HEADER, LEAVES, LEVEL, SIGNS};
 use super::levels::to_bytes;
 use super::valid::{self, Wrong};
-use super::{FieldMeta, MAGIC, Stored, VERSION};
+use super::{FieldMeta, MAGIC, Stored, VERSION, beside};
 use crate::Fault;
 
 /// The bytes of a field file.
@@ -69,28 +69,15 @@ pub(super) fn write<T: Stored>(
             .collect();
         put(SIGNS, &raw)?;
     }
-    if !meta.report.is_empty() {
-        put(REPORT, meta.report.as_bytes())?;
-    }
-    if !meta.notes.is_empty() {
-        let mut raw = (meta.notes.len() as u32).to_le_bytes().to_vec();
-        meta.notes.iter().for_each(|n| text(&mut raw, n));
-        put(NOTES, &raw)?;
-    }
-    if !meta.provenance.is_empty() {
-        put(PROVENANCE, meta.provenance.as_bytes())?;
+    for (kind, raw) in beside::texts(meta) {
+        put(kind, &raw)?;
     }
     chunk::write(out, END, &count.to_le_bytes())
 }
 
 fn header<T: Stored>(field: &HierarchicalSpline<T>, meta: &FieldMeta) -> Vec<u8> {
     let lattice = field.lattice();
-    let mut raw = vec![
-        T::BYTES as u8,
-        meta.source as u8,
-        meta.unit as u8,
-        u8::from(meta.iso.is_some()),
-    ];
+    let mut raw = beside::marks::<T>(meta).to_vec();
     raw.extend((field.level_count() as u32).to_le_bytes());
     lattice.cells.iter().for_each(|n| raw.extend(n.to_le_bytes()));
     lattice
@@ -100,13 +87,8 @@ fn header<T: Stored>(field: &HierarchicalSpline<T>, meta: &FieldMeta) -> Vec<u8>
         .for_each(|x| raw.extend(x.to_le_bytes()));
     raw.extend(field.slope().to_le_bytes());
     raw.extend(meta.iso.unwrap_or(0.0).to_le_bytes());
-    text(&mut raw, &meta.density_unit);
+    beside::put_text(&mut raw, &meta.density_unit);
     raw
-}
-
-fn text(raw: &mut Vec<u8>, s: &str) {
-    raw.extend((s.len() as u32).to_le_bytes());
-    raw.extend(s.as_bytes());
 }
 
 /// The leaf table, a column after the other: columns of like numbers pack several times better than rows.

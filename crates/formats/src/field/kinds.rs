@@ -10,3 +10,6 @@ pub(super) const REPORT: Kind = *b"REPT";
 pub(super) const NOTES: Kind = *b"NOTE";
 pub(super) const PROVENANCE: Kind = *b"PROV";
 pub(super) const END: Kind = *b"DONE";
+pub(super) const KNOTS_HEADER: Kind = *b"SPLN";
+pub(super) const KNOTS: Kind = *b"KNOT";
+pub(super) const COEFFICIENTS: Kind = *b"COEF";

@@ -1,11 +1,13 @@
 //! The native file of a fitted field, `.iclay`: see `docs/format.md` for every byte.
 
+mod beside;
 mod chunk;
 mod cursor;
 mod decode;
 mod difference;
 mod encode;
 mod kinds;
+mod knots;
 mod levels;
 mod stored;
 mod valid;
@@ -18,6 +20,7 @@ use bspline::HierarchicalSpline;
 pub use decode::decode;
 pub use difference::{DIFFERENCE_MAGIC, decode_difference, encode_difference};
 pub use encode::encode;
+pub use knots::{KNOTS_MAGIC, decode_knots, decode_knots_difference, encode_knots, encode_knots_difference};
 pub use stored::Stored;
 
 use crate::limits::Budget;

@@ -15,7 +15,7 @@ pub(super) const FULL: f64 = 0.5;
 ///
 /// # Errors
 /// [`GeometricError::Shape`] for a way without a place.
-pub(super) fn band(along: &[Point], radius: f64) -> Result<(Faded, Aabb), GeometricError> {
+pub(crate) fn band(along: &[Point], radius: f64) -> Result<(Faded, Aabb), GeometricError> {
     let places: Vec<DVec3> = along.iter().map(|p| p.0).collect();
     let Some(&first) = places.first() else {
         let why = "along has no place; write at least one point";

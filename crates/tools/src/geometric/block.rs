@@ -13,7 +13,7 @@ use super::{GeometricError, TOLERANCE};
 const COARSEST: f64 = 48.0;
 
 /// Room about a block, over its longest edge: what is added to it has to lie within.
-const ROOM: f64 = 0.5;
+pub(crate) const ROOM: f64 = 0.5;
 
 /// Radius of a block's edges over its finest knot interval. Sharp edges ring: of four blocks their corners stood out by 0.08 to 0.19
 /// intervals, with a radius of 1 by 0.01 to 0.08, with this by 0.01 to 0.04.
@@ -53,10 +53,7 @@ pub fn block(
     let finest = (outer.max_element() / spacing / COARSEST).log2().ceil().max(0.0) as usize;
     let step = spacing * (1u64 << finest) as f64;
     let cells = (outer / step).ceil().max(DVec3::ONE);
-    let edge = (EDGE * spacing).min(MOST_EDGE * size.min_element());
-    let inner = Cuboid::new(DVec3::ZERO, 0.5 * size - edge).map_err(GeometricError::shape)?;
-    let solid =
-        Csg::sum(vec![(1.0, Arc::new(inner) as Arc<dyn Field>)], edge).map_err(GeometricError::shape)?;
+    let solid = rounded(size, spacing)?;
     let lattice = Lattice {
         world_from_lattice: DAffine3::from_scale_rotation_translation(
             DVec3::splat(step),
@@ -77,4 +74,11 @@ pub fn block(
     };
     let (field, _, _) = fit_field(&solid, &coarse, &lattice.world_box(), &options, control)?;
     Ok(field)
+}
+
+/// The distance to the faces of a box about the origin, with its edges rounded for knot intervals of `spacing`.
+pub(crate) fn rounded(size: DVec3, spacing: f64) -> Result<Csg, GeometricError> {
+    let edge = (EDGE * spacing).min(MOST_EDGE * size.min_element());
+    let inner = Cuboid::new(DVec3::ZERO, 0.5 * size - edge).map_err(GeometricError::shape)?;
+    Csg::sum(vec![(1.0, Arc::new(inner) as Arc<dyn Field>)], edge).map_err(GeometricError::shape)
 }

@@ -26,7 +26,9 @@ use fitting::{Control, FitError};
 use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
+pub(crate) use band::band;
 pub use block::block;
+pub(crate) use block::{ROOM, rounded};
 pub use detail::{Refine, Simplify};
 pub use motion::{Motion, Move, Origin, reflection};
 pub use paste::{Copy, Cut, Paste};
@@ -35,7 +37,8 @@ pub use shape::Shape;
 pub use smooth::{Inflate, Smooth};
 pub use sweep::Sweep;
 use swept::Pose;
-use write::{Fineness, TOLERANCE, Writer};
+pub(crate) use write::TOLERANCE;
+use write::{Fineness, Writer};
 
 use crate::face::Face;
 use crate::limits::Limits;
@@ -123,7 +126,7 @@ pub enum GeometricError {
 }
 
 impl GeometricError {
-    fn shape(error: impl std::fmt::Display) -> Self {
+    pub(crate) fn shape(error: impl std::fmt::Display) -> Self {
         Self::Shape(error.to_string())
     }
 }

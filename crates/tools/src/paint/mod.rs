@@ -9,7 +9,7 @@ mod layer;
 
 use std::collections::BTreeMap;
 
-use bspline::{Aabb, Field, HierarchicalSpline};
+use bspline::Aabb;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -17,6 +17,9 @@ pub use brush::Brush;
 pub(crate) use brush::distance;
 pub use layer::{Layer, LayerError};
 
+use crate::canvas::Canvas;
+use crate::limits::Limits;
+use crate::malleable::Malleable;
 use crate::scene::Formula;
 
 /// Nodes that a stroke may fill: beyond it the stroke needs a smaller box.
@@ -132,17 +135,17 @@ impl Paint {
     ///
     /// # Errors
     /// Any [`PaintError`].
-    pub fn apply(
+    pub fn apply<F: Malleable>(
         &self,
-        field: &HierarchicalSpline<f32>,
+        field: &F,
         layers: &Layers,
         detail: usize,
         within: &Aabb,
     ) -> Result<Layer, PaintError> {
         let wrong = |why: String| PaintError::Stroke(format!("paint: {why}"));
         let old = layers.get(&self.layer).cloned();
-        let old = old.unwrap_or_else(|| Layer::empty(field.lattice(), detail));
-        let whole = field.lattice().world_box();
+        let old = old.unwrap_or_else(|| Layer::empty(&field.grids(), detail));
+        let whole = field.whole();
         let source = self.source().map_err(wrong)?;
         let reach = match &source {
             Source::Brush(brush) => brush.reach().map_err(wrong)?,
@@ -184,6 +187,24 @@ impl Paint {
                 })
             }
         }
+    }
+
+    /// The layer of a canvas with the stroke laid on, as far as limits allow.
+    ///
+    /// # Errors
+    /// Any [`PaintError`].
+    pub(crate) fn laid_on<F: Malleable>(
+        &self,
+        canvas: &Canvas<F>,
+        limits: &Limits,
+    ) -> Result<Layer, PaintError> {
+        let field = &canvas.field;
+        let whole = limits.cut(&field.whole());
+        let layer = self.apply(field, &canvas.layers, canvas.detail, &whole)?;
+        let before = canvas.layers.get(&self.layer).cloned();
+        let before = before.unwrap_or_else(|| Layer::empty(&field.grids(), canvas.detail));
+        let kept = limits.kept(before.tree(), layer.tree());
+        Ok(layer.with_tree(kept).expect("some of the nodes painted"))
     }
 
     fn source(&self) -> Result<Source<'_>, String> {

@@ -1,4 +1,5 @@
 use bspline::hierarchical::Lattice;
+use bspline::{Field, HierarchicalSpline};
 
 use super::*;
 
@@ -209,14 +210,14 @@ fn strokes_that_make_no_sense_say_why() {
 
 #[test]
 fn a_move_carries_what_is_painted() {
-    let canvas = crate::canvas::Canvas {
+    let canvas = Canvas {
         layers: laid(
             &STROKE.replace("[4, 4, 4]", "[10, 10, 10]"),
             &ball(40),
             &Layers::new(),
         )
         .unwrap(),
-        ..crate::canvas::Canvas::alone(ball(40), 0.0, 0)
+        ..Canvas::alone(ball(40), 0.0, 0)
     };
     let text =
         "[move.motion.shift]\nregion = { min = [7, 7, 7], max = [13, 13, 13] }\nby = [2, 0, 0]\nblend = 6";

@@ -341,7 +341,10 @@ fn formulas_and_objects_are_tools() {
         "add = { shape = { sphere = { radius = 3.0 } }, along = [[12, 12, 12]], finer = 2 }",
     );
     let mut canvas = canvas(&block);
-    canvas.others.put("ball", &ball, ISO, DAffine3::IDENTITY).unwrap();
+    canvas
+        .others
+        .put("ball", &ball.clone().into(), ISO, DAffine3::IDENTITY)
+        .unwrap();
     let text = "within = { min = [6, 6, 12.5], max = [18, 18, 20] }
         add = { shape = { object = { name = \"ball\" } }, along = [[12, 12, 13]], finer = 2 }";
     let (left, _) = stroke(text).apply(canvas, &mut Control::default()).unwrap();

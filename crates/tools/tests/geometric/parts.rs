@@ -15,7 +15,10 @@ fn beside(
     text: &str,
 ) -> HierarchicalSpline<f32> {
     let mut canvas: Canvas = canvas(field);
-    canvas.others.put("clip", clip, ISO, DAffine3::IDENTITY).unwrap();
+    canvas
+        .others
+        .put("clip", &clip.clone().into(), ISO, DAffine3::IDENTITY)
+        .unwrap();
     let left = stroke(text).apply(canvas, &mut Control::default());
     left.unwrap_or_else(|e| panic!("{text}: {e}")).0.field
 }

@@ -1,5 +1,6 @@
 use std::path::{Path, PathBuf};
 
+use fitting::Control;
 use formats::volumes::VolumeFormat;
 use formats::{Kind, PointFormat};
 
@@ -43,7 +44,7 @@ pub struct Args {
     pub json: bool,
 }
 
-/// Writes an object as it is now, in its own place: its field, or the scan that it was fitted to with its edits.
+/// Writes an object as it is now, in its own place: its field, in levels, or the scan that it was fitted to with its edits.
 pub fn run(args: &Args) -> Outcome {
     let cost = Cost::start();
     let mut notes = Vec::new();
@@ -55,9 +56,11 @@ pub fn run(args: &Args) -> Outcome {
     let state = document.state();
     let name = chosen(state, args.object.as_deref())?;
     let object = &state.objects()[name];
-    let sha256 = field::save_as(&output, &object.field, &edited_meta(object))?;
+    let (levels, told) = object.in_levels(name, &mut Control::default())?;
+    notes.extend(told);
+    let sha256 = field::save_as(&output, &levels, &edited_meta(object))?;
     let summary = Summary {
-        coefficients: Some(object.field.coefficient_count()),
+        coefficients: Some(levels.coefficient_count()),
         field_sha256: Some(sha256),
         notes,
         ..Summary::default()

@@ -20,7 +20,7 @@ pub fn run(source: &Source, json: bool) -> Outcome {
     let mut objects = Vec::new();
     for (name, object) in document.state().objects() {
         let field = &object.field;
-        let b = field.lattice().world_box();
+        let b = field.world_box();
         let painted = object.layers.iter().filter(|(_, layer)| !layer.is_empty());
         let painted: Vec<_> = painted.map(|(substance, _)| substance.name()).collect();
         let [lo, hi] = [b.min, b.max].map(|p| p.to_array().map(human_number).join(", "));
@@ -28,7 +28,13 @@ pub fn run(source: &Source, json: bool) -> Outcome {
         rows.push(("object", name.clone()));
         rows.push((
             "  coefficients",
-            format!("{coefficients}, shaped to level {}", object.detail()),
+            match field.knots() {
+                None => format!("{coefficients}, shaped to level {}", object.detail()),
+                Some(knots) => {
+                    let shape = knots.shape().map(|n| n.to_string()).join(" × ");
+                    format!("{coefficients} on knots of its own, {shape}")
+                }
+            },
         ));
         rows.push(("  box", format!("({lo}) to ({hi}) {}", object.meta.unit)));
         if let Some(parent) = &object.properties.parent {
@@ -48,6 +54,7 @@ pub fn run(source: &Source, json: bool) -> Outcome {
             "name": name,
             "coefficients": field.coefficient_count(),
             "detail": object.detail(),
+            "knots": field.knots().map(|knots| knots.shape()),
             "box": [b.min.to_array(), b.max.to_array()],
             "unit": object.meta.unit.symbol(),
             "iso": object.meta.iso,

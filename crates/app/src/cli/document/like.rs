@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use bspline::HierarchicalSpline;
 use document::{Command, Document, Journey, Object, revise_cloud, revise_volume};
 use formats::Fault;
 use formats::field::FieldMeta;
@@ -37,7 +38,7 @@ impl Like<'_> {
     pub fn export(&self, document: &mut Document, name: &str, output: &Path) -> Outcome<Vec<String>> {
         let (fitted, now) = versions(document, name)?;
         let input = input::read(self.source, None, self.choice, None, None)?;
-        let extent = fitted.field.lattice().world_box();
+        let extent = fitted.field.world_box();
         let differs = belongs::differs(
             &fitted.meta,
             &extent,
@@ -53,7 +54,7 @@ impl Like<'_> {
         let identity = document.state().sha256();
         // The box may have grown since.
         let fitted = fitted.in_box_of(&now);
-        let journey = Journey::new(&done(document)?, name, &now.field.lattice().world_box());
+        let journey = Journey::new(&done(document)?, name, &now.field.world_box());
         match input {
             Input::Volume(volume) => self.volume([&fitted, &now], &journey, &volume, &identity, output),
             Input::Cloud(cloud) => self.cloud([&fitted, &now], &journey, &cloud, output),
@@ -80,7 +81,7 @@ impl Like<'_> {
             )));
         }
         let iso = now.meta.iso.unwrap_or(0.0);
-        let changes = revise_cloud(&fitted.field, &now.field, &cloud.positions, iso, journey)
+        let changes = revise_cloud(scan_of(fitted)?, scan_of(now)?, &cloud.positions, iso, journey)
             .map_err(|e| Failure::input(format!("{e}; was the object replaced?")))?;
         formats::points::save_revised(self.source.path(), &changes, output, &limits(None)).map_err(|e| {
             match e.fault {
@@ -111,7 +112,7 @@ impl Like<'_> {
             .iso
             .ok_or_else(|| Failure::input("the object names no surface"))?;
         let fill = self.fill.unwrap_or_else(|| air(&now.meta, volume));
-        let revision = revise_volume(&fitted.field, &now.field, volume, iso, fill, journey)
+        let revision = revise_volume(scan_of(fitted)?, scan_of(now)?, volume, iso, fill, journey)
             .map_err(|e| Failure::input(format!("{e}; was the object replaced?")))?;
         let options = self.choice.options(None)?;
         let path = self.source.path();
@@ -123,6 +124,12 @@ impl Like<'_> {
         )?;
         Ok(sentences(&revision, &told, volume, fill))
     }
+}
+
+/// The field of an object that was fitted to a scan.
+fn scan_of(object: &Object) -> Outcome<&HierarchicalSpline<f32>> {
+    let why = "the object is a block on knots of its own, fitted to no scan; export its field, or mesh it";
+    object.field.levels().ok_or_else(|| Failure::usage(why))
 }
 
 /// What was done to a document.

@@ -3,6 +3,7 @@
 pub mod export;
 pub mod history;
 pub mod info;
+mod knots;
 mod like;
 pub mod new;
 pub mod replay;
@@ -12,7 +13,7 @@ pub mod undo;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use bspline::{Aabb, Field};
+use bspline::Aabb;
 use document::{CommandError, Document, DocumentError, Object, Options, State};
 use formats::Fault;
 use formats::field::FieldMeta;
@@ -150,11 +151,11 @@ impl Told {
             .collect();
         self.state_sha256 = hex(&shown.sha256());
         for (name, object) in shown.objects() {
-            let whole = object.field.lattice().world_box();
+            let whole = object.field.world_box();
             let boxes = before
                 .objects()
                 .get(name)
-                .map_or(vec![whole], |old| object.field.changed_boxes(&old.field, &whole));
+                .map_or(vec![whole], |old| object.field.changed_boxes(&old.field));
             if let Some(b) = boxes.into_iter().reduce(Aabb::hull) {
                 self.changed
                     .insert(name.clone(), [b.min.to_array(), b.max.to_array()]);

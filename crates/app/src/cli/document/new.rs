@@ -5,9 +5,12 @@ use fitting::{Cancel, FitReport};
 use formats::Unit;
 use formats::field::{AnyField, FieldMeta, SourceKind};
 use glam::DVec3;
+use tools::body::Body;
 use tools::force::Solid;
 use tools::geometric::block;
+use tools::knots;
 
+use super::knots::Knots;
 use super::{Told, failure, options};
 use crate::cli::failure::{Failure, Outcome};
 use crate::cli::field::{OpenField, stored_text};
@@ -37,6 +40,10 @@ pub struct Args {
     /// Finest knot interval of the block: the least that can be shaped is a few of it
     #[arg(long, value_name = "LENGTH", requires = "block", value_parser = positive, allow_negative_numbers = true)]
     spacing: Option<f64>,
+    /// Knots of the block, where they are not to be --spacing apart: for each axis places in ascending order, and ranges A..B/N in
+    /// N equal intervals, as x=-1,-0.5,0..1/20;z=0..5/10. Beyond the list they follow --spacing apart
+    #[arg(long, requires = "block", value_name = "KNOTS", allow_hyphen_values = true)]
+    knots: Option<Knots>,
     /// What the objects are when a force tool lets go: clay keeps its new shape, elastic springs back
     #[arg(long, value_enum, default_value = "clay")]
     material: Material,
@@ -92,8 +99,8 @@ pub fn run(args: &Args) -> Outcome {
                 source.name()
             )));
         }
-        let loaded = open.loaded();
-        if matches!(loaded.field, AnyField::F64(_)) {
+        let is_double = matches!(open.levels(), Ok(AnyField::F64(_)));
+        if is_double {
             notes.push(format!(
                 "{name}: documents hold single precision; the field was rounded to it"
             ));
@@ -110,11 +117,14 @@ pub fn run(args: &Args) -> Outcome {
             }
         }
         let meta = FieldMeta {
-            iso: args.iso.or(loaded.meta.iso),
-            ..loaded.meta.clone()
+            iso: args.iso.or(open.iso()),
+            ..open.meta().clone()
         };
-        let mut object = Object::new(&loaded.field, meta)
-            .map_err(|e| Failure::input(format!("{}: {e}", source.name())))?;
+        let mut object = match open.knots() {
+            Some(knots) => Object::of(knots.clone().into(), meta),
+            None => Object::new(open.levels()?, meta)
+                .map_err(|e| Failure::input(format!("{}: {e}", source.name())))?,
+        };
         object.properties.material = args.material.into();
         state = state.with(&name, object).map_err(failure)?;
     }
@@ -123,7 +133,14 @@ pub fn run(args: &Args) -> Outcome {
         let bar = Bar::new();
         let mut control = bar.control(&cancel);
         let size = DVec3::from_array(size.map(|s| s.0));
-        let field = block(size, spacing, &mut control).map_err(|e| Failure::usage(format!("--box: {e}")))?;
+        let field: Body = match &args.knots {
+            None => block(size, spacing, &mut control)
+                .map_err(|e| Failure::usage(format!("--box: {e}")))?
+                .into(),
+            Some(knots) => knots::block(size, spacing, knots.lists())
+                .map_err(|e| Failure::usage(format!("--knots: {e}")))?
+                .into(),
+        };
         bar.clear();
         let report = FitReport {
             tolerance: TOLERANCE * spacing,
@@ -136,7 +153,7 @@ pub fn run(args: &Args) -> Outcome {
             report: stored_text(&report),
             ..FieldMeta::default()
         };
-        let mut object = Object::new(&AnyField::F32(field), meta).map_err(Failure::input)?;
+        let mut object = Object::of(field, meta);
         object.properties.material = args.material.into();
         state = state.with("block", object).map_err(failure)?;
     }

@@ -2,6 +2,7 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use document::Command;
+use fitting::Control;
 
 use super::{Told, chosen, edited_meta, failure, open};
 use crate::cli::failure::{Failure, Outcome};
@@ -74,7 +75,9 @@ pub fn run(args: &Args) -> Outcome {
     let mut told = Told::of(&mut document, notes)?;
     if let (Some(output), Some(last)) = (&preview, commands.last()) {
         let object = shown.object(last.object()).map_err(failure)?;
-        field::save_as(output, &object.field, &edited_meta(object))?;
+        let (levels, note) = object.in_levels(last.object(), &mut Control::default())?;
+        field::save_as(output, &levels, &edited_meta(object))?;
+        told.notes.extend(note);
         told.show(document.state(), &shown);
         return told.print_after(output, args.json);
     }

@@ -50,7 +50,7 @@ pub fn dented(state: &State, name: &str, number: u32) -> State {
         function: [number % 7, number / 7 % 7, number / 49 % 7],
         delta: 0.25 + (number % 1009) as f32,
     };
-    object.field = object.field.edited(&[edit]).unwrap();
+    object.field = object.field.levels().unwrap().edited(&[edit]).unwrap().into();
     state.with(name, object).unwrap()
 }
 
@@ -68,7 +68,7 @@ pub fn random_edit(state: &State, draw: &mut Draw) -> State {
             // Two substances, and strokes that meet.
             let substance = [Substance::Stiffness, Substance::Friction][draw.below(2) as usize];
             let old = changed.layers.remove(&substance);
-            let old = old.unwrap_or_else(|| Layer::empty(changed.field.lattice(), 0));
+            let old = old.unwrap_or_else(|| Layer::empty(&changed.field.lattice(), 0));
             let centre = DVec3::from_array(std::array::from_fn(|_| f64::from(draw.below(6))));
             let reach = Aabb::new(centre - 1.5, centre + 1.5);
             let value = f64::from(draw.below(9));
@@ -99,7 +99,7 @@ pub fn random_edit(state: &State, draw: &mut Draw) -> State {
                     delta: draw.below(2000) as f32 / 128.0 - 8.0,
                 })
                 .collect();
-            changed.field = changed.field.edited(&edits).unwrap();
+            changed.field = changed.field.levels().unwrap().edited(&edits).unwrap().into();
         }
     }
     state.with(&name, changed).unwrap_or_else(|_| state.clone())
