@@ -183,7 +183,11 @@ fn unpacked(bytes: &[u8], header: &Header, budget: &mut Budget) -> Result<Vec<u8
         .filter(|place| (header.points_at as u64..bytes.len() as u64).contains(place))
         .min()
         .map_or(bytes.len(), |place| place as usize);
-    budget.reserve("the points, not compressed", header.point_count, header.record_bytes)?;
+    budget.reserve(
+        "the points, not compressed",
+        header.point_count,
+        header.record_bytes,
+    )?;
     let mut out = bytes[..header.points_at].to_vec();
     laz::unpack(bytes, header, budget, |point, _| {
         out.extend_from_slice(point);

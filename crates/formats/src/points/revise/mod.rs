@@ -66,9 +66,10 @@ pub fn save_revised(
             Kind::Cloud(PointFormat::Pcd) => (pcd::revised(&bytes, changes)?, "pcd"),
             Kind::Cloud(PointFormat::Obj) => (obj::revised(&bytes, changes)?, "obj"),
             #[cfg(feature = "lidar")]
-            Kind::Cloud(PointFormat::Las) => {
-                (las::revised(&bytes, changes, &mut budget)?, las::extension(&bytes))
-            }
+            Kind::Cloud(PointFormat::Las) => (
+                las::revised(&bytes, changes, &mut budget)?,
+                las::extension(&bytes),
+            ),
             other => {
                 return Err(Fault::Value {
                     what: "the format of the scan",
