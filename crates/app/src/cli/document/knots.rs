@@ -5,8 +5,12 @@ const MOST: usize = 1 << 16;
 
 /// Knots on each axis as the user writes them: `x=-2,-1,0..1/10,3;z=0..5/20`. A number is a knot; `A..B/N` are knots from A to
 /// B in N equal intervals, of which A may be the knot before. Axes that are not named have none.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Knots(pub [Vec<f64>; 3]);
+#[derive(Clone, Debug)]
+pub struct Knots {
+    /// As it was written, for messages.
+    pub text: String,
+    lists: [Vec<f64>; 3],
+}
 
 impl std::str::FromStr for Knots {
     type Err = String;
@@ -30,7 +34,10 @@ impl std::str::FromStr for Knots {
         }
         match knots.iter().all(Vec::is_empty) {
             true => Err("there are no knots; write them as x=-1,-0.5,0..1/20;z=0..5/10".into()),
-            false => Ok(Self(knots)),
+            false => Ok(Self {
+                text: text.into(),
+                lists: knots,
+            }),
         }
     }
 }
@@ -75,7 +82,7 @@ fn place(text: &str) -> Result<f64, String> {
 impl Knots {
     /// The lists, for [`tools::knots::block`].
     pub fn lists(&self) -> [&[f64]; 3] {
-        self.0.each_ref().map(|list| &list[..])
+        self.lists.each_ref().map(|list| &list[..])
     }
 }
 
@@ -85,7 +92,7 @@ mod tests {
 
     #[test]
     fn lists_and_ranges_are_read_in_their_order() {
-        let read = |text: &str| text.parse::<Knots>().map(|k| k.0);
+        let read = |text: &str| text.parse::<Knots>().map(|k| k.lists);
         let [x, y, z] = read("x=-2, -1,0..1/4,3 ; z=0..1/2").unwrap();
         assert_eq!(x, [-2.0, -1.0, 0.0, 0.25, 0.5, 0.75, 1.0, 3.0]);
         assert!(y.is_empty());

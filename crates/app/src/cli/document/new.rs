@@ -138,7 +138,7 @@ pub fn run(args: &Args) -> Outcome {
                 .map_err(|e| Failure::usage(format!("--box: {e}")))?
                 .into(),
             Some(knots) => knots::block(size, spacing, knots.lists())
-                .map_err(|e| Failure::usage(format!("--knots: {e}")))?
+                .map_err(|e| Failure::usage(format!("--knots {}: {e}", knots.text)))?
                 .into(),
         };
         bar.clear();
