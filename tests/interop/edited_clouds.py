@@ -8,6 +8,7 @@ import sys
 
 import laspy
 import numpy as np
+from laspy.vlrs.vlrlist import VLRList
 
 program, directory = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2])
 directory.mkdir(parents=True, exist_ok=True)
@@ -36,7 +37,7 @@ for point_format, version in ((3, '1.2'), (7, '1.4')):
     cloud.red, cloud.classification = rng.integers(0, 65_536, count), rng.integers(0, 30, count)
     cloud.return_number = cloud.number_of_returns = np.ones(count, np.uint8)
     if version == '1.4':
-        cloud.evlrs = [laspy.VLR('isoclay', 7, 'kept', b'behind the points')]
+        cloud.evlrs = VLRList([laspy.VLR('isoclay', 7, 'kept', b'behind the points')])
     for suffix in ('las', 'laz'):
         name = f'cloud_{point_format}.{suffix}'
         cloud.write(directory / name)
