@@ -6,9 +6,10 @@ use glam::DAffine3;
 use crate::force::Holding;
 use crate::hold::Held;
 use crate::limits::Limits;
+use crate::malleable::Malleable;
 use crate::material::Material;
 use crate::others::Others;
-use crate::paint::Layers;
+use crate::paint::{Layer, Layers, Paint, PaintError};
 
 /// What a tool works on. Cheap to copy.
 #[derive(Clone, Debug)]
@@ -101,6 +102,21 @@ impl<F> Canvas<F> {
             holds: self.holds.clone(),
             limits: limits.clone(),
         }
+    }
+}
+
+impl<F: Malleable> Canvas<F> {
+    /// The layer of a stroke of paint with it laid on, as far as limits allow.
+    ///
+    /// # Errors
+    /// Any [`PaintError`].
+    pub(crate) fn painted(&self, paint: &Paint, limits: &Limits) -> Result<Layer, PaintError> {
+        let whole = limits.cut(&self.field.whole());
+        let layer = paint.apply(&self.field, &self.layers, self.detail, &whole)?;
+        let before = self.layers.get(&paint.layer).cloned();
+        let before = before.unwrap_or_else(|| Layer::empty(&self.field.grids(), self.detail));
+        let kept = limits.kept(before.tree(), layer.tree());
+        Ok(layer.with_tree(kept).expect("some of the nodes painted"))
     }
 }
 

@@ -161,7 +161,7 @@ impl Tool<'_> {
                 return Ok((moved, notes));
             }
             Self::Paint(paint) => {
-                let layer = paint.laid_on(&canvas, limits)?;
+                let layer = canvas.painted(paint, limits)?;
                 let mut canvas = canvas;
                 canvas.layers.insert(paint.layer, layer);
                 return Ok((canvas, Vec::new()));

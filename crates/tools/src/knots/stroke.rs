@@ -66,7 +66,7 @@ impl Tool<'_> {
                 left.holds = joined.map_err(ToolError::Stroke)?;
             }
             Self::Paint(paint) => {
-                let layer = paint.laid_on(&left, limits)?;
+                let layer = left.painted(paint, limits)?;
                 left.layers.insert(paint.layer, layer);
             }
             Self::Refine(refine) => left.field = refine.on_knots(&left.field, limits)?,

@@ -17,8 +17,6 @@ pub use brush::Brush;
 pub(crate) use brush::distance;
 pub use layer::{Layer, LayerError};
 
-use crate::canvas::Canvas;
-use crate::limits::Limits;
 use crate::malleable::Malleable;
 use crate::scene::Formula;
 
@@ -187,24 +185,6 @@ impl Paint {
                 })
             }
         }
-    }
-
-    /// The layer of a canvas with the stroke laid on, as far as limits allow.
-    ///
-    /// # Errors
-    /// Any [`PaintError`].
-    pub(crate) fn laid_on<F: Malleable>(
-        &self,
-        canvas: &Canvas<F>,
-        limits: &Limits,
-    ) -> Result<Layer, PaintError> {
-        let field = &canvas.field;
-        let whole = limits.cut(&field.whole());
-        let layer = self.apply(field, &canvas.layers, canvas.detail, &whole)?;
-        let before = canvas.layers.get(&self.layer).cloned();
-        let before = before.unwrap_or_else(|| Layer::empty(&field.grids(), canvas.detail));
-        let kept = limits.kept(before.tree(), layer.tree());
-        Ok(layer.with_tree(kept).expect("some of the nodes painted"))
     }
 
     fn source(&self) -> Result<Source<'_>, String> {

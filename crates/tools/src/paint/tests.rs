@@ -2,6 +2,7 @@ use bspline::hierarchical::Lattice;
 use bspline::{Field, HierarchicalSpline};
 
 use super::*;
+use crate::canvas::Canvas;
 
 /// A ball in a box of `cells` cells of half a unit.
 fn ball(cells: u32) -> HierarchicalSpline<f32> {
