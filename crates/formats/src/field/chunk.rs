@@ -53,6 +53,18 @@ pub(super) struct Chunk<'a> {
     payload: &'a [u8],
 }
 
+/// Takes the chunk at the front of `rest`, the end of `length` bytes, which has to be of one kind, and unpacks it.
+pub fn expected(rest: &mut &[u8], length: usize, kind: Kind, budget: &mut Budget) -> Result<Vec<u8>, Fault> {
+    let at = (length - rest.len()) as u64;
+    let chunk = Chunk::take(rest, at)?;
+    match chunk.kind == kind {
+        true => chunk.unpack(budget),
+        false => Err(Fault::Damaged {
+            what: "its parts are not in order".into(),
+        }),
+    }
+}
+
 impl<'a> Chunk<'a> {
     /// Takes the chunk at the front of `rest`, which starts at byte `at` of the file.
     pub fn take(rest: &mut &'a [u8], at: u64) -> Result<Self, Fault> {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use bspline::hierarchical::{BrickChange, BrickDiff, Corrections, Lattice};
 
-use super::chunk::{self, Chunk, Kind};
+use super::chunk::{self, Kind};
 use super::cursor::Cursor;
 use super::levels::{Level, from_bytes, to_bytes};
 use super::{MAX_LEVELS, Stored};
@@ -62,14 +62,7 @@ pub fn decode_difference<T: Stored>(
     let mut rest = bytes
         .strip_prefix(&DIFFERENCE_MAGIC)
         .ok_or_else(|| damaged("it does not start as a difference does"))?;
-    let mut take = |kind: Kind, budget: &mut Budget| {
-        let at = (bytes.len() - rest.len()) as u64;
-        let chunk = Chunk::take(&mut rest, at)?;
-        match chunk.kind == kind {
-            true => chunk.unpack(budget),
-            false => Err(damaged("its parts are not in order")),
-        }
-    };
+    let mut take = |kind: Kind, budget: &mut Budget| chunk::expected(&mut rest, bytes.len(), kind, budget);
     let head = take(HEADER, &mut budget)?;
     let mut cursor = Cursor::new(&head, "the head of a difference");
     let (value, count) = (cursor.u8()?, cursor.u32()?);

@@ -4,7 +4,7 @@ use bspline::tensor::TensorDiff;
 use bspline::{KnotVector, Real, TensorSpline};
 use glam::DAffine3;
 
-use super::chunk::{self, Chunk, Kind};
+use super::chunk::{self, Kind};
 use super::cursor::Cursor;
 use super::kinds::{COEFFICIENTS, END, KNOTS, KNOTS_HEADER};
 use super::valid::{Wrong, written_wrongly};
@@ -148,14 +148,7 @@ pub fn decode_knots_difference<T: Stored>(bytes: &[u8], limits: &ReadLimits) -> 
     let mut rest = bytes
         .strip_prefix(&DIFFERENCE_MAGIC)
         .ok_or_else(|| damaged("it does not start as a difference of knots does"))?;
-    let mut take = |kind: Kind, budget: &mut Budget| {
-        let at = (bytes.len() - rest.len()) as u64;
-        let chunk = Chunk::take(&mut rest, at)?;
-        match chunk.kind == kind {
-            true => chunk.unpack(budget),
-            false => Err(damaged("its parts are not in order")),
-        }
-    };
+    let mut take = |kind: Kind, budget: &mut Budget| chunk::expected(&mut rest, bytes.len(), kind, budget);
     let head = take(HEADER, &mut budget)?;
     let mut c = Cursor::new(&head, "the head of a difference");
     let value = c.u8()?;
