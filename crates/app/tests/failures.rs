@@ -355,6 +355,20 @@ fn a_cancelled_fit() {
     assert_eq!(bench.files(), before);
 }
 
+/// Number of processes whose working directory is `directory`, as far as the system tells.
+fn at_work_in(directory: &std::path::Path) -> usize {
+    let directory = directory.canonicalize().unwrap();
+    std::fs::read_dir("/proc")
+        .into_iter()
+        .flatten()
+        .flatten()
+        .filter(|process| {
+            let cwd = std::fs::read_link(process.path().join("cwd"));
+            cwd.is_ok_and(|cwd| cwd == directory)
+        })
+        .count()
+}
+
 /// Ctrl-C at moments of a fixed sequence, in every command: exit code 4 wherever the work is, also where nothing looks
 /// at a flag (`eval` waits for its input), and no half-written file. A command that was done before ends with 0.
 #[test]
@@ -424,6 +438,7 @@ fn ctrl_c_ends_every_command() {
                 assert!(written.is_empty(), "{command}: left {written:?}");
                 let kept = std::fs::read_dir(bench.path("tmp")).unwrap().count();
                 assert_eq!(kept, 0, "{command}: temporary files are left");
+                assert_eq!(at_work_in(&bench.path("")), 0, "{command}: a process goes on");
                 cancelled.push(command);
             }
             other => panic!("{command}: code {other}: {}", run.stderr),

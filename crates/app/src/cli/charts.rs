@@ -1,7 +1,7 @@
 use std::ffi::OsString;
 use std::io::{self, Write};
+use std::iter::once;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 use clap::ValueEnum;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -12,6 +12,7 @@ use serde_json::{Map, Value};
 
 use super::failure::{Failure, OrFail, Outcome};
 use super::interrupt;
+use super::own;
 use super::phantom::Name;
 use super::progress::Bar;
 use super::quantity::between;
@@ -264,7 +265,7 @@ impl Prepared {
         })
     }
 
-    /// Runs this program, since only a process of its own has a time and a memory of its own.
+    /// Fits as often as told, each time in a process of its own, and takes the median of the costs.
     fn measure(&self, configuration: &Configuration, runs: u8, scratch: &Path) -> Outcome<Measurement> {
         let field = scratch.join("field.iclay");
         let mut fits = Vec::new();
@@ -310,13 +311,8 @@ impl Prepared {
 
 /// Runs a subcommand with `--json` and reads its last line.
 fn ask(subcommand: &str, arguments: impl Iterator<Item = OsString>) -> Outcome<Map<String, Value>> {
-    let program = std::env::current_exe().or_limit()?;
-    let out = Command::new(program)
-        .arg(subcommand)
-        .args(arguments)
-        .arg("--json")
-        .output()
-        .or_limit()?;
+    let arguments = once(subcommand.into()).chain(arguments);
+    let out = own::run(arguments.chain(once("--json".into()))).or_limit()?;
     let last = out
         .stdout
         .trim_ascii()

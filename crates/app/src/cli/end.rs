@@ -5,6 +5,7 @@ use std::sync::{Mutex, OnceLock, PoisonError, mpsc};
 use std::time::Duration;
 
 use super::failure::Failure;
+use super::own;
 
 /// Whether errors are printed as JSON too, and whether standard output is taken by data.
 static ERRORS: OnceLock<(bool, bool)> = OnceLock::new();
@@ -32,6 +33,7 @@ pub fn tell(failure: &Failure) {
 
 /// Ends the program at once.
 pub fn now(failure: Failure) -> ! {
+    own::end();
     formats::atomic::abandon();
     let code = failure.code();
     // Somebody may hold standard output, in front of a pipe that nobody reads.

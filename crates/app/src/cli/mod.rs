@@ -32,6 +32,7 @@ mod mesh_check;
 mod mesh_output;
 mod output;
 mod overwrite;
+mod own;
 mod phantom;
 mod picture;
 mod progress;
