@@ -10,6 +10,8 @@ mod holds;
 mod limits;
 #[path = "force/shapes.rs"]
 mod shapes;
+#[path = "force/tracks.rs"]
+mod tracks;
 
 use bspline::hierarchical::{HierarchicalSpline, Lattice};
 use bspline::polygonize::{PolygonizeOptions, check_mesh, polygonize};

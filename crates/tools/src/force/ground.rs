@@ -13,7 +13,7 @@ const SPACINGS_PER_RADIUS: f64 = 1.5;
 /// Samples per cell of the regions that are cut.
 const SAMPLES_PER_CELL: f64 = 4.0 / 3.0;
 /// Radii of a region beside the paths.
-const ROOM: f64 = 4.0;
+pub(super) const ROOM: f64 = 4.0;
 /// Knot intervals that the rim takes from a region.
 const RIM: f64 = 0.58;
 /// Mass and damping over `K/(λr)²` and `K/(λr²)`.
@@ -58,8 +58,8 @@ impl<T: Real> Ground<'_, T> {
         Ok((field, region))
     }
 
-    /// Whether a region reaches as far beside a path as it has to, or to the border of the field.
-    pub fn has_room(&self, region: &Region<T>, target: &Target) -> bool {
+    /// Whether a region reaches some radii beside a path, or to the border of the field.
+    pub fn has_room(&self, region: &Region<T>, target: &Target, radii: f64) -> bool {
         let cells = region.cells();
         let lattice = self.field.lattice();
         let (spacing, limit) = (lattice.spacing(cells.level), lattice.cells_at(cells.level));
@@ -68,7 +68,7 @@ impl<T: Real> Ground<'_, T> {
             let p = self.field.lattice_from_world().transform_point3(*p) * scale;
             (0..3).all(|a| {
                 let (low, end) = (cells.first[a], cells.first[a] + cells.count[a]);
-                let room = 0.999 * ROOM * self.radius / spacing[a] + RIM;
+                let room = 0.999 * radii * self.radius / spacing[a] + RIM;
                 (low == 0 || p[a] - f64::from(low) >= room)
                     && (end == limit[a] || f64::from(end) - p[a] >= room)
             })

@@ -32,6 +32,8 @@ pub enum Way {
         since: f64,
         /// Way since the first.
         along: f64,
+        /// Direction of the way at the last path.
+        heading: Option<DVec3>,
         /// Whether the last place was without a path.
         is_open: bool,
     },

@@ -6,9 +6,13 @@ use glam::DVec3;
 use super::hand::{Hand, Make, Way, dragged};
 use super::stroke::{ADVANCE, Extent, ForceStroke};
 use super::target::Target;
-use super::track::{self, DENSITY, MOST, OPEN, Place};
+use super::track::{self, CORNER, DENSITY, MOST, OPEN, Place};
 use super::{ForceError, How, Solid};
 
+/// Shares of the distance of paths: of the shortest leg of a way whose direction counts, and of the way from a path to one at
+/// a corner.
+const TREMBLE: f64 = 0.04;
+const APART: f64 = 0.2;
 /// Radii of the shortest path that a hand drags: it keeps its direction where it comes back to its start.
 const LEAST: f64 = 1e-3;
 
@@ -42,6 +46,7 @@ impl<T: Real> ForceStroke<T> {
             at,
             since: 0.0,
             along: 0.0,
+            heading: None,
             is_open: false,
         }));
         Ok(stroke)
@@ -84,17 +89,34 @@ impl<T: Real> ForceStroke<T> {
         }
         match self.hand.as_mut().map(|hand| &mut hand.way) {
             Some(Way::Drag { to, .. }) => *to = pose,
-            Some(Way::Walk { at, since, .. }) => {
+            Some(Way::Walk {
+                at, since, heading, ..
+            }) => {
                 let (from, gap) = (*at, self.radius / DENSITY);
                 let length = from.distance(pose);
-                let first = gap - *since;
+                // A hand that rests trembles.
+                let way = (length > TREMBLE * gap).then(|| (pose - from) / length);
+                // Corners, and bends, get paths of their own.
+                let turns = way
+                    .zip(*heading)
+                    .is_some_and(|(way, before)| way.dot(before) < CORNER);
+                let gone = *since;
+                let is_corner = turns && gone >= APART * gap;
+                let left = if is_corner { 0.0 } else { gone };
+                let first = gap - left;
                 let count = ((length - first) / gap).floor() + 1.0;
                 if count + self.targets.len() as f64 > MOST {
                     return Err(ForceError::tool(format!(
                         "the tool would have {count:.0} more paths on its way to {pose}; make its radius larger"
                     )));
                 }
-                (*at, *since) = (pose, *since + length - count.max(0.0) * gap);
+                (*at, *since) = (pose, left + length - count.max(0.0) * gap);
+                if heading.is_none() || is_corner || count >= 1.0 {
+                    *heading = way;
+                }
+                if is_corner {
+                    self.begin_path(from, gone);
+                }
                 for n in 0..count.max(0.0) as usize {
                     let s = first + n as f64 * gap;
                     self.begin_path(from + s / length * (pose - from), gap);

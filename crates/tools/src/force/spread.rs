@@ -1,4 +1,4 @@
-use bspline::Real;
+use bspline::{Real, vectorized};
 use dynamics::lattice::{OnBox, SampleBox};
 use dynamics::matter::Quantity;
 use dynamics::region::Region;
@@ -74,7 +74,7 @@ impl Spread {
         let at = places.iter().fold(SampleBox::default(), |all, (p, ..)| {
             all.joined(region.samples_near(*p, reach))
         });
-        let mut shares = vec![0.0; at.len()];
+        let (mut shares, mut sum) = (vec![0.0; at.len()], 0.0);
         let [_, ny, nz] = at.count;
         for (p, weight, direction) in &places {
             let near = region.samples_near(*p, reach);
@@ -92,15 +92,21 @@ impl Spread {
                         .collect()
                 };
                 let [gx, gy, gz] = [one(0), one(1), one(2)];
-                for (x, gx) in gx.iter().enumerate() {
-                    for (y, gy) in gy.iter().enumerate() {
-                        let row = rows(x, y);
-                        let factor = weight * gx * gy;
-                        for (share, gz) in shares[row..].iter_mut().zip(&gz) {
-                            *share += factor * gz;
+                sum += weight
+                    * [&gx, &gy, &gz]
+                        .map(|g| g.iter().sum::<f64>())
+                        .iter()
+                        .product::<f64>();
+                vectorized(
+                    #[inline(always)]
+                    || {
+                        for (x, gx) in gx.iter().enumerate() {
+                            for (y, gy) in gy.iter().enumerate() {
+                                add(&mut shares[rows(x, y)..], weight * gx * gy, &gz);
+                            }
                         }
-                    }
-                }
+                    },
+                );
                 continue;
             }
             // Formulas and cylinders are asked in the axes of the world.
@@ -110,12 +116,13 @@ impl Spread {
                     let row = rows(x, y);
                     for z in 0..near.count[2] {
                         let w = way(0, x) * axes[0] + way(1, y) * axes[1] + way(2, z) * axes[2];
-                        shares[row + z] += weight * shape.at(w, *direction)?;
+                        let share = weight * shape.at(w, *direction)?;
+                        shares[row + z] += share;
+                        sum += share;
                     }
                 }
             }
         }
-        let sum: f64 = shares.iter().sum();
         if !(sum > 0.0 && sum.is_finite()) {
             return Ok(Self {
                 at: SampleBox::default(),
@@ -123,7 +130,8 @@ impl Spread {
                 stiffness: 1.0,
             });
         }
-        shares.iter_mut().for_each(|s| *s /= sum);
+        let unit = 1.0 / sum;
+        shares.iter_mut().for_each(|s| *s *= unit);
         let stiffness = match &region.patch().matter().stiffness {
             Quantity::Constant(all) => *all,
             Quantity::PerSample(each) => {
@@ -138,6 +146,14 @@ impl Spread {
             shares,
             stiffness,
         })
+    }
+}
+
+/// `to += factor·what`, of the first numbers.
+#[inline(always)]
+fn add(to: &mut [f64], factor: f64, what: &[f64]) {
+    for (to, what) in to[..what.len()].iter_mut().zip(what) {
+        *to += factor * what;
     }
 }
 
@@ -201,15 +217,21 @@ impl<T: Real> Load<T> {
         for (spread, factor) in acting {
             let [mx, my, mz] = spread.at.count;
             let from: [usize; 3] = std::array::from_fn(|a| spread.at.first[a].saturating_sub(at.first[a]));
-            for x in 0..mx {
-                for y in 0..my {
-                    let row = ((from[0] + x) * ny + from[1] + y) * nz + from[2];
-                    let shares = &spread.shares[(x * my + y) * mz..][..mz];
-                    for (sum, share) in sums[row..].iter_mut().zip(shares) {
-                        *sum += factor * share;
+            vectorized(
+                #[inline(always)]
+                || {
+                    for x in 0..mx {
+                        for y in 0..my {
+                            let row = ((from[0] + x) * ny + from[1] + y) * nz + from[2];
+                            add(
+                                &mut sums[row..],
+                                factor,
+                                &spread.shares[(x * my + y) * mz..][..mz],
+                            );
+                        }
                     }
-                }
-            }
+                },
+            );
         }
         Self {
             at,

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use bspline::{Aabb, Real};
 use glam::DVec3;
 
+use super::ground::ROOM;
 use super::hand::Hand;
 use super::row::Functions;
 use super::stroke::{Acting, ForceStroke, STAGE};
@@ -13,6 +14,8 @@ use super::{ForceError, Solid};
 
 /// Radii about the paths of a stage in which those of earlier ones go on acting.
 const TRAIL: f64 = 5.0;
+/// Radii from the rim of a region within which a path of before is let go all the same.
+const HELD: f64 = 1.0;
 /// Share of its length that a path that has arrived may be off; after some steps with goals that stand still more is
 /// allowed, between neighbours it may not become less.
 const ARRIVED: f64 = 0.002;
@@ -77,7 +80,10 @@ impl<T: Real> ForceStroke<T> {
     /// Lets the tool go on along its track where it is done so far: its shape becomes the one at rest, the oldest paths end
     /// and the next begin.
     pub(super) fn advance(&mut self) -> Result<(), ForceError> {
-        if self.report.steps > 0 && self.begun < self.targets.len() && self.is_stage_over() {
+        let next = self.targets.get(self.begun);
+        let is_beyond = next.is_some_and(|t| !(t.begins <= self.gone && self.is_in_reach(t)));
+        // A path that the stage at hand has room for joins it: each cut leaves what was not quite done.
+        if self.report.steps > 0 && is_beyond && self.is_stage_over() {
             self.field = self.region.release_clay(&self.field)?;
             let from = match self.hand {
                 Some(_) => self.targets[self.begun].begins,
@@ -102,6 +108,7 @@ impl<T: Real> ForceStroke<T> {
                 .chain(next)
                 .collect();
             self.region = self.ground().cut(&paths)?;
+            self.remember();
             self.hold()?;
             self.count_cut();
         }
@@ -137,14 +144,16 @@ impl<T: Real> ForceStroke<T> {
 
     /// Whether the region at hand will do for a path.
     pub(super) fn is_in_reach(&self, target: &Target) -> bool {
-        self.hand.is_none() || self.ground().has_room(&self.region, target)
+        self.hand.is_none() || self.ground().has_room(&self.region, target, ROOM)
     }
 
-    /// Lets earlier paths act again that the region of a hand reaches. A hand that dawdles has time to lift what it let go
-    /// near by: 2.6 % of the depth, where paths ended five radii behind.
+    /// Lets earlier paths act that the region reaches, beside those near by. What is let go is lifted by what acts five radii
+    /// away: by 2 % of the depth in a stage, and more where a hand dawdles.
     fn remember(&mut self) {
         let acting: BTreeSet<usize> = self.acting.iter().map(|a| a.index).collect();
-        let back = (0..self.begun).filter(|i| !acting.contains(i) && self.is_in_reach(&self.targets[*i]));
+        let (ground, region) = (self.ground(), &self.region);
+        let is_held = |i: &usize| !acting.contains(i) && ground.has_room(region, &self.targets[*i], HELD);
+        let back = (0..self.begun).filter(is_held);
         let back: Vec<Acting> = back.map(|i| self.acting(i, usize::MAX / 2)).collect();
         self.acting.extend(back);
     }

@@ -308,10 +308,10 @@ impl<T: Real> ForceStroke<T> {
         (crossing - target.path.length()) / self.whole(target)
     }
 
-    /// Length that errors on a path count by: a hand may end where it began.
+    /// Length that errors on a path count by: a hand that drags may end where it began.
     pub(super) fn whole(&self, target: &Target) -> f64 {
         let length = target.path.length();
-        if self.hand.is_some() {
+        if self.hand.as_ref().is_some_and(|hand| hand.drags().is_some()) {
             length.max(self.radius)
         } else {
             length

@@ -12,7 +12,7 @@ const NEAR: f64 = 4.0;
 /// Radii that a free end of a curve, or the rim of an area, stands for beside its share.
 pub const OPEN: f64 = 0.5;
 /// Cosine of the turn from which on a curve has a corner.
-const CORNER: f64 = 0.9;
+pub(super) const CORNER: f64 = 0.9;
 /// Most paths of a tool.
 pub(super) const MOST: f64 = 20_000.0;
 

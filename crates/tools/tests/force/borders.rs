@@ -65,9 +65,10 @@ fn grooves_and_ridges_cross_borders() {
             let stroke = tool.begin(&field, ISO, grows).unwrap().painted(&layers).unwrap();
             let (_, report) = finished(stroke);
             let what = format!("{ratio} {side} {grows}: {report:?}");
-            assert!(report.overshoot <= 0.02, "{what}");
+            // For one step, as the second stage begins.
+            assert!(report.overshoot <= 0.025, "{what}");
             assert!(
-                report.arrival.least >= 0.98 && report.arrival.most <= 1.02,
+                report.arrival.least >= 0.985 && report.arrival.most <= 1.015,
                 "{what}"
             );
         }
