@@ -15,12 +15,11 @@ use serde::{Deserialize, Serialize};
 use super::GeometricError;
 use super::band::FULL;
 use super::write::{Fineness, TOLERANCE, Writer};
-use moved::{Cover, Moved};
-use way::Way;
-
 use crate::force::nearest_surface;
 use crate::limits::Limits;
 use crate::number::{Numbers, Point, Positive};
+use moved::{Cover, Moved};
+use way::Way;
 
 /// Radii in which a place has to have the surface.
 const NEAR: f64 = 2.0;
