@@ -32,7 +32,18 @@ impl<T: Real> Basis<T> {
             order <= MAX_DERIVATIVE,
             "derivative {order} of at most {MAX_DERIVATIVE}"
         );
-        let (p, span) = (knots.degree(), knots.span(t));
+        match (knots.degree(), order) {
+            // Loops of known lengths, in the same arithmetic.
+            (3, 0) => Self::of_degree(knots, 3, t, 0),
+            (3, 1) => Self::of_degree(knots, 3, t, 1),
+            (3, 2) => Self::of_degree(knots, 3, t, 2),
+            (p, order) => Self::of_degree(knots, p, t, order),
+        }
+    }
+
+    #[inline(always)]
+    fn of_degree(knots: &KnotVector, p: usize, t: f64, order: usize) -> Self {
+        let span = knots.span(t);
         let table = Table::new(&knots.knots()[span + 1 - p..=span + p], p, t);
         let mut rows = [[T::zero(); ORDER]; MAX_DERIVATIVE + 1];
         for r in 0..=p {
@@ -83,11 +94,12 @@ struct Table {
 
 impl Table {
     /// `u` are the `2p` knots round the span, of which `u[p-1] < u[p]` are its ends.
+    #[inline(always)]
     fn new(u: &[f64], p: usize, t: f64) -> Self {
         let mut ndu = [[0.0; ORDER]; ORDER];
         let (mut left, mut right) = ([0.0; ORDER], [0.0; ORDER]);
         ndu[0][0] = 1.0;
-        for j in 1..=p {
+        for j in 1..p + 1 {
             left[j] = t - u[p - j];
             right[j] = u[p - 1 + j] - t;
             let mut saved = 0.0;
@@ -104,18 +116,19 @@ impl Table {
     }
 
     /// Derivatives `1 ..= order <= p`, [Piegl97 A2.3].
+    #[inline(always)]
     fn derivatives(&self, p: usize, order: usize) -> [[f64; ORDER]; MAX_DERIVATIVE + 1] {
         let ndu = &self.ndu;
         let mut out = [[0.0; ORDER]; MAX_DERIVATIVE + 1];
-        for r in 0..=p {
+        for r in 0..p + 1 {
             let mut previous = [0.0; MAX_DERIVATIVE + 1];
             previous[0] = 1.0;
-            for k in 1..=order {
+            for k in 1..order + 1 {
                 let mut row = [0.0; MAX_DERIVATIVE + 1];
                 let low = p - k;
                 let mut d = 0.0;
                 // Term j takes function r-k+j of degree p-k, which exists for 0 <= r-k+j <= p-k.
-                for j in k.saturating_sub(r)..=k.min(p - r) {
+                for j in k.saturating_sub(r)..k.min(p - r) + 1 {
                     let s = r + j - k;
                     let from_same = if j < k { previous[j] } else { 0.0 };
                     let from_left = if j > 0 { previous[j - 1] } else { 0.0 };

@@ -1,4 +1,4 @@
-//! Geometric edits, from the change of a tool to the coefficients: the rows of [Hua04 Table 1], and one on 512³ samples.
+//! Geometric edits, from the change of a tool to the coefficients, on one core: the rows of [Hua04 Table 1], and one on 512³ samples.
 //!
 //! `cargo bench -p tools --bench edits`. The table prints 0.4, 3.0 and 23.5 ms for tools of 10³, 20³ and 40³ samples on 64³
 //! coefficients, 8.3 and 59.8 ms for those of 20³ and 40³ on 128³, in a working space of 128³ samples; the name of a row says
@@ -12,7 +12,7 @@ use bspline::hierarchical::Lattice;
 use bspline::polygonize::{BlockMesh, PolygonizeOptions};
 use bspline::primitives::Sphere;
 use bspline::{Aabb, Csg, Field, Frame, HierarchicalSpline};
-use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use criterion::{BenchmarkId, Criterion};
 use fitting::Control;
 use fitting::field::{Aim, FieldFitOptions, fit_field};
 use fitting::phantoms::Solid;
@@ -21,7 +21,7 @@ use glam::{DAffine3, DVec3};
 #[path = "common/cpu_time.rs"]
 mod cpu_time;
 
-use cpu_time::CpuTime;
+use cpu_time::{CpuTime, on_one_core};
 
 /// A phantom on one level of `cells³` cells, in a working space of `samples³`.
 struct Workpiece {
@@ -135,9 +135,6 @@ fn edits(c: &mut Criterion<CpuTime>) {
     }
 }
 
-criterion_group! {
-    name = benches;
-    config = Criterion::default().with_measurement(CpuTime).warm_up_time(std::time::Duration::from_millis(300)).measurement_time(std::time::Duration::from_secs(1));
-    targets = edits
+fn main() {
+    on_one_core(edits);
 }
-criterion_main!(benches);

@@ -1,4 +1,4 @@
-//! Whole loops of force tools: force, step, difference, local mesh; in processor time.
+//! Whole loops of force tools: force, step, difference, local mesh; in processor time of one core.
 //!
 //! `cargo bench -p tools --bench strokes`. The rows of [Hua04 Table 2] print 1.0, 6.9, 15.8, 38.2 and 74.9 ms for the simulation
 //! and the graphical update; the name of a row says so. Tools on the default fits of `data/bunny.obj.gz` and `data/head.nii.gz` have
@@ -11,10 +11,10 @@ mod cpu_time;
 mod scans;
 
 use criterion::measurement::Measurement;
-use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use criterion::{BenchmarkId, Criterion};
 use tools::study::{Looped, PatchPull, StrokeKind, TABLE_2, half_painted, mesh_about};
 
-use cpu_time::CpuTime;
+use cpu_time::{CpuTime, on_one_core};
 
 /// Loops of a pull on the patches of table 2.
 const PULLS: u64 = 40;
@@ -90,9 +90,9 @@ fn scans(c: &mut Criterion<CpuTime>) {
     }
 }
 
-criterion_group! {
-    name = benches;
-    config = Criterion::default().with_measurement(CpuTime).warm_up_time(std::time::Duration::from_millis(300)).measurement_time(std::time::Duration::from_secs(1));
-    targets = table_2, scans
+fn main() {
+    on_one_core(|c| {
+        table_2(c);
+        scans(c);
+    });
 }
-criterion_main!(benches);

@@ -1,9 +1,25 @@
-//! Processor time of the process: other processes on the machine do not change it.
+//! Processor time on one core: other processes on the machine change it little, and no thread waits for another.
 
+use criterion::Criterion;
 use criterion::measurement::{Measurement, ValueFormatter, WallTime};
 use rustix::time::{ClockId, clock_gettime};
 
 pub struct CpuTime;
+
+/// Measures `groups` by it.
+pub fn on_one_core(groups: impl FnOnce(&mut Criterion<CpuTime>) + Send) {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+    pool.expect("a thread").install(|| {
+        let seconds = std::time::Duration::from_secs_f64;
+        let criterion = Criterion::default().with_measurement(CpuTime);
+        let criterion = criterion
+            .warm_up_time(seconds(0.3))
+            .measurement_time(seconds(1.0));
+        let mut criterion = criterion.configure_from_args();
+        groups(&mut criterion);
+        criterion.final_summary();
+    });
+}
 
 /// Nanoseconds.
 fn now() -> f64 {

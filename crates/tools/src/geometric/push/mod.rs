@@ -3,19 +3,23 @@
 //! Each step makes an intermediate surface: what lies under the brush moves along its normal, and the next step begins on what that one
 //! left. The paper lets densities approach those of a ball at the tool's tip; here the way of a step is a length, speed times force.
 
-use bspline::{Aabb, Field, Frame, HierarchicalSpline, Interval, Jet, Real};
+mod moved;
+mod way;
+
+use bspline::{Aabb, Field, HierarchicalSpline, Real};
 use fitting::Control;
 use fitting::field::FieldFitReport;
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::GeometricError;
 use super::band::FULL;
 use super::write::{Fineness, TOLERANCE, Writer};
-use crate::fade::fade;
-use crate::force::{Path, nearest_surface};
+use crate::force::nearest_surface;
 use crate::limits::Limits;
 use crate::number::{Numbers, Point, Positive};
+use moved::{Cover, Moved};
+use way::Way;
 
 /// Radii in which a place has to have the surface.
 const NEAR: f64 = 2.0;
@@ -172,133 +176,6 @@ impl Push {
 
 fn wrong<R>(why: String) -> Result<R, GeometricError> {
     Err(GeometricError::Shape(why))
-}
-
-/// Where a brush goes.
-enum Way {
-    /// Nowhere.
-    Place(DVec3),
-    Path(Path),
-}
-
-impl Way {
-    fn through(along: &[Point]) -> Result<Self, GeometricError> {
-        let places = along.iter().map(|p| p.0);
-        let Some(first) = places.clone().next() else {
-            return wrong("along has no place; write at least one point".into());
-        };
-        Ok(match Path::through(places) {
-            Ok(path) => Self::Path(path),
-            // Points of a script are finite, so they are all one.
-            Err(_) => Self::Place(first),
-        })
-    }
-
-    /// Middles of equal pieces of a part of it, told by shares of its length.
-    fn part(&self, [from, to]: [f64; 2], apart: f64) -> Result<Vec<DVec3>, GeometricError> {
-        let path = match self {
-            Self::Place(at) => return Ok(vec![*at]),
-            Self::Path(path) => path,
-        };
-        let count = ((to - from) * path.length() / apart).ceil().max(1.0);
-        if count > f64::from(MOST) {
-            return wrong(format!(
-                "a step would go over {count} places; take a wider brush, or go a shorter way"
-            ));
-        }
-        let share = |n: u32| from + (to - from) * (f64::from(n) + 0.5) / count;
-        Ok((0..count as u32)
-            .map(|n| path.at(share(n) * path.length()))
-            .collect())
-    }
-}
-
-/// Share of a step's time, and of its strength, in which a brush acts on a place: 0 to 1.
-struct Cover {
-    places: Vec<DVec3>,
-    /// Of the time, at each of them.
-    share: f64,
-    radius: f64,
-}
-
-impl Cover {
-    fn at(&self, p: DVec3) -> f64 {
-        let weight = |place: &DVec3| {
-            let beyond = p.distance(*place) / self.radius - FULL;
-            fade(beyond / (1.0 - FULL))[0]
-        };
-        self.share * self.places.iter().map(weight).sum::<f64>()
-    }
-
-    fn reaches(&self, b: &Aabb) -> bool {
-        let radius = self.radius * self.radius;
-        let near = |place: &DVec3| place.distance_squared(place.clamp(b.min, b.max)) < radius;
-        self.places.iter().any(near)
-    }
-}
-
-/// `f(x + h·w·∇f/|∇f|)`: every place takes the value that lies `h·w` deeper. The surface moves out by `h·w` along its normal, on
-/// densities that are no distances too.
-struct Moved<'a> {
-    field: &'a dyn Field,
-    /// `h`.
-    by: f64,
-    /// Slope below which there is no direction.
-    flat: f64,
-    /// `w`.
-    cover: Cover,
-}
-
-impl Field for Moved<'_> {
-    fn value(&self, p: DVec3) -> f64 {
-        let weight = self.cover.at(p);
-        if weight == 0.0 {
-            return self.field.value(p);
-        }
-        let (_, slope) = self.field.value_gradient(p);
-        let length = slope.length().max(self.flat);
-        self.field.value(p + self.by * weight / length * slope)
-    }
-
-    /// By central differences.
-    fn value_gradient(&self, p: DVec3) -> (f64, DVec3) {
-        let step = 1e-4 * self.cover.radius;
-        let slope = DVec3::AXES.map(|a| (self.value(p + step * a) - self.value(p - step * a)) / (2.0 * step));
-        (self.value(p), DVec3::from_array(slope))
-    }
-
-    fn jet(&self, p: DVec3) -> Jet {
-        let (value, gradient) = self.value_gradient(p);
-        Jet {
-            value,
-            gradient,
-            hessian: DMat3::ZERO,
-        }
-    }
-
-    fn bounds(&self, b: &Aabb) -> Interval {
-        match self.cover.reaches(b) {
-            true => {
-                let reach = self.by.abs() * (1.0 + 1e-12);
-                self.field.bounds(&Aabb::new(b.min - reach, b.max + reach))
-            }
-            false => self.field.bounds(b),
-        }
-    }
-
-    fn frame_values(&self, frame: &Frame, lo: [i64; 3], count: [usize; 3], out: &mut [f64]) {
-        if count.contains(&0) {
-            return;
-        }
-        let last = std::array::from_fn(|a| lo[a] + count[a] as i64 - 1);
-        if !self.cover.reaches(&frame.world_box(lo, last)) {
-            return self.field.frame_values(frame, lo, count, out);
-        }
-        for (n, value) in out.iter_mut().enumerate() {
-            let at = [n / count[2] / count[1], n / count[2] % count[1], n % count[2]];
-            *value = self.value(frame.node(std::array::from_fn(|a| lo[a] + at[a] as i64)));
-        }
-    }
 }
 
 #[cfg(test)]
