@@ -13,9 +13,12 @@ use serde::{Deserialize, Serialize};
 use crate::coefficients::{changed, coefficient, support, with_functions};
 use crate::formula_solid::FormulaSolid;
 use crate::interior::Interior;
-use crate::mix::{Faded, Mixed};
+use crate::mix::Faded;
 use crate::number::{Point, Positive};
 use crate::others::Others;
+
+/// Knot intervals below a wall at which a change begins, and in which it grows to its whole.
+const ENTERED: [f64; 2] = [2.0, 3.0];
 
 /// A box along the axes of the world.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -249,13 +252,23 @@ impl Limits {
         }
     }
 
-    /// What a tool makes of `field`, where the mask fades.
-    pub fn mixed<'a>(&'a self, field: &'a dyn Field, target: &'a dyn Field) -> Option<Mixed<'a>> {
-        self.weight.as_ref().map(|weight| Mixed {
-            from: field,
-            to: target,
-            weight,
-        })
+    /// How much of a change happens where, 0 to 1, for tools that write by a fit on knots so far apart; `None` if all of it everywhere.
+    /// Below a wall it begins where the fit is free: else the border would be that of its functions, in steps.
+    pub fn weight(&self, spacing: f64) -> Option<Arc<dyn Field>> {
+        let mask = self
+            .weight
+            .clone()
+            .map(|weight| Arc::new(weight) as Arc<dyn Field>);
+        let below = self.interior.clone().map(|interior| -> Arc<dyn Field> {
+            let none = ENTERED[0] * spacing;
+            Arc::new(Faded::new(interior, none, none + ENTERED[1] * spacing))
+        });
+        match (mask, below) {
+            (Some(mask), Some(below)) => Some(Arc::new(
+                Csg::intersection(vec![mask, below]).expect("two fields"),
+            )),
+            (one, other) => one.or(other),
+        }
     }
 
     /// The version `new` with the coefficients of `old` wherever nothing may change, and their part of the change where the
