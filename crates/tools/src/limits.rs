@@ -17,8 +17,9 @@ use crate::mix::Faded;
 use crate::number::{Point, Positive};
 use crate::others::Others;
 
-/// Knot intervals below a wall at which a change begins, and in which it grows to its whole.
-const ENTERED: [f64; 2] = [2.0, 3.0];
+/// Knot intervals below a wall at which a change begins, and at which it is whole; of a solid that has at least so many there.
+const ENTERED: [f64; 2] = [2.0, 5.0];
+const ROOM: f64 = 10.0;
 
 /// A box along the axes of the world.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -149,8 +150,8 @@ impl Limits {
         mirror: Option<DAffine3>,
     ) -> Result<Self, String> {
         let interior = Interior::new(field, iso, wall);
-        let deepest = interior.deepest();
-        if deepest <= wall {
+        if interior.room() <= 0.0 {
+            let deepest = interior.deepest();
             return Err(format!(
                 "no place of the solid lies deeper than {deepest:.4} below its outer surface, so a wall of {wall} leaves nothing to \
                  work on; make it thinner"
@@ -260,8 +261,8 @@ impl Limits {
             .clone()
             .map(|weight| Arc::new(weight) as Arc<dyn Field>);
         let below = self.interior.clone().map(|interior| -> Arc<dyn Field> {
-            let none = ENTERED[0] * spacing;
-            Arc::new(Faded::new(interior, none, none + ENTERED[1] * spacing))
+            let [none, full] = ENTERED.map(|n| n * spacing.min(interior.room() / ROOM));
+            Arc::new(Faded::new(interior, none, full))
         });
         match (mask, below) {
             (Some(mask), Some(below)) => Some(Arc::new(
