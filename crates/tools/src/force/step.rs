@@ -185,7 +185,7 @@ impl<T: Real> ForceStroke<T> {
             };
             let spread =
                 Spread::new(&self.region, &part, &self.shape, self.radius).map_err(ForceError::Tool)?;
-            if spread.shares.is_empty() {
+            if spread.is_empty() {
                 return Ok(None);
             }
             Ok(Some(Bearing {
