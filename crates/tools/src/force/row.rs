@@ -55,7 +55,9 @@ impl<'a, T: Real> Functions<'a, T> {
     /// Calls `take` with the number and the weight of each function that is not 0 at `p`.
     #[inline]
     fn each(&self, p: DVec3, mut take: impl FnMut(usize, f64)) {
-        let Some((first, weights)) = self.near(p) else { return };
+        let Some((first, weights)) = self.near(p) else {
+            return;
+        };
         let at = |a: usize, i: usize| {
             usize::try_from(first[a] + i as i64)
                 .ok()
