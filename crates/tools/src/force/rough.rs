@@ -16,7 +16,7 @@ const LAGUERRE: [(f64, f64); 4] = [
 ];
 /// Paths up to which distances count: the work grows by the third power.
 const MOST: usize = 192;
-/// Contrast of stiffness up to which they do: what is beyond moves as one block.
+/// Contrast of stiffness up to which they do: at 100 a disc across the border went 6 % too far.
 const STEEP: f64 = 30.0;
 /// Least share of the diagonal that is added to it where matter is painted.
 const FIRM: f64 = 0.03;
