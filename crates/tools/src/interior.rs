@@ -21,8 +21,9 @@ pub struct Interior {
     cell: DVec3,
     /// Nodes on each axis.
     count: [usize; 3],
-    /// Depth of each node, last axis fastest.
+    /// Depth of each node, last axis fastest, and the largest.
     depth: Vec<f32>,
+    deepest: f64,
     bricks: Bricks,
 }
 
@@ -108,6 +109,7 @@ impl Interior {
             corner: grid.corner,
             cell: grid.cell,
             count,
+            deepest: f64::from(depth.iter().copied().fold(0.0, f32::max)),
             depth,
             bricks: Bricks::of(field),
         }
@@ -119,9 +121,14 @@ impl Interior {
         self.bounds(support).lo > 0.0 && self.bricks.new_about(support).iter().all(is_below)
     }
 
-    /// How deep it goes.
+    /// How deep it goes below the outer surface.
     pub fn deepest(&self) -> f64 {
-        f64::from(self.depth.iter().copied().fold(0.0, f32::max))
+        self.deepest
+    }
+
+    /// How much deeper than the wall it goes.
+    pub fn room(&self) -> f64 {
+        self.deepest - self.wall
     }
 
     fn node(&self, [x, y, z]: [usize; 3]) -> f64 {

@@ -13,9 +13,13 @@ use serde::{Deserialize, Serialize};
 use crate::coefficients::{changed, coefficient, support, with_functions};
 use crate::formula_solid::FormulaSolid;
 use crate::interior::Interior;
-use crate::mix::{Faded, Mixed};
+use crate::mix::Faded;
 use crate::number::{Point, Positive};
 use crate::others::Others;
+
+/// Knot intervals below a wall at which a change begins, and at which it is whole; of a solid that has at least so many there.
+const ENTERED: [f64; 2] = [2.0, 5.0];
+const ROOM: f64 = 10.0;
 
 /// A box along the axes of the world.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -146,8 +150,8 @@ impl Limits {
         mirror: Option<DAffine3>,
     ) -> Result<Self, String> {
         let interior = Interior::new(field, iso, wall);
-        let deepest = interior.deepest();
-        if deepest <= wall {
+        if interior.room() <= 0.0 {
+            let deepest = interior.deepest();
             return Err(format!(
                 "no place of the solid lies deeper than {deepest:.4} below its outer surface, so a wall of {wall} leaves nothing to \
                  work on; make it thinner"
@@ -249,13 +253,23 @@ impl Limits {
         }
     }
 
-    /// What a tool makes of `field`, where the mask fades.
-    pub fn mixed<'a>(&'a self, field: &'a dyn Field, target: &'a dyn Field) -> Option<Mixed<'a>> {
-        self.weight.as_ref().map(|weight| Mixed {
-            from: field,
-            to: target,
-            weight,
-        })
+    /// How much of a change happens where, 0 to 1, for tools that write by a fit on knots so far apart; `None` if all of it everywhere.
+    /// Below a wall it begins where the fit is free: else the border would be that of its functions, in steps.
+    pub fn weight(&self, spacing: f64) -> Option<Arc<dyn Field>> {
+        let mask = self
+            .weight
+            .clone()
+            .map(|weight| Arc::new(weight) as Arc<dyn Field>);
+        let below = self.interior.clone().map(|interior| -> Arc<dyn Field> {
+            let [none, full] = ENTERED.map(|n| n * spacing.min(interior.room() / ROOM));
+            Arc::new(Faded::new(interior, none, full))
+        });
+        match (mask, below) {
+            (Some(mask), Some(below)) => Some(Arc::new(
+                Csg::intersection(vec![mask, below]).expect("two fields"),
+            )),
+            (one, other) => one.or(other),
+        }
     }
 
     /// The version `new` with the coefficients of `old` wherever nothing may change, and their part of the change where the

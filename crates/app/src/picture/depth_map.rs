@@ -98,21 +98,21 @@ impl DepthMap {
 
     /// Whether nothing lies before `p`, whose normal is `normal`.
     pub fn is_visible(&self, p: DVec3, normal: DVec3) -> bool {
-        let q = self.off_surface(p, normal) + 0.5;
+        let q = self.off_surface(p, normal, 2.5) + 0.5;
         // Casts cut off towards 0: what is left of the map or above it counts as its first column or row.
         let (x, y) = (q.x as usize, q.y as usize);
         let is_outside = x >= self.size[0] || y >= self.size[1];
         is_outside || (q.z - 0.5) as f32 >= self.depth[y * self.size[0] + x]
     }
 
-    /// Pixel of a point a step off the surface, so that it does not shade itself.
-    fn off_surface(&self, p: DVec3, normal: DVec3) -> DVec3 {
-        self.pixel(p + normal * (2.5 / self.pixels_per_length))
+    /// Pixel of a point some pixels off the surface, so that it does not shade itself, and triangles across a hollow do not.
+    fn off_surface(&self, p: DVec3, normal: DVec3, pixels: f64) -> DVec3 {
+        self.pixel(p + normal * (pixels / self.pixels_per_length))
     }
 
     /// Share of the pixels round `p`'s own, `reach` on each side, in which nothing lies before it.
     pub fn visible(&self, p: DVec3, normal: DVec3, reach: i64) -> f64 {
-        let q = self.off_surface(p, normal);
+        let q = self.off_surface(p, normal, 2.5 * reach as f64);
         let (x, y) = (q.x.round() as i64, q.y.round() as i64);
         let mut seen = 0;
         for (i, j) in (-reach..=reach).flat_map(|i| (-reach..=reach).map(move |j| (x + i, y + j))) {

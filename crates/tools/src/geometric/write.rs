@@ -9,6 +9,7 @@ use glam::DVec3;
 use super::GeometricError;
 use crate::face::Face;
 use crate::limits::Limits;
+use crate::mix::Mixed;
 use crate::number::Positive;
 
 /// Tolerance over the finest knot interval where none is asked for.
@@ -138,7 +139,12 @@ impl<T: Real> Writer<'_, T> {
         let finest = finest.max(self.finest_in(within));
         let finest = finest.min(self.limits.finest().unwrap_or(finest));
         let spacing = self.field.lattice().spacing(finest).min_element();
-        let mixed = self.limits.mixed(self.field, target);
+        let weight = self.limits.weight(self.spacing());
+        let mixed = weight.as_deref().map(|weight| Mixed {
+            from: self.field,
+            to: target,
+            weight,
+        });
         let target: &dyn Field = mixed.as_ref().map_or(target, |mixed| mixed);
         // What stays as it is needs no more room.
         if !self.limits.is_inside() {

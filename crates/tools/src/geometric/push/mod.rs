@@ -1,7 +1,7 @@
 //! A surface pushed in or drawn out by a brush, as fast as the force says \[Kim03 §6.2.1\].
 //!
-//! Each step makes an intermediate surface: what lies under the brush moves along its normal, and the next step begins on what that one
-//! left. The paper lets densities approach those of a ball at the tool's tip; here the way of a step is a length, speed times force.
+//! Each step makes an intermediate surface: what lies under the brush moves along the normal at its place, and the next step begins on
+//! what that one left. The paper lets densities approach those of a ball at the tool's tip; here the way of a step is a length, speed times force.
 
 mod moved;
 mod way;
@@ -30,19 +30,23 @@ const APART: f64 = 0.25;
 /// Share of a step that may be lost: functions that change by less are left out.
 const LOST: f64 = 0.0025;
 
+/// Radii of a bend of the wall. Steps add up what each is off by: of eight, on four intervals across the wall, it is 0.8 % of the depth and 9°
+/// of its normals, on eight 0.2 % and 2°.
+const BEND: f64 = 0.25;
+
 /// Knot intervals of the object's detail that a step moves the surface by at least, or it does nothing: single precision has no more.
 const LEAST: f64 = 1e-4;
 
 /// Most steps of a stroke, and most places of a step.
 const MOST: u32 = 10_000;
 
-/// Moves a surface along its normal, step by step.
+/// Moves a surface as a thumb does, step by step: all under the brush goes along the normal at its place.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Push {
     /// The brush's way; each place is drawn to the surface as it is then.
     pub along: Vec<Point>,
-    /// It acts whole within half of this, and not at all beyond.
+    /// It acts whole within half of this of its axis, the normal at its place, and not at all beyond; along its axis whole within this.
     pub radius: Positive,
     /// Length that a force of 1 moves the surface by in one step.
     pub speed: Positive,
@@ -85,7 +89,7 @@ impl Push {
                 );
             }
         };
-        let by = -force * self.speed.0;
+        let by = force * self.speed.0;
         if by.abs() > FULL * self.radius.0 {
             return wrong(format!(
                 "a force of {force} moves the surface by {} in a step, more than half the radius {}; push less hard, or in more steps",
@@ -109,8 +113,8 @@ impl Push {
             let (places, drawn) = self.drawn(&writer, &way.part(part, APART * self.radius.0)?)?;
             if let Way::Place(at) = &mut way {
                 // It stays on the surface that it moves.
-                let (_, slope) = left.0.value_gradient(drawn[0]);
-                *at = drawn[0] - by * slope.normalize_or_zero();
+                let [place, inward] = drawn[0];
+                *at = place + by * inward;
             }
             let cover = Cover {
                 share: 1.0 / places as f64,
@@ -122,19 +126,21 @@ impl Push {
         Ok(left)
     }
 
-    /// The number of places, and those of them that have a surface, there.
+    /// The number of places, and those of them that have a surface: there, and the way into the solid.
     fn drawn<T: Real>(
         &self,
         writer: &Writer<T>,
         places: &[DVec3],
-    ) -> Result<(usize, Vec<DVec3>), GeometricError> {
-        writer.within(&self.about(places))?;
+    ) -> Result<(usize, Vec<[DVec3; 2]>), GeometricError> {
+        let about = Aabb::about(places.iter().copied()).expect("a place");
+        writer.within(&about.widened(self.radius.0))?;
         let reach = NEAR * self.radius.0;
         let drawn = places
             .iter()
             .map(|p| nearest_surface(writer.field, writer.iso, *p, reach));
         // Where the brush goes over an edge the rest of it acts.
-        let drawn: Vec<DVec3> = drawn.filter_map(Result::ok).collect();
+        let inward = |at| writer.field.value_gradient(at).1.normalize_or_zero();
+        let drawn: Vec<_> = drawn.filter_map(Result::ok).map(|at| [at, inward(at)]).collect();
         match drawn.is_empty() {
             true => Err(GeometricError::Nowhere {
                 at: places[0].to_array(),
@@ -142,11 +148,6 @@ impl Push {
             }),
             false => Ok((places.len(), drawn)),
         }
-    }
-
-    fn about(&self, places: &[DVec3]) -> Aabb {
-        let about = Aabb::about(places.iter().copied());
-        about.expect("a place").widened(self.radius.0)
     }
 
     /// One intermediate surface.
@@ -157,18 +158,17 @@ impl Push {
         by: f64,
         control: &mut Control,
     ) -> Result<(HierarchicalSpline<T>, FieldFitReport), GeometricError> {
-        let within = writer.within(&self.about(&cover.places))?;
+        let within = writer.within(&cover.within().expect("a place"))?;
         let moved = Moved {
             field: writer.field,
             by,
-            flat: 1e-6 * writer.field.slope(),
             cover,
         };
         let tolerance = self.tolerance.map_or(TOLERANCE * writer.spacing(), |t| t.0);
         let fineness = writer.shown(&Fineness {
             tolerance: Some(Positive(tolerance.min(LOST * by.abs()))),
             finer: self.finer,
-            feature: Some(FULL * self.radius.0),
+            feature: Some(BEND * self.radius.0),
         });
         writer.written(&moved, &within, &fineness, control)
     }
@@ -193,13 +193,14 @@ mod tests {
             let steps = (0..count).map(|n| {
                 let part = [n, n + 1].map(|n| f64::from(n) / f64::from(count));
                 let places = way.part(part, APART * radius).unwrap();
+                let places: Vec<_> = places.into_iter().map(|at| [at, DVec3::X]).collect();
                 let share = 1.0 / places.len() as f64;
                 let cover = Cover {
                     places,
                     share,
                     radius,
                 };
-                cover.at(p) / f64::from(count)
+                cover.at(p).x / f64::from(count)
             });
             steps.sum()
         };

@@ -1,4 +1,4 @@
-//! A field whose surface a brush has moved along its normal.
+//! A field whose surface a brush has moved along the normals of its places.
 
 use bspline::{Aabb, Field, Frame, Interval, Jet};
 use glam::{DMat3, DVec3};
@@ -6,51 +6,62 @@ use glam::{DMat3, DVec3};
 use crate::fade::fade;
 use crate::geometric::band::FULL;
 
-/// Share of a step's time, and of its strength, in which a brush acts on a place: 0 to 1.
+/// Radii that a brush reaches along its way.
+const ALONG: f64 = 2.0;
+
+/// Where a brush acts in a step, and which way.
 pub(super) struct Cover {
-    pub places: Vec<DVec3>,
+    /// Places of the surface, and the unit vectors into the solid there.
+    pub places: Vec<[DVec3; 2]>,
     /// Of the time, at each of them.
     pub share: f64,
     pub radius: f64,
 }
 
 impl Cover {
-    pub fn at(&self, p: DVec3) -> f64 {
-        let weight = |place: &DVec3| {
-            let beyond = p.distance(*place) / self.radius - FULL;
-            fade(beyond / (1.0 - FULL))[0]
+    /// What matter goes in a step, as a share of the way that the force gives: a length of 0 to 1. Across its way a brush acts whole within
+    /// half of its radius and fades to the whole; along it whole within the radius, and it fades to the double. So all of a wall goes
+    /// alike, and the profile of many steps is that of one: by the distance from its place alone a wall that lags would lag more and more.
+    pub fn at(&self, p: DVec3) -> DVec3 {
+        let way = |[place, inward]: &[DVec3; 2]| {
+            let from = (p - *place) / self.radius;
+            let along = from.dot(*inward);
+            let across = (from - along * *inward).length();
+            fade((across - FULL) / (1.0 - FULL))[0] * fade((along.abs() - 1.0) / (ALONG - 1.0))[0] * *inward
         };
-        self.share * self.places.iter().map(weight).sum::<f64>()
+        self.share * self.places.iter().map(way).sum::<DVec3>()
+    }
+
+    /// The box in which it acts.
+    pub fn within(&self) -> Option<Aabb> {
+        let boxes = self.places.iter().map(|[place, inward]| {
+            let across = (DVec3::ONE - *inward * *inward).max(DVec3::ZERO);
+            let reach =
+                self.radius * (ALONG * inward.abs() + DVec3::from_array(across.to_array().map(f64::sqrt)));
+            Aabb::new(*place - reach, *place + reach)
+        });
+        boxes.reduce(Aabb::hull)
     }
 
     fn reaches(&self, b: &Aabb) -> bool {
-        let radius = self.radius * self.radius;
-        let near = |place: &DVec3| place.distance_squared(place.clamp(b.min, b.max)) < radius;
+        let reach = self.radius * self.radius * (1.0 + ALONG * ALONG);
+        let near = |[place, _]: &[DVec3; 2]| place.distance_squared(place.clamp(b.min, b.max)) < reach;
         self.places.iter().any(near)
     }
 }
 
-/// `f(x + h·w·∇f/|∇f|)`: every place takes the value that lies `h·w` deeper. The surface moves out by `h·w` along its normal, on
-/// densities that are no distances too.
+/// `f(x − h·w)`: every place takes the value that lies behind it.
 pub(super) struct Moved<'a> {
     pub field: &'a dyn Field,
-    /// `h`.
+    /// `h`, into the solid.
     pub by: f64,
-    /// Slope below which there is no direction.
-    pub flat: f64,
     /// `w`.
     pub cover: Cover,
 }
 
 impl Field for Moved<'_> {
     fn value(&self, p: DVec3) -> f64 {
-        let weight = self.cover.at(p);
-        if weight == 0.0 {
-            return self.field.value(p);
-        }
-        let (_, slope) = self.field.value_gradient(p);
-        let length = slope.length().max(self.flat);
-        self.field.value(p + self.by * weight / length * slope)
+        self.field.value(p - self.by * self.cover.at(p))
     }
 
     /// By central differences.
