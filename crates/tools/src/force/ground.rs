@@ -133,6 +133,11 @@ fn level<T: Real>(field: &HierarchicalSpline<T>, radius: f64) -> Result<usize, F
     }
 }
 
+/// Over what length the motion of such matter fades by `e` in a step of `dt`, as `1/m`.
+pub(super) fn fading(radius: f64, dt: f64) -> f64 {
+    (MASS / (dt * dt) + DAMPING / (2.0 * dt)).sqrt() / radius
+}
+
 /// Matter of stiffness 1 that moves as wide as the tool is.
 fn matter<T: Real>(field: &HierarchicalSpline<T>, radius: f64) -> Matter {
     let stiffness = field.slope().powi(-2);

@@ -23,6 +23,7 @@ mod path;
 mod pull;
 pub mod quadrature;
 mod report;
+mod rough;
 mod row;
 mod spread;
 mod stage;

@@ -35,20 +35,29 @@ impl<'a, T: Real> Functions<'a, T> {
         }
     }
 
-    /// Calls `take` with the number and the weight of each function that is not 0 at `p`.
+    /// The first function on each axis of those that are not 0 at `p`, and their weights.
     #[inline]
-    fn each(&self, p: DVec3, mut take: impl FnMut(usize, f64)) {
+    fn near(&self, p: DVec3) -> Option<([i64; 3], [[f64; 4]; 3])> {
         let local = self.field.lattice_from_world().transform_point3(p) * self.scale - self.first;
         let mut first = [0i64; 3];
         let mut weights = [[0.0; 4]; 3];
         for a in 0..3 {
             let cell = local[a].floor();
             if !(cell >= 0.0 && cell < self.dims[a] as f64 + 3.0) {
-                return;
+                return None;
             }
             first[a] = cell as i64 - 3;
             weights[a] = basis(local[a] - cell);
         }
+        Some((first, weights))
+    }
+
+    /// Calls `take` with the number and the weight of each function that is not 0 at `p`.
+    #[inline]
+    fn each(&self, p: DVec3, mut take: impl FnMut(usize, f64)) {
+        let Some((first, weights)) = self.near(p) else {
+            return;
+        };
         let at = |a: usize, i: usize| {
             usize::try_from(first[a] + i as i64)
                 .ok()
@@ -83,24 +92,63 @@ impl<'a, T: Real> Functions<'a, T> {
     }
 }
 
-/// What a change of the free coefficients is worth to the mean of the field over a path: a list of weights,
-/// in which a coefficient may stand more than once: to sort it costs more than to read it some times.
-#[derive(Clone, Debug, Default)]
-pub struct Row(Vec<(usize, f64)>);
+/// What a change of the free coefficients is worth to the mean of the field over a path: weights on the box of coefficients
+/// about it.
+#[derive(Clone, Debug)]
+pub struct Row {
+    dims: [usize; 3],
+    first: [usize; 3],
+    count: [usize; 3],
+    weights: Vec<f64>,
+}
 
 impl Row {
     /// The mean over the nodes of an integral.
     pub fn mean<T: Real>(functions: &Functions<T>, nodes: &[Node], at: impl Fn(f64) -> DVec3) -> Self {
         let whole: f64 = nodes.iter().map(|n| n.weight).sum();
-        let mut all = Vec::with_capacity(64 * nodes.len());
-        for node in nodes {
-            functions.each(at(node.at), |i, w| all.push((i, w * node.weight / whole)));
+        let of = |n: &Node| Some((functions.near(at(n.at))?, n.weight / whole));
+        let near: Vec<_> = nodes.iter().filter_map(of).collect();
+        let dims = functions.dims;
+        let inside = |a: usize, i: i64| i.clamp(0, dims[a] as i64) as usize;
+        let firsts = |a: usize| near.iter().map(move |((first, _), _)| first[a]);
+        let first = [0, 1, 2].map(|a| inside(a, firsts(a).min().unwrap_or(0)));
+        let end = [0, 1, 2].map(|a| inside(a, firsts(a).max().map_or(0, |i| i + 4)));
+        let count: [usize; 3] = std::array::from_fn(|a| end[a].saturating_sub(first[a]));
+        let mut weights = vec![0.0; count.iter().product()];
+        for ((from, [wx, wy, wz]), share) in &near {
+            // Those of the four that are in the box.
+            let part = |a: usize| {
+                let range = inside(a, from[a])..inside(a, from[a] + 4);
+                range.map(move |i| (i - first[a], (i as i64 - from[a]) as usize))
+            };
+            for (x, i) in part(0) {
+                for (y, j) in part(1) {
+                    let row = (x * count[1] + y) * count[2];
+                    let factor = wx[i] * wy[j] * share;
+                    for (z, k) in part(2) {
+                        weights[row + z] += factor * wz[k];
+                    }
+                }
+            }
         }
-        Self(all)
+        Self {
+            dims,
+            first,
+            count,
+            weights,
+        }
     }
 
     /// `Σ wᵢpᵢ`.
     pub fn times<T: Real>(&self, p: &[T]) -> f64 {
-        self.0.iter().map(|(i, w)| w * p[*i].as_f64()).sum()
+        let [_, my, mz] = self.count;
+        let rows = self.weights.chunks_exact(mz.max(1)).enumerate();
+        let sums = rows.map(|(row, weights)| {
+            let (x, y) = (self.first[0] + row / my, self.first[1] + row % my);
+            let from = (x * self.dims[1] + y) * self.dims[2] + self.first[2];
+            let terms = weights.iter().zip(&p[from..]);
+            terms.map(|(w, p)| w * p.as_f64()).sum::<f64>()
+        });
+        sums.sum()
     }
 }

@@ -17,11 +17,15 @@ const PIECE: [(f64, f64); 3] = [
 /// Places of a path, and of what is before and behind it, whose matter counts as its own.
 const LINE: usize = 9;
 
+/// Numbers that are worked on at once: rows of shares are filled up with zeros to a multiple of it.
+const LANES: usize = 4;
+
 /// How a path's force is shared out over the samples near it: shares that add up to 1.
 #[derive(Clone, Debug)]
 pub struct Spread {
-    pub at: SampleBox,
-    pub shares: Vec<f64>,
+    at: SampleBox,
+    /// Row by row along z.
+    shares: Vec<f64>,
     /// Stiffness of what it moves: the harmonic mean over the shares.
     pub stiffness: f64,
 }
@@ -74,8 +78,8 @@ impl Spread {
         let at = places.iter().fold(SampleBox::default(), |all, (p, ..)| {
             all.joined(region.samples_near(*p, reach))
         });
-        let (mut shares, mut sum) = (vec![0.0; at.len()], 0.0);
-        let [_, ny, nz] = at.count;
+        let [nx, ny, nz] = [at.count[0], at.count[1], filled_up(at.count[2])];
+        let (mut shares, mut sum) = (vec![0.0; nx * ny * nz], 0.0);
         for (p, weight, direction) in &places {
             let near = region.samples_near(*p, reach);
             let local = region.local(*p);
@@ -130,22 +134,85 @@ impl Spread {
                 stiffness: 1.0,
             });
         }
-        let unit = 1.0 / sum;
-        shares.iter_mut().for_each(|s| *s *= unit);
-        let stiffness = match &region.patch().matter().stiffness {
-            Quantity::Constant(all) => *all,
+        let mut spread = Self {
+            at,
+            shares,
+            stiffness: 1.0,
+        };
+        match &region.patch().matter().stiffness {
+            Quantity::Constant(all) => {
+                let unit = 1.0 / sum;
+                spread.shares.iter_mut().for_each(|s| *s *= unit);
+                spread.stiffness = *all;
+            }
             Quantity::PerSample(each) => {
                 let own = part.line(radius).map(|p| read(region, each, p));
                 let own = own.sum::<f64>() / LINE as f64;
-                let near: Vec<f64> = at.indices(lattice.sample_dims()).map(|i| each[i]).collect();
-                yielding(&mut shares, &near, own)
+                spread.yield_to(each, lattice.sample_dims(), own, sum);
             }
+        }
+        Ok(spread)
+    }
+
+    /// Whether no sample is near.
+    pub fn is_empty(&self) -> bool {
+        self.shares.is_empty()
+    }
+
+    /// Takes from the shares, which add up to `sum`, of what is softer than a path's own matter, in which it lies, and finds the
+    /// stiffness of what is moved: what moves a stiff solid by a little would carry soft matter beside it far beyond, where it
+    /// tears off.
+    fn yield_to(&mut self, each: &[f64], dims: [usize; 3], own: f64, sum: f64) {
+        // In units of its own matter, of which nothing is softer if it is nothing.
+        let (unit, border) = if own > 0.0 { (own, 1.0) } else { (1.0, 0.0) };
+        let per_unit = 1.0 / unit;
+        let less = move |k: f64| if k < border { k } else { 1.0 };
+        let [_, my, mz] = self.at.count;
+        let width = filled_up(mz);
+        let first = self.at.first;
+        let near = |row: usize| {
+            let (x, y) = (first[0] + row / my, first[1] + row % my);
+            &each[(x * dims[1] + y) * dims[2] + first[2]..][..mz]
         };
-        Ok(Self {
-            at,
-            shares,
-            stiffness,
-        })
+        // Sums of what stays, and of that over its stiffness, for each z.
+        let mut sums = [vec![0.0; mz], vec![0.0; mz]];
+        let [stays, gives] = &mut sums;
+        let shares = &mut self.shares;
+        vectorized(
+            #[inline(always)]
+            || {
+                for (row, shares) in shares.chunks_exact(width).enumerate() {
+                    let sums = stays.iter_mut().zip(gives.iter_mut());
+                    for ((share, k), (stays, gives)) in shares.iter().zip(near(row)).zip(sums) {
+                        let k = k * per_unit;
+                        let left = share * less(k);
+                        *stays += left;
+                        *gives += if k > 0.0 { left / k } else { 0.0 };
+                    }
+                }
+            },
+        );
+        let [stays, gives] = sums.map(|each| each.iter().sum::<f64>());
+        if stays <= 0.0 {
+            let unit = 1.0 / sum;
+            self.shares.iter_mut().for_each(|s| *s *= unit);
+            return;
+        }
+        if gives > 0.0 {
+            self.stiffness = unit * (stays / gives);
+        }
+        let unit = 1.0 / stays;
+        let shares = &mut self.shares;
+        vectorized(
+            #[inline(always)]
+            || {
+                for (row, shares) in shares.chunks_exact_mut(width).enumerate() {
+                    for (share, k) in shares.iter_mut().zip(near(row)) {
+                        *share *= less(k * per_unit) * unit;
+                    }
+                }
+            },
+        );
     }
 }
 
@@ -157,22 +224,9 @@ fn add(to: &mut [f64], factor: f64, what: &[f64]) {
     }
 }
 
-/// Takes from the shares of what is softer than a path's own matter, in which it lies, and gives the stiffness of what is moved: what
-/// moves a stiff solid by a little would carry soft matter beside it far beyond, where it tears off.
-fn yielding(shares: &mut [f64], near: &[f64], own: f64) -> f64 {
-    let less = |k: f64| if k < own { k / own } else { 1.0 };
-    let sum: f64 = shares.iter().zip(near).map(|(s, k)| s * less(*k)).sum();
-    if sum <= 0.0 {
-        return 1.0;
-    }
-    let mut gives = 0.0;
-    for (share, k) in shares.iter_mut().zip(near) {
-        *share *= less(*k) / sum;
-        if *share > 0.0 {
-            gives += *share / k;
-        }
-    }
-    1.0 / gives
+/// The length of a row with what fills it up.
+fn filled_up(count: usize) -> usize {
+    count.next_multiple_of(LANES)
 }
 
 /// A quantity at a place, linear between the samples of a region.
@@ -212,31 +266,37 @@ impl<T: Real> Load<T> {
         let at = acting
             .clone()
             .fold(SampleBox::default(), |all, (s, _)| all.joined(s.at));
-        let mut sums = vec![0.0; at.len()];
-        let [_, ny, nz] = at.count;
+        let [nx, ny, nz] = at.count;
+        // What fills up a row at the end is room for what fills up those of spreads.
+        let width = nz + LANES;
+        let mut sums = vec![0.0; nx * ny * width];
         for (spread, factor) in acting {
             let [mx, my, mz] = spread.at.count;
             let from: [usize; 3] = std::array::from_fn(|a| spread.at.first[a].saturating_sub(at.first[a]));
+            let count = filled_up(mz);
+            let mut rows = spread.shares.chunks_exact(count.max(1));
             vectorized(
                 #[inline(always)]
                 || {
                     for x in 0..mx {
-                        for y in 0..my {
-                            let row = ((from[0] + x) * ny + from[1] + y) * nz + from[2];
-                            add(
-                                &mut sums[row..],
-                                factor,
-                                &spread.shares[(x * my + y) * mz..][..mz],
-                            );
+                        for (y, shares) in rows.by_ref().take(my).enumerate() {
+                            let row = ((from[0] + x) * ny + from[1] + y) * width + from[2];
+                            let to = &mut sums[row..][..count];
+                            for (to, shares) in to.chunks_exact_mut(LANES).zip(shares.chunks_exact(LANES)) {
+                                for (to, share) in to.iter_mut().zip(shares) {
+                                    *to += factor * share;
+                                }
+                            }
                         }
                     }
                 },
             );
         }
-        Self {
-            at,
-            values: sums.into_iter().map(T::from_f64).collect(),
+        let mut values = Vec::with_capacity(at.len());
+        for row in sums.chunks_exact(width) {
+            values.extend(row[..nz].iter().map(|v| T::from_f64(*v)));
         }
+        Self { at, values }
     }
 
     pub fn on_box(&self) -> OnBox<'_, T> {

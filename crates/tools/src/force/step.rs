@@ -9,11 +9,12 @@ use glam::DVec3;
 
 use super::quadrature::Tolerance;
 use super::report::{Arrival, Told};
+use super::rough::{Rough, Seen};
 use super::row::{Functions, Row};
 use super::spread::{Load, Part, Spread};
 use super::stroke::{ADVANCE, Acting, ForceStroke};
 use super::target::Span;
-use super::{ForceError, Rule, Solid, system};
+use super::{ForceError, Rule, Solid, ground, system};
 
 /// Share of what is missing by which rest lengths follow in a step of clay, as an exponent: `λΔt`.
 const FLOW: f64 = 0.1;
@@ -92,23 +93,23 @@ impl<T: Real> ForceStroke<T> {
             .map(|&i| bearing(i).short - bearing(i).row.times(&moved) - soft[i] * self.acting[i].force)
             .collect();
         let soft: Vec<f64> = live.iter().map(|&i| soft[i]).collect();
-        let diagonal: Vec<f64> = live
-            .iter()
-            .zip(&soft)
-            .map(|(&i, soft)| self.acting[i].stiffness / self.acting[i].worth + soft)
-            .collect();
         let enough: Vec<f64> = live.iter().map(|&i| self.enough(&self.acting[i])).collect();
         self.memory
             .turn_to(live.iter().map(|&i| self.acting[i].index).collect());
+        let rough = self.memory.rough.take();
+        let rough = rough.unwrap_or_else(|| self.rough(&live, &bearings, &soft));
         let most = self.extent.solves();
         let (region, solid) = (&mut self.region, self.how.solid());
-        let solved = system::solve(&right, &soft, &diagonal, most, &enough, &mut self.memory, |z| {
+        let solved = system::solve(&right, &soft, &rough, most, &enough, &mut self.memory, |z| {
             let of = live.iter().zip(z).map(|(&i, z)| (&bearing(i).spread, *z));
             let load = Load::<T>::of(of);
             let found = answer(region, solid, dt, &load)?;
             let felt = live.iter().map(|&i| bearing(i).row.times(&found.p)).collect();
             Ok::<_, ForceError>((found, felt))
         })?;
+        if self.how.rule == Rule::Arrive {
+            self.memory.rough = Some(rough);
+        }
         solves += solved.parts.len();
         for (&i, force) in live.iter().zip(&solved.forces) {
             self.acting[i].force += force;
@@ -185,7 +186,7 @@ impl<T: Real> ForceStroke<T> {
             };
             let spread =
                 Spread::new(&self.region, &part, &self.shape, self.radius).map_err(ForceError::Tool)?;
-            if spread.shares.is_empty() {
+            if spread.is_empty() {
                 return Ok(None);
             }
             Ok(Some(Bearing {
@@ -241,11 +242,37 @@ impl<T: Real> ForceStroke<T> {
         let each = |b: &Option<Bearing>| b.as_ref().map_or(0.0, |b| b.row.times(&p));
         let moved: Vec<f64> = bearings.iter().map(each).collect();
         let most = moved.iter().copied().fold(0.0, f64::max);
+        self.memory.rough = None;
         for (acting, moved) in self.acting.iter_mut().zip(moved) {
             // Paths that the region hardly moves must not rule the others.
             acting.stiffness = moved.max(1e-3 * most);
         }
         Ok(())
+    }
+
+    /// What forces move, roughly.
+    fn rough(&self, live: &[usize], bearings: &[Option<Bearing>], soft: &[f64]) -> Rough {
+        let seen = |&i: &usize| {
+            let (acting, span) = (&self.acting[i], bearings[i].as_ref().map(|b| b.span));
+            let target = &self.targets[acting.index];
+            Seen {
+                at: target.path.at(span.map_or(0.0, |s| 0.5 * (s.from + s.to))),
+                weight: target.weight,
+                stiffness: if target.weight > 0.0 {
+                    acting.worth / target.weight
+                } else {
+                    1.0
+                },
+                goes: acting.stiffness,
+            }
+        };
+        let seen: Vec<Seen> = live.iter().map(seen).collect();
+        match (self.how.rule, self.how.solid()) {
+            (Rule::Arrive, Solid::Clay) => {
+                Rough::new(&seen, soft, self.radius, ground::fading(self.radius, self.dt()))
+            }
+            _ => Rough::diagonal(&seen, soft),
+        }
     }
 
     /// What each path may stay short of, per force.

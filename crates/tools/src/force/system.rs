@@ -1,8 +1,10 @@
 //! The forces of a step: `(C + diag(s)) T = e`, with `C` known only by what it does to a vector.
 //!
 //! `C_jl` is what a unit of force on path `l` moves path `j` by within the step, `e_j` what path `j` is short of, and `s_j`
-//! how soft its rule is. GMRES \[Saad86\] with few steps, preconditioned with the row sums of `C` over what the
-//! paths stand for, and with what the steps before found of `C`, which changes little from one to the next.
+//! how soft its rule is. GMRES \[Saad86\] with few steps, preconditioned with what forces move [roughly](super::rough), and with
+//! what the steps before found of `C`, which changes little from one to the next.
+
+use super::rough::Rough;
 
 /// Pairs of forces and what they moved that are kept.
 const KEPT: usize = 12;
@@ -17,6 +19,8 @@ pub struct Memory {
     paths: Vec<usize>,
     /// Forces, and `C + diag(s)` times them, the oldest first.
     pairs: Vec<[Vec<f64>; 2]>,
+    /// What they move, roughly.
+    pub rough: Option<Rough>,
 }
 
 impl Memory {
@@ -25,7 +29,7 @@ impl Memory {
         if self.paths != paths {
             *self = Self {
                 paths,
-                pairs: Vec::new(),
+                ..Self::default()
             };
         }
     }
@@ -84,7 +88,7 @@ pub struct Solved<R> {
 pub fn solve<R, E>(
     right: &[f64],
     soft: &[f64],
-    diagonal: &[f64],
+    rough: &Rough,
     most: usize,
     enough: &[f64],
     memory: &mut Memory,
@@ -117,9 +121,7 @@ pub fn solve<R, E>(
             add(&mut v, -share, moved);
             add(&mut z, share, forces);
         }
-        for i in 0..n {
-            z[i] += v[i] / diagonal[i];
-        }
+        add(&mut z, 1.0, &rough.solve(&v));
         let (response, mut w) = respond(&z)?;
         for i in 0..n {
             w[i] += soft[i] * z[i];
@@ -193,7 +195,7 @@ mod tests {
             |i: usize, j: usize| 1.0 / (1.0 + (i as f64 - j as f64).abs()) + if i > j { 0.1 } else { 0.0 };
         let right: Vec<f64> = (0..n).map(|i| (i as f64 - 1.5).sin()).collect();
         let soft = [0.01; 6];
-        let diagonal = [2.0, 2.2, 2.4, 2.4, 2.2, 2.0];
+        let rough = Rough::Diagonal(vec![2.0, 2.2, 2.4, 2.4, 2.2, 2.0]);
         let mut last = 1.0;
         for most in 1..=n {
             let respond = |z: &[f64]| {
@@ -203,7 +205,7 @@ mod tests {
             let solved = solve(
                 &right,
                 &soft,
-                &diagonal,
+                &rough,
                 most,
                 &[0.0; 6],
                 &mut Memory::default(),
@@ -246,7 +248,8 @@ mod tests {
                 if !remembers {
                     memory = Memory::default();
                 }
-                solve(&right, &soft, &sums, 30, &[0.01; 40], &mut memory, respond)
+                let rough = Rough::Diagonal(sums);
+                solve(&right, &soft, &rough, 30, &[0.01; 40], &mut memory, respond)
             };
             let solved = (0..6).map(one).map(Result::unwrap);
             solved.map(|s| s.parts.len()).collect()
