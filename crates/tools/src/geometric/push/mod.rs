@@ -193,14 +193,14 @@ mod tests {
             let steps = (0..count).map(|n| {
                 let part = [n, n + 1].map(|n| f64::from(n) / f64::from(count));
                 let places = way.part(part, APART * radius).unwrap();
-                let places: Vec<_> = places.into_iter().map(|at| [at, DVec3::X]).collect();
+                let places: Vec<_> = places.into_iter().map(|at| [at, DVec3::Z]).collect();
                 let share = 1.0 / places.len() as f64;
                 let cover = Cover {
                     places,
                     share,
                     radius,
                 };
-                cover.at(p).x / f64::from(count)
+                cover.at(p).z / f64::from(count)
             });
             steps.sum()
         };
