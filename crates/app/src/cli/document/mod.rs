@@ -22,7 +22,7 @@ use serde::Serialize;
 use super::failure::{Failure, Outcome};
 use super::input::limits;
 use super::output::Output;
-use super::quantity::{human_bytes, human_count};
+use super::quantity::{human_bytes, human_count, human_number};
 use super::summary::{self, hex, table};
 
 /// Opens a document for the command alone; what was lost goes to the notes.
@@ -187,8 +187,11 @@ impl Told {
             .iter()
             .map(|(name, hash)| ("object", format!("{name}  {hash}")));
         let changed = self.changed.iter();
-        let changed =
-            changed.map(|(name, [min, max])| ("would change", format!("{name}  {min:?} to {max:?}")));
+        let corner = |p: &[f64; 3]| p.map(human_number).join(", ");
+        let changed = changed.map(|(name, [min, max])| {
+            let part = format!("{name}  between ({}) and ({})", corner(min), corner(max));
+            ("would change", part)
+        });
         table(rows.into_iter().chain(objects).chain(changed), &self.notes)
     }
 }
