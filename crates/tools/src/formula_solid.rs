@@ -3,6 +3,7 @@ use glam::{DMat3, DVec3};
 
 use crate::scene::formula::Formula;
 use crate::scene::operations::Slope;
+use crate::slope::slope;
 
 /// Points on each axis at which a formula is asked whether it is finite.
 const ASKED: usize = 33;
@@ -82,9 +83,4 @@ impl Field for FormulaSolid {
         );
         Interval::new(lo, hi)
     }
-}
-
-/// Central differences of a function.
-fn slope(step: f64, p: DVec3, of: impl Fn(DVec3) -> f64) -> DVec3 {
-    DVec3::from_array(DVec3::AXES.map(|axis| (of(p + step * axis) - of(p - step * axis)) / (2.0 * step)))
 }

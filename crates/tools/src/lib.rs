@@ -25,6 +25,7 @@ pub mod place;
 mod room;
 pub mod scene;
 pub mod session;
+mod slope;
 #[cfg(feature = "study")]
 pub mod study;
 pub mod symmetry;

@@ -11,6 +11,7 @@ use super::{ForceError, Holding, How};
 use crate::curve::Along;
 use crate::number::{Point, Positive};
 use crate::paint::Layers;
+use crate::slope::slope;
 
 /// Radii across an outline at least: what is narrower does not keep its section.
 const ACROSS: f64 = 4.0;
@@ -139,9 +140,7 @@ impl<T: Real> Field for Pillar<'_, T> {
 
     /// By central differences: near edges of the pillar about their mean.
     fn value_gradient(&self, p: DVec3) -> (f64, DVec3) {
-        let step = 0.05 * self.step;
-        let slope = DVec3::AXES.map(|a| (self.value(p + step * a) - self.value(p - step * a)) / (2.0 * step));
-        (self.value(p), DVec3::from_array(slope))
+        (self.value(p), slope(0.05 * self.step, p, |p| self.value(p)))
     }
 
     fn jet(&self, p: DVec3) -> Jet {

@@ -5,6 +5,7 @@ use glam::{DMat3, DVec3};
 
 use crate::fade::fade;
 use crate::geometric::band::FULL;
+use crate::slope::slope;
 
 /// Radii that a brush reaches along its way.
 const ALONG: f64 = 2.0;
@@ -66,9 +67,10 @@ impl Field for Moved<'_> {
 
     /// By central differences.
     fn value_gradient(&self, p: DVec3) -> (f64, DVec3) {
-        let step = 1e-4 * self.cover.radius;
-        let slope = DVec3::AXES.map(|a| (self.value(p + step * a) - self.value(p - step * a)) / (2.0 * step));
-        (self.value(p), DVec3::from_array(slope))
+        (
+            self.value(p),
+            slope(1e-4 * self.cover.radius, p, |p| self.value(p)),
+        )
     }
 
     fn jet(&self, p: DVec3) -> Jet {
