@@ -46,6 +46,7 @@ impl<T: Real> ForceStroke<T> {
             index,
             age,
             force: 0.0,
+            start: self.start(&self.targets[index]),
             crossing: None,
             before: None,
             stiffness: 0.0,
@@ -163,11 +164,10 @@ impl<T: Real> ForceStroke<T> {
         let functions = Functions::of(&self.field, &self.region);
         let p = &self.region.patch().state().p;
         let value = |at: DVec3| functions.value(p, at);
-        let step = self.look();
-        for acting in &mut self.acting {
-            let target = &self.targets[acting.index];
-            acting.before = acting.crossing;
-            acting.crossing = target.crossing(&value, self.iso, self.radius, step);
+        let look = |a: &Acting| self.surface(&self.targets[a.index], a.start, &value);
+        let now: Vec<Option<f64>> = self.acting.iter().map(look).collect();
+        for (acting, now) in self.acting.iter_mut().zip(now) {
+            acting.before = std::mem::replace(&mut acting.crossing, now);
         }
     }
 }

@@ -26,6 +26,8 @@ const SOFT: [f64; 2] = [0.01, 0.003];
 const CLOSE: f64 = 0.002;
 /// Factor by which the matter under a path may become other before its softness does.
 const OTHER: f64 = 1.5;
+/// Density by which gaps close, over its fall in a radius.
+const CLOSED: f64 = 0.1;
 /// Of the integrals: over the value, and of the mean over the fall of the density in a radius.
 const EXACT: Tolerance = Tolerance {
     relative: 1e-4,
@@ -39,6 +41,8 @@ struct Bearing {
     /// Mean that it is short of.
     short: f64,
     span: Span,
+    /// Whether it only keeps what it has: its goal lies in what was there before.
+    rests: bool,
 }
 
 impl<T: Real> ForceStroke<T> {
@@ -85,7 +89,8 @@ impl<T: Real> ForceStroke<T> {
             .map(|(now, then)| *now - *then)
             .collect();
         // Where nothing gives way no force is large enough.
-        let is_live = |i: &usize| bearings[*i].is_some() && self.acting[*i].stiffness > 0.0;
+        let is_live =
+            |i: &usize| bearings[*i].as_ref().is_some_and(|b| !b.rests) && self.acting[*i].stiffness > 0.0;
         let live: Vec<usize> = (0..bearings.len()).filter(is_live).collect();
         let bearing = |i: usize| bearings[i].as_ref().expect("live paths have one");
         let right: Vec<f64> = live
@@ -165,11 +170,10 @@ impl<T: Real> ForceStroke<T> {
         };
         let one = |(acting, goal): (&Acting, &f64)| {
             let target = &self.targets[acting.index];
-            let Some(span) = acting
-                .crossing
-                .filter(|_| acting.is_free)
-                .and_then(|at| target.span(&value, self.iso, at, *goal, step))
-            else {
+            let crossing = acting.crossing.filter(|_| acting.is_free);
+            let own = crossing.map(|at| (at, self.own(target, acting.start, at, *goal)));
+            let span = own.and_then(|(_, own)| target.span(&value, self.iso, own, *goal, step));
+            let (Some((crossing, own)), Some(span)) = (own, span) else {
                 return Ok(None);
             };
             // A path without length is the place where it ends.
@@ -178,7 +182,14 @@ impl<T: Real> ForceStroke<T> {
                 from: span.from.min(span.to - least),
                 ..span
             };
-            let integral = target.integral(value, self.iso, span, exact);
+            // What closes does so by more than a thread.
+            let fall = acting.start.map_or(0.0, |start| start.fall);
+            let more = if span.is_gap && !target.ends_early {
+                CLOSED * fall * if target.grows { 1.0 } else { -1.0 } * self.radius
+            } else {
+                0.0
+            };
+            let integral = target.integral(value, self.iso + more, span, exact);
             let part = Part {
                 path: &target.path,
                 from: span.from,
@@ -194,6 +205,7 @@ impl<T: Real> ForceStroke<T> {
                 row: Row::mean(&functions, &integral.nodes, |s| target.path.at(s)),
                 short: integral.value / (span.to - span.from),
                 span,
+                rests: own < crossing && own <= *goal,
             }))
         };
         self.acting.iter().zip(goals).map(one).collect()

@@ -11,7 +11,7 @@ use super::report::{Arrival, ForceReport};
 use super::row::Functions;
 use super::spread::Load;
 use super::system::Memory;
-use super::target::Target;
+use super::target::{Start, Target};
 use super::within::within;
 use super::{ForceError, How, Rule, Solid, track};
 use crate::paint::Layers;
@@ -51,6 +51,8 @@ pub(super) struct Acting {
     pub(super) index: usize,
     /// Total force.
     pub(super) force: f64,
+    /// How it lay when the stroke began; `None` where it did not meet the surface.
+    pub(super) start: Option<Start>,
     /// Arc length of the surface on it, where there is one, now and before the step.
     pub(super) crossing: Option<f64>,
     pub(super) before: Option<f64>,
@@ -303,6 +305,30 @@ impl<T: Real> ForceStroke<T> {
         self.load.on_box()
     }
 
+    /// How a path lay when the stroke began.
+    pub(super) fn start(&self, target: &Target) -> Option<Start> {
+        target.start(&|p| self.origin.value(p), self.iso, self.radius, self.look())
+    }
+
+    /// Arc length of the surface on a path, of what is not beyond its end from the beginning.
+    pub(super) fn surface(
+        &self,
+        target: &Target,
+        start: Option<Start>,
+        value: &impl Fn(DVec3) -> f64,
+    ) -> Option<f64> {
+        let crossing = target.crossing(value, self.iso, self.radius, self.look())?;
+        Some(self.own(target, start, crossing, target.path.length()))
+    }
+
+    /// What of a path up to a crossing is the stroke's, if it is to go to `goal`.
+    pub(super) fn own(&self, target: &Target, start: Option<Start>, crossing: f64, goal: f64) -> f64 {
+        let before = |p: DVec3| self.origin.value(p);
+        start.map_or(crossing, |start| {
+            target.own(&before, self.iso, start, [crossing, goal], self.look())
+        })
+    }
+
     /// How far the surface at an arc length is beyond the end of a path, as a share of what it has to go.
     pub(super) fn ahead(&self, target: &Target, crossing: f64) -> f64 {
         (crossing - target.path.length()) / self.whole(target)
@@ -350,7 +376,7 @@ impl<T: Real> ForceStroke<T> {
                 Solid::Clay => field.value(p),
                 Solid::Elastic => self.value(p),
             };
-            t.crossing(&value, self.iso, self.radius, self.look())
+            self.surface(t, self.start(t), &value)
         });
         Ok((field, self.report))
     }

@@ -28,6 +28,17 @@ pub struct Span {
     pub from: f64,
     /// Arc length of its farther end.
     pub to: f64,
+    /// Whether the far side of a gap ends it before its goal.
+    pub is_gap: bool,
+}
+
+/// How a path lay in the field when its stroke began.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Start {
+    /// Arc length of the surface.
+    pub at: f64,
+    /// Fall of the density per length in front of it, towards the surface.
+    pub fall: f64,
 }
 
 impl Target {
@@ -61,7 +72,45 @@ impl Target {
         first_crossing(behind, BEYOND * radius, end, step).filter(|s| *s < end)
     }
 
-    /// What is left of the path from a crossing to the arc length `goal`; `None` if nothing is to be done.
+    /// How it lies in a field.
+    pub fn start(
+        &self,
+        value: &impl Fn(glam::DVec3) -> f64,
+        iso: f64,
+        radius: f64,
+        step: f64,
+    ) -> Option<Start> {
+        let at = self.crossing(value, iso, radius, step)?;
+        let behind = |s| self.behind(value, iso, s);
+        let fall = (behind(at - step) - behind(at + step)) / (2.0 * step);
+        Some(Start {
+            at,
+            fall: fall.max(0.0),
+        })
+    }
+
+    /// Where a surface at `crossing` counts as being if it is to come to `goal`: at the goal where it has met what was there
+    /// `before`.
+    pub fn own(
+        &self,
+        before: &impl Fn(glam::DVec3) -> f64,
+        iso: f64,
+        start: Start,
+        [crossing, goal]: [f64; 2],
+        step: f64,
+    ) -> f64 {
+        let mut s = goal.max(start.at + step);
+        while s < crossing {
+            if self.behind(before, iso, s) > 0.0 {
+                return goal;
+            }
+            s += step;
+        }
+        crossing
+    }
+
+    /// What is left of the path from a crossing to the arc length `goal`, or to the far side of a gap before it; `None` if
+    /// nothing is to be done.
     pub fn span(
         &self,
         value: &impl Fn(glam::DVec3) -> f64,
@@ -70,19 +119,22 @@ impl Target {
         goal: f64,
         step: f64,
     ) -> Option<Span> {
-        if !self.ends_early {
-            return Some(Span {
-                from: crossing.min(goal),
-                to: crossing.max(goal),
-            });
-        }
         if crossing >= goal {
-            return None;
+            return (!self.ends_early).then_some(Span {
+                from: goal,
+                to: crossing,
+                is_gap: false,
+            });
         }
         let start = crossing + 1e-6 * step;
         let before = |s: f64| -self.behind(value, iso, start + s);
-        let to = first_crossing(before, 0.0, goal - start, 0.5 * step).map_or(start, |s| start + s);
-        Some(Span { from: crossing, to })
+        let none = if self.ends_early { start } else { goal };
+        let gap = first_crossing(before, 0.0, goal - start, 0.5 * step).map_or(none, |s| start + s);
+        Some(Span {
+            from: crossing,
+            to: gap,
+            is_gap: gap < goal,
+        })
     }
 
     /// `∫(c − s)dc` over a span.

@@ -133,7 +133,11 @@ impl PatchPull {
             relative: 1e-4,
             mean: 1e-5 * RADIUS,
         };
-        let span = Span { from, to };
+        let span = Span {
+            from,
+            to,
+            is_gap: false,
+        };
         let integral = self.target.integral(|p| self.field.value(p), 0.0, span, exact);
         let short = integral.value / (to - from);
         let (at, kernel) = self.kernel(from, to);
