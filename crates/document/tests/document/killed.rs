@@ -81,6 +81,10 @@ fn stroke_on_knots(state: &State, n: u32) -> (String, Value, State) {
     (command.title(), command.to_value(), next)
 }
 
+fn hex(hash: &[u8; 32]) -> String {
+    hash.iter().map(|b| format!("{b:02x}")).collect()
+}
+
 /// Edits a document without end; tells each that is safe.
 #[test]
 #[ignore = "run by those that kill it"]
@@ -98,13 +102,7 @@ fn endless_writer() {
     loop {
         let (title, command, next) = (kind.next)(document.state(), count);
         document.commit(&title, command, next).unwrap();
-        let hash: String = document
-            .state()
-            .sha256()
-            .iter()
-            .map(|b| format!("{b:02x}"))
-            .collect();
-        println!("safe {hash}");
+        println!("safe {}", hex(&document.state().sha256()));
         count += 1;
     }
 }
@@ -116,7 +114,7 @@ fn killed(kind: &Kind, times: u32) {
     drop(Document::create(&path, (kind.first)(), Options::default()).unwrap());
     let mut draw = Draw(5);
     let mut torn = 0;
-    for _ in 0..times {
+    for time in 0..times {
         let mut writer = Command::new(std::env::current_exe().unwrap())
             .args([
                 "--exact",
@@ -154,18 +152,23 @@ fn killed(kind: &Kind, times: u32) {
         );
         torn += u32::from(opened.lost.is_some());
         let mut document = opened.document;
-        let history = document.history().unwrap();
+        // States that the file has: that before its oldest edit, where those before were forgotten, and one after each.
+        let mut states = vec![hex(&document.first_state().unwrap().sha256())];
+        states.extend(document.history().unwrap().into_iter().map(|edit| edit.sha256));
         // The last one told, or the one after it.
         let told = last.trim_start_matches("safe ");
-        let at = history
+        let at = states
             .iter()
-            .rposition(|edit| edit.sha256 == told)
-            .expect("what was told is there");
+            .rposition(|hash| hash == told)
+            .unwrap_or_else(|| panic!("kill {time}: what was told is not there"));
         assert!(
-            history.len() - at <= 2,
-            "{} edits after the last that was told",
-            history.len() - 1 - at
+            states.len() - at <= 2,
+            "kill {time}: {} edits after the last that was told",
+            states.len() - 1 - at
         );
+        if time % 50 == 49 {
+            println!("{}: killed {} times", kind.name, time + 1);
+        }
     }
     let mut document = Document::open(&path, Options::default()).unwrap().document;
     let counts = document.counts().unwrap();
