@@ -41,6 +41,17 @@ fn scripts_of_the_gallery_leave_what_is_recorded() {
         } else {
             bench.json(&format!("new {name}.isoclay {start}"));
         }
+        if let Some(tried) = text.lines().find_map(|line| line.strip_prefix("# tried: ")) {
+            // Nothing is left of what was only shown.
+            let bytes = || std::fs::read(bench.path(&format!("{name}.isoclay"))).unwrap();
+            let before = bytes();
+            bench.write("tried.toml", format!("[[stroke]]\n{tried}\n"));
+            let told = bench.json(&format!(
+                "sculpt {name}.isoclay --script tried.toml --preview tried.iclay"
+            ));
+            assert_ne!(told["changed"], serde_json::json!({}), "{name}: {told}");
+            assert!(bytes() == before, "{name}");
+        }
         let done = bench.json(&format!("sculpt {name}.isoclay --script {}", script.display()));
         assert!(done["done"].as_u64() >= Some(1), "{name}: {done}");
         found.insert(name, done["state_sha256"].as_str().unwrap().to_string());

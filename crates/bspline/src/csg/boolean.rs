@@ -297,11 +297,14 @@ impl Boolean {
             }
             term.resize(out.len(), 0.0);
             branch.field.frame_values(frame, lo, count, term);
-            for (o, t) in out.iter_mut().zip(term.iter()) {
-                let t = branch.map(*t);
-                if self.wins(t, *o) {
-                    *o = t;
-                }
+            if branch.twice_iso.is_some() {
+                term.iter_mut().for_each(|t| *t = branch.map(*t));
+            }
+            let pairs = out.iter_mut().zip(term.iter());
+            // Decided outside of the loops, and without a jump in them: so they are vectorized.
+            match self.operation {
+                Operation::Union => pairs.for_each(|(o, t)| *o = if *t > *o { *t } else { *o }),
+                Operation::Intersection => pairs.for_each(|(o, t)| *o = if *t < *o { *t } else { *o }),
             }
         }
     }

@@ -109,7 +109,11 @@ impl<T: Real> Corrections<T> {
     /// The first active slot whose coefficient is no number, with it.
     pub(super) fn unfit(&self) -> Option<(usize, T)> {
         // Most are fit, and that is told faster without their slots.
-        match self.values.iter().all(|value| value.is_finite()) {
+        match self
+            .values
+            .iter()
+            .fold(true, |all, value| all & value.is_finite())
+        {
             true => None,
             false => self.iter().find(|(_, value)| !value.is_finite()),
         }
@@ -152,12 +156,29 @@ impl<T: Real> Corrections<T> {
                 values.extend_from_slice(a);
                 return 0;
             }
+            let is_changed = |(old, new): (&T, &T)| u64::from(old != new);
             if here == there {
                 let start = values.len();
                 values.extend(a.iter().zip(b).map(|(a, b)| *a + *b));
-                let pairs = bits(here).zip(a.iter().zip(&values[start..]));
-                return pairs.fold(0, |changed, (slot, (old, new))| {
-                    changed | u64::from(old != new) << slot
+                let pairs = a.iter().zip(&values[start..]);
+                if here == u64::MAX {
+                    let pairs = pairs.enumerate();
+                    return pairs.fold(0, |changed, (slot, pair)| changed | is_changed(pair) << slot);
+                }
+                let pairs = bits(here).zip(pairs);
+                return pairs.fold(0, |changed, (slot, pair)| changed | is_changed(pair) << slot);
+            }
+            if here | there == here {
+                let start = values.len();
+                values.extend_from_slice(a);
+                return bits(there).zip(b).fold(0, |changed, (slot, more)| {
+                    let rank = match here {
+                        u64::MAX => slot,
+                        here => (here & ((1 << slot) - 1)).count_ones() as usize,
+                    };
+                    let value = &mut values[start + rank];
+                    let old = std::mem::replace(value, *value + *more);
+                    changed | is_changed((&old, value)) << slot
                 });
             }
             let (mut a, mut b) = (a.iter(), b.iter());
@@ -185,6 +206,15 @@ impl<T: Real> Corrections<T> {
 
     /// Adds the coefficients of the slots below `count` on each axis to `target`, 11 wide, from `start` on.
     pub(super) fn add_to(&self, count: [usize; 3], target: &mut [T; HALO_LEN], start: usize) {
+        match count[2] {
+            BRICK => self.add_rows::<BRICK>([count[0], count[1]], target, start),
+            _ => self.add_rows::<{ HALO - BRICK }>([count[0], count[1]], target, start),
+        }
+    }
+
+    /// [`Self::add_to`] of rows along z of one length.
+    #[inline(always)]
+    fn add_rows<const ROW: usize>(&self, count: [usize; 2], target: &mut [T; HALO_LEN], start: usize) {
         let mut rank = 0;
         for (x, &word) in self.mask.iter().enumerate().take(count[0]) {
             let mut values = &self.values[rank..];
@@ -199,9 +229,12 @@ impl<T: Real> Corrections<T> {
                 let (own, rest) = values.split_at(row.count_ones() as usize);
                 values = rest;
                 let to = start + (x * HALO + y) * HALO;
-                let to = &mut target[to..to + count[2]];
+                let to: &mut [T; ROW] = (&mut target[to..to + ROW]).try_into().expect("a row");
                 if row == 0xff {
-                    to.iter_mut().zip(own).for_each(|(t, v)| *t += *v);
+                    let own: &[T; ROW] = own[..ROW].try_into().expect("a row");
+                    for z in 0..ROW {
+                        to[z] += own[z];
+                    }
                     continue;
                 }
                 for value in own {

@@ -16,10 +16,10 @@ pub(super) struct ChangedBrick<T> {
     changed: [u64; BRICK],
 }
 
-/// The same for those who ask: packed, where a change costs a search, or with a place for every slot, which costs
-/// unpacking.
+/// The same for those who ask: packed, shared with the field until they change, where a change costs a search; or with a
+/// place for every slot, which costs unpacking.
 enum Functions<T> {
-    Packed(Corrections<T>),
+    Packed(Arc<Corrections<T>>),
     Dense(DenseCorrections<T>),
 }
 
@@ -27,10 +27,11 @@ impl<T: Real> ChangedBrick<T> {
     /// A brick as it is; `is_packed` where few of its functions are to change.
     pub fn of(field: &HierarchicalSpline<T>, level: usize, key: BrickKey, is_packed: bool) -> Self {
         let node = field.find(level, key);
-        let old = node.and_then(|n| n.corrections.as_deref());
+        let old = node.and_then(|n| n.corrections.as_ref());
         let functions = match (is_packed, old) {
-            (true, old) => Functions::Packed(old.map_or_else(Corrections::empty, Corrections::clone)),
-            (false, Some(old)) => Functions::Dense(old.into()),
+            (true, Some(old)) => Functions::Packed(old.clone()),
+            (true, None) => Functions::Packed(Arc::new(Corrections::empty())),
+            (false, Some(old)) => Functions::Dense((&**old).into()),
             (false, None) => Functions::Dense(DenseCorrections::empty()),
         };
         Self {
@@ -43,14 +44,16 @@ impl<T: Real> ChangedBrick<T> {
 
     /// Adds to the coefficients of functions.
     pub fn add(&mut self, add: &Corrections<T>) -> Result<(), EditError> {
-        let old = std::mem::replace(&mut self.functions, Functions::Packed(Corrections::empty()));
-        let (sum, changed) = old.packed().plus(add);
+        let (sum, changed) = match &self.functions {
+            Functions::Packed(functions) => functions.plus(add),
+            Functions::Dense(functions) => functions.pack().plus(add),
+        };
         if let Some((slot, value)) = sum.unfit() {
             let at = [slot / BRICK / BRICK, slot / BRICK % BRICK, slot % BRICK];
             let function = std::array::from_fn(|a| self.key.0[a] * BRICK as u32 + at[a] as u32);
             return Err(self.not_finite(function, value));
         }
-        self.functions = Functions::Packed(sum);
+        self.functions = Functions::Packed(Arc::new(sum));
         self.changed = std::array::from_fn(|x| self.changed[x] | changed[x]);
         Ok(())
     }
@@ -96,7 +99,7 @@ impl<T: Real> ChangedBrick<T> {
         if old != new {
             self.changed[x] |= 1 << (slot % 64);
             match &mut self.functions {
-                Functions::Packed(functions) => functions.put(slot, new),
+                Functions::Packed(functions) => Arc::make_mut(functions).put(slot, new),
                 Functions::Dense(functions) => functions.put(slot, new),
             }
         }
@@ -109,8 +112,12 @@ impl<T: Real> ChangedBrick<T> {
             return None;
         }
         let place = (self.level, self.key);
-        let functions = Arc::new(self.functions.packed());
-        Some(Graft::new(lattice, place, self.changed, Some(functions)))
+        Some(Graft::new(
+            lattice,
+            place,
+            self.changed,
+            Some(self.functions.packed()),
+        ))
     }
 
     fn not_finite(&self, function: [u32; 3], value: T) -> EditError {
@@ -123,10 +130,10 @@ impl<T: Real> ChangedBrick<T> {
 }
 
 impl<T: Real> Functions<T> {
-    fn packed(self) -> Corrections<T> {
+    fn packed(self) -> Arc<Corrections<T>> {
         match self {
             Self::Packed(functions) => functions,
-            Self::Dense(functions) => functions.pack(),
+            Self::Dense(functions) => Arc::new(functions.pack()),
         }
     }
 }

@@ -9,7 +9,7 @@ use super::Lattice;
 use super::brick::{BrickKey, HALO_LEN};
 use super::graft::Graft;
 use super::node::{Children, Node, covers_cells, crown, meets_cells};
-use super::window::{Slots, Window, has_same_bits};
+use super::window::{Slots, Window, have_same_bits};
 use crate::Real;
 
 /// Bricks below a node from which on its children are made side by side: about a millisecond's work, as waking another
@@ -131,9 +131,8 @@ impl<T: Real> Renewal<'_, T> {
         let mut totals = kept.unwrap_or_else(|| Arc::new([T::zero(); HALO_LEN]));
         let blank = Arc::get_mut(&mut totals).expect("just made");
         self.window.fill(self.parent, octant, blank);
-        let is_same = |old: &[T]| old.iter().zip(&*totals).all(|(a, b)| has_same_bits(*a, *b));
         match old {
-            Some(old) if is_same(&**old) => (Some(old.clone()), false),
+            Some(old) if have_same_bits(old, &totals) => (Some(old.clone()), false),
             _ => (Some(totals), true),
         }
     }

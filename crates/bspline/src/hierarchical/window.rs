@@ -231,7 +231,17 @@ fn number(at: [usize; 3], n: usize) -> usize {
     (at[0] * n + at[1]) * n + at[2]
 }
 
+/// Whether all totals are equal, and zeros of the same sign.
+pub(super) fn have_same_bits<T: Real>(a: &[T; HALO_LEN], b: &[T; HALO_LEN]) -> bool {
+    // Planes at a time: a loop that may end anywhere is not vectorized.
+    let planes = a.chunks(HALO * HALO).zip(b.chunks(HALO * HALO));
+    planes.into_iter().all(|(a, b)| {
+        let pairs = a.iter().zip(b);
+        pairs.fold(true, |all, (a, b)| all & has_same_bits(*a, *b))
+    })
+}
+
 /// Equal, and zeros of the same sign.
-pub(super) fn has_same_bits<T: Real>(a: T, b: T) -> bool {
-    a == b && a.is_sign_negative() == b.is_sign_negative()
+fn has_same_bits<T: Real>(a: T, b: T) -> bool {
+    (a == b) & (a.is_sign_negative() == b.is_sign_negative())
 }

@@ -15,13 +15,13 @@ use super::clay::again;
 use super::common::Draw;
 
 /// A block of 8 × 6 × 4 with close knots about one edge.
-fn uneven() -> TensorSpline<f32> {
+pub fn uneven() -> TensorSpline<f32> {
     let x: Vec<f64> = (0..=16).map(|i| 1.0 + 0.25 * f64::from(i)).collect();
     let z: Vec<f64> = (0..=10).map(|i| 1.0 + 0.2 * f64::from(i)).collect();
     block(DVec3::new(8.0, 6.0, 4.0), 0.5, [&x, &[], &z]).unwrap()
 }
 
-fn state_of(field: TensorSpline<f32>) -> State {
+pub fn state_of(field: TensorSpline<f32>) -> State {
     let meta = FieldMeta {
         iso: Some(0.0),
         ..FieldMeta::default()
@@ -31,7 +31,7 @@ fn state_of(field: TensorSpline<f32>) -> State {
         .unwrap()
 }
 
-fn commands(session: &str) -> Vec<Command> {
+pub fn commands(session: &str) -> Vec<Command> {
     Command::of_script::<document::CommandError>(session, |_| Ok("block".into())).unwrap()
 }
 

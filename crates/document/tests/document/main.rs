@@ -1,8 +1,10 @@
 //! Documents: edits, undo, and files that crashes and faults have cut.
 
+mod any_order;
 mod clay;
 mod cloud;
 mod common;
+mod killed;
 mod knots;
 mod live;
 mod preview;
@@ -10,10 +12,8 @@ mod revision;
 mod sessions;
 
 use std::collections::BTreeSet;
-use std::io::{BufRead, BufReader, Seek, SeekFrom, Write};
+use std::io::{Seek, SeekFrom, Write};
 use std::path::Path;
-use std::process::{Command, Stdio};
-use std::time::Duration;
 
 use bspline::AnyField;
 use bspline::hierarchical::{BlockEdit, Change as BlockChange, HierarchicalSpline, LevelEdit};
@@ -387,93 +387,6 @@ fn what_is_no_document_is_refused_by_name() {
     );
     assert!(Document::open(&directory.path().join("nothing"), Options::default()).is_err());
     assert!(Document::open(directory.path(), Options::default()).is_err());
-}
-
-/// Edits a document without end; tells each that is safe.
-#[test]
-#[ignore = "run by a_killed_program_loses_no_edit_that_it_told"]
-fn endless_writer() {
-    let path = std::env::var_os("ISOCLAY_TEST_DOCUMENT").expect("set by the test that runs this");
-    let mut document = Document::open(
-        Path::new(&path),
-        Options {
-            quota: 60_000,
-            ..Options::default()
-        },
-    )
-    .unwrap()
-    .document;
-    let mut count = 0;
-    loop {
-        let next = dented(document.state(), "a", count);
-        document.commit("dent", Value::Null, next).unwrap();
-        let hash: String = document
-            .state()
-            .sha256()
-            .iter()
-            .map(|b| format!("{b:02x}"))
-            .collect();
-        println!("safe {hash}");
-        count += 1;
-    }
-}
-
-#[test]
-fn a_killed_program_loses_no_edit_that_it_told() {
-    let directory = tempdir().unwrap();
-    let path = directory.path().join("killed.isoclay");
-    let first = State::new().with("a", object(&ball())).unwrap();
-    drop(Document::create(&path, first, Options::default()).unwrap());
-    let mut draw = Draw(5);
-    for _ in 0..30 {
-        let mut writer = Command::new(std::env::current_exe().unwrap())
-            .args([
-                "--exact",
-                "endless_writer",
-                "--ignored",
-                "--nocapture",
-                "--test-threads=1",
-            ])
-            .env("ISOCLAY_TEST_DOCUMENT", &path)
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
-        let mut lines = BufReader::new(writer.stdout.take().unwrap()).lines();
-        let is_safe = |line: &String| line.starts_with("safe ");
-        let started = lines
-            .by_ref()
-            .map_while(Result::ok)
-            .find(is_safe)
-            .expect("it writes");
-        std::thread::sleep(Duration::from_micros(u64::from(draw.below(30_000))));
-        writer.kill().unwrap();
-        writer.wait().unwrap();
-        let last = lines
-            .map_while(Result::ok)
-            .filter(is_safe)
-            .last()
-            .unwrap_or(started);
-        let opened = Document::open(&path, Options::default()).unwrap();
-        assert!(
-            opened.lost.as_ref().is_none_or(|lost| lost.is_torn),
-            "{:?}",
-            opened.lost
-        );
-        let mut document = opened.document;
-        let history = document.history().unwrap();
-        // The last one told, or the one after it.
-        let told = last.trim_start_matches("safe ");
-        let at = history
-            .iter()
-            .rposition(|edit| edit.sha256 == told)
-            .expect("what was told is there");
-        assert!(
-            history.len() - at <= 2,
-            "{} edits after the last that was told",
-            history.len() - 1 - at
-        );
-    }
 }
 
 #[test]

@@ -4,7 +4,8 @@ use bspline::vectorized;
 use glam::DMat3;
 
 use super::Aim;
-use super::tiles::{Mask, NONE, Rows, TILE, TileKey, Tiles, Values, places};
+use super::masks::{Mask, NONE, Rows, is_none, places};
+use super::tiles::{TILE, TileKey, Tiles, Values};
 
 /// Cells of a level on each side of the surface in which its distance counts.
 const NEAR: f64 = 3.0;
@@ -64,7 +65,13 @@ impl Judge {
         rest: &[Values],
     ) -> Mask {
         let rests = &rest[tile];
-        if *judged == NONE || rests.iter().all(|r| *r == 0.0) {
+        // Where there is no rest nobody asks for slopes.
+        let judged: &Mask = &std::array::from_fn(|x| {
+            let plane = &rests[64 * x..64 * (x + 1)];
+            let is_any = plane.iter().fold(false, |any, r| any | (*r != 0.0));
+            if is_any { judged[x] } else { 0 }
+        });
+        if is_none(judged) {
             return NONE;
         }
         match self.aim {
@@ -135,6 +142,14 @@ impl Judge {
         let (xx, yy, zz) = (m.x_axis.x, m.y_axis.y, m.z_axis.z);
         let (xy, xz, yz) = (2.0 * m.x_axis.y, 2.0 * m.x_axis.z, 2.0 * m.y_axis.z);
         let mut out = [0.0; TILE * TILE * TILE];
+        // Most tiles have all of their neighbours; to ask each knot for them costs as much as the slopes.
+        let lines = || {
+            (rows.x.start..rows.x.end + 2).flat_map(|x| (rows.y.start..rows.y.end + 2).map(move |y| (x, y)))
+        };
+        let is_whole = lines().all(|(x, y)| {
+            let line = &padded[(x * WIDE + y) * WIDE..][..WIDE];
+            line.iter().fold(true, |all, v| all & !v.is_nan())
+        });
         vectorized(
             #[inline(always)]
             || {
@@ -149,7 +164,10 @@ impl Judge {
                         [at(own - step), at(own), at(own + step)]
                     });
                     for (z, to) in to.iter_mut().enumerate() {
-                        let [x, y, z] = rows.map(|[a, o, b]| difference(a[z], o[z], b[z]));
+                        let [x, y, z] = match is_whole {
+                            true => rows.map(|[a, o, b]| 0.5 * ((o[z] - a[z]) + (b[z] - o[z]))),
+                            false => rows.map(|[a, o, b]| difference(a[z], o[z], b[z])),
+                        };
                         *to = x * (xx * x + xy * y + xz * z) + y * (yy * y + yz * z) + zz * z * z;
                     }
                 }

@@ -9,9 +9,11 @@ use glam::DVec3;
 
 use super::FieldFitOptions;
 use super::judge::{Judge, Left, between_knots, children};
+use super::masks::{ALL, Mask, NONE, Rows, between, is_none, places};
 use super::region::Region;
+use super::room::Room;
 use super::sample::sample;
-use super::tiles::{Mask, NONE, Rows, TILE, TileKey, Tiles, Values, between, places};
+use super::tiles::{TILE, TileKey, Tiles, Values};
 use crate::FitError;
 
 /// Side and middle of the cubic B-spline at the knots.
@@ -40,8 +42,8 @@ pub(super) struct Round<T> {
 /// Target and rest at the knots of some tiles.
 struct Samples {
     tiles: Tiles,
-    target: Vec<Values>,
-    rest: Vec<Values>,
+    target: Room,
+    rest: Room,
     count: u64,
 }
 
@@ -92,7 +94,7 @@ impl<T: Real> LevelFit<'_, T> {
     /// Those of the functions `asked` of a tile that may change.
     fn free(&self, key: TileKey, asked: Mask) -> Mask {
         let ends = [0, TILE * TILE * TILE - 1].map(|place| knot_of(key, place));
-        if asked == NONE || self.region.are_free(ends[0], ends[1]) {
+        if is_none(&asked) || self.region.are_free(ends[0], ends[1]) {
             return asked;
         }
         let mut free = NONE;
@@ -140,12 +142,16 @@ impl<T: Real> LevelFit<'_, T> {
 
     fn samples(&self, mut keys: Vec<TileKey>) -> Result<Samples, FitError> {
         let (lo, hi) = self.region.sampled();
-        keys.retain(|key| between(*key, lo, hi) != NONE);
+        keys.retain(|key| !is_none(&between(*key, lo, hi)));
         let tiles = Tiles::new(keys);
         let fields = [self.target, self.field as &dyn Field];
         let (target, rest, counts) = tiles
             .fill_runs(|run, target, rest, room| sample(fields, &self.region, run[0], target, rest, room));
-        for (key, target) in tiles.keys.iter().zip(&target) {
+        for (key, (target, rest)) in tiles.keys.iter().zip(target.iter().zip(&*rest)) {
+            // The rest is told faster, and not finite where the target is not.
+            if rest.iter().fold(true, |all, r| all & r.is_finite()) {
+                continue;
+            }
             let inside = between(*key, lo, hi);
             if let Some(bad) = places(&inside).find(|i| !target[*i].is_finite()) {
                 return Err(self.not_finite(*key, bad));
@@ -173,34 +179,28 @@ impl<T: Real> LevelFit<'_, T> {
     ///
     /// Only the sum is cut off where functions do not take part: where all that reach a point do, it is interpolated as
     /// if there were no cut. `left` is room.
-    fn coefficients(
-        &self,
-        tiles: &Tiles,
-        rest: &[Values],
-        takes_part: &[Mask],
-        mut left: Vec<Values>,
-    ) -> Vec<Values> {
+    fn coefficients(&self, tiles: &Tiles, rest: &[Values], takes_part: &[Mask], mut left: Room) -> Room {
         let (first, last) = self.region.sampled();
-        let convolved = |i: usize, values: &[Values], weights: [f64; 2], out: &mut Values| {
-            let rows = Rows::of(&between(tiles.keys[i], first, last));
+        let convolved = |i: usize, asked: &Mask, values: &[Values], weights: [f64; 2], out: &mut Values| {
+            let rows = Rows::of(&and(asked, &between(tiles.keys[i], first, last)));
             tiles.convolved(i, &rows, values, weights, out);
         };
         let mut once = tiles.fill(|i, out| {
             if tiles.is_any_near(i, takes_part) {
-                convolved(i, rest, QUASI, out);
+                convolved(i, &ALL, rest, QUASI, out);
             }
         });
         tiles.change(&mut left, |i, out| {
             out.fill(0.0);
             if tiles.is_any_near(i, takes_part) {
-                convolved(i, &once, SAMPLES, out);
+                convolved(i, &ALL, &once, SAMPLES, out);
                 out.iter_mut().zip(&rest[i]).for_each(|(o, r)| *o = r - *o);
             }
         });
         tiles.change(&mut once, |i, out| {
-            if takes_part[i] != NONE {
+            if !is_none(&takes_part[i]) {
                 let mut more = [0.0; TILE * TILE * TILE];
-                convolved(i, &left, QUASI, &mut more);
+                convolved(i, &takes_part[i], &left, QUASI, &mut more);
                 out.iter_mut().zip(more).for_each(|(o, more)| *o += more);
             }
         });
@@ -213,7 +213,7 @@ impl<T: Real> LevelFit<'_, T> {
         const PARTS: [Range<usize>; 2] = [0..TILE - 1, TILE - 1..TILE];
         let mut bricks: BTreeMap<BrickKey, DenseCorrections<T>> = BTreeMap::new();
         for ((key, mask), values) in keys.iter().zip(takes_part).zip(coefficients) {
-            if *mask == NONE {
+            if is_none(mask) {
                 continue;
             }
             for n in 0..8 {
@@ -230,11 +230,11 @@ impl<T: Real> LevelFit<'_, T> {
                 for row in rows {
                     let (at, taken) = (start(row), taken(row) >> zs.start);
                     let [i, j, k] = function(at).map(|f| f as usize % BRICK);
-                    for (z, value) in values[at..at + zs.len()].iter().enumerate() {
-                        if taken >> z & 1 == 1 {
-                            brick.set([i, j, k + z], T::from_f64(*value));
-                        }
-                    }
+                    brick.mask[i] |= taken << (BRICK * j + k);
+                    // Nobody reads those of functions that do not take part.
+                    let to = &mut brick.values[(i * BRICK + j) * BRICK + k..][..zs.len()];
+                    let own = to.iter_mut().zip(&values[at..at + zs.len()]);
+                    own.for_each(|(to, value)| *to = T::from_f64(*value));
                 }
             }
         }
@@ -259,10 +259,10 @@ impl<T: Real> LevelFit<'_, T> {
         let own = tiles.map(|i| {
             // A change reaches two knots further.
             let reached = match self.is_first && !is_last {
-                true => [!0; TILE],
+                true => ALL,
                 false => tiles.spread(i, spread, 2),
             };
-            if reached == NONE {
+            if is_none(&reached) {
                 return NONE;
             }
             judge.near(tiles, i, &reached, target, rest)
@@ -270,7 +270,7 @@ impl<T: Real> LevelFit<'_, T> {
         let mut open: Vec<(TileKey, Mask)> = tiles.keys.iter().copied().zip(own).collect();
         // Beside the tiles nothing is known but that a change reaches there.
         let mut beside: Vec<TileKey> = (tiles.keys.iter().zip(spread))
-            .filter(|(_, mask)| **mask != NONE)
+            .filter(|(_, mask)| !is_none(mask))
             .flat_map(|(key, _)| about(*key))
             .filter(|key| tiles.keys.binary_search(key).is_err())
             .collect();

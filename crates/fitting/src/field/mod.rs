@@ -8,8 +8,10 @@
 
 mod judge;
 mod level;
+mod masks;
 mod prune;
 mod region;
+mod room;
 mod sample;
 mod tiles;
 

@@ -17,18 +17,21 @@ pub(super) fn sample(
     rests: &mut [Values],
     room: &mut Vec<f64>,
 ) -> u64 {
-    targets.as_flattened_mut().fill(f64::NAN);
     let (lo, hi) = region.sampled();
     let last = region.last();
     let first = key.map(|k| i64::from(k) * TILE as i64);
     let size = [TILE, TILE, TILE * targets.len()];
     let start: [i64; 3] = std::array::from_fn(|a| first[a].max(lo[a]));
     let end: [i64; 3] = std::array::from_fn(|a| (first[a] + size[a] as i64 - 1).min(hi[a]));
+    let is_whole = (0..3).all(|a| end[a] - start[a] + 1 == size[a] as i64);
+    if !is_whole {
+        targets.as_flattened_mut().fill(f64::NAN);
+    }
     if (0..3).any(|a| start[a] > end[a]) {
+        rests.as_flattened_mut().fill(0.0);
         return 0;
     }
     // Outside of the lattice's box, where coefficients do not reach, the values go on in straight lines from inside.
-    let leaves_box = (0..3).any(|a| start[a] < 0 || end[a] > last[a]);
     let from: [i64; 3] = std::array::from_fn(|a| start[a].clamp(0, (last[a] - 1).max(0)));
     let to: [i64; 3] = std::array::from_fn(|a| end[a].min(last[a]).max((from[a] + 1).min(last[a])));
     let count: [usize; 3] = std::array::from_fn(|a| (to[a] - from[a] + 1) as usize);
@@ -48,24 +51,33 @@ pub(super) fn sample(
     for (n, (targets, rests)) in targets.iter_mut().zip(rests.iter_mut()).enumerate() {
         let first = [first[0], first[1], first[2] + (n * TILE) as i64];
         let [begin, stop] = [start[2].max(first[2]), end[2].min(first[2] + TILE as i64 - 1)];
+        let (inner_begin, inner_stop) = (begin.max(0), stop.min(last[2]));
         for x in start[0]..=end[0] {
             for y in start[1]..=end[1] {
                 let to_row = ((x - first[0]) as usize * TILE + (y - first[1]) as usize) * TILE;
-                if !leaves_box {
-                    let (i, to) = (at([x, y, begin]), to_row + (begin - first[2]) as usize);
-                    let len = (stop - begin + 1) as usize;
-                    let (t, f) = (&target_values[i..i + len], &field_values[i..i + len]);
-                    targets[to..to + len].copy_from_slice(t);
-                    for (rest, (t, f)) in rests[to..to + len].iter_mut().zip(t.iter().zip(f)) {
-                        *rest = t - f;
+                let to = |z: i64| to_row + (z - first[2]) as usize;
+                if inner_begin <= inner_stop {
+                    let row = to(inner_begin)..to(inner_stop) + 1;
+                    let (t, r) = (&mut targets[row.clone()], &mut rests[row]);
+                    if (0..=last[0]).contains(&x) && (0..=last[1]).contains(&y) {
+                        let known = at([x, y, inner_begin]);
+                        let known = known..known + t.len();
+                        let values = target_values[known.clone()].iter().zip(&field_values[known]);
+                        for ((t, r), (target, field)) in t.iter_mut().zip(r).zip(values) {
+                            (*t, *r) = (*target, target - field);
+                        }
+                    } else {
+                        let rows = columns([x, y], last);
+                        let rows = rows.map(|([x, y], weight)| (at([x, y, inner_begin]), weight));
+                        straight_row(rows.clone(), target_values, t);
+                        straight_row(rows, field_values, r);
+                        r.iter_mut().zip(t).for_each(|(r, t)| *r = *t - *r);
                     }
-                    continue;
                 }
-                for z in begin..=stop {
-                    let to = to_row + (z - first[2]) as usize;
+                for z in (begin..inner_begin.min(stop + 1)).chain((inner_stop + 1).max(begin)..stop + 1) {
                     let on = |values: &[f64]| straight([x, y, z], last, |i| values[at(i)]);
                     let (t, f) = (on(target_values), on(field_values));
-                    (targets[to], rests[to]) = (t, t - f);
+                    (targets[to(z)], rests[to(z)]) = (t, t - f);
                 }
             }
         }
@@ -105,27 +117,40 @@ fn beside(values: &mut [f64], len: usize, known: &Range<usize>) {
 }
 
 /// Value at a knot, outside `0 ..= last` continued linearly on each axis.
-fn straight(knot: [i64; 3], last: [i64; 3], value: impl Fn([i64; 3]) -> f64) -> f64 {
-    let weights: [[(i64, f64); 2]; 3] = std::array::from_fn(|a| {
-        let face = knot[a].clamp(0, last[a]);
-        let steps = (knot[a] - face).abs() as f64;
-        let inner = if knot[a] < 0 {
-            1.min(last[a])
-        } else {
-            (last[a] - 1).max(0)
-        };
-        [(face, 1.0 + steps), (inner, -steps)]
-    });
+fn straight([x, y, z]: [i64; 3], last: [i64; 3], value: impl Fn([i64; 3]) -> f64) -> f64 {
     let mut sum = 0.0;
-    for (x, wx) in weights[0] {
-        for (y, wy) in weights[1] {
-            for (z, wz) in weights[2] {
-                let weight = wx * wy * wz;
-                if weight != 0.0 {
-                    sum += weight * value([x, y, z]);
-                }
+    for ([x, y], weight) in columns([x, y], last) {
+        for (z, wz) in weights(z, last[2]) {
+            if wz != 0.0 {
+                sum += weight * wz * value([x, y, z]);
             }
         }
     }
     sum
+}
+
+/// [`straight`] of a row along z: `rows` says where those inside begin that it continues, and what they weigh.
+fn straight_row(rows: impl Iterator<Item = (usize, f64)>, values: &[f64], out: &mut [f64]) {
+    out.fill(0.0);
+    for (first, weight) in rows {
+        let row = &values[first..first + out.len()];
+        out.iter_mut().zip(row).for_each(|(o, v)| *o += weight * v);
+    }
+}
+
+/// The rows along z inside of which a row is a continuation, and what they weigh.
+fn columns([x, y]: [i64; 2], last: [i64; 3]) -> impl Iterator<Item = ([i64; 2], f64)> + Clone {
+    let ys = weights(y, last[1]);
+    let all = weights(x, last[0])
+        .into_iter()
+        .flat_map(move |(x, wx)| ys.map(|(y, wy)| ([x, y], wx * wy)));
+    all.filter(|(_, weight)| *weight != 0.0)
+}
+
+/// The knots in `0 ..= last` whose values one outside continues, and what they weigh; of one inside itself.
+fn weights(knot: i64, last: i64) -> [(i64, f64); 2] {
+    let face = knot.clamp(0, last);
+    let steps = (knot - face).abs() as f64;
+    let inner = if knot < 0 { 1.min(last) } else { (last - 1).max(0) };
+    [(face, 1.0 + steps), (inner, -steps)]
 }

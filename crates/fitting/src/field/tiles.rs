@@ -1,10 +1,11 @@
 //! Values at the knots of a level in tiles of 8³, and what is done with them: stencils and masks that look into the
 //! tiles beside.
 
-use std::ops::Range;
-
 use bspline::vectorized;
 use rayon::prelude::*;
+
+use super::masks::{Mask, Rows, is_none, spread};
+use super::room::Room;
 
 /// Knots along a tile.
 pub(super) const TILE: usize = 8;
@@ -21,37 +22,18 @@ pub(super) const RUN: usize = 4;
 pub(super) type TileKey = [i32; 3];
 /// Values of a tile, z fastest.
 pub(super) type Values = [f64; LEN];
-/// One bit per knot: word `x`, bit `8y + z`.
-pub(super) type Mask = [u64; TILE];
 
 /// A tile's values and those one knot beside.
 pub(super) type Padded = [f64; PADDED * PADDED * PADDED];
 
-/// Rows of a tile along z that matter: a range on x and one on y.
-#[derive(Clone, Debug)]
-pub(super) struct Rows {
-    pub x: Range<usize>,
-    pub y: Range<usize>,
-}
-
-impl Rows {
-    /// Those with a knot of a mask.
-    pub fn of(mask: &Mask) -> Self {
-        let plane = mask.iter().fold(0, |all, word| all | word).to_le_bytes();
-        let ends = |is_set: &dyn Fn(usize) -> bool| {
-            let first = (0..TILE).find(|i| is_set(*i)).unwrap_or(0);
-            let last = (0..TILE).rev().find(|i| is_set(*i));
-            first..last.map_or(first, |last| last + 1)
-        };
-        Self {
-            x: ends(&|x| mask[x] != 0),
-            y: ends(&|y| plane[y] != 0),
-        }
-    }
-}
-
-pub(super) const NONE: Mask = [0; TILE];
 const ABSENT: u32 = u32::MAX;
+
+/// Values of a tile along z, and those before and behind them where there are tiles.
+struct Row<'a> {
+    before: Option<f64>,
+    own: &'a [f64; TILE],
+    behind: Option<f64>,
+}
 
 /// Tiles of a level in order, and where those beside each stand.
 pub(super) struct Tiles {
@@ -91,9 +73,12 @@ impl Tiles {
     }
 
     /// Values of each tile as `of` writes them over zeros.
-    pub fn fill(&self, of: impl Fn(usize, &mut Values) + Sync + Send) -> Vec<Values> {
-        let mut values = vec![[0.0; LEN]; self.keys.len()];
-        self.change(&mut values, of);
+    pub fn fill(&self, of: impl Fn(usize, &mut Values) + Sync + Send) -> Room {
+        let mut values = Room::of(self.keys.len());
+        self.change(&mut values, |i, values| {
+            values.fill(0.0);
+            of(i, values);
+        });
         values
     }
 
@@ -108,15 +93,14 @@ impl Tiles {
         }
     }
 
-    /// Two values of each tile as `of` writes them over zeros, and what it gives for each run of tiles along z: what is asked
+    /// Two values of each tile, all of which `of` writes, and what it gives for each run of tiles along z: what is asked
     /// for together costs less. With room for intermediate values.
     pub fn fill_runs<R: Send>(
         &self,
         of: impl Fn(&[TileKey], &mut [Values], &mut [Values], &mut Vec<f64>) -> R + Sync + Send,
-    ) -> (Vec<Values>, Vec<Values>, Vec<R>) {
-        let zeros = || vec![[0.0; LEN]; self.keys.len()];
-        let (mut a, mut b) = (zeros(), zeros());
-        let (mut rest_a, mut rest_b) = (a.as_mut_slice(), b.as_mut_slice());
+    ) -> (Room, Room, Vec<R>) {
+        let [mut a, mut b] = [(); 2].map(|()| Room::of(self.keys.len()));
+        let (mut rest_a, mut rest_b) = (&mut a[..], &mut b[..]);
         let is_next = |k: &TileKey, l: &TileKey| *l == [k[0], k[1], k[2] + 1];
         let columns = self.keys.chunk_by(is_next).flat_map(|column| column.chunks(RUN));
         let runs: Vec<_> = columns
@@ -142,7 +126,7 @@ impl Tiles {
     /// Whether anything is not zero in a tile or beside it.
     pub fn is_any_near(&self, tile: usize, masks: &[Mask]) -> bool {
         let known = self.neighbours[tile].iter().filter(|n| **n != ABSENT);
-        known.into_iter().any(|n| masks[*n as usize] != NONE)
+        known.into_iter().any(|n| !is_none(&masks[*n as usize]))
     }
 
     /// Values of the rows of a tile and one knot beside them; NaN where there is no tile.
@@ -150,24 +134,20 @@ impl Tiles {
         let mut out = [f64::NAN; PADDED * PADDED * PADDED];
         for x in rows.x.start..rows.x.end + 2 {
             for y in rows.y.start..rows.y.end + 2 {
-                if let Some(row) = self.row(tile, [x, y], values, Some(f64::NAN)) {
-                    out[(x * PADDED + y) * PADDED..][..PADDED].copy_from_slice(&row);
+                if let Some(row) = self.row(tile, [x, y], values) {
+                    let to = &mut out[(x * PADDED + y) * PADDED..][..PADDED];
+                    to[1..=TILE].copy_from_slice(row.own);
+                    to[0] = row.before.unwrap_or(f64::NAN);
+                    to[PADDED - 1] = row.behind.unwrap_or(f64::NAN);
                 }
             }
         }
         out
     }
 
-    /// One row of a tile with those about it, numbered as they lie in [`Padded`], if its tile is there. Where there is no
-    /// tile before or behind it stands `absent`, or the value at the face.
+    /// One row of a tile with those about it, numbered as they lie in [`Padded`], if its tile is there.
     #[inline(always)]
-    fn row(
-        &self,
-        tile: usize,
-        [x, y]: [usize; 2],
-        values: &[Values],
-        absent: Option<f64>,
-    ) -> Option<[f64; PADDED]> {
+    fn row<'a>(&self, tile: usize, [x, y]: [usize; 2], values: &'a [Values]) -> Option<Row<'a>> {
         let ((dx, sx), (dy, sy)) = (split(x), split(y));
         let first = (dx * 3 + dy) * 3;
         let [before, own, behind]: [u32; 3] = self.neighbours[tile][first..first + 3]
@@ -177,31 +157,26 @@ impl Tiles {
             return None;
         }
         let at = (sx * TILE + sy) * TILE;
-        let of = |n: u32| -> &[f64; TILE] {
+        let of = |n: u32| -> &'a [f64; TILE] {
             values[n as usize][at..at + TILE]
                 .try_into()
                 .expect("eight values")
         };
-        let mut row = [0.0; PADDED];
-        row[1..=TILE].copy_from_slice(of(own));
-        row[0] = match before {
-            ABSENT => absent.unwrap_or(row[1]),
-            before => of(before)[TILE - 1],
-        };
-        row[PADDED - 1] = match behind {
-            ABSENT => absent.unwrap_or(row[TILE]),
-            behind => of(behind)[0],
-        };
-        Some(row)
+        let known = |n: u32, z: usize| (n != ABSENT).then(|| of(n)[z]);
+        Some(Row {
+            before: known(before, TILE - 1),
+            own: of(own),
+            behind: known(behind, 0),
+        })
     }
 
     /// A row where there is no tile: the nearest of a tile that there is.
     #[cold]
-    fn nearest_row(&self, tile: usize, [x, y]: [usize; 2], values: &[Values]) -> [f64; PADDED] {
+    fn nearest_row<'a>(&self, tile: usize, [x, y]: [usize; 2], values: &'a [Values]) -> Row<'a> {
         let [inner_x, inner_y] = [x, y].map(|p| p.clamp(1, TILE));
         [[inner_x, y], [x, inner_y], [inner_x, inner_y]]
             .into_iter()
-            .find_map(|at| self.row(tile, at, values, None))
+            .find_map(|at| self.row(tile, at, values))
             .expect("the tile itself")
     }
 
@@ -223,16 +198,20 @@ impl Tiles {
                 let (xs, ys) = (rows.x.clone(), rows.y.clone());
                 // The last three planes, done along z and y.
                 let mut planes = [[0.0; PLANE]; 3];
+                let mut along_z = [[0.0; TILE]; PADDED];
                 for x in xs.start..xs.end + 2 {
-                    let mut along_z = [[0.0; TILE]; PADDED];
                     for y in ys.start..ys.end + 2 {
-                        let row = match self.row(tile, [x, y], values, None) {
+                        let row = match self.row(tile, [x, y], values) {
                             Some(row) => row,
                             None => self.nearest_row(tile, [x, y], values),
                         };
-                        for z in 0..TILE {
-                            along_z[y][z] = own * row[z + 1] + side * (row[z] + row[z + 2]);
+                        const LAST: usize = TILE - 1;
+                        let (v, to) = (row.own, &mut along_z[y]);
+                        to[0] = own * v[0] + side * (row.before.unwrap_or(v[0]) + v[1]);
+                        for z in 1..LAST {
+                            to[z] = own * v[z] + side * (v[z - 1] + v[z + 1]);
                         }
+                        to[LAST] = own * v[LAST] + side * (v[LAST - 1] + row.behind.unwrap_or(v[LAST]));
                     }
                     let to = &mut planes[x % 3];
                     for y in ys.clone() {
@@ -280,63 +259,6 @@ fn split(padded: usize) -> (usize, usize) {
         p if p == PADDED - 1 => (2, 0),
         p => (1, p - 1),
     }
-}
-
-fn spread(reach: usize, masks: impl Fn(usize) -> Option<Mask>) -> Mask {
-    // Rows of bits, `reach` wider on every side.
-    let width = TILE + 2 * reach;
-    let mut rows = [[0u16; TILE + 4]; TILE + 4];
-    for n in 0..27 {
-        let Some(mask) = masks(n).filter(|m| *m != NONE) else {
-            continue;
-        };
-        let step = [n / 9, n / 3 % 3, n % 3];
-        // Where the tile's first knot lies in the wider one.
-        let start = step.map(|s| (s * TILE + reach) as i32 - TILE as i32);
-        for (x, word) in mask.iter().enumerate() {
-            let x = start[0] + x as i32;
-            if !(0..width as i32).contains(&x) || *word == 0 {
-                continue;
-            }
-            for (y, bits) in word.to_le_bytes().into_iter().enumerate() {
-                let y = start[1] + y as i32;
-                if (0..width as i32).contains(&y) {
-                    let bits = u32::from(bits) << 16 >> (16 - start[2]);
-                    rows[x as usize][y as usize] |= (bits & ((1 << width) - 1)) as u16;
-                }
-            }
-        }
-    }
-    for row in rows.iter_mut().flatten() {
-        *row = (0..=2 * reach).fold(0, |all, by| all | *row >> by);
-    }
-    std::array::from_fn(|x| {
-        let bytes = std::array::from_fn(|y| {
-            let near = rows[x..=x + 2 * reach]
-                .iter()
-                .flat_map(|rows| &rows[y..=y + 2 * reach]);
-            near.fold(0, |all, row| all | row) as u8
-        });
-        u64::from_le_bytes(bytes)
-    })
-}
-
-/// The knots `lo ..= hi` of a tile.
-pub(super) fn between(key: TileKey, lo: [i64; 3], hi: [i64; 3]) -> Mask {
-    let [xs, ys, zs] = [0, 1, 2].map(|a| {
-        let first = i64::from(key[a]) * TILE as i64;
-        let start = (lo[a] - first).clamp(0, TILE as i64);
-        let end = (hi[a] + 1 - first).clamp(start, TILE as i64);
-        start as usize..end as usize
-    });
-    let row = ((1u64 << zs.len()) - 1) << zs.start;
-    let plane = ys.fold(0, |plane, y| plane | row << (TILE * y));
-    std::array::from_fn(|x| if xs.contains(&x) { plane } else { 0 })
-}
-
-/// Bits of a mask, with their place `64x + 8y + z`.
-pub(super) fn places(mask: &Mask) -> impl Iterator<Item = usize> {
-    bspline::hierarchical::active_slots(mask)
 }
 
 /// Does work on `tiles` tiles where its parts can be shared at once: each call from outside the threads' pool waits for

@@ -17,7 +17,7 @@ use crate::{Fault, ReadLimits, Unit, guard};
 
 pub(super) use write::write;
 
-const MM_PER_METRE: f64 = 1000.0;
+pub(super) const MM_PER_METRE: f64 = 1000.0;
 /// Bytes of the parsed description for each byte of its text: a node takes 4 bytes at least.
 const XML_RATIO: usize = 40;
 /// Points decoded at once.
@@ -38,7 +38,7 @@ pub fn parse_e57(bytes: &[u8], limits: &ReadLimits) -> Result<PointCloud, Fault>
     normals::finish(parse(bytes, &mut budget)?, &mut budget)
 }
 
-fn damaged(e: &e57::Error) -> Fault {
+pub(super) fn damaged(e: &e57::Error) -> Fault {
     // The cause is what helps: a checksum, a cut.
     let cause = std::error::Error::source(e)
         .map(|c| format!(" ({c})"))
@@ -169,7 +169,7 @@ fn fill<T: Read + Seek>(
     Ok(())
 }
 
-fn pose(scan: &e57::PointCloud) -> DAffine3 {
+pub(super) fn pose(scan: &e57::PointCloud) -> DAffine3 {
     match &scan.transform {
         None => DAffine3::IDENTITY,
         Some(t) => DAffine3::from_rotation_translation(
@@ -180,20 +180,20 @@ fn pose(scan: &e57::PointCloud) -> DAffine3 {
 }
 
 /// Where in a row of a scan the wanted values stand.
-struct Columns {
-    cartesian: Option<[usize; 3]>,
-    cartesian_invalid: Option<usize>,
+pub(super) struct Columns {
+    pub cartesian: Option<[usize; 3]>,
+    pub cartesian_invalid: Option<usize>,
     /// Range, azimuth and elevation.
-    spherical: Option<[usize; 3]>,
-    spherical_invalid: Option<usize>,
-    normal: Option<[usize; 3]>,
+    pub spherical: Option<[usize; 3]>,
+    pub spherical_invalid: Option<usize>,
+    pub normal: Option<[usize; 3]>,
     /// Bits of a row, and of its shortest value.
     row_bits: u64,
     least_bits: u64,
 }
 
 impl Columns {
-    fn of(prototype: &[Record]) -> Result<Self, Fault> {
+    pub fn of(prototype: &[Record]) -> Result<Self, Fault> {
         let find = |name: &RecordName| prototype.iter().position(|r| r.name == *name);
         let three = |names: [RecordName; 3]| {
             let [a, b, c] = names.map(|n| find(&n));
@@ -247,7 +247,7 @@ impl Columns {
     }
 }
 
-fn bits(kind: &RecordDataType) -> u64 {
+pub(super) fn bits(kind: &RecordDataType) -> u64 {
     match kind {
         RecordDataType::Single { .. } => 32,
         RecordDataType::Double { .. } => 64,

@@ -1,6 +1,8 @@
 //! A cloud written again with some points changed: every other row of the file stays as it is, to the bit.
 
 #[cfg(feature = "lidar")]
+mod e57;
+#[cfg(feature = "lidar")]
 mod las;
 mod obj;
 mod pcd;
@@ -41,11 +43,11 @@ pub struct CloudChanges {
     pub added: Vec<Placed>,
 }
 
-/// Writes the cloud `like` (PLY, PCD, LAS, LAZ, OBJ or XYZ) to `output`, of the same format, with `changes`. New points follow the last one.
-/// LAS has whole multiples of its step: edited points are rounded to them.
+/// Writes the cloud `like` (PLY, PCD, LAS, LAZ, E57, OBJ or XYZ) to `output`, of the same format, with `changes`. New points follow the last one
+/// (of E57 the last of their scan). LAS, and E57 where it says so, has whole multiples of a step: edited points are rounded to them.
 ///
 /// # Errors
-/// Those of [`read`](super::read); [`Fault::Value`] for what is not written back: E57, coordinates that are whole numbers,
+/// Those of [`read`](super::read); [`Fault::Value`] for what is not written back: coordinates that are whole numbers,
 /// points that come or go where others name them by number, or in a raster; I/O. The target is whole or untouched.
 ///
 /// # Panics
@@ -70,11 +72,13 @@ pub fn save_revised(
                 las::revised(&bytes, changes, &mut budget)?,
                 las::extension(&bytes),
             ),
+            #[cfg(feature = "lidar")]
+            Kind::Cloud(PointFormat::E57) => (e57::revised(&bytes, changes, &mut budget)?, "e57"),
             other => {
                 return Err(Fault::Value {
                     what: "the format of the scan",
                     value: other.to_string(),
-                    remedy: "edited clouds are written as PLY, PCD, LAS, LAZ, OBJ or XYZ; convert the scan to .ply and fit that",
+                    remedy: "edited clouds are written as PLY, PCD, LAS, LAZ, E57, OBJ or XYZ; convert the scan to .ply and fit that",
                 });
             }
         };
