@@ -4,6 +4,8 @@
 mod areas;
 #[path = "force/borders.rs"]
 mod borders;
+#[path = "force/gaps.rs"]
+mod gaps;
 #[path = "force/holds.rs"]
 mod holds;
 #[path = "force/limits.rs"]
