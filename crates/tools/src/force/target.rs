@@ -128,12 +128,17 @@ impl Target {
         }
         let start = crossing + 1e-6 * step;
         let before = |s: f64| -self.behind(value, iso, start + s);
-        let none = if self.ends_early { start } else { goal };
-        let gap = first_crossing(before, 0.0, goal - start, 0.5 * step).map_or(none, |s| start + s);
+        let ahead = goal - start;
+        let far = first_crossing(before, 0.0, ahead, 0.5 * step);
+        let is_gap = far.is_some_and(|s| s < ahead);
         Some(Span {
             from: crossing,
-            to: gap,
-            is_gap: gap < goal,
+            to: if is_gap || self.ends_early {
+                start + far.unwrap_or(0.0)
+            } else {
+                goal
+            },
+            is_gap,
         })
     }
 
