@@ -170,10 +170,11 @@ impl<T: Real> ForceStroke<T> {
         };
         let one = |(acting, goal): (&Acting, &f64)| {
             let target = &self.targets[acting.index];
-            let crossing = acting.crossing.filter(|_| acting.is_free);
-            let own = crossing.map(|at| (at, self.own(target, acting.start, at, *goal)));
-            let span = own.and_then(|(_, own)| target.span(&value, self.iso, own, *goal, step));
-            let (Some((crossing, own)), Some(span)) = (own, span) else {
+            let Some(crossing) = acting.crossing.filter(|_| acting.is_free) else {
+                return Ok(None);
+            };
+            let own = self.own(target, acting.start, crossing, *goal);
+            let Some(span) = target.span(&value, self.iso, own, *goal, step) else {
                 return Ok(None);
             };
             // A path without length is the place where it ends.

@@ -37,7 +37,7 @@ pub struct Span {
 pub struct Start {
     /// Arc length of the surface.
     pub at: f64,
-    /// Fall of the density per length in front of it, towards the surface.
+    /// Fall of the density per length there, along the path; 0 where it rises.
     pub fall: f64,
 }
 
