@@ -219,6 +219,17 @@ impl<T: Real> Corrections<T> {
         for (x, &word) in self.mask.iter().enumerate().take(count[0]) {
             let mut values = &self.values[rank..];
             rank += word.count_ones() as usize;
+            if word == u64::MAX {
+                let (own, _) = values[..BRICK * BRICK].as_chunks::<BRICK>();
+                for (y, own) in own.iter().enumerate().take(count[1]) {
+                    let to = start + (x * HALO + y) * HALO;
+                    let to: &mut [T; ROW] = (&mut target[to..to + ROW]).try_into().expect("a row");
+                    for z in 0..ROW {
+                        to[z] += own[z];
+                    }
+                }
+                continue;
+            }
             let mut rows = word;
             for y in 0..count[1] {
                 if rows == 0 {

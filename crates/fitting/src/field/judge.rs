@@ -75,17 +75,26 @@ impl Judge {
             return NONE;
         }
         match self.aim {
-            Aim::Density { tolerance } => mask(judged, |i| rests[i].abs() > tolerance),
+            Aim::Density { tolerance } => mask(
+                judged,
+                #[inline(always)]
+                |i| rests[i].abs() > tolerance,
+            ),
             Aim::Surface { iso, tolerance } => {
                 let slopes = self.slopes_squared(tiles, tile, judged, target);
                 let (tolerance, near) = (tolerance * tolerance, (TAKEN * self.cell).powi(2));
                 let rounding = self.rounding * self.rounding;
-                mask(judged, |i| {
-                    let (t, r, s) = (target[tile][i], rests[i], slopes[i]);
-                    let height = (t - iso) * (t - iso);
-                    let is_over = (r * r > tolerance * s) & (self.is_first | (height <= near * s));
-                    is_over | is_wrong(t, r, iso, rounding * s)
-                })
+                let target = &target[tile];
+                mask(
+                    judged,
+                    #[inline(always)]
+                    |i| {
+                        let (t, r, s) = (target[i], rests[i], slopes[i]);
+                        let height = (t - iso) * (t - iso);
+                        let is_over = (r * r > tolerance * s) & (self.is_first | (height <= near * s));
+                        is_over | is_wrong(t, r, iso, rounding * s)
+                    },
+                )
             }
         }
     }
@@ -97,10 +106,15 @@ impl Judge {
         };
         let slopes = self.slopes_squared(tiles, tile, asked, target);
         let (near, rounding) = ((OPEN * self.cell).powi(2), self.rounding * self.rounding);
-        mask(asked, |i| {
-            let (t, r, s) = (target[tile][i], rest[tile][i], slopes[i]);
-            (t - iso) * (t - iso) <= near * s || is_wrong(t, r, iso, rounding * s)
-        })
+        let (target, rest) = (&target[tile], &rest[tile]);
+        mask(
+            asked,
+            #[inline(always)]
+            |i| {
+                let (t, r, s) = (target[i], rest[i], slopes[i]);
+                ((t - iso) * (t - iso) <= near * s) | is_wrong(t, r, iso, rounding * s)
+            },
+        )
     }
 
     /// What is left at the knots `judged` of a tile.
@@ -193,13 +207,25 @@ fn is_wrong(target: f64, rest: f64, iso: f64, rounding: f64) -> bool {
     ((target > iso) != (target - rest > iso)) & ((target - iso) * (target - iso) > rounding)
 }
 
-/// Those of the knots `asked` of which `of` is true.
+/// Those of the knots `asked` of which `of`, marked `#[inline(always)]`, is true.
 #[inline(always)]
 fn mask(asked: &Mask, of: impl Fn(usize) -> bool) -> Mask {
-    std::array::from_fn(|x| match asked[x] {
-        0 => 0,
-        word => word & (0..64).fold(0, |word, bit| word | u64::from(of(64 * x + bit)) << bit),
-    })
+    let mut found = NONE;
+    vectorized(
+        #[inline(always)]
+        || {
+            for x in 0..TILE {
+                if asked[x] != 0 {
+                    let mut word = 0;
+                    for bit in 0..64 {
+                        word |= u64::from(of(64 * x + bit)) << bit;
+                    }
+                    found[x] = asked[x] & word;
+                }
+            }
+        },
+    );
+    found
 }
 
 /// Tiles of the next level about the knots of `open`, sorted: knot `k` of this level is knot `2k` of that, and a knot

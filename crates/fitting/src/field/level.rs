@@ -181,27 +181,30 @@ impl<T: Real> LevelFit<'_, T> {
     /// if there were no cut. `left` is room.
     fn coefficients(&self, tiles: &Tiles, rest: &[Values], takes_part: &[Mask], mut left: Room) -> Room {
         let (first, last) = self.region.sampled();
-        let convolved = |i: usize, asked: &Mask, values: &[Values], weights: [f64; 2], out: &mut Values| {
-            let rows = Rows::of(&and(asked, &between(tiles.keys[i], first, last)));
-            tiles.convolved(i, &rows, values, weights, out);
-        };
+        let rows = |i: usize| Rows::of(&between(tiles.keys[i], first, last));
         let mut once = tiles.fill(|i, out| {
-            if tiles.is_any_near(i, takes_part) {
-                convolved(i, &ALL, rest, QUASI, out);
+            let rows = rows(i);
+            let is_near = tiles.is_any_near(i, takes_part);
+            if !(is_near && rows.is_all()) {
+                out.fill(0.0);
+            }
+            if is_near {
+                tiles.convolved(i, &rows, rest, QUASI, out, |to, _, value| *to = value);
             }
         });
+        // Beside the rows that are sampled no function takes part, nor next to one: nobody reads what was there.
         tiles.change(&mut left, |i, out| {
-            out.fill(0.0);
             if tiles.is_any_near(i, takes_part) {
-                convolved(i, &ALL, &once, SAMPLES, out);
-                out.iter_mut().zip(&rest[i]).for_each(|(o, r)| *o = r - *o);
+                let rest = &rest[i];
+                tiles.convolved(i, &rows(i), &once, SAMPLES, out, |to, place, value| {
+                    *to = rest[place] - value;
+                });
             }
         });
         tiles.change(&mut once, |i, out| {
             if !is_none(&takes_part[i]) {
-                let mut more = [0.0; TILE * TILE * TILE];
-                convolved(i, &takes_part[i], &left, QUASI, &mut more);
-                out.iter_mut().zip(more).for_each(|(o, more)| *o += more);
+                let rows = Rows::of(&takes_part[i]);
+                tiles.convolved(i, &rows, &left, QUASI, out, |to, _, value| *to += value);
             }
         });
         once
@@ -229,12 +232,14 @@ impl<T: Real> LevelFit<'_, T> {
                 let brick = brick.or_insert_with(DenseCorrections::empty);
                 for row in rows {
                     let (at, taken) = (start(row), taken(row) >> zs.start);
-                    let [i, j, k] = function(at).map(|f| f as usize % BRICK);
+                    let [i, j, k] = [row[0], row[1], zs.start].map(|place| (place + 1) % BRICK);
                     brick.mask[i] |= taken << (BRICK * j + k);
                     // Nobody reads those of functions that do not take part.
-                    let to = &mut brick.values[(i * BRICK + j) * BRICK + k..][..zs.len()];
-                    let own = to.iter_mut().zip(&values[at..at + zs.len()]);
-                    own.for_each(|(to, value)| *to = T::from_f64(*value));
+                    let to = &mut brick.values[(i * BRICK + j) * BRICK + k..];
+                    match zs.len() {
+                        1 => to[0] = T::from_f64(values[at]),
+                        _ => copied::<T, { TILE - 1 }>(&values[at..], to),
+                    }
                 }
             }
         }
@@ -292,9 +297,16 @@ fn about(key: TileKey) -> impl Iterator<Item = TileKey> {
     (0..27).map(move |n| [key[0] + n / 9 - 1, key[1] + n / 3 % 3 - 1, key[2] + n % 3 - 1])
 }
 
+#[inline]
 fn knot_of(key: TileKey, place: usize) -> [i64; 3] {
     let at = [place / TILE / TILE, place / TILE % TILE, place % TILE];
     std::array::from_fn(|a| i64::from(key[a]) * TILE as i64 + at[a] as i64)
+}
+
+/// The first `N` values, which is a loop of a known length.
+fn copied<T: Real, const N: usize>(values: &[f64], to: &mut [T]) {
+    let pairs = to[..N].iter_mut().zip(&values[..N]);
+    pairs.for_each(|(to, value)| *to = T::from_f64(*value));
 }
 
 fn and(a: &Mask, b: &Mask) -> Mask {

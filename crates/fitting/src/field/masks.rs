@@ -24,6 +24,11 @@ pub(super) struct Rows {
 }
 
 impl Rows {
+    /// Whether they are all of a tile.
+    pub fn is_all(&self) -> bool {
+        self.x.len() == TILE && self.y.len() == TILE
+    }
+
     /// Those with a knot of a mask.
     pub fn of(mask: &Mask) -> Self {
         let plane = mask.iter().fold(0, |all, word| all | word).to_le_bytes();

@@ -62,10 +62,7 @@ pub(super) fn sample(
                     if (0..=last[0]).contains(&x) && (0..=last[1]).contains(&y) {
                         let known = at([x, y, inner_begin]);
                         let known = known..known + t.len();
-                        let values = target_values[known.clone()].iter().zip(&field_values[known]);
-                        for ((t, r), (target, field)) in t.iter_mut().zip(r).zip(values) {
-                            (*t, *r) = (*target, target - field);
-                        }
+                        put_row([t, r], [&target_values[known.clone()], &field_values[known]]);
                     } else {
                         let rows = columns([x, y], last);
                         let rows = rows.map(|([x, y], weight)| (at([x, y, inner_begin]), weight));
@@ -84,6 +81,23 @@ pub(super) fn sample(
         go_on(first, [start[0], start[1], begin], [end[0], end[1], stop], rests);
     }
     len as u64
+}
+
+/// Target and rest of a row from the values of target and field.
+#[inline(always)]
+fn put_row([targets, rests]: [&mut [f64]; 2], [target, field]: [&[f64]; 2]) {
+    // Most rows are whole: a loop of a known length.
+    if let (Ok(targets), Ok(rests)) = (targets.try_into(), rests.try_into()) {
+        let (targets, rests): (&mut [f64; TILE], &mut [f64; TILE]) = (targets, rests);
+        let (target, field) = (&target[..TILE], &field[..TILE]);
+        for z in 0..TILE {
+            (targets[z], rests[z]) = (target[z], target[z] - field[z]);
+        }
+        return;
+    }
+    for (((to, rest), target), field) in targets.iter_mut().zip(rests).zip(target).zip(field) {
+        (*to, *rest) = (*target, target - field);
+    }
 }
 
 /// Beside what is sampled, `start ..= end` of the tile that begins at `first`, the rest goes on as it is.

@@ -35,6 +35,29 @@ struct Row<'a> {
     behind: Option<f64>,
 }
 
+/// Tiles along z about one, or beside it, as stencils read them.
+struct Column<'a> {
+    own: &'a Values,
+    /// The tile with the value before a row and its place in z: the row's own first where there is no tile.
+    before: (&'a Values, usize),
+    /// The same behind.
+    behind: (&'a Values, usize),
+    /// Whether the tile at hand goes on there, on x and on y, as there is no other.
+    goes_on: [bool; 2],
+}
+
+impl Column<'_> {
+    /// Where the row begins that stands at `x`, `y` in [`Padded`].
+    #[inline(always)]
+    fn start(&self, x: usize, y: usize) -> usize {
+        let within = |padded: usize, goes_on: bool| match goes_on {
+            true => padded.clamp(1, TILE) - 1,
+            false => (padded + TILE - 1) % TILE,
+        };
+        (within(x, self.goes_on[0]) * TILE + within(y, self.goes_on[1])) * TILE
+    }
+}
+
 /// Tiles of a level in order, and where those beside each stand.
 pub(super) struct Tiles {
     pub keys: Vec<TileKey>,
@@ -72,13 +95,10 @@ impl Tiles {
         each(self.keys.len(), of)
     }
 
-    /// Values of each tile as `of` writes them over zeros.
+    /// Values of each tile, all of which `of` writes.
     pub fn fill(&self, of: impl Fn(usize, &mut Values) + Sync + Send) -> Room {
         let mut values = Room::of(self.keys.len());
-        self.change(&mut values, |i, values| {
-            values.fill(0.0);
-            of(i, values);
-        });
+        self.change(&mut values, of);
         values
     }
 
@@ -170,18 +190,32 @@ impl Tiles {
         })
     }
 
-    /// A row where there is no tile: the nearest of a tile that there is.
-    #[cold]
-    fn nearest_row<'a>(&self, tile: usize, [x, y]: [usize; 2], values: &'a [Values]) -> Row<'a> {
-        let [inner_x, inner_y] = [x, y].map(|p| p.clamp(1, TILE));
-        [[inner_x, y], [x, inner_y], [inner_x, inner_y]]
-            .into_iter()
-            .find_map(|at| self.row(tile, at, values))
-            .expect("the tile itself")
+    /// The tiles about one as its stencils read them, by their step on x and y: found once, not for every row.
+    #[inline(always)]
+    fn columns<'a>(&self, tile: usize, values: &'a [Values]) -> [[Column<'a>; 3]; 3] {
+        let neighbours = &self.neighbours[tile];
+        std::array::from_fn(|dx| {
+            std::array::from_fn(|dy| {
+                // Where there is no tile the nearest that there is goes on: beside it on x, on y, the tile itself.
+                let all = [[dx, dy], [1, dy], [dx, 1], [1, 1]];
+                let is_there = |at: &[usize; 2]| neighbours[(at[0] * 3 + at[1]) * 3 + 1] != ABSENT;
+                let at = all.into_iter().find(is_there).unwrap_or([1, 1]);
+                let first = (at[0] * 3 + at[1]) * 3;
+                let [before, own, behind] = [0, 1, 2].map(|z| values.get(neighbours[first + z] as usize));
+                let own = own.expect("a tile that is there");
+                Column {
+                    before: before.map_or((own, 0), |before| (before, TILE - 1)),
+                    own,
+                    behind: behind.map_or((own, TILE - 1), |behind| (behind, 0)),
+                    goes_on: [at[0] != dx, at[1] != dy],
+                }
+            })
+        })
     }
 
-    /// `weights[0]·v_{i-1} + weights[1]·v_i + weights[0]·v_{i+1}` on each axis, in these rows of a tile; the others stay.
-    /// Where there is no tile the values at its face go on.
+    /// `weights[0]·v_{i-1} + weights[1]·v_i + weights[0]·v_{i+1}` on each axis, in these rows of a tile, handed to `put`
+    /// with its place and what `out` holds there; the others stay. Where there is no tile the values at its face go on.
+    #[inline(always)]
     pub fn convolved(
         &self,
         tile: usize,
@@ -189,6 +223,7 @@ impl Tiles {
         values: &[Values],
         weights: [f64; 2],
         out: &mut Values,
+        put: impl Fn(&mut f64, usize, f64),
     ) {
         vectorized(
             #[inline(always)]
@@ -196,22 +231,23 @@ impl Tiles {
                 let [side, own] = weights;
                 const PLANE: usize = TILE * TILE;
                 let (xs, ys) = (rows.x.clone(), rows.y.clone());
+                let columns = self.columns(tile, values);
                 // The last three planes, done along z and y.
                 let mut planes = [[0.0; PLANE]; 3];
                 let mut along_z = [[0.0; TILE]; PADDED];
                 for x in xs.start..xs.end + 2 {
                     for y in ys.start..ys.end + 2 {
-                        let row = match self.row(tile, [x, y], values) {
-                            Some(row) => row,
-                            None => self.nearest_row(tile, [x, y], values),
-                        };
+                        let column = &columns[x.div_ceil(TILE)][y.div_ceil(TILE)];
+                        let start = column.start(x, y);
+                        let [before, behind] = [column.before, column.behind].map(|(v, z)| v[start + z]);
                         const LAST: usize = TILE - 1;
-                        let (v, to) = (row.own, &mut along_z[y]);
-                        to[0] = own * v[0] + side * (row.before.unwrap_or(v[0]) + v[1]);
+                        let v: &[f64; TILE] = column.own[start..start + TILE].try_into().expect("a row");
+                        let to = &mut along_z[y];
+                        to[0] = own * v[0] + side * (before + v[1]);
                         for z in 1..LAST {
                             to[z] = own * v[z] + side * (v[z - 1] + v[z + 1]);
                         }
-                        to[LAST] = own * v[LAST] + side * (v[LAST - 1] + row.behind.unwrap_or(v[LAST]));
+                        to[LAST] = own * v[LAST] + side * (v[LAST - 1] + behind);
                     }
                     let to = &mut planes[x % 3];
                     for y in ys.clone() {
@@ -224,9 +260,11 @@ impl Tiles {
                         continue;
                     }
                     let [before, own_plane, behind] = [1, 2, 0].map(|n| &planes[(x + n) % 3]);
-                    let to = &mut out[(x - 2) * PLANE..][..PLANE];
+                    let first = (x - 2) * PLANE;
+                    let to = &mut out[first..first + PLANE];
                     for i in ys.start * TILE..ys.end * TILE {
-                        to[i] = own * own_plane[i] + side * (before[i] + behind[i]);
+                        let value = own * own_plane[i] + side * (before[i] + behind[i]);
+                        put(&mut to[i], first + i, value);
                     }
                 }
             },
@@ -252,6 +290,7 @@ impl Tiles {
 }
 
 /// Which of three tiles a padded place lies in, and where in it.
+#[inline(always)]
 fn split(padded: usize) -> (usize, usize) {
     match padded {
         0 => (0, TILE - 1),
