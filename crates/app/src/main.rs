@@ -14,5 +14,6 @@ use std::process::ExitCode;
 static ALLOCATOR: allocator::OrEnd = allocator::OrEnd;
 
 fn main() -> ExitCode {
+    allocator::keep_freed_pages();
     cli::main()
 }

@@ -337,7 +337,7 @@ impl Document {
         }
     }
 
-    /// Forgets the oldest edits, so that the file takes about half its quota.
+    /// Forgets the oldest edits, so that the file takes about half its quota. The last one done stays, however large.
     fn shorten(&mut self) -> Result<(), DocumentError> {
         let object_bytes = self
             .layout
@@ -354,7 +354,7 @@ impl Document {
             kept <= room
         };
         let first = self.layout.edits.len() - self.layout.edits.iter().rev().take_while(fits).count();
-        let first = first.min(self.layout.done);
+        let first = first.min(self.layout.done.saturating_sub(1));
         let left: u64 = self.layout.edits[first..].iter().map(Record::size).sum::<u64>() + object_bytes;
         // What little it gains is not worth a new file.
         if left > self.size() / 4 * 3 {

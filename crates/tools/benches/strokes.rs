@@ -60,7 +60,7 @@ fn scans(c: &mut Criterion<CpuTime>) {
             for kind in StrokeKind::ALL {
                 for (matter, painted) in [("even", false), ("half painted", true)] {
                     let begin = || {
-                        let stroke = kind.begin(&sculpture.field, sculpture.iso, at, radius);
+                        let stroke = kind.begin(&sculpture.field, sculpture.iso, at, radius, true);
                         let stroke = stroke.expect("a tool on the surface");
                         let stroke = match painted {
                             true => stroke.painted(&layers).expect("paint"),

@@ -28,7 +28,9 @@ use glam::{DAffine3, DVec3};
 use std::sync::Arc;
 use tools::canvas::Canvas;
 use tools::force::quadrature::Tolerance;
-use tools::force::{Chisel, Drill, Extent, ForceReport, ForceStroke, How, Path, Pull, Rule, Solid, Target};
+use tools::force::{
+    Arrival, Chisel, Drill, Extent, ForceReport, ForceStroke, How, Path, Pull, Rule, Solid, Target,
+};
 use tools::session::Session;
 
 /// Density of the surface, and its fall: tools work in lengths on any field.

@@ -3,19 +3,17 @@ use std::sync::Arc;
 
 use bspline::hierarchical::Lattice;
 use bspline::{Field, Frame, HierarchicalSpline, Real, TensorSpline};
-use fitting::orient::Route;
-use fitting::{Cancel, FitReport, Leaf, SignReport, StopReason};
-use formats::field::{AnyField, FieldMeta, LeafRecord, SourceKind};
+use fitting::{Cancel, FitReport};
+use formats::field::{AnyField, FieldMeta, SourceKind};
 use formats::{Fault, FormatError, Kind, Unit};
 use glam::DAffine3;
-use serde::{Deserialize, Serialize};
 use tools::body::Body;
 use tools::malleable::Malleable;
 
 use super::failure::{Failure, Outcome};
 use super::input::limits;
 use super::output::Output;
-use super::solves::Solve;
+use super::report;
 use super::source::{FIELDS, Source};
 use super::summary::hex;
 
@@ -104,36 +102,6 @@ impl Solid {
     }
 }
 
-/// The figures of a [`FitReport`] as they stand in the file; leaves and notes have places of their own.
-#[derive(Serialize, Deserialize)]
-struct StoredReport {
-    input_count: usize,
-    used_count: usize,
-    depth: usize,
-    rms: f64,
-    p95: f64,
-    max: f64,
-    bound: f64,
-    noise: Option<f64>,
-    tolerance: f64,
-    smoothing: f64,
-    /// [`FitReport::left_out`], each less the one before.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    left_out: Vec<u32>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    signs: Option<StoredSigns>,
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    solves: Vec<Solve>,
-}
-
-/// The figures of a [`SignReport`]; the confidences of the leaves have a place of their own.
-#[derive(Serialize, Deserialize)]
-struct StoredSigns {
-    route: String,
-    outlier_count: usize,
-    unsure_count: usize,
-}
-
 /// Asks the spline of either precision.
 macro_rules! either {
     ($any:expr, $f:ident => $ask:expr) => {
@@ -167,51 +135,12 @@ impl OpenField {
                 )));
             }
         };
-        let stored: StoredReport = serde_json::from_str(&meta.report).map_err(|e| {
-            Failure::input(format!(
-                "{}: its fit report cannot be read ({e}); fit the input again",
-                source.name()
-            ))
-        })?;
-        let leaves = meta
-            .leaves
-            .iter()
-            .map(leaf)
-            .collect::<Option<Vec<Leaf>>>()
-            .ok_or_else(|| {
-                Failure::input(format!(
-                    "{}: a leaf stopped for a reason that this program does not know; use a newer isoclay",
-                    source.name()
-                ))
-            })?;
-        let report = FitReport {
-            input_count: stored.input_count,
-            used_count: stored.used_count,
-            coefficients: match &field {
-                Solid::Levels(field) => either!(field, f => f.coefficient_count()),
-                Solid::Knots(field) => field.coefficients().len(),
-            },
-            depth: stored.depth,
-            rms: stored.rms,
-            p95: stored.p95,
-            max: stored.max,
-            bound: stored.bound,
-            noise: stored.noise,
-            tolerance: stored.tolerance,
-            smoothing: stored.smoothing,
-            left_out: stored
-                .left_out
-                .iter()
-                .scan(0u32, |at, step| {
-                    *at = at.saturating_add(*step);
-                    Some(*at)
-                })
-                .collect(),
-            signs: stored.signs.map(|s| signs(s, &meta.sign_confidence)),
-            leaves,
-            solves: stored.solves.into_iter().map(Into::into).collect(),
-            notes: meta.notes.clone(),
+        let coefficients = match &field {
+            Solid::Levels(field) => either!(field, f => f.coefficient_count()),
+            Solid::Knots(field) => field.coefficients().len(),
         };
+        let report = report::read(&meta, coefficients)
+            .map_err(|why| Failure::input(format!("{}: {why}", source.name())))?;
         Ok(Self {
             placement,
             asked: field.clone(),
@@ -443,45 +372,9 @@ fn not_loaded(source: &Source, e: FormatError) -> Failure {
     }
 }
 
-/// A report as it stands in a file.
-pub fn stored_text(report: &FitReport) -> String {
-    let stored = StoredReport {
-        input_count: report.input_count,
-        used_count: report.used_count,
-        depth: report.depth,
-        rms: report.rms,
-        p95: report.p95,
-        max: report.max,
-        bound: report.bound,
-        noise: report.noise,
-        tolerance: report.tolerance,
-        smoothing: report.smoothing,
-        left_out: {
-            let before = [0].iter().chain(&report.left_out);
-            report.left_out.iter().zip(before).map(|(i, b)| i - b).collect()
-        },
-        signs: report.signs.as_ref().map(|s| StoredSigns {
-            route: s.route.name().into(),
-            outlier_count: s.outlier_count,
-            unsure_count: s.unsure_count,
-        }),
-        solves: report.solves.iter().map(Solve::from).collect(),
-    };
-    serde_json::to_string(&stored).expect("a struct of plain fields is always JSON")
-}
-
 /// Writes a fitted field; returns its SHA-256.
 pub fn save(output: &Output, field: &AnyField, report: &FitReport, meta: FieldMeta) -> Outcome<String> {
-    let meta = FieldMeta {
-        report: stored_text(report),
-        leaves: report.leaves.iter().map(record).collect(),
-        sign_confidence: report
-            .signs
-            .as_ref()
-            .map_or_else(Vec::new, |s| s.leaf_confidence.clone()),
-        notes: report.notes.clone(),
-        ..meta
-    };
+    let meta = report::with_report(meta, report);
     either!(field, f => save_as(output, f, &meta))
 }
 
@@ -493,44 +386,4 @@ pub fn save_as<T: formats::field::Stored>(
 ) -> Outcome<String> {
     formats::field::save(output.path(), field, meta).map_err(|e| output.writing(e))?;
     Ok(hex(&field.sha256()))
-}
-
-fn record(leaf: &Leaf) -> LeafRecord {
-    LeafRecord {
-        level: leaf.level,
-        cell: leaf.cell,
-        sample_count: leaf.sample_count,
-        rms: leaf.rms,
-        max: leaf.max,
-        reason: leaf.reason as u8,
-    }
-}
-
-fn signs(stored: StoredSigns, leaf_confidence: &[f32]) -> SignReport {
-    SignReport {
-        route: Route::ALL
-            .into_iter()
-            .find(|r| r.name() == stored.route)
-            .unwrap_or_default(),
-        outlier_count: stored.outlier_count,
-        unsure_count: stored.unsure_count,
-        leaf_confidence: leaf_confidence.to_vec(),
-    }
-}
-
-fn leaf(r: &LeafRecord) -> Option<Leaf> {
-    use StopReason::*;
-    let reason = [
-        Tolerance, Depth, NoData, Noise, Budget, Memory, Neighbours, Crease, Smoothing, Thin,
-    ]
-    .into_iter()
-    .find(|s| *s as u8 == r.reason)?;
-    Some(Leaf {
-        level: r.level,
-        cell: r.cell,
-        sample_count: r.sample_count,
-        rms: r.rms,
-        max: r.max,
-        reason,
-    })
 }

@@ -293,12 +293,13 @@ fn a_file_keeps_to_its_quota_by_forgetting_the_oldest_edits() {
     assert_eq!(document.state().sha256(), *hashes.last().unwrap());
 }
 
-/// Where the objects alone outgrow the quota, some edits are kept all the same.
+/// Where the objects alone outgrow the quota, or an edit does, the last one is kept all the same.
 #[test]
 fn what_is_larger_than_its_quota_can_still_be_undone() {
     let directory = tempdir().unwrap();
     let path = directory.path().join("large.isoclay");
-    let first = State::new().with("a", object(&common::large())).unwrap();
+    let large = object(&common::large());
+    let first = State::new().with("a", large.clone()).unwrap();
     let quota = 20_000;
     let mut document = Document::create(
         &path,
@@ -319,6 +320,17 @@ fn what_is_larger_than_its_quota_can_still_be_undone() {
         document.redo(1).unwrap();
     }
     assert!(document.counts().unwrap().forgotten > 0);
+    for number in 0..5 {
+        let before = document.state().sha256();
+        let next = document
+            .state()
+            .with(&format!("b{number}"), large.clone())
+            .unwrap();
+        document.commit("put in", Value::Null, next).unwrap();
+        assert_eq!(document.undo(1).unwrap(), 1);
+        assert_eq!(document.state().sha256(), before);
+        document.redo(1).unwrap();
+    }
 }
 
 #[test]

@@ -13,6 +13,9 @@ use crate::curve::Along;
 const SHARES: f64 = 4.0;
 /// Share of the distance of places within which inner ones keep off the rim.
 const OFF: f64 = 0.6;
+/// Radii over which the normals of an area are averaged, as a standard deviation, and beyond which a place counts no more.
+const EVEN: f64 = 1.5;
+const FAR: f64 = 4.5;
 
 /// An outline seen along the normal of the plane that it lies in about.
 pub struct Flat {
@@ -155,6 +158,26 @@ pub fn within<T: Real>(
         })
     });
     drawn.collect()
+}
+
+/// Normals of the places of an area, averaged over what lies about each by what it stands for. Paths along the normals themselves
+/// would fan out or cross on uneven ground, as no smooth force moves it.
+pub fn normals(places: &[Place], radius: f64) -> Vec<DVec3> {
+    let bin = |p: DVec3| (p / (FAR * radius)).floor().to_array().map(|c| c as i64);
+    let mut bins: BTreeMap<[i64; 3], Vec<&Place>> = BTreeMap::new();
+    for place in places {
+        bins.entry(bin(place.at)).or_default().push(place);
+    }
+    let mean = |place: &Place| {
+        let [x, y, z] = bin(place.at);
+        let about = (0..27).filter_map(|n| bins.get(&[x + n / 9 - 1, y + n / 3 % 3 - 1, z + n % 3 - 1]));
+        let near = about.flatten().map(|other| {
+            let off = place.at.distance(other.at) / (EVEN * radius);
+            other.weight * libm::exp(-0.5 * off * off) * other.normal
+        });
+        near.sum::<DVec3>().normalize_or(place.normal)
+    };
+    places.iter().map(mean).collect()
 }
 
 /// Adds to the weight of each place the part of the area that is nearest to it.

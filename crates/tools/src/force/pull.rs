@@ -1,4 +1,5 @@
 use bspline::{HierarchicalSpline, Real};
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::path::Path;
@@ -28,7 +29,8 @@ pub struct Pull {
     /// The same on a curved way: vectors from the place of the surface, one after the other.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub way: Option<Vec<Point>>,
-    /// The same along the normals of the surface, a length: out of the solid, or into it if negative.
+    /// The same along the normals of the surface, a length: out of the solid, or into it if negative. Those of an area are
+    /// averaged over a radius and a half of it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lift: Option<Finite>,
     /// Standard deviation of the spread of its force, a world length.
@@ -48,11 +50,11 @@ impl Pull {
         field: &HierarchicalSpline<T>,
         iso: f64,
     ) -> Result<ForceStroke<T>, ForceError> {
-        let target = |place: &track::Place| {
+        let target = |(place, normal): (&track::Place, DVec3)| {
             let way: Vec<_> = match (&self.by, &self.way, &self.lift) {
                 (Some(by), None, None) => vec![by.0],
                 (None, Some(way), None) => way.iter().map(|p| p.0).collect(),
-                (None, None, Some(lift)) => vec![lift.0 * place.normal],
+                (None, None, Some(lift)) => vec![lift.0 * normal],
                 _ => return Err(ForceError::tool("write exactly one of by, way and lift")),
             };
             let path = Path::through(std::iter::once(place.at).chain(way.iter().map(|w| place.at + *w)))?;
@@ -63,7 +65,11 @@ impl Pull {
             })
         };
         let places = self.places(field, iso)?;
-        let targets: Result<Vec<_>, _> = places.iter().map(target).collect();
+        let normals = match self.extent() {
+            Extent::Area => area::normals(&places, self.radius.0),
+            _ => places.iter().map(|place| place.normal).collect(),
+        };
+        let targets: Result<Vec<_>, _> = places.iter().zip(normals).map(target).collect();
         ForceStroke::new(field, iso, targets?, self.extent(), self.radius.0, &self.how)
     }
 

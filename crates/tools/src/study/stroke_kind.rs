@@ -38,7 +38,7 @@ impl StrokeKind {
         if self == Self::Track { 0.8 } else { 1.6 }
     }
 
-    /// A stroke that begins at a place of the surface.
+    /// A stroke that begins at a place of the surface, out of the solid or into it.
     ///
     /// # Errors
     /// [`StudyError::Force`].
@@ -48,6 +48,7 @@ impl StrokeKind {
         iso: f64,
         at: DVec3,
         radius: f64,
+        is_out: bool,
     ) -> Result<ForceStroke<f32>, StudyError> {
         let walk = |length: f64| walk(field, iso, at, length * radius, 0.5 * radius);
         let (drag, r) = (self.drag() * radius, Positive(radius));
@@ -58,7 +59,7 @@ impl StrokeKind {
                 radius: r,
                 how: Default::default(),
             };
-            return Ok(chisel.begin(field, iso, true)?);
+            return Ok(chisel.begin(field, iso, is_out)?);
         }
         let pull = Pull {
             along: Along::Points(match self {
@@ -69,7 +70,7 @@ impl StrokeKind {
             disc: (self == Self::Area).then_some(Positive(2.0 * radius)),
             by: None,
             way: None,
-            lift: Some(Finite(drag)),
+            lift: Some(Finite(if is_out { drag } else { -drag })),
             radius: r,
             how: Default::default(),
         };

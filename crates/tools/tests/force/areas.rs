@@ -73,6 +73,29 @@ fn outlined_areas_arrive_as_one() {
     );
 }
 
+#[test]
+fn areas_of_uneven_ground_are_lifted_as_one() {
+    // Bumps two radii wide, as steep as 30° or 40°; along their normals paths of a radius and a half cross.
+    let k = std::f64::consts::TAU / (2.0 * R);
+    for (steep, angle) in [(0.6, 0.0), (0.8, 0.4)] {
+        let (sin, cos) = f64::sin_cos(angle);
+        let height = |x: f64, y: f64| {
+            steep / k * (0.7 * (k * (cos * x + sin * y)).sin() + 0.7 * (k * (cos * y - sin * x)).cos())
+        };
+        let field = field_of::<f32>(48, |p| 12.0 + height(p.x, p.y) - p.z);
+        for way in ["lift = 1.8", "lift = -1.8"] {
+            for area in [
+                "along = [[12.3, 11.8, 12]]\ndisc = 2.4",
+                "area = [[9, 10, 12], [15, 9, 12], [14, 14, 12], [11, 15, 12]]",
+            ] {
+                let (_, report) = pulled(&field, &format!("{area}\n{way}\nradius = {R}"));
+                let Arrival { least, most } = report.arrival;
+                assert!(least > 0.985 && most < 1.02, "{area} {way} {steep}: {report:?}");
+            }
+        }
+    }
+}
+
 /// Rings as a disc has them, `n` of them, all places `size/n` apart.
 fn rings(n: usize, size: f64, d: f64) -> Vec<Target> {
     use std::f64::consts::{PI, TAU};

@@ -65,7 +65,7 @@ pub fn brushes(run: &mut ToolRun, add: &mut Add) -> Result<(), ToolsError> {
             if kind != StrokeKind::Point && *size > 3.0 {
                 continue;
             }
-            let stroke = kind.begin(&sculpture.field, 0.0, at, radius)?;
+            let stroke = kind.begin(&sculpture.field, 0.0, at, radius, true)?;
             let mesh = mesh_about(&sculpture, at, 10.0 * radius, radius.min(interval))?;
             let line = ToolLine {
                 tool: format!("{}, radius {size} intervals", kind.name()),
@@ -124,7 +124,7 @@ pub fn on_sculpture(sculpture: &Sculpture, run: &mut ToolRun, add: &mut Add) -> 
         for kind in StrokeKind::ALL {
             for painted in [false, true] {
                 run.go_on(0.9)?;
-                let mut stroke = kind.begin(&sculpture.field, sculpture.iso, at, radius)?;
+                let mut stroke = kind.begin(&sculpture.field, sculpture.iso, at, radius, true)?;
                 if painted {
                     stroke = stroke.painted(&layers)?;
                 }

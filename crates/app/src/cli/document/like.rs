@@ -91,7 +91,7 @@ impl Like<'_> {
         })?;
         let count = |n: usize| human_count(n);
         Ok(vec![format!(
-            "{} of {} points moved with the surface, {} are on no surface any more, {} are new (the last of the file)",
+            "{} of {} points moved with the surface, {} are on no surface any more, {} are new (behind those of the scan)",
             count(changes.moved.len()),
             count(cloud.positions.len()),
             count(changes.removed.len()),

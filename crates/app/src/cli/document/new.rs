@@ -13,10 +13,11 @@ use tools::knots;
 use super::knots::Knots;
 use super::{Told, failure, options};
 use crate::cli::failure::{Failure, Outcome};
-use crate::cli::field::{OpenField, stored_text};
+use crate::cli::field::OpenField;
 use crate::cli::interrupt;
 use crate::cli::progress::Bar;
 use crate::cli::quantity::{finite, positive};
+use crate::cli::report::with_report;
 use crate::cli::source::{FIELDS, Source};
 use crate::cli::volume_choice::{Length, OneOrThree};
 
@@ -150,10 +151,9 @@ pub fn run(args: &Args) -> Outcome {
             source: SourceKind::Other,
             unit: args.unit.unwrap_or_default(),
             iso: Some(0.0),
-            report: stored_text(&report),
             ..FieldMeta::default()
         };
-        let mut object = Object::of(field, meta);
+        let mut object = Object::of(field, with_report(meta, &report));
         object.properties.material = args.material.into();
         state = state.with("block", object).map_err(failure)?;
     }
