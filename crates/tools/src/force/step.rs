@@ -93,10 +93,12 @@ impl<T: Real> ForceStroke<T> {
             |i: &usize| bearings[*i].as_ref().is_some_and(|b| !b.rests) && self.acting[*i].stiffness > 0.0;
         let live: Vec<usize> = (0..bearings.len()).filter(is_live).collect();
         let bearing = |i: usize| bearings[i].as_ref().expect("live paths have one");
-        let right: Vec<f64> = live
-            .iter()
-            .map(|&i| bearing(i).short - bearing(i).row.times(&moved) - soft[i] * self.acting[i].force)
-            .collect();
+        let share = self.kept_soft();
+        let right = live.iter().map(|&i| {
+            let short = bearing(i).short - bearing(i).row.times(&moved);
+            short - share * soft[i] * self.acting[i].force
+        });
+        let right: Vec<f64> = right.collect();
         let soft: Vec<f64> = live.iter().map(|&i| soft[i]).collect();
         let enough: Vec<f64> = live.iter().map(|&i| self.enough(&self.acting[i])).collect();
         self.memory
@@ -133,6 +135,14 @@ impl<T: Real> ForceStroke<T> {
         match self.how.solid() {
             Solid::Clay => FLOW,
             Solid::Elastic => LONG,
+        }
+    }
+
+    /// Share of the forces at hand for which paths stay soft.
+    fn kept_soft(&self) -> f64 {
+        match (self.how.rule, self.how.solid()) {
+            (Rule::Arrive, Solid::Clay) if self.settled > 0 => self.extent.kept_soft(),
+            _ => 1.0,
         }
     }
 

@@ -31,6 +31,8 @@ pub enum Extent {
     Curve,
     /// An area, which takes more solves a step.
     Area,
+    /// The whole surface of a goal, towards which it goes in stages.
+    Whole,
     /// A track that the tool walks along, in order: those of six radii act at a time, with those near them from before.
     Track,
 }
@@ -40,7 +42,18 @@ impl Extent {
     pub(super) fn solves(self) -> usize {
         match self {
             Self::Curve | Self::Track => 8,
-            Self::Area => 12,
+            Self::Area | Self::Whole => 12,
+        }
+    }
+
+    /// Share of a force at hand for which paths of clay stay soft once their goals stand. With all of it they creep home as
+    /// slowly as rest lengths take the force over. Areas without any ripple where their paths are many; tracks without it end
+    /// farther off on thin parts.
+    pub(super) fn kept_soft(self) -> f64 {
+        match self {
+            Self::Curve => 0.0,
+            Self::Area => 0.3,
+            Self::Whole | Self::Track => 1.0,
         }
     }
 }

@@ -71,7 +71,7 @@ impl<T: Real> Toward<'_, T> {
             let longest = targets.iter().map(|t| t.path.length()).fold(0.0, f64::max);
             let settle = SETTLE[usize::from(stage >= stages)];
             let most = (longest / (ADVANCE * self.radius)).ceil() as usize + settle;
-            let stroke = ForceStroke::new(&field, self.iso, targets, Extent::Area, self.radius, self.how)?;
+            let stroke = ForceStroke::new(&field, self.iso, targets, Extent::Whole, self.radius, self.how)?;
             let mut stroke = stroke.painted(self.layers)?.held(self.holding)?;
             let mut steps = 0;
             while !stroke.is_over() && steps < most {
