@@ -3,8 +3,9 @@
 use bspline::{HierarchicalSpline, Real};
 use glam::DVec3;
 
+use super::extent::Extent;
 use super::hand::{Hand, Make, Way, dragged};
-use super::stroke::{ADVANCE, Extent, ForceStroke};
+use super::stroke::{ADVANCE, ForceStroke};
 use super::target::Target;
 use super::track::{self, CORNER, DENSITY, MOST, OPEN, Place};
 use super::{ForceError, How, Solid};

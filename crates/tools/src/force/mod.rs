@@ -7,12 +7,14 @@
 //! short of anything at its end, or a stated multiple of what unpainted matter would need.
 //!
 //! With `T` the total force of a path, `e = I/ℓ` the mean that it is short of, `J` its spread and `J̃` the mean of the field
-//! over it, a step solves `(J̃ᵀH⁻¹J + diag(s))ΔT = e − J̃ᵀy − sT` ([`system`]), `y` what the step does with the forces at hand.
+//! over it, a step solves `(J̃ᵀH⁻¹J + diag(s))ΔT = e − J̃ᵀy − ψsT` ([`system`]), `y` what the step does with the forces at hand, `ψ`
+//! how soft their paths stay for these (`Extent::kept_soft`).
 
 mod area;
 mod bend;
 mod chisel;
 mod drill;
+mod extent;
 mod extrude;
 mod filter;
 mod ground;
@@ -40,13 +42,14 @@ mod within;
 pub use bend::Bend;
 pub use chisel::Chisel;
 pub use drill::Drill;
+pub use extent::Extent;
 pub use extrude::Extrude;
 pub use filter::Filter;
 pub use holding::Holding;
 pub use path::{Path, first_crossing, nearest_surface};
 pub use pull::Pull;
 pub use report::{Arrival, ForceReport, Told};
-pub use stroke::{Extent, ForceStroke};
+pub use stroke::ForceStroke;
 pub use target::{Span, Target};
 pub use tool::ForceTool;
 pub(crate) use tool::released;

@@ -2,8 +2,9 @@ use bspline::{HierarchicalSpline, Real};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
+use super::extent::Extent;
 use super::path::Path;
-use super::stroke::{Extent, ForceStroke};
+use super::stroke::ForceStroke;
 use super::target::Target;
 use super::{ForceError, How, area, track};
 use crate::curve::Along;

@@ -17,9 +17,8 @@ const TRAIL: f64 = 5.0;
 /// Radii from the rim of a region within which a path of before is let go all the same.
 const HELD: f64 = 1.0;
 /// Share of its length that a path that has arrived may be off; after some steps with goals that stand still more is
-/// allowed, between neighbours it may not become less.
+/// allowed, `Extent::arrived_late`, between neighbours it may not become less.
 const ARRIVED: f64 = 0.002;
-const ARRIVED_LATE: f64 = 0.01;
 const LATE: usize = 8;
 /// Share that an elastic path at rest moves in a step.
 const AT_REST: f64 = 1e-5;
@@ -60,7 +59,11 @@ impl<T: Real> ForceStroke<T> {
             return self.acting.is_empty() && self.report.steps > 0;
         }
         let is_late = self.settled >= LATE && self.acting.len() > 1;
-        let off = if is_late { ARRIVED_LATE } else { ARRIVED };
+        let off = if is_late {
+            self.extent.arrived_late()
+        } else {
+            ARRIVED
+        };
         let is_there = |a: &Acting| {
             let Some(crossing) = a.crossing else { return true };
             let target = &self.targets[a.index];

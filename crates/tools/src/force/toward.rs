@@ -12,7 +12,8 @@ use glam::DVec3;
 
 use super::path::{Path, first_crossing};
 
-use super::stroke::{ADVANCE, Extent, ForceStroke};
+use super::extent::Extent;
+use super::stroke::{ADVANCE, ForceStroke};
 use super::target::Target;
 use super::track::{DENSITY, few};
 use super::{ForceError, Holding, How, Solid};

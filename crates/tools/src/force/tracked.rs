@@ -3,8 +3,9 @@
 use bspline::{HierarchicalSpline, Real};
 use glam::DVec3;
 
+use super::extent::Extent;
 use super::hand::Make;
-use super::stroke::{Extent, ForceStroke};
+use super::stroke::ForceStroke;
 use super::{ForceError, How, track};
 use crate::curve::Along;
 
