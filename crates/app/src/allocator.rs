@@ -43,6 +43,16 @@ pub fn keep_freed_pages() {
     }
 }
 
+/// Asks for addresses 64 MiB at a time: the heaps of threads grow by a page and a call each otherwise, and go back whole when
+/// they are empty. Not under a ceiling, which counts addresses; memory is only what has been written.
+pub fn take_large_steps() {
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    // SAFETY: a setting of the allocator, made while there is one thread.
+    unsafe {
+        libc::mallopt(libc::M_TOP_PAD, 64 << 20);
+    }
+}
+
 fn granted(p: *mut u8, size: usize) -> *mut u8 {
     if p.is_null() {
         refused(size);

@@ -138,6 +138,9 @@ pub fn main() -> ExitCode {
     };
     let (json, data_on_stdout) = cli.command.stdout();
     end::tell_as(json, data_on_stdout);
+    if cli.memory.is_none() {
+        crate::allocator::take_large_steps();
+    }
     let ready = interrupt::listen().and_then(|()| cli.memory.map_or(Ok(()), ceiling::hold));
     let outcome = ready.and_then(|()| match &cli.command {
         Command::Fit(a) => fit::run(a),
