@@ -1,5 +1,7 @@
 //! Cholesky factorization inside the band of a matrix.
 
+use std::hint::black_box;
+
 use bspline::Real;
 use bspline::vectorized;
 
@@ -346,42 +348,49 @@ fn tree<T: Real>(s: &[T; HALF]) -> T {
 /// [`lanes_dot`] of one list with each of several.
 #[inline(always)]
 fn lanes_dots<T: Real>(a: &[T], b: [&[T]; TILE]) -> [T; TILE] {
-    let mut sums = [[T::zero(); LANES]; TILE];
     let (a, a_rest) = a.as_chunks::<LANES>();
-    let [b0, b1, b2, b3] = b.map(
+    let [(b0, r0), (b1, r1), (b2, r2), (b3, r3)] = b.map(
         #[inline(always)]
-        |b| &b.as_chunks::<LANES>().0[..a.len()],
+        |b| b.as_chunks::<LANES>(),
     );
-    for (k, a) in a.iter().enumerate() {
-        for (sum, b) in sums.iter_mut().zip([&b0[k], &b1[k], &b2[k], &b3[k]]) {
-            for l in 0..LANES {
-                sum[l] += a[l] * b[l];
-            }
-        }
+    let [mut s0, mut s1, mut s2, mut s3] = [[T::zero(); LANES]; TILE];
+    for ((((a, b0), b1), b2), b3) in a.iter().zip(b0).zip(b1).zip(b2).zip(b3) {
+        add_products(&mut s0, a, b0);
+        add_products(&mut s1, a, b1);
+        add_products(&mut s2, a, b2);
+        add_products(&mut s3, a, b3);
     }
-    let mut totals = [T::zero(); TILE];
-    for ((total, sum), b) in totals.iter_mut().zip(&sums).zip(b) {
-        *total = total_of(sum, a_rest, &b[b.len() - a_rest.len()..]);
-    }
-    totals
+    [
+        total_of(s0, a_rest, r0),
+        total_of(s1, a_rest, r1),
+        total_of(s2, a_rest, r2),
+        total_of(s3, a_rest, r3),
+    ]
 }
 
 #[inline(always)]
 fn lanes_dot<T: Real>(a: &[T], b: &[T]) -> T {
-    let mut sum = [T::zero(); LANES];
     let (a, a_rest) = a.as_chunks::<LANES>();
     let (b, b_rest) = b.as_chunks::<LANES>();
+    let mut sum = [T::zero(); LANES];
     for (a, b) in a.iter().zip(b) {
-        for l in 0..LANES {
-            sum[l] += a[l] * b[l];
-        }
+        add_products(&mut sum, a, b);
     }
-    total_of(&sum, a_rest, b_rest)
+    total_of(sum, a_rest, b_rest)
+}
+
+#[inline(always)]
+fn add_products<T: Real>(sum: &mut [T; LANES], a: &[T; LANES], b: &[T; LANES]) {
+    for l in 0..LANES {
+        sum[l] += a[l] * b[l];
+    }
 }
 
 /// What lanes add up to, with the products of what they left.
 #[inline(always)]
-fn total_of<T: Real>(sum: &[T; LANES], a_rest: &[T], b_rest: &[T]) -> T {
+fn total_of<T: Real>(sum: [T; LANES], a_rest: &[T], b_rest: &[T]) -> T {
+    // Otherwise the compiler fits the lanes of the loop before to the pairs that are added here.
+    let sum = black_box(sum);
     let half = std::array::from_fn(|l| sum[l] + sum[l + HALF]);
     let mut total = tree(&half);
     for (a, b) in a_rest.iter().zip(b_rest) {
