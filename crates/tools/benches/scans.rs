@@ -104,7 +104,11 @@ impl Ground {
                         stroke = stroke.painted(&layers).expect("paint");
                     }
                     let mut steps = 0;
-                    while steps < STEPS && !stroke.is_over() && stroke.step().is_ok() {
+                    while steps < STEPS && !stroke.is_over() {
+                        if let Err(e) = stroke.step() {
+                            eprintln!("{kind:?} at {at}: {e}");
+                            break;
+                        }
                         steps += 1;
                     }
                     done.push(stroke.release().expect("a field").1);
