@@ -1,5 +1,5 @@
 //! What a hand can do to a field: scripted [scenes](scene) of forces, matter and constraints, and [geometric] tools that carve,
-//! add and [carry along](warp). A [session] is a row of strokes; each uses one [tool], within [limits]. Haptics are not built yet.
+//! add and [carry along](warp). A [session] is a row of strokes; each uses one [tool], within [limits]. [haptics] make what is done felt.
 
 pub mod body;
 pub mod canvas;
@@ -10,6 +10,7 @@ pub mod fade;
 pub mod force;
 mod formula_solid;
 pub mod geometric;
+pub mod haptics;
 pub mod hold;
 mod interior;
 pub mod knots;

@@ -1,0 +1,16 @@
+//! Touch: from the pose of a hand to a force on it, a thousand times a second.
+//!
+//! Nothing here allocates, locks, waits or does I/O while it ticks; all of it is a pure function of its state and what it is
+//! told, so that every scene is a test. An [`Obstacle`] is what may be touched at one moment, an immutable value; a
+//! [`Renderer`] turns the pose of a hand into what is felt.
+//!
+//! Units: millimetres, seconds, newtons, newton-millimetres. Stiffness is given in newtons per metre and damping in newton-seconds per
+//! metre, as data sheets give them. Distances are positive in the air and negative in the solid; forces and torques act on the hand.
+
+mod device;
+mod feel;
+mod obstacle;
+
+pub use device::{Abilities, Device, DeviceError, Reading};
+pub use feel::{Contact, Felt, Pose, Renderer};
+pub use obstacle::{Blend, Obstacle, Together, Touch};
