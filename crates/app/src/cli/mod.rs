@@ -15,6 +15,7 @@ mod charts;
 mod check;
 mod convert;
 mod cost;
+mod devices;
 mod document;
 mod end;
 mod eval;
@@ -111,6 +112,8 @@ enum Command {
     Replay(document::replay::Args),
     /// Write an object of a document as a field
     Export(document::export::Args),
+    /// List devices for touch, test one, or print the rules that let users open them
+    Devices(devices::Args),
     /// Draw speed against accuracy
     Charts(charts::Args),
 }
@@ -160,6 +163,7 @@ pub fn main() -> ExitCode {
         Command::Redo(a) => document::undo::run(a, true),
         Command::Replay(a) => document::replay::run(a),
         Command::Export(a) => document::export::run(a),
+        Command::Devices(a) => devices::run(a),
         Command::Charts(a) => charts::run(a),
     });
     match outcome {
@@ -221,6 +225,7 @@ impl Command {
             Self::Undo(a) | Self::Redo(a) => (a.json, false),
             Self::Replay(a) => (a.json, false),
             Self::Export(a) => (a.json, is_stdout(&a.output)),
+            Self::Devices(a) => (a.json, false),
             Self::Charts(a) => (a.json(), false),
         }
     }
