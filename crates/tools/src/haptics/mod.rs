@@ -13,6 +13,7 @@ mod feel;
 mod obstacle;
 mod proxy;
 mod vcp;
+mod work;
 
 pub use coupling::Coupling;
 pub use device::{Abilities, Device, DeviceError, Reading};
@@ -20,3 +21,4 @@ pub use feel::{Contact, Felt, Pose, Renderer};
 pub use obstacle::{Blend, Obstacle, Together, Touch};
 pub use proxy::{Friction, Magnet, Proxy, ProxyOptions};
 pub use vcp::{Vcp, VcpOptions};
+pub use work::{Embedding, Viscous};

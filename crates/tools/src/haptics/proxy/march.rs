@@ -49,6 +49,7 @@ enum Way {
 }
 
 /// What may be walked over: all that is at least `clearance` away from the surface.
+#[derive(Clone, Copy)]
 pub(super) struct March<'a> {
     pub obstacle: &'a dyn Obstacle,
     /// mm.

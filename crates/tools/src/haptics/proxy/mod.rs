@@ -1,4 +1,4 @@
-//! The surface contact point: a proxy of the tool that the solid keeps out [Zilles95, Ruspini97; Kim03 §4.2].
+//! The surface contact point: a proxy of the tool that the solid keeps out [Zilles94, Ruspini97; Kim03 §4.2; Chen00 figs. 13–15].
 //!
 //! A tick moves the proxy from where it was as near to the hand as it gets without crossing the solid: free until it
 //! meets the surface, then along tangent planes, of which those of a hollow are kept together, and back onto the surface by its
@@ -33,6 +33,9 @@ pub struct ProxyOptions {
     pub offset: f64,
     /// Draws the tool to the surface.
     pub magnet: Option<Magnet>,
+    /// Height of humps, mm, that the proxy gets over though the hand draws it back: its spring may stretch by as much
+    /// [Chen00].
+    pub stretch: f64,
     /// Speed at which solid that has grown over the tool pushes it out, mm/s.
     pub push_out: f64,
     /// Way that makes no difference, mm.
@@ -48,6 +51,7 @@ impl Default for ProxyOptions {
             friction: Friction::default(),
             offset: 0.0,
             magnet: None,
+            stretch: 0.0,
             push_out: 100.0,
             tolerance: 1e-4,
         }
@@ -120,6 +124,21 @@ impl Proxy {
         }
     }
 
+    /// Looks over the humps about a place that is as near to the hand as marching gets.
+    fn over_humps(&self, march: &March, here: Place, hand: DVec3) -> Place {
+        let lifted = March {
+            clearance: march.clearance + self.options.stretch,
+            ..*march
+        };
+        let Some(above) = lifted.onto(here) else {
+            return here;
+        };
+        let (beyond, _) = lifted.toward(hand, above);
+        let (there, _) = march.toward(hand, beyond);
+        let is_nearer = there.at.distance(hand) < here.at.distance(hand) - march.tolerance;
+        if is_nearer { there } else { here }
+    }
+
     /// Lets friction hold the proxy back on its way from `from` to `to`.
     fn held(&mut self, march: &March, from: Place, to: Place, hand: DVec3, coefficient: f64) -> Place {
         let depth = to.at.distance(hand);
@@ -161,7 +180,10 @@ impl Renderer for Proxy {
             here = march.onto(here).unwrap_or(here);
             march.clearance = march.clearance.min(here.distance);
         }
-        let (there, is_held) = march.toward(hand.at, here);
+        let (mut there, is_held) = march.toward(hand.at, here);
+        if is_held && self.options.stretch > 0.0 {
+            there = self.over_humps(&march, there, hand.at);
+        }
         if !is_held {
             return self.drawn(&there, hand);
         }
