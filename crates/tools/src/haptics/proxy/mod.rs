@@ -58,6 +58,11 @@ impl Default for ProxyOptions {
     }
 }
 
+/// Length of the humps that a stretched spring gets over, over its stretch.
+const HUMP: f64 = 4.0;
+/// Time over which normals of the contact are averaged for that, s.
+const LEANING: f64 = 0.05;
+
 /// A ball or a point that touches.
 #[derive(Clone, Debug)]
 pub struct Proxy {
@@ -67,6 +72,8 @@ pub struct Proxy {
     /// Whether it has not been clear of the solid since then.
     is_inside: bool,
     sticks: bool,
+    /// Mean normal of the contact.
+    leaning: DVec3,
     stretching: Stretching,
 }
 
@@ -78,6 +85,7 @@ impl Proxy {
             at: None,
             is_inside: false,
             sticks: false,
+            leaning: DVec3::ZERO,
             stretching: Stretching::default(),
         }
     }
@@ -95,6 +103,7 @@ impl Proxy {
     /// Nothing is felt, and the proxy is where the hand is.
     fn free(&mut self, hand: &Pose, contact: Contact) -> Felt {
         self.sticks = false;
+        self.leaning = DVec3::ZERO;
         self.stretching.end();
         self.at = Some(hand.at);
         Felt {
@@ -124,17 +133,20 @@ impl Proxy {
         }
     }
 
-    /// Looks over the humps about a place that is as near to the hand as marching gets.
+    /// Looks over a hump in front of a place that is as near to the hand as marching gets: up by the stretch along the mean
+    /// normal, across, and down again.
     fn over_humps(&self, march: &March, here: Place, hand: DVec3) -> Place {
-        let lifted = March {
-            clearance: march.clearance + self.options.stretch,
-            ..*march
-        };
-        let Some(above) = lifted.onto(here) else {
+        let (stretch, up) = (self.options.stretch, self.leaning.normalize_or_zero());
+        let lag = hand - here.at;
+        let across = (lag - lag.dot(up) * up).normalize_or_zero();
+        let lifted = here.at + stretch * up;
+        let beyond = lifted + HUMP * stretch * across;
+        let there = march
+            .free(here, lifted)
+            .and_then(|lifted| march.free(lifted, beyond));
+        let Some(there) = there.map(|place| march.toward(hand, place).0) else {
             return here;
         };
-        let (beyond, _) = lifted.toward(hand, above);
-        let (there, _) = march.toward(hand, beyond);
         let is_nearer = there.at.distance(hand) < here.at.distance(hand) - march.tolerance;
         if is_nearer { there } else { here }
     }
@@ -188,6 +200,7 @@ impl Renderer for Proxy {
             return self.drawn(&there, hand);
         }
         let normal = there.normal().unwrap_or(DVec3::ZERO);
+        self.leaning += dt / (dt + LEANING) * (normal - self.leaning);
         let touch = obstacle.touch(there.at - there.distance * normal);
         let rests = here.distance - march.clearance <= 2.0 * tolerance;
         let place = match touch.friction > 0.0 && rests {
