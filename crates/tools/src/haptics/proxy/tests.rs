@@ -1,5 +1,5 @@
 use super::*;
-use crate::haptics::{Blend, Together, Touch};
+use crate::haptics::{Blend, Together};
 
 /// Solid below a plane through a point.
 struct Below(DVec3, DVec3, Touch);
