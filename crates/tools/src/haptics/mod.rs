@@ -9,8 +9,15 @@
 
 mod device;
 mod feel;
+pub mod gates;
 mod obstacle;
+mod record;
+mod servo;
+mod workspace;
 
 pub use device::{Abilities, Device, DeviceError, Reading};
 pub use feel::{Contact, Felt, Pose, Renderer};
 pub use obstacle::{Blend, Obstacle, Together, Touch};
+pub use record::TickRecord;
+pub use servo::{Servo, ServoError, ServoOptions, Tick};
+pub use workspace::Workspace;
