@@ -10,10 +10,14 @@
 mod coupling;
 mod device;
 mod feel;
+pub mod gates;
 mod obstacle;
 mod proxy;
 mod vcp;
 mod work;
+mod record;
+mod servo;
+mod workspace;
 
 pub use coupling::Coupling;
 pub use device::{Abilities, Device, DeviceError, Reading};
@@ -22,3 +26,6 @@ pub use obstacle::{Blend, Obstacle, Together, Touch};
 pub use proxy::{Friction, Magnet, Proxy, ProxyOptions};
 pub use vcp::{Vcp, VcpOptions};
 pub use work::{Embedding, Viscous};
+pub use record::TickRecord;
+pub use servo::{Servo, ServoError, ServoOptions, Tick};
+pub use workspace::Workspace;
