@@ -10,7 +10,9 @@
 mod device;
 mod feel;
 mod obstacle;
+mod snapshot;
 
 pub use device::{Abilities, Device, DeviceError, Reading};
 pub use feel::{Contact, Felt, Pose, Renderer};
 pub use obstacle::{Blend, Obstacle, Together, Touch};
+pub use snapshot::{BrickOptions, DistanceBrick, Interpolation, Surface};
