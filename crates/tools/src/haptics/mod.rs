@@ -18,6 +18,7 @@ mod work;
 mod record;
 mod servo;
 mod workspace;
+mod snapshot;
 
 pub use coupling::Coupling;
 pub use device::{Abilities, Device, DeviceError, Reading};
@@ -29,3 +30,4 @@ pub use work::{Embedding, Viscous};
 pub use record::TickRecord;
 pub use servo::{Servo, ServoError, ServoOptions, Tick};
 pub use workspace::Workspace;
+pub use snapshot::{BrickOptions, DistanceBrick, Interpolation, Surface};
