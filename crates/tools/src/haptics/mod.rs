@@ -7,9 +7,11 @@
 //! Units: millimetres, seconds, newtons, newton-millimetres. Stiffness is given in newtons per metre and damping in newton-seconds per
 //! metre, as data sheets give them. Distances are positive in the air and negative in the solid; forces and torques act on the hand.
 
+pub mod controls;
 mod device;
 mod feel;
 mod obstacle;
+pub mod simulated;
 
 pub use device::{Abilities, Device, DeviceError, Reading};
 pub use feel::{Contact, Felt, Pose, Renderer};
