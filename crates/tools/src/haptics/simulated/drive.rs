@@ -1,5 +1,7 @@
 //! What a rig ticks.
 
+use glam::DVec3;
+
 use super::super::{DeviceError, Felt, Obstacle, Pose, Reading, Renderer};
 
 /// From what a device told to what is sent to it.
@@ -25,14 +27,20 @@ pub struct Bare<R> {
 
 impl<R: Renderer> Drive for Bare<R> {
     /// Nothing where nothing was told.
-    fn tick(&mut self, read: Result<Reading, DeviceError>, obstacle: &dyn Obstacle, _: f64, dt: f64) -> Felt {
-        match read {
+    fn tick(
+        &mut self,
+        told: Result<&Reading, &DeviceError>,
+        obstacle: &dyn Obstacle,
+        _: f64,
+        dt: f64,
+    ) -> Felt {
+        match told {
             Ok(reading) if reading.pose.is_finite() => {
                 let mut felt = self.renderer.tick(obstacle, &reading.pose, dt);
                 felt.force = felt.force.clamp_length_max(self.force);
                 felt
             }
-            _ => Felt::nothing(&Pose::at(glam::DVec3::ZERO)),
+            _ => Felt::nothing(&Pose::at(DVec3::ZERO)),
         }
     }
 }

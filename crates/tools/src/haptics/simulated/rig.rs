@@ -65,7 +65,7 @@ impl<'a, D: Drive> Rig<'a, D> {
             );
             let (felt, distance, age, cost) = self.world.show(now, |obstacle, age| {
                 let start = self.clock.map(|c| c());
-                let felt = self.drive.tick(read, obstacle, age, dt);
+                let felt = self.drive.tick(read.as_ref(), obstacle, age, dt);
                 let cost = self.clock.zip(start).map_or(0.0, |(c, start)| c() - start);
                 let distance = obstacle.distance(felt.proxy.at).0;
                 (felt, distance, age, cost)

@@ -2,8 +2,12 @@
 
 mod obstacles;
 mod projection;
+mod renderers;
 mod scene;
+mod scripted;
 
-pub use obstacles::{Ball, Bumps, Channel, Edge, Groove, HalfSpace, Rod, Sheet};
+pub use obstacles::{Ball, Bumps, Channel, Edge, Groove, HalfSpace, Passage, Rod, Rubbing, Sheet};
 pub use projection::Projection;
+pub use renderers::{penalty, plane, proxy, vcp};
 pub use scene::{Check, Loop, omni};
+pub use scripted::scripted;

@@ -1,7 +1,7 @@
 //! Solids whose distance is a formula.
 
 use glam::{DVec2, DVec3};
-use tools::haptics::Obstacle;
+use tools::haptics::{Obstacle, Touch};
 
 /// Distance and direction from the nearest of some points or rays in the plane of x and z, as a 3D answer.
 fn flat((distance, g): (f64, DVec2)) -> (f64, DVec3) {
@@ -177,6 +177,52 @@ impl Obstacle for Channel {
     }
 }
 
+/// Two walls along the plane x = 0, without end.
+#[derive(Clone, Copy, Debug)]
+pub struct Passage {
+    /// Between the walls.
+    pub gap: f64,
+    /// Of each wall.
+    pub thickness: f64,
+}
+
+impl Obstacle for Passage {
+    fn distance(&self, p: DVec3) -> (f64, DVec3) {
+        let side = if p.x < 0.0 { -1.0 } else { 1.0 };
+        let beyond = side * p.x - 0.5 * (self.gap + self.thickness);
+        let away = if beyond < 0.0 { -side } else { side };
+        (beyond.abs() - 0.5 * self.thickness, away * DVec3::X)
+    }
+
+    fn finest(&self) -> f64 {
+        self.thickness
+    }
+}
+
+/// An obstacle with friction.
+#[derive(Clone, Copy, Debug)]
+pub struct Rubbing<O> {
+    pub solid: O,
+    pub coefficient: f64,
+}
+
+impl<O: Obstacle> Obstacle for Rubbing<O> {
+    fn distance(&self, p: DVec3) -> (f64, DVec3) {
+        self.solid.distance(p)
+    }
+
+    fn finest(&self) -> f64 {
+        self.solid.finest()
+    }
+
+    fn touch(&self, _: DVec3) -> Touch {
+        Touch {
+            friction: self.coefficient,
+            ..Touch::default()
+        }
+    }
+}
+
 /// z below waves in two directions. The field z − h(x, y) is no distance: its gradient is up to some times as long as 1.
 #[derive(Clone, Copy, Debug)]
 pub struct Bumps {
@@ -239,6 +285,11 @@ mod tests {
             true,
         );
         is_distance("rod", &Rod { radius: 1.0 }, true);
+        let passage = Passage {
+            gap: 3.0,
+            thickness: 1.0,
+        };
+        is_distance("passage", &passage, true);
         is_distance("channel", &Channel { gap: 3.0 }, true);
     }
 }
