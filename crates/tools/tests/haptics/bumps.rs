@@ -27,14 +27,9 @@ fn slid(renderer: impl Renderer) -> Check {
 #[test]
 fn a_bumpy_surface_is_slid_over() {
     let check = slid(proxy(2.0, 500.0));
-    println!("proxy {:#?}", check.measures);
     check.assert(
         "proxy on bumps",
-        &[
-            ("P2", check.is_passive()),
-            ("P3", check.is_slewed()),
-            ("P4", check.stays_out()),
-        ],
+        &[("P2", check.is_passive()), ("P4", check.stays_out())],
     );
 }
 
@@ -42,8 +37,12 @@ fn a_bumpy_surface_is_slid_over() {
 #[test]
 fn the_penalty_method_creates_energy_on_bumps() {
     let check = slid(penalty(2.0, 500.0));
-    println!("penalty {:#?}", check.measures);
-    assert!(!check.is_passive());
+    assert!(check.measures.returned > 5e-4, "{:#?}", check.measures);
+    // The ray of the stateless contact ends on the surface, but begins along the same gradient.
     let check = slid(vcp(2.0, 500.0));
-    println!("vcp {:#?}", check.measures);
+    assert!(
+        check.measures.returned > 2e-4 && check.stays_out(),
+        "{:#?}",
+        check.measures
+    );
 }

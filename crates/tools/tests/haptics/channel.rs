@@ -17,9 +17,9 @@ fn drifted(renderer: impl Renderer) -> Check {
     let of = |x, z| DVec3::new(x, 0.0, z);
     let path = Path::smooth([
         (0.2, of(0.0, 0.0)),
-        (0.7, of(6.0, -10.0)),
-        (1.2, of(-6.0, -20.0)),
-        (1.7, of(6.0, -30.0)),
+        (0.7, of(8.0, -10.0)),
+        (1.2, of(-8.0, -20.0)),
+        (1.7, of(8.0, -30.0)),
     ]);
     let setup = Loop::new(SimulatedHand::light(path), 3.0);
     let walls = Passage {
@@ -59,12 +59,6 @@ fn methods_without_memory_leave_a_passage_through_its_walls() {
         ("penalty", drifted(penalty(2.0, 500.0))),
         ("vcp", drifted(vcp(2.0, 500.0))),
     ] {
-        println!(
-            "{name}: {} {} {:#?}",
-            check.trace.crossings(is_between),
-            chatter(&check),
-            check.measures
-        );
         assert!(check.trace.crossings(is_between) > 0, "{name}");
         assert!(!check.is_slewed(), "{name}");
     }

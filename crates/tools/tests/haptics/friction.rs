@@ -31,7 +31,6 @@ fn the_angle_of_friction_is_recovered() {
         assert!(angles.len() > 200, "{} ticks slide", angles.len());
         let mean = angles.iter().sum::<f64>() / angles.len() as f64;
         let wanted = coefficient.atan();
-        println!("{coefficient}: {mean} against {wanted}");
         assert!(
             (mean / wanted - 1.0).abs() < 0.02,
             "{mean} rad in place of {wanted}"

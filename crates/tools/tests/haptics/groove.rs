@@ -14,7 +14,7 @@ pub const HALVES: [f64; 3] = [20.0, 10.0, 5.0];
 pub fn pressed(half: f64, timing: Timing, renderer: impl Renderer) -> Check {
     let half = half.to_radians();
     let of = |x, z| DVec3::new(x, 0.0, z);
-    let top = 20.0 * half.sin();
+    let top = 12.5 * half.tan();
     let path = Path::smooth([(0.1, of(top, 25.0)), (0.9, of(0.0, -9.0))]);
     let hand = SimulatedHand::light(path.trembling(0.02 * DVec3::X, 35.0));
     let setup = Loop {
@@ -78,13 +78,28 @@ fn the_exact_projection_passes_the_same_judge() {
     }
 }
 
-/// One side at a time pushes the hand to and fro across the middle, and the contact is inside the other side.
+/// One side at a time pushes the hand to and fro across the middle, and the contact is inside the other side: in some 70 to 170
+/// ticks the stateless contact is up to 3.3 mm deep, jumps by all of the device's force, and gives back 5 to 10 mJ; that of the
+/// penalty method is 0.9 mm deep for good.
 #[test]
 fn methods_of_one_normal_enter_the_sides_of_a_groove() {
     for half in HALVES {
-        let check = pressed(half, Timing::default(), penalty(RADIUS, STIFFNESS));
-        assert!(!check.stays_out(), "penalty at {half}°: {:#?}", check.measures);
-        let check = pressed(half, Timing::default(), vcp(RADIUS, STIFFNESS));
-        println!("vcp {half}: {:#?}", check.measures);
+        for (name, check) in [
+            (
+                "penalty",
+                pressed(half, Timing::default(), penalty(RADIUS, STIFFNESS)),
+            ),
+            ("vcp", pressed(half, Timing::default(), vcp(RADIUS, STIFFNESS))),
+        ] {
+            let m = &check.measures;
+            let sinks = m.sunk > 20 && m.deepest > 0.5 && m.jumps_over > 0;
+            assert!(sinks, "{name} at {half}°: {m:#?}");
+        }
+        let wild = pressed(half, Timing::default(), vcp(RADIUS, STIFFNESS));
+        assert!(
+            !wild.is_passive() && !wild.is_slewed(),
+            "vcp at {half}°: {:#?}",
+            wild.measures
+        );
     }
 }

@@ -65,7 +65,6 @@ fn a_tangent_plane_jumps_when_it_is_refreshed() {
         let check = circled(radius, speed, rate, plane(2.0, 500.0, rate));
         let way = speed / rate;
         let jump = 1e-3 * 500.0 * way * way / (2.0 * radius);
-        println!("{radius} {speed} {rate}: {jump} {:#?}", check.measures);
         assert!(check.measures.jumps_over > 0, "{:#?}", check.measures);
         assert!(
             check.measures.jump > 0.5 * jump,

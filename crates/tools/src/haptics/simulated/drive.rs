@@ -9,7 +9,7 @@ pub trait Drive {
     /// One tick, `dt` seconds after the one before, with an obstacle that is `age` seconds old.
     fn tick(
         &mut self,
-        read: Result<Reading, DeviceError>,
+        told: Result<&Reading, &DeviceError>,
         obstacle: &dyn Obstacle,
         age: f64,
         dt: f64,
