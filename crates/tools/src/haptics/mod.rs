@@ -8,11 +8,19 @@
 //! metre, as data sheets give them. Distances are positive in the air and negative in the solid; forces and torques act on the hand.
 
 pub mod controls;
+mod coupling;
 mod device;
 mod feel;
 mod obstacle;
+mod proxy;
 pub mod simulated;
+mod vcp;
+mod work;
 
+pub use coupling::Coupling;
 pub use device::{Abilities, Device, DeviceError, Reading};
 pub use feel::{Contact, Felt, Pose, Renderer};
 pub use obstacle::{Blend, Obstacle, Together, Touch};
+pub use proxy::{Friction, Magnet, Proxy, ProxyOptions};
+pub use vcp::{Vcp, VcpOptions};
+pub use work::{Embedding, Viscous};
