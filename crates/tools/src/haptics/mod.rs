@@ -7,12 +7,14 @@
 //! Units: millimetres, seconds, newtons, newton-millimetres. Stiffness is given in newtons per metre and damping in newton-seconds per
 //! metre, as data sheets give them. Distances are positive in the air and negative in the solid; forces and torques act on the hand.
 
+pub mod controls;
 mod coupling;
 mod device;
 mod feel;
 pub mod gates;
 mod obstacle;
 mod proxy;
+pub mod simulated;
 mod vcp;
 mod work;
 mod record;
