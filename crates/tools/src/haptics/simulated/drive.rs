@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::super::{DeviceError, Felt, Obstacle, Pose, Reading, Renderer};
+use super::super::{DeviceError, Felt, Obstacle, Pose, Reading, Renderer, Servo};
 
 /// From what a device told to what is sent to it.
 pub trait Drive {
@@ -41,6 +41,24 @@ impl<R: Renderer> Drive for Bare<R> {
                 felt
             }
             _ => Felt::nothing(&Pose::at(DVec3::ZERO)),
+        }
+    }
+}
+
+impl Drive for Servo {
+    /// Force and torque are those that the gates let through, in the axes of the device; the proxy is in the scene.
+    fn tick(
+        &mut self,
+        told: Result<&Reading, &DeviceError>,
+        obstacle: &dyn Obstacle,
+        age: f64,
+        dt: f64,
+    ) -> Felt {
+        let tick = self.tick(told, obstacle, age, dt);
+        Felt {
+            force: tick.wrench.force,
+            torque: tick.wrench.torque,
+            ..tick.felt
         }
     }
 }
