@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::super::gates::Trip;
 use super::super::{DeviceError, Felt, Obstacle, Pose, Reading, Renderer, Servo};
 
 /// From what a device told to what is sent to it.
@@ -14,6 +15,11 @@ pub trait Drive {
         age: f64,
         dt: f64,
     ) -> Felt;
+
+    /// The device did not take what was sent.
+    fn refused(&mut self, why: &DeviceError) {
+        let _ = why;
+    }
 }
 
 /// A renderer and the limit of a device's force, without any gate: what stability is asked of first.
@@ -60,5 +66,12 @@ impl Drive for Servo {
             torque: tick.wrench.torque,
             ..tick.felt
         }
+    }
+
+    fn refused(&mut self, why: &DeviceError) {
+        self.trip(match why {
+            DeviceError::Gone(_) => Trip::Gone,
+            DeviceError::Silent(_) | DeviceError::Refused { .. } => Trip::Writer,
+        });
     }
 }
