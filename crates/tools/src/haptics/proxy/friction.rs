@@ -25,6 +25,22 @@ impl Default for Friction {
 }
 
 impl Friction {
+    /// Whether a place of the surface holds the proxy against a pull: it leans by no more than the angle of friction from the
+    /// normal there. Of the cone alone.
+    pub(super) fn holds(&self, coefficient: f64, pull: DVec3, normal: DVec3, sticks: bool) -> bool {
+        let Self::Cone { at_rest } = *self else {
+            return false;
+        };
+        let pressing = -pull.dot(normal);
+        let along = (pull + pressing * normal).length();
+        let coefficient = if sticks {
+            coefficient * at_rest
+        } else {
+            coefficient
+        };
+        pressing > 0.0 && along <= coefficient * pressing
+    }
+
     /// Where the proxy goes from `from`, when without friction it would go to `to`, and whether it sticks. `depth` of the hand
     /// below `to`, mm; `sticks`, whether it did in the last tick.
     pub(super) fn follow(

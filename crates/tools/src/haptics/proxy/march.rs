@@ -178,6 +178,14 @@ impl March<'_> {
         Way::Long(here)
     }
 
+    /// The end of a straight way, if no solid is met on it.
+    pub fn free(&self, from: Place, to: DVec3) -> Option<Place> {
+        match self.walk(from, to) {
+            Way::Free(there) => Some(there),
+            _ => None,
+        }
+    }
+
     /// The place on the surface by Newton steps along the gradient.
     pub fn onto(&self, mut place: Place) -> Option<Place> {
         for _ in 0..ONTO {

@@ -16,7 +16,7 @@ pub use friction::Friction;
 pub use magnet::Magnet;
 
 use super::coupling::{Coupling, Stretching, pressing};
-use super::{Contact, Felt, Obstacle, Pose, Renderer};
+use super::{Contact, Felt, Obstacle, Pose, Renderer, Touch};
 use march::{March, Place};
 
 /// What a proxy is told.
@@ -58,6 +58,11 @@ impl Default for ProxyOptions {
     }
 }
 
+/// Length of the humps that a stretched spring gets over, over its stretch.
+const HUMP: f64 = 4.0;
+/// Time over which normals of the contact are averaged for that, s.
+const LEANING: f64 = 0.05;
+
 /// A ball or a point that touches.
 #[derive(Clone, Debug)]
 pub struct Proxy {
@@ -67,6 +72,8 @@ pub struct Proxy {
     /// Whether it has not been clear of the solid since then.
     is_inside: bool,
     sticks: bool,
+    /// Mean normal of the contact.
+    leaning: DVec3,
     stretching: Stretching,
 }
 
@@ -78,6 +85,7 @@ impl Proxy {
             at: None,
             is_inside: false,
             sticks: false,
+            leaning: DVec3::ZERO,
             stretching: Stretching::default(),
         }
     }
@@ -95,6 +103,7 @@ impl Proxy {
     /// Nothing is felt, and the proxy is where the hand is.
     fn free(&mut self, hand: &Pose, contact: Contact) -> Felt {
         self.sticks = false;
+        self.leaning = DVec3::ZERO;
         self.stretching.end();
         self.at = Some(hand.at);
         Felt {
@@ -103,10 +112,46 @@ impl Proxy {
         }
     }
 
-    /// The hand in the band of the magnet.
-    fn drawn(&mut self, place: &Place, hand: &Pose) -> Felt {
+    /// Where the proxy goes from `here`, and what the surface is like there; nowhere if the hand is free.
+    fn contact(&mut self, march: &March, here: Place, hand: DVec3, dt: f64) -> Option<(Place, Touch)> {
+        let rests = here.distance - march.clearance <= 2.0 * march.tolerance;
+        let law = self.options.friction;
+        if let Some(normal) = here.normal().filter(|_| rests) {
+            let touch = touch(march.obstacle, &here);
+            if law.holds(touch.friction, hand - here.at, normal, self.sticks) {
+                self.sticks = true;
+                return Some((here, touch));
+            }
+        }
+        let (mut there, is_held) = march.toward(hand, here);
+        if !is_held {
+            return None;
+        }
+        if self.options.stretch > 0.0 {
+            there = self.over_humps(march, there, hand);
+        }
+        let normal = there.normal().unwrap_or(DVec3::ZERO);
+        self.leaning += dt / (dt + LEANING) * (normal - self.leaning);
+        let touch = touch(march.obstacle, &there);
+        if !rests || touch.friction == 0.0 {
+            self.sticks = false;
+            return Some((there, touch));
+        }
+        let depth = there.at.distance(hand);
+        let (at, sticks) = law.follow(touch.friction, here.at, there.at, depth, self.sticks);
+        self.sticks = sticks;
+        let slid = || march.onto(Place::of(march.obstacle, at)).unwrap_or(there);
+        Some((if sticks { here } else { slid() }, touch))
+    }
+
+    /// The hand in the band of the magnet, if it is.
+    fn drawn(&mut self, obstacle: &dyn Obstacle, hand: &Pose) -> Felt {
         let felt = self.free(hand, Contact::Free);
-        let Some((magnet, normal)) = self.options.magnet.zip(place.normal()) else {
+        let Some(magnet) = self.options.magnet else {
+            return felt;
+        };
+        let place = Place::of(obstacle, hand.at);
+        let Some(normal) = place.normal() else {
             return felt;
         };
         let height = place.distance - self.clearance();
@@ -124,32 +169,29 @@ impl Proxy {
         }
     }
 
-    /// Looks over the humps about a place that is as near to the hand as marching gets.
+    /// Looks over a hump in front of a place that is as near to the hand as marching gets: up by the stretch along the mean
+    /// normal, across, and down again.
     fn over_humps(&self, march: &March, here: Place, hand: DVec3) -> Place {
-        let lifted = March {
-            clearance: march.clearance + self.options.stretch,
-            ..*march
-        };
-        let Some(above) = lifted.onto(here) else {
+        let (stretch, up) = (self.options.stretch, self.leaning.normalize_or_zero());
+        let lag = hand - here.at;
+        let across = (lag - lag.dot(up) * up).normalize_or_zero();
+        let lifted = here.at + stretch * up;
+        let beyond = lifted + HUMP * stretch * across;
+        let there = march
+            .free(here, lifted)
+            .and_then(|lifted| march.free(lifted, beyond));
+        let Some(there) = there.map(|place| march.toward(hand, place).0) else {
             return here;
         };
-        let (beyond, _) = lifted.toward(hand, above);
-        let (there, _) = march.toward(hand, beyond);
         let is_nearer = there.at.distance(hand) < here.at.distance(hand) - march.tolerance;
         if is_nearer { there } else { here }
     }
+}
 
-    /// Lets friction hold the proxy back on its way from `from` to `to`.
-    fn held(&mut self, march: &March, from: Place, to: Place, hand: DVec3, coefficient: f64) -> Place {
-        let depth = to.at.distance(hand);
-        let law = self.options.friction;
-        let (at, sticks) = law.follow(coefficient, from.at, to.at, depth, self.sticks);
-        self.sticks = sticks;
-        match sticks {
-            true => from,
-            false => march.onto(Place::of(march.obstacle, at)).unwrap_or(to),
-        }
-    }
+/// What the surface is like where a place rests on it.
+fn touch(obstacle: &dyn Obstacle, place: &Place) -> Touch {
+    let normal = place.normal().unwrap_or(DVec3::ZERO);
+    obstacle.touch(place.at - place.distance * normal)
 }
 
 impl Renderer for Proxy {
@@ -180,22 +222,8 @@ impl Renderer for Proxy {
             here = march.onto(here).unwrap_or(here);
             march.clearance = march.clearance.min(here.distance);
         }
-        let (mut there, is_held) = march.toward(hand.at, here);
-        if is_held && self.options.stretch > 0.0 {
-            there = self.over_humps(&march, there, hand.at);
-        }
-        if !is_held {
-            return self.drawn(&there, hand);
-        }
-        let normal = there.normal().unwrap_or(DVec3::ZERO);
-        let touch = obstacle.touch(there.at - there.distance * normal);
-        let rests = here.distance - march.clearance <= 2.0 * tolerance;
-        let place = match touch.friction > 0.0 && rests {
-            true => self.held(&march, here, there, hand.at, touch.friction),
-            false => {
-                self.sticks = false;
-                there
-            }
+        let Some((place, touch)) = self.contact(&march, here, hand.at, dt) else {
+            return self.drawn(obstacle, hand);
         };
         self.at = Some(place.at);
         let stretch = place.at - hand.at;
