@@ -133,10 +133,12 @@ impl Session {
             while let Ok(record) = records.pop() {
                 keep(&record);
             }
-            Ok(Report {
+            let simulation = simulation.join().expect(whole);
+            let graphics = graphics.join().expect(whole);
+            simulation.map(|simulation| Report {
                 haptic,
-                graphics: graphics.join().expect(whole),
-                simulation: simulation.join().expect(whole)?,
+                simulation,
+                graphics,
             })
         })?;
         Ok((sculpting, report))
