@@ -1,0 +1,46 @@
+//! What a rig ticks.
+
+use glam::DVec3;
+
+use super::super::{DeviceError, Felt, Obstacle, Pose, Reading, Renderer};
+
+/// From what a device told to what is sent to it.
+pub trait Drive {
+    /// One tick, `dt` seconds after the one before, with an obstacle that is `age` seconds old.
+    fn tick(
+        &mut self,
+        told: Result<&Reading, &DeviceError>,
+        obstacle: &dyn Obstacle,
+        age: f64,
+        dt: f64,
+    ) -> Felt;
+}
+
+/// A renderer and the limit of a device's force, without any gate: what stability is asked of first.
+#[derive(Clone, Debug)]
+pub struct Bare<R> {
+    /// The renderer.
+    pub renderer: R,
+    /// Largest force, N.
+    pub force: f64,
+}
+
+impl<R: Renderer> Drive for Bare<R> {
+    /// Nothing where nothing was told.
+    fn tick(
+        &mut self,
+        told: Result<&Reading, &DeviceError>,
+        obstacle: &dyn Obstacle,
+        _: f64,
+        dt: f64,
+    ) -> Felt {
+        match told {
+            Ok(reading) if reading.pose.is_finite() => {
+                let mut felt = self.renderer.tick(obstacle, &reading.pose, dt);
+                felt.force = felt.force.clamp_length_max(self.force);
+                felt
+            }
+            _ => Felt::nothing(&Pose::at(DVec3::ZERO)),
+        }
+    }
+}
