@@ -7,10 +7,14 @@
 //! Units: millimetres, seconds, newtons, newton-millimetres. Stiffness is given in newtons per metre and damping in newton-seconds per
 //! metre, as data sheets give them. Distances are positive in the air and negative in the solid; forces and torques act on the hand.
 
+mod coupling;
 mod device;
 mod feel;
+mod multi_point;
 mod obstacle;
 
+pub use coupling::Coupling;
 pub use device::{Abilities, Device, DeviceError, Reading};
 pub use feel::{Contact, Felt, Pose, Renderer};
+pub use multi_point::{MultiPoint, MultiPointError, MultiPointOptions, PointTool, Sampling, ToolError};
 pub use obstacle::{Blend, Obstacle, Together, Touch};
