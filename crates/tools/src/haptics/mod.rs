@@ -15,4 +15,7 @@ mod snapshot;
 pub use device::{Abilities, Device, DeviceError, Reading};
 pub use feel::{Contact, Felt, Pose, Renderer};
 pub use obstacle::{Blend, Obstacle, Together, Touch};
-pub use snapshot::{BrickOptions, DistanceBrick, Interpolation, Surface};
+pub use snapshot::{
+    BrickOptions, Demand, DistanceBrick, FieldObstacle, Interpolation, Moving, Part, Shape, Snapshot,
+    SnapshotMaker, Surface, TouchMap, TouchedObject, Unresolved,
+};
