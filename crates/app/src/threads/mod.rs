@@ -10,9 +10,11 @@ pub mod hand;
 mod haptic;
 pub mod histogram;
 mod priority;
+pub mod rehearsal;
 pub mod sculpting;
 pub mod shown;
 mod simulation;
+pub mod touch;
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
