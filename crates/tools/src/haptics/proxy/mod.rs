@@ -1,4 +1,4 @@
-//! The surface contact point: a proxy of the tool that the solid keeps out [Zilles94, Ruspini97; Kim03 §4.2; Chen00 figs. 13–15].
+//! The surface contact point: a proxy of the tool that the solid keeps out [Zilles94, Ruspini97; Kim03 §4.2; SensAble99 figs. 13–15].
 //!
 //! A tick moves the proxy from where it was as near to the hand as it gets without crossing the solid: free until it
 //! meets the surface, then along tangent planes, of which those of a hollow are kept together, and back onto the surface by its
@@ -34,7 +34,7 @@ pub struct ProxyOptions {
     /// Draws the tool to the surface.
     pub magnet: Option<Magnet>,
     /// Height of humps, mm, that the proxy gets over though the hand draws it back: its spring may stretch by as much
-    /// [Chen00].
+    /// [SensAble99].
     pub stretch: f64,
     /// Speed at which solid that has grown over the tool pushes it out, mm/s.
     pub push_out: f64,
@@ -113,10 +113,11 @@ impl Proxy {
     }
 
     /// Where the proxy goes from `here`, and what the surface is like there; nowhere if the hand is free.
-    fn contact(&mut self, march: &March, here: Place, hand: DVec3, dt: f64) -> Option<(Place, Touch)> {
-        let rests = here.distance - march.clearance <= 2.0 * march.tolerance;
+    fn contact(&mut self, march: &March, from: Place, hand: DVec3, dt: f64) -> Option<(Place, Touch)> {
+        // Friction counts from where the surface is met.
+        let here = march.onward(from, hand)?;
         let law = self.options.friction;
-        if let Some(normal) = here.normal().filter(|_| rests) {
+        if let Some(normal) = here.normal() {
             let touch = touch(march.obstacle, &here);
             if law.holds(touch.friction, hand - here.at, normal, self.sticks) {
                 self.sticks = true;
@@ -133,7 +134,7 @@ impl Proxy {
         let normal = there.normal().unwrap_or(DVec3::ZERO);
         self.leaning += dt / (dt + LEANING) * (normal - self.leaning);
         let touch = touch(march.obstacle, &there);
-        if !rests || touch.friction == 0.0 {
+        if touch.friction == 0.0 {
             self.sticks = false;
             return Some((there, touch));
         }

@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use glam::{DQuat, DVec3};
 
+use super::super::gates::held;
 use super::super::{Abilities, Device, DeviceError, Pose, Reading};
 use super::{Fault, FaultKind, Mechanics, SimulatedHand};
 
@@ -39,6 +40,7 @@ pub struct SimulatedDevice {
     told: Option<(f64, Pose)>,
     stalled_since: Option<f64>,
     is_self_timed: bool,
+    fades: bool,
 }
 
 impl SimulatedDevice {
@@ -60,6 +62,7 @@ impl SimulatedDevice {
             told: None,
             stalled_since: None,
             is_self_timed: false,
+            fades: false,
         }
     }
 
@@ -74,6 +77,13 @@ impl SimulatedDevice {
     #[must_use]
     pub fn self_timed(mut self) -> Self {
         self.is_self_timed = true;
+        self
+    }
+
+    /// With a writer that lets a force fade when no other follows, as [`held`] says.
+    #[must_use]
+    pub fn fading(mut self) -> Self {
+        self.fades = true;
         self
     }
 
@@ -107,12 +117,21 @@ impl SimulatedDevice {
 
     /// Force of the motors now, N.
     pub fn force(&self) -> DVec3 {
-        self.force
+        self.force * self.share()
     }
 
     /// Torque of the motors now, N mm.
     pub fn torque(&self) -> DVec3 {
-        self.torque
+        self.torque * self.share()
+    }
+
+    /// Share that is left of what arrived last.
+    fn share(&self) -> f64 {
+        if self.fades {
+            held(self.now - self.arrived)
+        } else {
+            1.0
+        }
     }
 
     /// Work of the motors on the hand and the mass so far, J: what came out of the port of the loop.
@@ -143,10 +162,10 @@ impl SimulatedDevice {
         if lets_go || self.fails(FaultKind::Unplugged) {
             (self.force, self.torque) = (DVec3::ZERO, DVec3::ZERO);
         }
-        let m = &self.mechanics;
+        let (m, motors) = (&self.mechanics, self.force());
         let (hand, hand_damping) = self.hand.force(self.now, self.at, self.speed);
         // Damping is taken at the end of the step, so that it only ever brakes.
-        let pushed = self.speed + (h / m.mass) * (hand + self.force);
+        let pushed = self.speed + (h / m.mass) * (hand + motors);
         let damped = pushed / (1.0 + h * (m.damping + hand_damping) / m.mass);
         // So is dry friction: what it stops within a step stays at rest, the band of rest of [Karnopp85].
         let stopped = h * m.friction / m.mass;
@@ -157,7 +176,7 @@ impl SimulatedDevice {
             damped * (1.0 - stopped / size)
         };
         self.at += 1e3 * h * self.speed;
-        self.work += h * self.force.dot(self.speed);
+        self.work += h * motors.dot(self.speed);
     }
 
     fn fails(&self, kind: FaultKind) -> bool {

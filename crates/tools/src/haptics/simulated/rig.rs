@@ -70,8 +70,9 @@ impl<'a, D: Drive> Rig<'a, D> {
                 let distance = obstacle.distance(felt.proxy.at).0;
                 (felt, distance, age, cost)
             });
-            // A device that is gone takes no force; the loop has been told by its reading.
-            let _ = self.device.send(felt.force, felt.torque);
+            if let Err(why) = self.device.send(felt.force, felt.torque) {
+                self.drive.refused(&why);
+            }
             if let Some((at, force)) = before
                 && told.is_finite()
             {
