@@ -8,6 +8,7 @@ mod devices;
 mod fans;
 mod picture;
 mod pieces;
+mod threads;
 
 use std::process::ExitCode;
 

@@ -10,7 +10,8 @@ const TRIES: usize = 4;
 
 /// Holds the latest `N` words that one thread put there. Only one thread may put.
 ///
-/// A writer that was stopped in the middle of a put disturbs nobody: it is in a slot that is not announced yet. So a reader
+/// Several threads may get, which the exchange of the three threads does not allow: what a device told is looked at by the haptic
+/// thread and by the one that writes. A writer that was stopped in the middle of a put disturbs nobody: it is in a slot that is not announced yet. So a reader
 /// takes a bounded number of steps, whatever the other does.
 #[derive(Debug)]
 pub struct Mailbox<const N: usize> {
