@@ -6,6 +6,7 @@
 
 mod common;
 
+mod band;
 mod bumps;
 mod carve;
 mod channel;
@@ -19,6 +20,7 @@ mod gated;
 mod groove;
 mod inside;
 mod jitter;
+mod memory;
 mod saturated;
 mod several;
 mod sheet;
