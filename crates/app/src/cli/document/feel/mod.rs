@@ -13,8 +13,8 @@ use glam::DVec3;
 use tools::haptics::gates::GateOptions;
 use tools::haptics::simulated::{Preset, SimulatedDevice};
 use tools::haptics::{
-    BrickOptions, Coupling, Device, Proxy, ProxyOptions, Servo, ServoOptions, TickRecord, Vcp, VcpOptions,
-    Workspace,
+    Abilities, BrickOptions, Coupling, Device, Proxy, ProxyOptions, Servo, ServoOptions, TickRecord, Vcp,
+    VcpOptions, Workspace,
 };
 
 use super::{Told, chosen, failure, open};
@@ -109,7 +109,7 @@ pub fn run(args: &Args) -> Outcome {
     let mechanics = preset.mechanics();
     let workspace = workspace(document.state(), &name, mechanics.reach, args.scale)?;
     let device = SimulatedDevice::new(mechanics, script.hand(&workspace, seconds));
-    let servo = servo(args, &device, workspace)?;
+    let servo = servo(args, device.abilities(), workspace)?;
     notes.extend(servo.granted().note());
     let show = show(args, document.state(), &name, &workspace)?;
     let granted = servo.granted();
@@ -214,11 +214,11 @@ fn object<'a>(state: &'a State, name: &str) -> Outcome<&'a Object> {
 }
 
 /// Coupling and gates as they are wished.
-fn servo(args: &Args, device: &SimulatedDevice, workspace: Workspace) -> Outcome<Servo> {
+fn servo(args: &Args, abilities: &Abilities, workspace: Workspace) -> Outcome<Servo> {
     let scale = workspace.scale;
     let options = ServoOptions {
         stiffness: args.stiffness,
-        period: device.abilities().period,
+        period: abilities.period.min(1e-3),
         workspace,
         gates: GateOptions {
             force: args.force.unwrap_or(f64::INFINITY),
@@ -227,7 +227,7 @@ fn servo(args: &Args, device: &SimulatedDevice, workspace: Workspace) -> Outcome
         ..ServoOptions::default()
     };
     let radius = args.radius * scale;
-    let servo = Servo::new(device.abilities(), options, |stiffness, damping| {
+    let servo = Servo::new(abilities, options, |stiffness, damping| {
         let coupling = Coupling { stiffness, damping };
         match args.contact {
             ContactMode::Proxy => {
@@ -264,7 +264,8 @@ fn show(args: &Args, state: &State, name: &str, workspace: &Workspace) -> Outcom
     let placed = state.placement(name).map_err(failure)?;
     let lattice = object.field.lattice();
     let cell = (placed * lattice.world_from_lattice).matrix3;
-    let knots = cell.x_axis.length() / f64::from(1_u32 << object.detail().min(31));
+    // Half the knot interval: most tools add a level where they work.
+    let knots = 0.5 * cell.x_axis.length() / f64::from(1_u32 << object.detail().min(31));
     let usual = BrickOptions::of_tool(args.radius * workspace.scale, knots);
     let bricks = BrickOptions {
         reach: (REACH * workspace.scale).clamp(
