@@ -35,7 +35,6 @@ pub use snapshot::{
     BrickOptions, Demand, DistanceBrick, FieldObstacle, Interpolation, Moving, Part, Shape, Snapshot,
     SnapshotMaker, Surface, TouchMap, TouchedObject, Unresolved,
 };
-pub use snapshot::{BrickOptions, DistanceBrick, Interpolation, Surface};
 pub use vcp::{Vcp, VcpOptions};
 pub use work::{Embedding, Viscous};
 pub use workspace::Workspace;
