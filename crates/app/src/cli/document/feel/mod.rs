@@ -13,7 +13,7 @@ use glam::DVec3;
 use tools::haptics::gates::GateOptions;
 use tools::haptics::simulated::{Preset, SimulatedDevice};
 use tools::haptics::{
-    Abilities, BrickOptions, Coupling, Device, Proxy, ProxyOptions, Servo, ServoOptions, TickRecord, Vcp,
+    Abilities, Coupling, Demand, Device, Proxy, ProxyOptions, Servo, ServoOptions, TickRecord, Vcp,
     VcpOptions, Workspace,
 };
 
@@ -27,7 +27,7 @@ use crate::cli::simulate;
 use crate::cli::source::Source;
 use crate::threads::rehearsal::Rehearsal;
 use crate::threads::sculpting::Sculpting;
-use crate::threads::touch::Touchable;
+use crate::threads::touch::Toucher;
 use crate::threads::{Session, Show};
 use report::Felt;
 use script::Script;
@@ -37,8 +37,6 @@ use tally::{Tally, write_trace};
 const STEP: f64 = 1.0 / 30.0;
 /// What may be touched is known so far about the hand, mm of the device.
 const REACH: f64 = 15.0;
-/// Nodes of a brick from its middle to its sides at most.
-const NODES: f64 = 24.0;
 /// Time after the last target, s.
 const REST: f64 = 0.5;
 
@@ -254,7 +252,7 @@ fn servo(args: &Args, abilities: &Abilities, workspace: Workspace) -> Outcome<Se
     servo.map_err(Failure::usage)
 }
 
-/// What may be touched, as fine as the object's knots or half the tool.
+/// What may be touched.
 fn show(args: &Args, state: &State, name: &str, workspace: &Workspace) -> Outcome<Show> {
     let object = object(state, name)?;
     if object.meta.iso.is_none() {
@@ -264,15 +262,12 @@ fn show(args: &Args, state: &State, name: &str, workspace: &Workspace) -> Outcom
     let placed = state.placement(name).map_err(failure)?;
     let lattice = object.field.lattice();
     let cell = (placed * lattice.world_from_lattice).matrix3;
-    // Half the knot interval: most tools add a level where they work.
-    let knots = 0.5 * cell.x_axis.length() / f64::from(1_u32 << object.detail().min(31));
-    let usual = BrickOptions::of_tool(args.radius * workspace.scale, knots);
-    let bricks = BrickOptions {
-        reach: (REACH * workspace.scale).clamp(
-            4.0 * usual.band,
-            f64::max(4.0 * usual.band, NODES * usual.spacing),
-        ),
+    let knots = cell.x_axis.length() / f64::from(1_u32 << object.detail().min(31));
+    let usual = Demand::of_ball(args.radius * workspace.scale);
+    let mut toucher = Toucher::new(Demand {
+        reach: (REACH * workspace.scale).max(4.0 * usual.radius),
+        detail: knots,
         ..usual
-    };
-    Ok(Box::new(move |state, at| Touchable::shared(state, at, &bricks)))
+    });
+    Ok(Box::new(move |state, at| toucher.show(state, at)))
 }
