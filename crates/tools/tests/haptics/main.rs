@@ -14,6 +14,7 @@ mod deposit;
 mod edge;
 mod fast;
 mod faults;
+mod field;
 mod friction;
 mod gated;
 mod groove;
