@@ -20,6 +20,7 @@ mod gated;
 mod groove;
 mod inside;
 mod jitter;
+mod same;
 mod saturated;
 mod several;
 mod sheet;
