@@ -17,7 +17,7 @@
 //! what it made, and a reader that must not wait for the allocator does not.
 //!
 //! It is a crate of its own so that its model can be checked by loom without building the program anew under `--cfg loom`: `RUSTFLAGS="--cfg
-//! loom" cargo test -p exchange --lib --target-dir target/loom`. Of all crates it alone holds `unsafe` code.
+//! loom" cargo test -p exchange --lib --target-dir target/loom`.
 
 mod cell;
 

@@ -201,6 +201,11 @@ impl Servo {
         &self.gates
     }
 
+    /// Where the hand was last, in the scene.
+    pub fn hand(&self) -> Pose {
+        self.hand
+    }
+
     /// Where the room of the device lies.
     pub fn workspace(&self) -> &Workspace {
         &self.workspace

@@ -42,8 +42,8 @@ impl Place {
 enum Way {
     /// At its end.
     Free(Place),
-    /// Just inside the solid.
-    Blocked(Place),
+    /// Just inside the solid, with the last place in the air before it.
+    Blocked { before: Place, by: Place },
     /// On it, since it is long.
     Long(Place),
 }
@@ -98,7 +98,7 @@ impl March<'_> {
                     }
                     Some(there)
                 }
-                Way::Blocked(by) => {
+                Way::Blocked { by, .. } => {
                     let plane = self.linear(&by);
                     // A plane that cuts off where the proxy is belongs to solid that is not flat between here and there.
                     is_near = plane.height(here.at) >= -self.tolerance;
@@ -130,10 +130,43 @@ impl March<'_> {
         )
     }
 
+    /// Goes straight to `goal` from a place in the air until the surface is met; a place on the surface stays. Nowhere if
+    /// nothing is in the way.
+    pub fn onward(&self, from: Place, goal: DVec3) -> Option<Place> {
+        if self.rests(&from) || from.at == goal {
+            return self.rests(&from).then_some(from);
+        }
+        match self.walk(from, goal) {
+            Way::Free(there) => self.rests(&there).then_some(there),
+            Way::Long(there) => Some(there),
+            Way::Blocked { before, by } => Some(self.between(before, by)),
+        }
+    }
+
+    /// Where the way from a place in the air to one in the solid meets the surface, by false position; a place in the air.
+    fn between(&self, mut air: Place, mut solid: Place) -> Place {
+        for _ in 0..ONTO {
+            if self.rests(&air) {
+                break;
+            }
+            let [over, under] = [air, solid].map(|place| place.distance - self.clearance);
+            let middle = Place::of(self.obstacle, air.at.lerp(solid.at, over / (over - under)));
+            let is_air = middle.distance >= self.clearance - self.tolerance;
+            *(if is_air { &mut air } else { &mut solid }) = middle;
+        }
+        match self.rests(&air) {
+            true => air,
+            false => self.onto(solid).unwrap_or(air),
+        }
+    }
+
+    fn rests(&self, place: &Place) -> bool {
+        place.distance - self.clearance <= self.tolerance
+    }
+
     /// The plane that holds a place which rests on the surface.
     fn plane(&self, place: &Place) -> Option<Plane> {
-        let rests = place.distance - self.clearance <= self.tolerance;
-        rests.then(|| self.linear(place))
+        self.rests(place).then(|| self.linear(place))
     }
 
     /// Where the surface is by the distance and gradient at a place.
@@ -164,12 +197,13 @@ impl March<'_> {
                 .max(self.tolerance);
             gone += step;
             let is_there = gone >= length;
+            let before = here;
             here = Place::of(
                 self.obstacle,
                 if is_there { to } else { from.at + gone * direction },
             );
             if here.distance < self.clearance - self.tolerance {
-                return Way::Blocked(here);
+                return Way::Blocked { before, by: here };
             }
             if is_there {
                 return Way::Free(here);

@@ -113,10 +113,11 @@ impl Proxy {
     }
 
     /// Where the proxy goes from `here`, and what the surface is like there; nowhere if the hand is free.
-    fn contact(&mut self, march: &March, here: Place, hand: DVec3, dt: f64) -> Option<(Place, Touch)> {
-        let rests = here.distance - march.clearance <= 2.0 * march.tolerance;
+    fn contact(&mut self, march: &March, from: Place, hand: DVec3, dt: f64) -> Option<(Place, Touch)> {
+        // Friction counts from where the surface is met.
+        let here = march.onward(from, hand)?;
         let law = self.options.friction;
-        if let Some(normal) = here.normal().filter(|_| rests) {
+        if let Some(normal) = here.normal() {
             let touch = touch(march.obstacle, &here);
             if law.holds(touch.friction, hand - here.at, normal, self.sticks) {
                 self.sticks = true;
@@ -133,7 +134,7 @@ impl Proxy {
         let normal = there.normal().unwrap_or(DVec3::ZERO);
         self.leaning += dt / (dt + LEANING) * (normal - self.leaning);
         let touch = touch(march.obstacle, &there);
-        if !rests || touch.friction == 0.0 {
+        if touch.friction == 0.0 {
             self.sticks = false;
             return Some((there, touch));
         }
