@@ -111,6 +111,8 @@ enum Command {
     Replay(document::replay::Args),
     /// Write an object of a document as a field
     Export(document::export::Args),
+    /// Touch a document through a device, and work on it by hand
+    Feel(document::feel::Args),
     /// Draw speed against accuracy
     Charts(charts::Args),
 }
@@ -160,6 +162,7 @@ pub fn main() -> ExitCode {
         Command::Redo(a) => document::undo::run(a, true),
         Command::Replay(a) => document::replay::run(a),
         Command::Export(a) => document::export::run(a),
+        Command::Feel(a) => document::feel::run(a),
         Command::Charts(a) => charts::run(a),
     });
     match outcome {
@@ -221,6 +224,7 @@ impl Command {
             Self::Undo(a) | Self::Redo(a) => (a.json, false),
             Self::Replay(a) => (a.json, false),
             Self::Export(a) => (a.json, is_stdout(&a.output)),
+            Self::Feel(a) => (a.json, a.output.as_deref().is_some_and(is_stdout)),
             Self::Charts(a) => (a.json(), false),
         }
     }

@@ -9,6 +9,9 @@ use tools::haptics::{Obstacle, Touch};
 pub trait Snapshot: Obstacle {
     /// A number that follows from all that it tells, or from a fair part.
     fn checksum(&self) -> u64;
+
+    /// Whether it still tells all that a hand at a place may meet until the next one comes.
+    fn covers(&self, at: DVec3) -> bool;
 }
 
 /// Nothing to touch.
@@ -27,6 +30,10 @@ impl Obstacle for Nothing {
 impl Snapshot for Nothing {
     fn checksum(&self) -> u64 {
         0
+    }
+
+    fn covers(&self, _: DVec3) -> bool {
+        false
     }
 }
 
@@ -150,6 +157,10 @@ mod tests {
     impl Snapshot for Plane {
         fn checksum(&self) -> u64 {
             self.0.to_bits()
+        }
+
+        fn covers(&self, _: DVec3) -> bool {
+            true
         }
     }
 

@@ -58,11 +58,15 @@ pub fn run(
         links.heartbeat.store(start.as_nanos() as u64, Ordering::Relaxed);
         links.hand.refresh();
         let hand = *links.hand.get();
-        if let Err(why) = sculpting.step(&hand, &mut control) {
-            break Err(why);
+        let is_changed = match sculpting.step(&hand, &mut control) {
+            Ok(is_changed) => is_changed,
+            Err(why) => break Err(why),
+        };
+        let at = hand.pose.map_or(DVec3::ZERO, |pose| pose.at);
+        let from = to.clone();
+        if is_changed || !to.covers(at) {
+            to = show(sculpting.shown(), at);
         }
-        let from = to;
-        to = show(sculpting.shown(), hand.pose.map_or(DVec3::ZERO, |pose| pose.at));
         sequence += 1;
         let shown = Shown::new(sequence, from, to.clone(), period.as_secs_f64());
         for end in &mut links.shown {
