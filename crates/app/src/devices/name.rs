@@ -67,7 +67,7 @@ pub enum NameError {
         arm: String,
     },
     /// No device is simulated under this name.
-    #[error("{device:?} is no simulated device; write sim: and {}", Preset::ALL.map(Preset::name).join(", "))]
+    #[error("{device:?} is no simulated device; write one of {}", Preset::ALL.map(|p| format!("sim:{}", p.name())).join(", "))]
     Simulated {
         /// What was asked for.
         device: String,
@@ -164,7 +164,7 @@ mod tests {
             ("joystick", "pid[:spring|:constant]"),
             ("spacemouse:pro", "spacemouse"),
             ("script:", "script:FILE"),
-            ("sim:touch", "omni, phantom"),
+            ("sim:touch", "sim:omni, sim:phantom"),
             ("haptikfabriken", "woodenhaptics-2019"),
             ("haptikfabriken:polhem-2", "polhem-1"),
             ("haptikfabriken:polhem-1,fast", "write gravity"),

@@ -11,7 +11,7 @@ use clap::ValueEnum;
 use document::{Object, State};
 use glam::DVec3;
 use tools::haptics::gates::GateOptions;
-use tools::haptics::simulated::{Preset, SimulatedDevice};
+use tools::haptics::simulated::SimulatedDevice;
 use tools::haptics::{
     Abilities, Coupling, Demand, Device, Proxy, ProxyOptions, Servo, ServoOptions, TickRecord, Vcp,
     VcpOptions, Workspace,
@@ -25,6 +25,7 @@ use crate::cli::progress::Bar;
 use crate::cli::quantity::positive;
 use crate::cli::simulate;
 use crate::cli::source::Source;
+use crate::devices::{self, Force, Name};
 use crate::threads::rehearsal::Rehearsal;
 use crate::threads::sculpting::Sculpting;
 use crate::threads::touch::Toucher;
@@ -37,6 +38,10 @@ use tally::{Tally, write_trace};
 const STEP: f64 = 1.0 / 30.0;
 /// What may be touched is known so far about the hand, mm of the device.
 const REACH: f64 = 15.0;
+/// Longest time from tick to tick, s.
+const TICK: f64 = 1e-3;
+/// Time of a session with a device that is not simulated, s.
+const REAL: f64 = 60.0;
 /// Time after the last target, s.
 const REST: f64 = 0.5;
 
@@ -45,10 +50,10 @@ const REST: f64 = 0.5;
 pub struct Args {
     /// Document (.isoclay)
     document: PathBuf,
-    /// Device in the hand: sim:ideal, sim:omni, sim:phantom, sim:falcon or sim:wooden
+    /// Device in the hand: sim:omni and others that are simulated, or one of those that `isoclay devices` names, which may push then
     #[arg(long, value_name = "DEVICE")]
     device: String,
-    /// What the hand does (.toml, or .jsonl with an object a line); - reads standard input. docs/guide.md lists what it may say
+    /// What the hand does, or of a real one only what its first button does (.toml, or .jsonl with an object a line); - reads standard input. docs/guide.md lists what it may say
     #[arg(long, value_name = "SCRIPT")]
     script: PathBuf,
     /// Object to work on, where there are several
@@ -72,10 +77,10 @@ pub struct Args {
     /// How contact is found: by a proxy that the solid keeps out, or anew in every tick
     #[arg(long, value_name = "MODE", default_value = "proxy")]
     contact: ContactMode,
-    /// Time that it takes, s [default: half a second more than the script]
+    /// Time that it takes, s [default: half a second more than the script; of a device that is not simulated 60]
     #[arg(long, value_name = "S", value_parser = positive)]
     seconds: Option<f64>,
-    /// Use three threads and the clock in place of virtual time
+    /// Use three threads and the clock in place of virtual time; any device that is not simulated does
     #[arg(long)]
     real_time: bool,
     /// Print one JSON object instead of a table
@@ -96,18 +101,40 @@ pub fn run(args: &Args) -> Outcome {
     let source = Source::open(&args.script, None, "scripts .toml or .jsonl", &cancel)?.under("--script");
     let about = |why: String| Failure::input(format!("{}: {why}", source.name()));
     let script = Script::parse(&simulate::text(&source)?).map_err(about)?;
-    let preset = preset(&args.device)?;
+    let named: Name = args
+        .device
+        .parse()
+        .map_err(|why| Failure::usage(format!("--device {}: {why}", args.device)))?;
+    let is_real = !matches!(named, Name::Simulated(_));
+    if !is_real && !script.has_targets() {
+        let why = "there is no target; write one [[target]] with time and at, or more";
+        return Err(about(why.into()));
+    }
     let output = args.output.as_ref();
     let output = output.map(|path| Output::check("-o", path, &["csv"], None, &[&source]));
     let output = output.transpose()?;
-    let seconds = args.seconds.unwrap_or(script.end() + REST);
+    let usual = if is_real { REAL } else { script.end() + REST };
+    let seconds = args.seconds.unwrap_or(usual);
     let mut notes = Vec::new();
     let document = open(&args.document, &mut notes)?;
     let name = chosen(document.state(), args.object.as_deref())?.to_string();
-    let mechanics = preset.mechanics();
-    let workspace = workspace(document.state(), &name, mechanics.reach, args.scale)?;
-    let device = SimulatedDevice::new(mechanics, script.hand(&workspace, seconds));
-    let servo = servo(args, device.abilities(), workspace)?;
+    let (held, workspace) = match &named {
+        Name::Simulated(preset) => {
+            let mechanics = preset.mechanics();
+            let workspace = workspace(document.state(), &name, mechanics.reach, args.scale)?;
+            let hand = script.hand(&workspace, seconds);
+            let device = SimulatedDevice::new(mechanics, hand);
+            (Held::Simulated(device), workspace)
+        }
+        named => {
+            let device = devices::open(named, Force::Allowed)
+                .map_err(|why| Failure::input(format!("--device {}: {why}", args.device)))?;
+            let reach = device.abilities().reach;
+            let workspace = workspace(document.state(), &name, reach, args.scale)?;
+            (Held::Real(Box::new(device)), workspace)
+        }
+    };
+    let servo = servo(args, held.abilities(), workspace)?;
     notes.extend(servo.granted().note());
     let show = show(args, document.state(), &name, &workspace)?;
     let granted = servo.granted();
@@ -125,34 +152,41 @@ pub fn run(args: &Args) -> Outcome {
         bar.show("feeling", passed / seconds);
         !cancel.is_cancelled()
     };
-    let (sculpting, threads) = if args.real_time {
-        let session = Session {
-            tick: Duration::from_secs_f64(device.abilities().period),
-            device: Box::new(device.self_timed()),
-            servo,
-            sculpting,
-            show,
-            step: Duration::from_secs_f64(STEP),
-        };
-        let start = std::time::Instant::now();
-        let lasts = || {
-            let passed = start.elapsed().as_secs_f64();
-            passed < seconds && goes_on(passed)
-        };
-        let (sculpting, report) = session.run(lasts, &mut keep).map_err(failure)?;
-        (sculpting, Some(report))
-    } else {
-        let mut rehearsal = Rehearsal {
-            device,
-            servo,
-            sculpting,
-            show,
-            step: STEP,
-        };
-        let mut control = bar.control(&cancel);
-        let run = rehearsal.run(seconds, &mut control, goes_on, &mut keep);
-        run.map_err(failure)?;
-        (rehearsal.sculpting, None)
+    let held = match held {
+        Held::Simulated(device) if args.real_time => Held::Real(Box::new(device.self_timed())),
+        held => held,
+    };
+    let (sculpting, threads) = match held {
+        Held::Real(device) => {
+            let session = Session {
+                tick: Duration::from_secs_f64(device.abilities().period.min(TICK)),
+                device,
+                servo,
+                sculpting,
+                show,
+                step: Duration::from_secs_f64(STEP),
+            };
+            let start = std::time::Instant::now();
+            let lasts = || {
+                let passed = start.elapsed().as_secs_f64();
+                passed < seconds && goes_on(passed)
+            };
+            let (sculpting, report) = session.run(lasts, &mut keep).map_err(failure)?;
+            (sculpting, Some(report))
+        }
+        Held::Simulated(device) => {
+            let mut rehearsal = Rehearsal {
+                device,
+                servo,
+                sculpting,
+                show,
+                step: STEP,
+            };
+            let mut control = bar.control(&cancel);
+            let run = rehearsal.run(seconds, &mut control, goes_on, &mut keep);
+            run.map_err(failure)?;
+            (rehearsal.sculpting, None)
+        }
     };
     bar.clear();
     interrupt::check(&cancel)?;
@@ -175,16 +209,21 @@ pub fn run(args: &Args) -> Outcome {
     felt.print(told, args.json, output.as_ref().is_some_and(Output::is_stdout))
 }
 
-/// The device of a name.
-fn preset(name: &str) -> Outcome<Preset> {
-    let names = Preset::ALL.map(|p| format!("sim:{}", p.name()));
-    let preset = name.strip_prefix("sim:").and_then(Preset::named);
-    preset.ok_or_else(|| {
-        Failure::usage(format!(
-            "--device {name}: names no device that is known here; write one of {}",
-            names.join(", ")
-        ))
-    })
+/// What is in the hand.
+enum Held {
+    /// A device that is computed, with the hand.
+    Simulated(SimulatedDevice),
+    /// One that only the clock moves on.
+    Real(Box<dyn Device>),
+}
+
+impl Held {
+    fn abilities(&self) -> &Abilities {
+        match self {
+            Self::Simulated(device) => device.abilities(),
+            Self::Real(device) => device.abilities(),
+        }
+    }
 }
 
 /// The object in the middle of the device's room.
@@ -216,7 +255,7 @@ fn servo(args: &Args, abilities: &Abilities, workspace: Workspace) -> Outcome<Se
     let scale = workspace.scale;
     let options = ServoOptions {
         stiffness: args.stiffness,
-        period: abilities.period.min(1e-3),
+        period: abilities.period.min(TICK),
         workspace,
         gates: GateOptions {
             force: args.force.unwrap_or(f64::INFINITY),

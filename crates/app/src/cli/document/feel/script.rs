@@ -108,10 +108,14 @@ impl Script {
             }
         }
         match self.target.len() {
-            0 => Err("there is no target; write one [[target]] with time and at, or more".into()),
             n if n > MOST => Err(format!("there are {n} targets; write at most {MOST}")),
             _ => Ok(self),
         }
+    }
+
+    /// Whether it says where the hand is to go.
+    pub fn has_targets(&self) -> bool {
+        !self.target.is_empty()
     }
 
     /// When the last target is reached, s.
