@@ -468,10 +468,10 @@ fn a_usage_of_four_bytes_brings_its_page_and_a_range_has_places() {
 proptest! {
     #[test]
     fn any_descriptor_is_read_or_refused(bytes in prop::collection::vec(any::<u8>(), 0..200), report in any::<[u8; 20]>()) {
-        if let Ok(descriptor) = Descriptor::parse(&bytes) {
-            if let Ok(layout) = Layout::of(descriptor) {
-                let _ = Reports::new(layout.input).take(&report);
-            }
+        if let Ok(descriptor) = Descriptor::parse(&bytes)
+            && let Ok(layout) = Layout::of(descriptor)
+        {
+            let _ = Reports::new(layout.input).take(&report);
         }
     }
 

@@ -124,7 +124,7 @@ pub fn run(args: &Args) -> Outcome {
             let workspace = workspace(document.state(), &name, mechanics.reach, args.scale)?;
             let hand = script.hand(&workspace, seconds);
             let device = SimulatedDevice::new(mechanics, hand);
-            (Held::Simulated(device), workspace)
+            (Held::Simulated(Box::new(device)), workspace)
         }
         named => {
             let device = devices::open(named, Force::Allowed)
@@ -176,7 +176,7 @@ pub fn run(args: &Args) -> Outcome {
         }
         Held::Simulated(device) => {
             let mut rehearsal = Rehearsal {
-                device,
+                device: *device,
                 servo,
                 sculpting,
                 show,
@@ -203,7 +203,7 @@ pub fn run(args: &Args) -> Outcome {
     let told = Told::of(&mut document, notes)?;
     if let Some(output) = &output {
         let written = formats::atomic::replace(output.path(), |out| write_trace(&records, out));
-        written.map_err(|e| output.writing(e.into()))?;
+        written.map_err(|e| output.writing(e))?;
         output.finish()?;
     }
     felt.print(told, args.json, output.as_ref().is_some_and(Output::is_stdout))
@@ -212,7 +212,7 @@ pub fn run(args: &Args) -> Outcome {
 /// What is in the hand.
 enum Held {
     /// A device that is computed, with the hand.
-    Simulated(SimulatedDevice),
+    Simulated(Box<SimulatedDevice>),
     /// One that only the clock moves on.
     Real(Box<dyn Device>),
 }
