@@ -43,7 +43,7 @@ impl Rehearsal {
         self.servo.arm();
         let start = self.servo.workspace().scene_from_device(&self.device.pose());
         let mut made = (self.show)(self.sculpting.shown(), start.at);
-        let mut shown = Shown::new(1, made.clone(), made.clone(), self.step);
+        let mut shown = Shown::new(1, made.clone(), self.step);
         let (mut next_step, mut last_step) = (0.0, 0.0);
         // Half a period of tolerance: times are sums of rounded steps.
         while self.device.now() < until - 0.5 * period {
@@ -52,11 +52,10 @@ impl Rehearsal {
                 if !goes_on(now) {
                     break;
                 }
-                shown = Shown::new(shown.sequence + 1, shown.to.clone(), made.clone(), self.step);
+                shown = Shown::new(shown.sequence + 1, made, self.step);
+                self.sculpting.step(&hand, control)?;
                 let at = hand.pose.map_or(start.at, |pose| pose.at);
-                if self.sculpting.step(&hand, control)? || !made.covers(at) {
-                    made = (self.show)(self.sculpting.shown(), at);
-                }
+                made = (self.show)(self.sculpting.shown(), at);
                 (last_step, next_step) = (now, next_step + self.step);
             }
             let told = self.device.read();

@@ -8,15 +8,16 @@ use document::{DocumentError, State};
 use exchange::{Publisher, Reader};
 use fitting::Control;
 use glam::DVec3;
+use tools::haptics::Snapshot;
 
 use super::clock::{now, sleep_until};
 use super::hand::Hand;
 use super::histogram::Histogram;
 use super::sculpting::Sculpting;
-use super::shown::{Shown, Snapshot};
+use super::shown::Shown;
 
 /// Makes what may be touched of a state, round a place of the scene.
-pub type Show = Box<dyn FnMut(&State, DVec3) -> Arc<dyn Snapshot> + Send>;
+pub type Show = Box<dyn FnMut(&State, DVec3) -> Arc<Snapshot> + Send>;
 
 /// What the simulation has to do with the other threads.
 pub struct Links<'a> {
@@ -51,24 +52,19 @@ pub fn run(
 ) -> Result<SimulationReport, DocumentError> {
     let mut report = SimulationReport::default();
     let mut control = Control::default();
-    let mut to = show(sculpting.shown(), DVec3::ZERO);
     let mut sequence = 0;
     let outcome = loop {
         let start = now();
         links.heartbeat.store(start.as_nanos() as u64, Ordering::Relaxed);
         links.hand.refresh();
         let hand = *links.hand.get();
-        let is_changed = match sculpting.step(&hand, &mut control) {
-            Ok(is_changed) => is_changed,
-            Err(why) => break Err(why),
-        };
-        let at = hand.pose.map_or(DVec3::ZERO, |pose| pose.at);
-        let from = to.clone();
-        if is_changed || !to.covers(at) {
-            to = show(sculpting.shown(), at);
+        if let Err(why) = sculpting.step(&hand, &mut control) {
+            break Err(why);
         }
+        let at = hand.pose.map_or(DVec3::ZERO, |pose| pose.at);
+        let snapshot = show(sculpting.shown(), at);
         sequence += 1;
-        let shown = Shown::new(sequence, from, to.clone(), period.as_secs_f64());
+        let shown = Shown::new(sequence, snapshot, period.as_secs_f64());
         for end in &mut links.shown {
             // What comes back is freed here.
             end.publish(shown.clone());

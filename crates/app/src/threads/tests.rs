@@ -11,15 +11,13 @@ use formats::field::FieldMeta;
 use glam::{DAffine3, DVec3};
 use tools::haptics::gates::{GateOptions, held};
 use tools::haptics::simulated::{Path, Preset, SimulatedDevice, SimulatedHand};
-use tools::haptics::{
-    BrickOptions, Coupling, Proxy, ProxyOptions, Servo, ServoOptions, TickRecord, Workspace,
-};
+use tools::haptics::{Coupling, Demand, Proxy, ProxyOptions, Servo, ServoOptions, TickRecord, Workspace};
 use tools::session::Stroke;
 
 use super::clock::now;
 use super::rehearsal::Rehearsal;
 use super::sculpting::Sculpting;
-use super::touch::Touchable;
+use super::touch::Toucher;
 use super::{Session, Show};
 
 /// Radius of the ball that is worked on, mm; its middle is at (12, 12, 12).
@@ -89,11 +87,12 @@ fn parts() -> (SimulatedDevice, Servo, Show) {
             ..ProxyOptions::default()
         }))
     });
-    let bricks = BrickOptions {
+    let demand = Demand {
         reach: 8.0,
-        ..BrickOptions::of_tool(TOOL, 0.5)
+        ..Demand::of_ball(TOOL)
     };
-    let show = Box::new(move |state: &State, at| Touchable::shared(state, at, &bricks));
+    let mut toucher = Toucher::new(demand);
+    let show = Box::new(move |state: &State, at| toucher.show(state, at));
     (device, servo.unwrap(), show)
 }
 

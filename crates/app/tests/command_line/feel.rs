@@ -21,10 +21,10 @@ buttons = 1
 [[target]]
 time = 3.8
 at = [0.2, 0.0, 0.9]
-buttons = 0
 [[target]]
 time = 4.2
-at = [0.0, 0.0, 1.3]
+at = [0.2, 0.0, 1.3]
+buttons = 0
 "#;
 
 fn ball() -> Bench {

@@ -6,6 +6,7 @@
 
 mod common;
 
+mod band;
 mod bumps;
 mod carve;
 mod channel;
@@ -20,6 +21,7 @@ mod gated;
 mod groove;
 mod inside;
 mod jitter;
+mod memory;
 mod same;
 mod saturated;
 mod several;

@@ -13,8 +13,8 @@ use glam::DVec3;
 use tools::haptics::gates::GateOptions;
 use tools::haptics::simulated::{Preset, SimulatedDevice};
 use tools::haptics::{
-    BrickOptions, Coupling, Device, Proxy, ProxyOptions, Servo, ServoOptions, TickRecord, Vcp, VcpOptions,
-    Workspace,
+    Abilities, Coupling, Demand, Device, Proxy, ProxyOptions, Servo, ServoOptions, TickRecord, Vcp,
+    VcpOptions, Workspace,
 };
 
 use super::{Told, chosen, failure, open};
@@ -27,7 +27,7 @@ use crate::cli::simulate;
 use crate::cli::source::Source;
 use crate::threads::rehearsal::Rehearsal;
 use crate::threads::sculpting::Sculpting;
-use crate::threads::touch::Touchable;
+use crate::threads::touch::Toucher;
 use crate::threads::{Session, Show};
 use report::Felt;
 use script::Script;
@@ -37,8 +37,6 @@ use tally::{Tally, write_trace};
 const STEP: f64 = 1.0 / 30.0;
 /// What may be touched is known so far about the hand, mm of the device.
 const REACH: f64 = 15.0;
-/// Nodes of a brick from its middle to its sides at most.
-const NODES: f64 = 24.0;
 /// Time after the last target, s.
 const REST: f64 = 0.5;
 
@@ -109,7 +107,7 @@ pub fn run(args: &Args) -> Outcome {
     let mechanics = preset.mechanics();
     let workspace = workspace(document.state(), &name, mechanics.reach, args.scale)?;
     let device = SimulatedDevice::new(mechanics, script.hand(&workspace, seconds));
-    let servo = servo(args, &device, workspace)?;
+    let servo = servo(args, device.abilities(), workspace)?;
     notes.extend(servo.granted().note());
     let show = show(args, document.state(), &name, &workspace)?;
     let granted = servo.granted();
@@ -214,11 +212,11 @@ fn object<'a>(state: &'a State, name: &str) -> Outcome<&'a Object> {
 }
 
 /// Coupling and gates as they are wished.
-fn servo(args: &Args, device: &SimulatedDevice, workspace: Workspace) -> Outcome<Servo> {
+fn servo(args: &Args, abilities: &Abilities, workspace: Workspace) -> Outcome<Servo> {
     let scale = workspace.scale;
     let options = ServoOptions {
         stiffness: args.stiffness,
-        period: device.abilities().period,
+        period: abilities.period.min(1e-3),
         workspace,
         gates: GateOptions {
             force: args.force.unwrap_or(f64::INFINITY),
@@ -227,7 +225,7 @@ fn servo(args: &Args, device: &SimulatedDevice, workspace: Workspace) -> Outcome
         ..ServoOptions::default()
     };
     let radius = args.radius * scale;
-    let servo = Servo::new(device.abilities(), options, |stiffness, damping| {
+    let servo = Servo::new(abilities, options, |stiffness, damping| {
         let coupling = Coupling { stiffness, damping };
         match args.contact {
             ContactMode::Proxy => {
@@ -254,7 +252,7 @@ fn servo(args: &Args, device: &SimulatedDevice, workspace: Workspace) -> Outcome
     servo.map_err(Failure::usage)
 }
 
-/// What may be touched, as fine as the object's knots or half the tool.
+/// What may be touched.
 fn show(args: &Args, state: &State, name: &str, workspace: &Workspace) -> Outcome<Show> {
     let object = object(state, name)?;
     if object.meta.iso.is_none() {
@@ -265,13 +263,11 @@ fn show(args: &Args, state: &State, name: &str, workspace: &Workspace) -> Outcom
     let lattice = object.field.lattice();
     let cell = (placed * lattice.world_from_lattice).matrix3;
     let knots = cell.x_axis.length() / f64::from(1_u32 << object.detail().min(31));
-    let usual = BrickOptions::of_tool(args.radius * workspace.scale, knots);
-    let bricks = BrickOptions {
-        reach: (REACH * workspace.scale).clamp(
-            4.0 * usual.band,
-            f64::max(4.0 * usual.band, NODES * usual.spacing),
-        ),
+    let usual = Demand::of_ball(args.radius * workspace.scale);
+    let mut toucher = Toucher::new(Demand {
+        reach: (REACH * workspace.scale).max(4.0 * usual.radius),
+        detail: knots,
         ..usual
-    };
-    Ok(Box::new(move |state, at| Touchable::shared(state, at, &bricks)))
+    });
+    Ok(Box::new(move |state, at| toucher.show(state, at)))
 }
