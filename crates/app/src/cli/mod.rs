@@ -7,6 +7,7 @@ mod ceiling;
 mod chart_dynamics;
 mod chart_edits;
 mod chart_fields;
+mod chart_haptics;
 mod chart_masks;
 mod chart_mesh;
 mod chart_orient;
