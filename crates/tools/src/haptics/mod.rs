@@ -10,12 +10,16 @@
 mod device;
 mod feel;
 mod obstacle;
+mod probe;
 mod snapshot;
+mod stroke_force;
 
 pub use device::{Abilities, Device, DeviceError, Reading};
 pub use feel::{Contact, Felt, Pose, Renderer};
 pub use obstacle::{Blend, Obstacle, Together, Touch};
+pub use probe::{MatterMap, Probe, ProbeOptions, Probed};
 pub use snapshot::{
     BrickOptions, Demand, DistanceBrick, FieldObstacle, Interpolation, Moving, Part, Shape, Snapshot,
     SnapshotMaker, Surface, TouchMap, TouchedObject, Unresolved,
 };
+pub use stroke_force::{StrokeForce, StrokeForceOptions, StrokeStep, newtons_per_unit};
