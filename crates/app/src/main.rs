@@ -4,9 +4,11 @@ mod allocator;
 mod charts;
 mod check;
 mod cli;
+mod devices;
 mod fans;
 mod picture;
 mod pieces;
+mod threads;
 
 use std::process::ExitCode;
 

@@ -1,0 +1,236 @@
+//! Features of the solid between the tool's points, and which points are looked at.
+//!
+//! The source notes that a feature can enter the tool between two points, and mends flat contact of spheres alone [SVO Figs. 20-22].
+//! Here every place of the tool's surface belongs to a point and is at most its `cover` away, so only points that are less clear
+//! than that can hide a feature: finer points about these are looked at, as many in a tick as are allowed. One in the solid
+//! becomes a guest: it joins the tool's points and slides over the tool's surface to where it is deepest, in every tick that
+//! it touches. At rest a guest's gradient is across the tool's surface, so a sharp edge of the solid under a face of
+//! the tool presses along the face's normal.
+
+use glam::DQuat;
+
+use super::super::{Obstacle, Pose};
+use super::MultiPoint;
+use super::places::{Place, ask};
+use super::projection::Twist;
+use super::tool::PointTool;
+
+/// Looks of a guest on its way over the tool, in a look of the tool.
+const SLIDES: usize = 4;
+/// Tangential part of a gradient that is none.
+const LEVEL: f64 = 1e-4;
+
+/// Which points between the tool's own were looked at when, and what follows from it.
+#[derive(Clone, Debug)]
+pub(super) struct Features {
+    /// Clearance of each fine point when it was last asked for; −∞ if never.
+    clearance: Vec<f64>,
+    /// Way and turn of the tool until then.
+    when: Vec<(f64, f64)>,
+    /// Way, mm, with growth of the solid, and turn, rad, of the tool since it was made.
+    way: f64,
+    turned: f64,
+    /// Point whose fine points have their turn next.
+    next: usize,
+    /// Fine points that may still be asked for in this tick.
+    left: usize,
+    /// Step of each guest over the tool, mm.
+    stride: Vec<f64>,
+    /// Points that are not looked at in this tick, with `deepest`.
+    ignored: Vec<bool>,
+    order: Vec<usize>,
+}
+
+impl Features {
+    pub fn new(tool: &PointTool) -> Self {
+        let guests = super::places::GUESTS;
+        Self {
+            clearance: vec![f64::NEG_INFINITY; tool.fine.len()],
+            when: vec![(0.0, 0.0); tool.fine.len()],
+            way: 0.0,
+            turned: 0.0,
+            next: 0,
+            left: 0,
+            stride: vec![tool.spacing; guests],
+            ignored: vec![false; tool.points.len() + guests],
+            order: Vec::with_capacity(tool.points.len()),
+        }
+    }
+
+    pub fn forget(&mut self) {
+        self.clearance.fill(f64::NEG_INFINITY);
+        self.next = 0;
+    }
+
+    /// The tool moved, or the solid did.
+    pub fn moved(&mut self, way: f64, turned: f64) {
+        self.way += way;
+        self.turned += turned;
+    }
+
+    pub fn is_ignored(&self, point: usize) -> bool {
+        self.ignored[point]
+    }
+}
+
+impl MultiPoint {
+    /// Guests at the pose of the proxy: those that no longer touch go, the others slide to where they are deepest.
+    pub(super) fn settle_guests(&mut self, obstacle: &dyn Obstacle, dt: f64) {
+        self.features.left = self.options.fine_checks;
+        for i in self.places.own..self.places.len() {
+            if !self.places.counts[i] {
+                continue;
+            }
+            self.places.there[i] = self.places.here[i];
+            let (pose, turn) = (self.pose, self.places.turn);
+            self.slide(obstacle, &pose, turn, i);
+            self.places.here[i] = self.places.there[i];
+            let here = self.places.here[i];
+            // A point of the tool, or a guest before it, says the same.
+            let is_double = (0..i).any(|k| {
+                let other = self.places.here[k];
+                self.places.counts[k]
+                    && other.on.distance(here.on) < 0.1 * self.tool.spacing
+                    && other.clearance <= here.clearance
+            });
+            self.places.counts[i] = here.clearance < self.tool.spacing && !is_double;
+            self.places.level[i] = (here.clearance + self.options.push_out * dt).min(0.0);
+        }
+    }
+
+    /// Moves a guest over the tool's surface to where it is deeper, at the pose that is tried.
+    pub(super) fn slide(&mut self, obstacle: &dyn Obstacle, pose: &Pose, turn: DQuat, i: usize) {
+        let Some(shape) = self.tool.shape else { return };
+        let back = turn.inverse();
+        let mut place = self.places.there[i];
+        let stride = &mut self.features.stride[i - self.places.own];
+        let across = |place: &Place| {
+            let (g, n) = (back * place.gradient, shape.distance(place.on).1);
+            g - g.dot(n) * n
+        };
+        let mut slope = across(&place);
+        for _ in 0..SLIDES {
+            if slope.length() < LEVEL {
+                break;
+            }
+            let on = shape.project(place.on - *stride * slope);
+            let next = ask(&self.tool, obstacle, pose, turn, on);
+            if next.clearance < place.clearance {
+                let (way, change) = (on - place.on, across(&next) - slope);
+                // Step of Barzilai and Borwein: the way to where the slope is none if it changes on as it did.
+                let curved = way.dot(change);
+                *stride = match curved > 1e-12 {
+                    true => (way.length_squared() / curved)
+                        .clamp(1e-3 * self.tool.spacing, 1e3 * self.tool.spacing),
+                    false => 2.0 * *stride,
+                };
+                slope += change;
+                place = next;
+            } else {
+                *stride *= 0.3;
+            }
+        }
+        *stride = stride.max(1e-3 * self.tool.spacing);
+        self.places.there[i] = place;
+    }
+
+    /// Looks for the solid between the points at the pose that is tried; what is found becomes a guest.
+    pub(super) fn find_features(
+        &mut self,
+        obstacle: &dyn Obstacle,
+        twist: &Twist,
+        pose: &Pose,
+        turn: DQuat,
+        is_violated: &mut bool,
+        is_too_far: &mut bool,
+    ) {
+        let own = self.places.own;
+        if self.tool.fine.is_empty() {
+            return;
+        }
+        let (v, w) = super::march::halves(twist, self.lever);
+        let (way, turned) = (self.features.way + v.length(), self.features.turned + w.length());
+        // Whether or not the pose becomes the proxy's: from it to any later one it is no further than this says.
+        let then = (self.features.way - v.length(), self.features.turned - w.length());
+        for k in 0..own {
+            let parent = (self.features.next + k) % own;
+            if self.places.there[parent].clearance > self.tool.cover[parent] {
+                continue;
+            }
+            for f in self.tool.first[parent]..self.tool.first[parent + 1] {
+                let on = self.tool.fine[f];
+                let since = self.features.when[f];
+                let moved = way - since.0 + (turned - since.1) * (on - self.tool.handle).length();
+                if self.features.clearance[f] - moved >= -self.options.tolerance {
+                    continue;
+                }
+                if self.features.left == 0 {
+                    self.features.next = parent;
+                    return;
+                }
+                self.features.left -= 1;
+                let found = ask(&self.tool, obstacle, pose, turn, on);
+                self.features.clearance[f] = found.clearance;
+                self.features.when[f] = then;
+                if found.clearance < -self.options.tolerance {
+                    self.welcome(obstacle, found, twist, pose, turn, is_violated, is_too_far);
+                }
+            }
+        }
+    }
+
+    /// Makes a fine point that is in the solid a guest.
+    fn welcome(
+        &mut self,
+        obstacle: &dyn Obstacle,
+        found: Place,
+        twist: &Twist,
+        pose: &Pose,
+        turn: DQuat,
+        is_violated: &mut bool,
+        is_too_far: &mut bool,
+    ) {
+        let guests = self.places.own..self.places.len();
+        // Guests that slide to the same place are one.
+        let near = |i: &usize| {
+            self.places.counts[*i] && self.places.there[*i].on.distance(found.on) < self.tool.spacing
+        };
+        if guests
+            .clone()
+            .any(|i| near(&i) && self.places.there[i].clearance <= found.clearance)
+        {
+            return;
+        }
+        let free = guests.clone().find(|i| !self.places.counts[*i]);
+        let clearest = guests.max_by(|a, b| {
+            let clearance = |i: usize| self.places.there[i].clearance;
+            clearance(*a).total_cmp(&clearance(*b))
+        });
+        let Some(i) = free.or(clearest) else { return };
+        self.places.counts[i] = true;
+        self.places.there[i] = found;
+        self.features.stride[i - self.places.own] = self.tool.spacing;
+        self.slide(obstacle, pose, turn, i);
+        // If it was in the solid before it was found, it leaves that as if the solid had grown.
+        let on = self.places.there[i].on;
+        let here = ask(&self.tool, obstacle, &self.pose, self.places.turn, on);
+        self.places.here[i] = here;
+        self.places.level[i] = here.clearance.min(0.0);
+        self.judge(i, twist, turn, is_violated, is_too_far);
+    }
+
+    /// Leaves all points but the deepest out of the steps of this tick.
+    pub(super) fn choose_deepest(&mut self, count: usize) {
+        let Self { places, features, .. } = self;
+        features.order.clear();
+        features.order.extend(0..places.own);
+        let clearance = |i: &usize| places.here[*i].clearance;
+        features
+            .order
+            .sort_unstable_by(|a, b| clearance(a).total_cmp(&clearance(b)).then(a.cmp(b)));
+        features.ignored.fill(true);
+        for i in features.order.iter().take(count) {
+            features.ignored[*i] = false;
+        }
+    }
+}
