@@ -4,6 +4,7 @@ mod allocator;
 mod charts;
 mod check;
 mod cli;
+mod devices;
 mod fans;
 mod picture;
 mod pieces;

@@ -15,6 +15,7 @@ mod charts;
 mod check;
 mod convert;
 mod cost;
+mod devices;
 mod document;
 mod end;
 mod eval;
@@ -113,6 +114,8 @@ enum Command {
     Export(document::export::Args),
     /// Touch a document through a device, and work on it by hand
     Feel(document::feel::Args),
+    /// List devices for touch, test one, or print the rules that let users open them
+    Devices(devices::Args),
     /// Draw speed against accuracy
     Charts(charts::Args),
 }
@@ -163,6 +166,7 @@ pub fn main() -> ExitCode {
         Command::Replay(a) => document::replay::run(a),
         Command::Export(a) => document::export::run(a),
         Command::Feel(a) => document::feel::run(a),
+        Command::Devices(a) => devices::run(a),
         Command::Charts(a) => charts::run(a),
     });
     match outcome {
@@ -225,6 +229,7 @@ impl Command {
             Self::Replay(a) => (a.json, false),
             Self::Export(a) => (a.json, is_stdout(&a.output)),
             Self::Feel(a) => (a.json, a.output.as_deref().is_some_and(is_stdout)),
+            Self::Devices(a) => (a.json, false),
             Self::Charts(a) => (a.json(), false),
         }
     }

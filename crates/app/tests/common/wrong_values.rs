@@ -181,6 +181,12 @@ pub const ROWS: &[Row] = &[
     ("picture", "--zoom", "@cloud --zoom *0", "0.01 to 10000"),
     ("picture", "--at", "@cloud --at *1,2", "three numbers"),
     ("picture", "--at", "@cloud --at *50,-50,50", "another point"),
+    // Devices.
+    ("devices", "--test", "--test *joystick", "spacemouse"),
+    ("devices", "--test", "--test haptikfabriken:*polhem-2", "polhem-1"),
+    ("devices", "--test", "--test pid:*force=0", "up to 100"),
+    ("devices", "--seconds", "--test spacemouse --seconds *0", "1 to 600"),
+    ("devices", "--memory", "--memory *lots", "2GiB"),
     // Phantoms, scenes, charts.
     ("phantom", "--count", "@cloud --count *0", "1 to 100000000"),
     ("phantom", "--size", "@volume --size *3", "4 to 1024"),
