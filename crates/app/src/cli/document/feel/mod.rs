@@ -25,6 +25,7 @@ use crate::cli::progress::Bar;
 use crate::cli::quantity::positive;
 use crate::cli::simulate;
 use crate::cli::source::Source;
+use crate::devices;
 use crate::threads::rehearsal::Rehearsal;
 use crate::threads::sculpting::Sculpting;
 use crate::threads::touch::Toucher;
@@ -37,6 +38,8 @@ use tally::{Tally, write_trace};
 const STEP: f64 = 1.0 / 30.0;
 /// What may be touched is known so far about the hand, mm of the device.
 const REACH: f64 = 15.0;
+/// Time from tick to tick by the clock.
+const TICK: Duration = Duration::from_millis(1);
 /// Time after the last target, s.
 const REST: f64 = 0.5;
 
@@ -45,7 +48,7 @@ const REST: f64 = 0.5;
 pub struct Args {
     /// Document (.isoclay)
     document: PathBuf,
-    /// Device in the hand: sim:ideal, sim:omni, sim:phantom, sim:falcon or sim:wooden
+    /// Device in the hand: sim:ideal, sim:omni, sim:phantom, sim:falcon or sim:wooden, or one that `isoclay devices` lists
     #[arg(long, value_name = "DEVICE")]
     device: String,
     /// What the hand does (.toml, or .jsonl with an object a line); - reads standard input. docs/guide.md lists what it may say
@@ -60,7 +63,7 @@ pub struct Args {
     /// Stiffness at the hand, N/m, as far as the device holds it
     #[arg(long, value_name = "N/M", default_value = "500", value_parser = positive)]
     stiffness: f64,
-    /// Largest force, N; that of the device counts besides
+    /// Largest force, N; that of the device counts besides. Without it a device that is plugged in does not push
     #[arg(long, value_name = "N", value_parser = positive)]
     force: Option<f64>,
     /// Radius of the ball that touches, mm of the device
@@ -96,7 +99,7 @@ pub fn run(args: &Args) -> Outcome {
     let source = Source::open(&args.script, None, "scripts .toml or .jsonl", &cancel)?.under("--script");
     let about = |why: String| Failure::input(format!("{}: {why}", source.name()));
     let script = Script::parse(&simulate::text(&source)?).map_err(about)?;
-    let preset = preset(&args.device)?;
+    let held = Held::named(args)?;
     let output = args.output.as_ref();
     let output = output.map(|path| Output::check("-o", path, &["csv"], None, &[&source]));
     let output = output.transpose()?;
@@ -104,13 +107,12 @@ pub fn run(args: &Args) -> Outcome {
     let mut notes = Vec::new();
     let document = open(&args.document, &mut notes)?;
     let name = chosen(document.state(), args.object.as_deref())?.to_string();
-    let mechanics = preset.mechanics();
-    let workspace = workspace(document.state(), &name, mechanics.reach, args.scale)?;
-    let device = SimulatedDevice::new(mechanics, script.hand(&workspace, seconds));
-    let servo = servo(args, device.abilities(), workspace)?;
-    notes.extend(servo.granted().note());
-    let show = show(args, document.state(), &name, &workspace)?;
+    let abilities = held.abilities();
+    let workspace = workspace(document.state(), &name, abilities.reach, args.scale)?;
+    let servo = servo(args, &abilities, workspace)?;
     let granted = servo.granted();
+    notes.extend(granted.note());
+    let show = show(args, document.state(), &name, &workspace)?;
     let sculpting = Sculpting::new(document, name, script.stroke.clone());
     let mut tally = Tally::default();
     let mut records = Vec::new();
@@ -125,64 +127,132 @@ pub fn run(args: &Args) -> Outcome {
         bar.show("feeling", passed / seconds);
         !cancel.is_cancelled()
     };
-    let (sculpting, threads) = if args.real_time {
-        let session = Session {
-            tick: Duration::from_secs_f64(device.abilities().period),
-            device: Box::new(device.self_timed()),
-            servo,
-            sculpting,
-            show,
-            step: Duration::from_secs_f64(STEP),
-        };
-        let start = std::time::Instant::now();
-        let lasts = || {
-            let passed = start.elapsed().as_secs_f64();
-            passed < seconds && goes_on(passed)
-        };
-        let (sculpting, report) = session.run(lasts, &mut keep).map_err(failure)?;
-        (sculpting, Some(report))
-    } else {
-        let mut rehearsal = Rehearsal {
-            device,
-            servo,
-            sculpting,
-            show,
-            step: STEP,
-        };
-        let mut control = bar.control(&cancel);
-        let run = rehearsal.run(seconds, &mut control, goes_on, &mut keep);
-        run.map_err(failure)?;
-        (rehearsal.sculpting, None)
+    let simulated = |mechanics| {
+        let hand = script.hand(&workspace, seconds).map_err(about)?;
+        Ok::<_, Failure>(SimulatedDevice::new(mechanics, hand))
     };
+    let device: Box<dyn Device> = match held {
+        Held::Simulated(preset) if !args.real_time => {
+            let mut rehearsal = Rehearsal {
+                device: simulated(preset.mechanics())?,
+                servo,
+                sculpting,
+                show,
+                step: STEP,
+            };
+            let mut control = bar.control(&cancel);
+            let run = rehearsal.run(seconds, &mut control, goes_on, &mut keep);
+            run.map_err(failure)?;
+            bar.clear();
+            interrupt::check(&cancel)?;
+            let felt = |tally, strokes| Felt::new(&args.device, granted, &workspace, tally, strokes, None);
+            return told(
+                args,
+                rehearsal.sculpting,
+                felt,
+                tally,
+                &records,
+                notes,
+                output.as_ref(),
+            );
+        }
+        Held::Simulated(preset) => Box::new(simulated(preset.mechanics())?.self_timed()),
+        Held::Plugged(device) => device,
+    };
+    let session = Session {
+        device,
+        servo,
+        sculpting,
+        show,
+        tick: TICK,
+        step: Duration::from_secs_f64(STEP),
+    };
+    let start = std::time::Instant::now();
+    let lasts = || {
+        let passed = start.elapsed().as_secs_f64();
+        passed < seconds && goes_on(passed)
+    };
+    let (sculpting, report) = session.run(lasts, &mut keep).map_err(failure)?;
     bar.clear();
     interrupt::check(&cancel)?;
+    let felt = |tally, strokes| Felt::new(&args.device, granted, &workspace, tally, strokes, Some(&report));
+    told(args, sculpting, felt, tally, &records, notes, output.as_ref())
+}
+
+/// Tells of the end: the document, the trace, and what was counted.
+fn told(
+    args: &Args,
+    sculpting: Sculpting,
+    felt: impl FnOnce(Tally, usize) -> Felt,
+    tally: Tally,
+    records: &[TickRecord],
+    mut notes: Vec<String>,
+    output: Option<&Output>,
+) -> Outcome {
     let (mut document, strokes, told) = sculpting.close();
     notes.extend(told);
-    let felt = Felt::new(
-        &args.device,
-        granted,
-        &workspace,
-        tally,
-        strokes,
-        threads.as_ref(),
-    );
+    let felt = felt(tally, strokes);
     let told = Told::of(&mut document, notes)?;
-    if let Some(output) = &output {
-        let written = formats::atomic::replace(output.path(), |out| write_trace(&records, out));
+    if let Some(output) = output {
+        let written = formats::atomic::replace(output.path(), |out| write_trace(records, out));
         written.map_err(|e| output.writing(e.into()))?;
         output.finish()?;
     }
-    felt.print(told, args.json, output.as_ref().is_some_and(Output::is_stdout))
+    felt.print(told, args.json, output.is_some_and(Output::is_stdout))
 }
 
-/// The device of a name.
+/// What is in the hand.
+enum Held {
+    Simulated(Preset),
+    Plugged(Box<dyn Device>),
+}
+
+impl Held {
+    /// The device of a name. One that is plugged in pushes only if the user says how much.
+    fn named(args: &Args) -> Outcome<Self> {
+        let name = &args.device;
+        if name.starts_with("sim:") {
+            return preset(name).map(Self::Simulated);
+        }
+        let about = |e: &dyn std::fmt::Display| format!("--device {name}: {e}");
+        let known: devices::Name = name.parse().map_err(|e| {
+            Failure::usage(format!(
+                "{}, and {} that are computed",
+                about(&e),
+                simulated_names()
+            ))
+        })?;
+        if args.seconds.is_none() {
+            let why = "a device in a real hand has no end of its own; say --seconds";
+            return Err(Failure::usage(about(&why)));
+        }
+        let force = match args.force {
+            Some(_) => devices::Force::Allowed,
+            None => devices::Force::Withheld,
+        };
+        let opened = devices::open(&known, force).map_err(|e| Failure::input(about(&e)))?;
+        Ok(Self::Plugged(Box::new(opened)))
+    }
+
+    fn abilities(&self) -> Abilities {
+        match self {
+            Self::Simulated(preset) => preset.mechanics().abilities(),
+            Self::Plugged(device) => device.abilities().clone(),
+        }
+    }
+}
+
+fn simulated_names() -> String {
+    Preset::ALL.map(|p| format!("sim:{}", p.name())).join(", ")
+}
+
+/// The computed device of a name.
 fn preset(name: &str) -> Outcome<Preset> {
-    let names = Preset::ALL.map(|p| format!("sim:{}", p.name()));
     let preset = name.strip_prefix("sim:").and_then(Preset::named);
     preset.ok_or_else(|| {
         Failure::usage(format!(
             "--device {name}: names no device that is known here; write one of {}",
-            names.join(", ")
+            simulated_names()
         ))
     })
 }

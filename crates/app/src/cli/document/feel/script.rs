@@ -108,7 +108,6 @@ impl Script {
             }
         }
         match self.target.len() {
-            0 => Err("there is no target; write one [[target]] with time and at, or more".into()),
             n if n > MOST => Err(format!("there are {n} targets; write at most {MOST}")),
             _ => Ok(self),
         }
@@ -120,7 +119,13 @@ impl Script {
     }
 
     /// The hand that does it for so many seconds, in the room of a device.
-    pub fn hand(&self, workspace: &Workspace, seconds: f64) -> SimulatedHand {
+    ///
+    /// # Errors
+    /// A sentence, if it says no target.
+    pub fn hand(&self, workspace: &Workspace, seconds: f64) -> Result<SimulatedHand, String> {
+        if self.target.is_empty() {
+            return Err("there is no target; write one [[target]] with time and at, or more".into());
+        }
         let mut targets = self.target.clone();
         let end = self.end();
         let mut start = end;
@@ -147,7 +152,7 @@ impl Script {
             Grip::Light => SimulatedHand::light(path),
             Grip::Firm => SimulatedHand::firm(path),
         };
-        hand.turning(turns).pressing(buttons)
+        Ok(hand.turning(turns).pressing(buttons))
     }
 }
 
@@ -183,7 +188,7 @@ mod tests {
             shift: DVec3::new(1.0, 2.0, 0.0),
             ..Workspace::default()
         };
-        let hand = script.hand(&workspace, 5.0);
+        let hand = script.hand(&workspace, 5.0).unwrap();
         assert_eq!(hand.path.at(0.0).0, DVec3::new(0.0, 0.0, 1.5));
         assert_eq!(hand.path.at(2.0).0, DVec3::ZERO);
         // Again and again, each time as long.
@@ -197,7 +202,8 @@ mod tests {
     #[test]
     fn what_is_no_script_is_refused_with_its_place() {
         let refused = |text: &str| Script::parse(text).unwrap_err();
-        assert!(refused("").contains("[[target]]"));
+        let nothing = Script::parse("").unwrap().hand(&Workspace::default(), 1.0);
+        assert!(nothing.unwrap_err().contains("[[target]]"));
         assert!(refused("[[target]]\ntime = -1\nat = [0, 0, 0]").contains("target 1"));
         let order = "[[target]]\ntime = 1\nat = [0, 0, 0]\n[[target]]\ntime = 1\nat = [0, 0, 0]";
         assert!(refused(order).contains("target 2"));
