@@ -21,7 +21,6 @@ mod proxy;
 mod record;
 mod servo;
 pub mod simulated;
-mod snapshot;
 mod vcp;
 mod work;
 mod workspace;

@@ -50,7 +50,7 @@ const REST: f64 = 0.5;
 pub struct Args {
     /// Document (.isoclay)
     document: PathBuf,
-    /// Device in the hand: sim:omni and others that are simulated, or one of those that `isoclay devices` names, which may push then
+    /// Device in the hand: sim:omni and others that are simulated, or one of those that `isoclay devices` names
     #[arg(long, value_name = "DEVICE")]
     device: String,
     /// What the hand does, or of a real one only what its first button does (.toml, or .jsonl with an object a line); - reads standard input. docs/guide.md lists what it may say
@@ -65,7 +65,7 @@ pub struct Args {
     /// Stiffness at the hand, N/m, as far as the device holds it
     #[arg(long, value_name = "N/M", default_value = "500", value_parser = positive)]
     stiffness: f64,
-    /// Largest force, N; that of the device counts besides
+    /// Largest force, N; that of the device counts besides. A device that is plugged in pushes only if this is said
     #[arg(long, value_name = "N", value_parser = positive)]
     force: Option<f64>,
     /// Radius of the ball that touches, mm of the device
@@ -127,7 +127,12 @@ pub fn run(args: &Args) -> Outcome {
             (Held::Simulated(Box::new(device)), workspace)
         }
         named => {
-            let device = devices::open(named, Force::Allowed)
+            // Nobody is pushed who did not say how hard.
+            let force = match args.force {
+                Some(_) => Force::Allowed,
+                None => Force::Withheld,
+            };
+            let device = devices::open(named, force)
                 .map_err(|why| Failure::input(format!("--device {}: {why}", args.device)))?;
             let reach = device.abilities().reach;
             let workspace = workspace(document.state(), &name, reach, args.scale)?;
