@@ -72,7 +72,10 @@ pub struct Args {
     #[arg(long)]
     no_report: bool,
     /// Join the manifests of the shards in this directory, and write summary and report from them
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["inputs", "output", "shard", "resume"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = [
+        "inputs", "output", "shard", "resume", "jobs", "threads", "time_limit", "tolerance", "volume_tolerance", "coefficients",
+        "max_depth", "unoriented", "robust", "shape", "unit", "precision", "mesh",
+    ])]
     merge: Option<PathBuf>,
     /// Print a JSON object for each input that has ended, and one for the whole
     #[arg(long)]
