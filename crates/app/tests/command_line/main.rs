@@ -1,5 +1,6 @@
 //! The grammar of the command line, its exit codes, and what goes to stdout.
 
+mod batch;
 #[path = "../common/mod.rs"]
 mod common;
 mod devices;
