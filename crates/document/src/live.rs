@@ -3,7 +3,7 @@
 use bspline::Aabb;
 use fitting::Control;
 use glam::DVec3;
-use tools::live::{LiveStroke, Pose};
+use tools::live::{Grip, LiveStroke, Pose};
 use tools::paint::Paint;
 use tools::session::Stroke;
 
@@ -47,6 +47,11 @@ impl Live {
     /// [`CommandError::Tool`].
     pub fn step(&mut self, pose: Pose, control: &mut Control) -> Result<DVec3, CommandError> {
         Ok(self.stroke.step(pose, control)?)
+    }
+
+    /// What a hand that pulls has hold of, see [`LiveStroke::grip`].
+    pub fn grip(&self) -> Option<Grip> {
+        self.stroke.grip()
     }
 
     /// Lays paint on while a force tool works, see [`LiveStroke::paint`].

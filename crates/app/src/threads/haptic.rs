@@ -89,6 +89,7 @@ pub fn run(
         let obstacle = links.shown.get().after((beat.at - seen).as_secs_f64());
         let beaten = Duration::from_nanos(links.heartbeat.load(Ordering::Relaxed));
         let heartbeat = beat.at.saturating_sub(beaten).as_secs_f64();
+        servo.pull(links.shown.get().pulled);
         let tick = servo.tick(told.as_ref(), &obstacle, heartbeat, elapsed.as_secs_f64());
         if device.send(tick.wrench.force, tick.wrench.torque).is_err() {
             servo.trip(Trip::Writer);

@@ -52,7 +52,7 @@ impl Rehearsal {
                 if !goes_on(now) {
                     break;
                 }
-                shown = Shown::new(shown.sequence + 1, made, self.step);
+                shown = Shown::new(shown.sequence + 1, made, self.step).pulling(self.sculpting.pulled());
                 self.sculpting.step(&hand, control)?;
                 let at = hand.pose.map_or(start.at, |pose| pose.at);
                 made = (self.show)(self.sculpting.shown(), at);
@@ -60,6 +60,7 @@ impl Rehearsal {
             }
             let told = self.device.read();
             let obstacle = shown.after(now - last_step);
+            self.servo.pull(shown.pulled);
             let tick = self.servo.tick(told.as_ref(), &obstacle, now - last_step, period);
             if self.device.send(tick.wrench.force, tick.wrench.torque).is_err() {
                 self.servo.trip(Trip::Writer);

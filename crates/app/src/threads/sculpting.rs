@@ -3,11 +3,14 @@
 use document::{CommandError, Document, DocumentError, Live, State};
 use fitting::Control;
 use glam::{DQuat, DVec3};
-use tools::haptics::Pose;
+use tools::haptics::{Embedding, Pose, StrokeStep, newtons_per_unit};
 use tools::live;
 use tools::session::Stroke;
 
 use super::hand::Hand;
+
+/// A drag by one radius of the tool in unpainted matter is felt as so many newtons.
+const DRAG: f64 = 1.0;
 
 /// A document in a hand. What comes into its journal is what a script would leave there: who does the strokes, and how often
 /// somebody looked, does not show.
@@ -17,6 +20,12 @@ pub struct Sculpting {
     /// What the button begins; without one the hand only touches.
     tool: Option<Stroke>,
     live: Option<Live>,
+    /// How a solid that carves or adds goes in, and the time of a step, s; without it is where the hand is.
+    embedding: Option<(Embedding, f64)>,
+    /// What the hand pulls at, and newtons for each unit of that stroke's force.
+    pulled: Option<StrokeStep>,
+    newtons: Option<f64>,
+    steps: u64,
     presses: u32,
     shown: State,
     strokes: usize,
@@ -32,10 +41,25 @@ impl Sculpting {
             object,
             tool,
             live: None,
+            embedding: None,
+            pulled: None,
+            newtons: None,
+            steps: 0,
             presses: 0,
             strokes: 0,
             notes: Vec::new(),
         }
+    }
+
+    /// With solids that go into the matter by what a rate allows in each step of so many seconds, from where they touch it.
+    pub fn embedding(mut self, embedding: Embedding, step: f64) -> Self {
+        self.embedding = Some((embedding, step));
+        self
+    }
+
+    /// What the hand pulled at in the last step, if it pulls.
+    pub fn pulled(&self) -> Option<StrokeStep> {
+        self.pulled
     }
 
     /// A step with the hand where it is; whether what is to be seen changed.
@@ -64,6 +88,7 @@ impl Sculpting {
             return Ok(is_changed);
         }
         if hand.is_pressing() || is_pressed_anew {
+            let pose = self.embedded(pose, hand);
             is_changed = self.tell(&pose, control) || is_changed;
         }
         if !hand.is_pressing() {
@@ -77,6 +102,7 @@ impl Sculpting {
     /// # Errors
     /// That the edit cannot be written.
     pub fn end(&mut self, control: &mut Control) -> Result<bool, DocumentError> {
+        (self.pulled, self.newtons) = (None, None);
         let Some(live) = self.live.take() else {
             return Ok(false);
         };
@@ -99,15 +125,52 @@ impl Sculpting {
         match told.and_then(|()| live.look()) {
             Ok((state, boxes)) => {
                 self.shown = state;
+                self.pulled = self.grip();
                 !boxes.is_empty()
             }
             Err(why) => {
-                self.live = None;
+                (self.live, self.pulled, self.newtons) = (None, None, None);
                 self.shown = self.document.state().clone();
                 self.note(&why);
                 true
             }
         }
+    }
+
+    /// Where a tool in a hand works.
+    fn embedded(&self, pose: Pose, hand: &Hand) -> Pose {
+        let is_solid = self
+            .tool
+            .as_ref()
+            .is_some_and(|t| t.carve.is_some() || t.add.is_some());
+        match &self.embedding {
+            Some((embedding, step)) if is_solid => Pose {
+                at: embedding.beyond(hand.proxy.at, pose.at, *step),
+                ..pose
+            },
+            _ => pose,
+        }
+    }
+
+    /// What a hand that pulls has hold of, in newtons and millimetres of the scene.
+    fn grip(&mut self) -> Option<StrokeStep> {
+        let grip = self.live.as_ref()?.grip()?;
+        let scene_from_object = self.document.state().placement(&self.object).ok()?;
+        let [reference, cursor] = grip.way.map(|p| scene_from_object.transform_point3(p));
+        // Lengths of the scene for one of the object's.
+        let scale = libm::cbrt(scene_from_object.matrix3.determinant().abs());
+        let [own, unpainted] = grip.rigidity;
+        let newtons = *self
+            .newtons
+            .get_or_insert_with(|| newtons_per_unit(DRAG, unpainted, grip.radius));
+        self.steps += 1;
+        Some(StrokeStep {
+            number: self.steps,
+            reference,
+            cursor,
+            force: newtons * grip.force,
+            rigidity: newtons * own / scale,
+        })
     }
 
     /// A pose of the scene in the object's own world.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::DVec3;
-use tools::haptics::{Moving, Obstacle, Shape, Snapshot};
+use tools::haptics::{Moving, Obstacle, Shape, Snapshot, StrokeStep};
 
 /// Places along each edge of a brick whose distances the checksum takes.
 const LOOKS: u32 = 4;
@@ -17,6 +17,8 @@ pub struct Shown {
     pub snapshot: Arc<Snapshot>,
     /// Time over which one becomes the other, s: an edit is a motion.
     pub over: f64,
+    /// What the hand pulls at, if it pulls: newtons and millimetres of the scene.
+    pub pulled: Option<StrokeStep>,
     /// Of all of these.
     check: u64,
 }
@@ -33,10 +35,18 @@ impl Shown {
             sequence,
             snapshot,
             over,
+            pulled: None,
             check: 0,
         };
         shown.check = shown.sum();
         shown
+    }
+
+    /// With what the hand pulls at.
+    pub fn pulling(mut self, pulled: Option<StrokeStep>) -> Self {
+        self.pulled = pulled;
+        self.check = self.sum();
+        self
     }
 
     /// Whether it is as it was made: no word of it belongs to another.
@@ -64,7 +74,8 @@ impl Shown {
             s.parts().len() as u64,
         ];
         let place = s.at.to_array().map(f64::to_bits);
-        let mut sum = words.into_iter().chain(place).fold(0, mixed);
+        let pulled = self.pulled.map_or([0; 2], |p| [p.number, p.force.to_bits()]);
+        let mut sum = words.into_iter().chain(place).chain(pulled).fold(0, mixed);
         for part in s.parts() {
             let Shape::Brick(brick) = &part.shape else {
                 continue;

@@ -64,7 +64,7 @@ pub fn run(
         let at = hand.pose.map_or(DVec3::ZERO, |pose| pose.at);
         let snapshot = show(sculpting.shown(), at);
         sequence += 1;
-        let shown = Shown::new(sequence, snapshot, period.as_secs_f64());
+        let shown = Shown::new(sequence, snapshot, period.as_secs_f64()).pulling(sculpting.pulled());
         for end in &mut links.shown {
             // What comes back is freed here.
             end.publish(shown.clone());

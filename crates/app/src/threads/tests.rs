@@ -11,7 +11,9 @@ use formats::field::FieldMeta;
 use glam::{DAffine3, DVec3};
 use tools::haptics::gates::{GateOptions, held};
 use tools::haptics::simulated::{Path, Preset, SimulatedDevice, SimulatedHand};
-use tools::haptics::{Coupling, Demand, Proxy, ProxyOptions, Servo, ServoOptions, TickRecord, Workspace};
+use tools::haptics::{
+    Contact, Coupling, Demand, Proxy, ProxyOptions, Servo, ServoOptions, TickRecord, Workspace,
+};
 use tools::session::Stroke;
 
 use super::clock::now;
@@ -260,4 +262,57 @@ fn a_stroke_that_cannot_begin_is_noted_and_the_hand_goes_on() {
     }
     let (_, strokes, notes) = sculpting.close();
     assert_eq!((strokes, notes.len()), (0, 1), "{notes:?}");
+}
+
+/// A hand takes hold of the top of a ball of clay and drags it in by three radii of the tool.
+#[test]
+fn a_pull_is_felt_along_its_way_without_steps() {
+    let directory = tempfile::tempdir().unwrap();
+    let pull: Stroke = toml::from_str("pull = { along = [[12, 12, 21]], radius = 1.5 }").unwrap();
+    // In the device's room, whose middle is that of the ball.
+    let at = |z: f64| DVec3::new(0.0, 0.0, z);
+    let path = Path::smooth([
+        (0.3, at(BALL + 4.0)),
+        (0.6, at(BALL)),
+        (1.6, at(BALL - 4.5)),
+        (2.2, at(BALL - 4.5)),
+        (2.5, at(BALL + 4.0)),
+    ]);
+    let hand = SimulatedHand::light(path).pressing([(0.7, 1), (2.0, 0)]);
+    let (_, servo, show) = parts();
+    let mut rehearsal = Rehearsal {
+        device: SimulatedDevice::new(Preset::Omni.mechanics(), hand),
+        servo,
+        sculpting: Sculpting::new(document(directory.path()), "ball".into(), Some(pull)),
+        show,
+        step: 1.0 / 30.0,
+    };
+    let mut records = Vec::new();
+    let keep = |record: &TickRecord| records.push(*record);
+    rehearsal
+        .run(2.6, &mut Control::default(), |_| true, keep)
+        .unwrap();
+    let (mut document, strokes, notes) = rehearsal.sculpting.close();
+    assert_eq!((strokes, notes), (1, Vec::new()));
+    assert_bounded_and_continuous(&records);
+    let pulling: Vec<_> = records
+        .iter()
+        .filter(|r| r.status.contact() == Contact::Pulls)
+        .collect();
+    assert!(pulling.len() > 1200, "{}", pulling.len());
+    // Against the drag, along it.
+    let most = pulling.iter().map(|r| r.force[2]).fold(0.0, f32::max);
+    let aside = pulling
+        .iter()
+        .map(|r| r.force[0].hypot(r.force[1]))
+        .fold(0.0, f32::max);
+    assert!(most > 0.5 && aside < 0.1 * most, "{most} N, {aside} N aside");
+    // The hand got nothing that it had not given.
+    let mut given = 0.0;
+    for pair in records.windows(2) {
+        let way = DVec3::from(pair[1].hand.map(f64::from)) - DVec3::from(pair[0].hand.map(f64::from));
+        given -= 1e-3 * way.dot(DVec3::from(pair[0].force.map(f64::from)));
+        assert!(given > -1e-4, "{given} J");
+    }
+    assert_eq!(again(&mut document).sha256(), document.state().sha256());
 }

@@ -39,6 +39,8 @@ pub enum Contact {
     Sticks,
     /// The solid holds it by the magnetic band, without pressure.
     Attracted,
+    /// A force tool pulls the solid.
+    Pulls,
     /// It is inside the solid and feels nothing until it is clear.
     Inside,
 }

@@ -3,7 +3,10 @@
 use glam::DVec3;
 
 use super::gates::{Ceiling, GateError, GateOptions, Gates, Granted, Stage, Status, Trip, Wrench};
-use super::{Abilities, DeviceError, Felt, Obstacle, Pose, Reading, Renderer, TickRecord, Workspace};
+use super::{
+    Abilities, Contact, DeviceError, Felt, Obstacle, Pose, Reading, Renderer, StrokeForce,
+    StrokeForceOptions, StrokeStep, TickRecord, Workspace,
+};
 
 /// What a servo is set to.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,6 +78,9 @@ pub struct Tick {
 pub struct Servo {
     workspace: Workspace,
     renderer: Box<dyn Renderer>,
+    stroke: StrokeForce,
+    /// Of the stroke that is at work now.
+    pulled: Option<StrokeStep>,
     gates: Gates,
     granted: Granted,
     last: Felt,
@@ -106,6 +112,11 @@ impl Servo {
         let nowhere = Pose::at(options.workspace.shift);
         Ok(Self {
             workspace: options.workspace,
+            stroke: StrokeForce::new(StrokeForceOptions {
+                stiffness: granted.stiffness / scale,
+                ..StrokeForceOptions::of_scale(1.0)
+            }),
+            pulled: None,
             renderer: make(granted.stiffness / scale, granted.damping / scale),
             gates: Gates::new(abilities, granted.stiffness, options.gates)?,
             granted,
@@ -139,7 +150,7 @@ impl Servo {
             Some(reading) => {
                 self.buttons = reading.buttons;
                 self.hand = self.workspace.scene_from_device(&reading.pose);
-                let felt = self.renderer.tick(obstacle, &self.hand, dt);
+                let felt = self.feel(obstacle, dt);
                 let wished = self.workspace.device_from_scene(Wrench {
                     force: felt.force,
                     torque: felt.torque,
@@ -165,10 +176,30 @@ impl Servo {
         }
     }
 
+    /// Tells what a force tool in the hand did in the last step of the simulation, in newtons and millimetres of the scene; none when
+    /// it has let go. While it pulls, that is felt in place of contact: the hand is where it pulls to, in the solid or out of it.
+    pub fn pull(&mut self, step: Option<StrokeStep>) {
+        self.pulled = step;
+    }
+
+    /// What the hand feels: the stroke that pulls, or else contact, which begins anew after one.
+    fn feel(&mut self, obstacle: &dyn Obstacle, dt: f64) -> Felt {
+        if self.pulled.is_none() && self.stroke.is_at_rest() {
+            return self.renderer.tick(obstacle, &self.hand, dt);
+        }
+        self.renderer.reset();
+        Felt {
+            force: self.stroke.tick(self.pulled.as_ref(), self.hand.at, dt),
+            contact: Contact::Pulls,
+            ..Felt::nothing(&self.hand)
+        }
+    }
+
     /// The user wants force, see [`Gates::arm`]. A contact that there was is forgotten.
     pub fn arm(&mut self) {
         self.gates.arm();
         self.renderer.reset();
+        self.stroke.reset();
     }
 
     /// The user wants no force.

@@ -100,6 +100,11 @@ impl StrokeForce {
         self.last
     }
 
+    /// Whether there is neither a stroke nor what is left of one.
+    pub fn is_at_rest(&self) -> bool {
+        self.step.is_none() && self.last == DVec3::ZERO
+    }
+
     /// What the step at hand says.
     fn spring(&self, hand: DVec3) -> DVec3 {
         let Some(step) = &self.step else {

@@ -20,7 +20,11 @@ impl Embedding {
     /// Where a tool works next: from its touch with the surface towards the hand, for `dt` seconds. `is_clear` says
     /// whether a tool there would be clear of the solid; it is where the proxy is, and the hand is beyond the surface.
     pub fn step(&self, is_clear: impl Fn(DVec3) -> bool, proxy: DVec3, hand: DVec3, dt: f64) -> DVec3 {
-        let touch = touching(is_clear, proxy, hand);
+        self.beyond(touching(is_clear, proxy, hand), hand, dt)
+    }
+
+    /// The same of a tool that touches where it is.
+    pub fn beyond(&self, touch: DVec3, hand: DVec3, dt: f64) -> DVec3 {
         touch + (hand - touch).clamp_length_max(self.rate * dt)
     }
 }

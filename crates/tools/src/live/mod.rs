@@ -57,6 +57,19 @@ impl Pose {
     }
 }
 
+/// What a hand that pulls has hold of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grip {
+    /// Where it took hold, and where it was in the last step.
+    pub way: [DVec3; 2],
+    /// Magnitude of the force on the solid, as [`LiveStroke::step`] gives it.
+    pub force: f64,
+    /// See [`ForceStroke::rigidity`](crate::force::ForceStroke::rigidity).
+    pub rigidity: [f64; 2],
+    /// Radius of the tool.
+    pub radius: f64,
+}
+
 /// A stroke that is not at its end. Dropped, it leaves nothing.
 pub struct LiveStroke {
     /// With the poses so far.
@@ -205,6 +218,19 @@ impl LiveStroke {
             (Some(_), _) => Ok(()),
             (None, _) => self.work.redo(&self.stroke, control).map(|_| ()),
         }
+    }
+
+    /// What a hand that pulls has hold of after its last step; nothing of other tools.
+    pub fn grip(&self) -> Option<Grip> {
+        let tool = self.stroke.pull.as_ref()?;
+        let first = self.first?.at;
+        let (force, by) = self.work.pulled()?;
+        Some(Grip {
+            way: [first, first + by],
+            force: force.force().length(),
+            rigidity: force.rigidity(),
+            radius: tool.radius.0,
+        })
     }
 
     /// Lays paint on, here and now, while a force tool works.

@@ -118,6 +118,11 @@ impl Work {
         Ok(DVec3::ZERO)
     }
 
+    /// The force tool at work, and the pose of its last step.
+    pub fn pulled(&self) -> Option<(&ForceStroke<f32>, DVec3)> {
+        Some((self.force.as_ref()?, self.last?.at))
+    }
+
     /// The motion of a stroke from the canvas as it was.
     pub fn carry(&mut self, stroke: &Stroke, stays: bool, control: &mut Control) -> Result<(), ToolError> {
         self.steps += 1;

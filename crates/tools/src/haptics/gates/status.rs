@@ -40,6 +40,7 @@ impl Status {
             Contact::Sticks => 2,
             Contact::Attracted => 3,
             Contact::Inside => 4,
+            Contact::Pulls => 5,
         })
     }
 
@@ -62,7 +63,8 @@ impl Status {
             1 => Contact::Slides,
             2 => Contact::Sticks,
             3 => Contact::Attracted,
-            _ => Contact::Inside,
+            4 => Contact::Inside,
+            _ => Contact::Pulls,
         }
     }
 

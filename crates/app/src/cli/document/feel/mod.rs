@@ -13,8 +13,8 @@ use glam::DVec3;
 use tools::haptics::gates::GateOptions;
 use tools::haptics::simulated::SimulatedDevice;
 use tools::haptics::{
-    Abilities, Coupling, Demand, Device, Proxy, ProxyOptions, Servo, ServoOptions, TickRecord, Vcp,
-    VcpOptions, Workspace,
+    Abilities, Coupling, Demand, Device, Embedding, Proxy, ProxyOptions, Servo, ServoOptions, TickRecord,
+    Vcp, VcpOptions, Workspace,
 };
 
 use super::{Told, chosen, failure, open};
@@ -143,7 +143,10 @@ pub fn run(args: &Args) -> Outcome {
     notes.extend(servo.granted().note());
     let show = show(args, document.state(), &name, &workspace)?;
     let granted = servo.granted();
-    let sculpting = Sculpting::new(document, name, script.stroke.clone());
+    let mut sculpting = Sculpting::new(document, name, script.stroke.clone());
+    if let Some(rate) = script.rate {
+        sculpting = sculpting.embedding(Embedding { rate: rate.0 }, STEP);
+    }
     let mut tally = Tally::default();
     let mut records = Vec::new();
     let mut keep = |record: &TickRecord| {

@@ -4,6 +4,7 @@ use glam::{DQuat, DVec3};
 use serde::Deserialize;
 use tools::haptics::Workspace;
 use tools::haptics::simulated::{Path, SimulatedHand};
+use tools::number::Positive;
 use tools::session::Stroke;
 
 /// Most targets: a day of ten a second.
@@ -45,6 +46,9 @@ pub struct Script {
     hand: Grip,
     /// What the first button begins and ends; without it the hand only touches.
     pub stroke: Option<Stroke>,
+    /// Speed at which a solid that carves or adds goes into the matter from where it touches it, lengths of the document a second;
+    /// without it works where the hand is.
+    pub rate: Option<Positive>,
     /// Whether the hand begins anew at the end.
     #[serde(default)]
     repeat: bool,

@@ -107,6 +107,7 @@ pub fn write_trace(records: &[TickRecord], out: &mut dyn Write) -> io::Result<()
             Contact::Sticks => "sticks",
             Contact::Attracted => "attracted",
             Contact::Inside => "inside",
+            Contact::Pulls => "pulls",
         };
         write!(out, "{seconds:.6},{contact},{}", u8::from(r.status.is_live()))?;
         for bit in [
