@@ -265,11 +265,12 @@ fn snapshots(c: &mut Criterion<CpuTime>, piece: &Piece) {
             });
         });
         let mut maker = SnapshotMaker::new(demand);
-        let (mut n, mut next) = (0, || {
+        let mut n = 0;
+        let mut next = || {
             n += 1;
             maker.free();
             maker.make(piece.at, &[piece.object(&fields[n % 2], &layers)], n as u64)
-        });
+        };
         next();
         group.bench_function(
             BenchmarkId::new(format!("ball {radius} mm"), "after an edit"),
