@@ -7,7 +7,7 @@
 //! it touches. At rest a guest's gradient is across the tool's surface, so a sharp edge of the solid under a face of
 //! the tool presses along the face's normal.
 
-use glam::DQuat;
+use glam::{DQuat, DVec3};
 
 use super::super::{Obstacle, Pose};
 use super::MultiPoint;
@@ -17,6 +17,8 @@ use super::tool::PointTool;
 
 /// Looks of a guest on its way over the tool, in a look of the tool.
 const SLIDES: usize = 4;
+/// Way from a place of the surface to the nearest fine point, over the spacing of these, at most.
+const HIDES: f64 = 0.75;
 /// Tangential part of a gradient that is none.
 const LEVEL: f64 = 1e-4;
 
@@ -98,40 +100,61 @@ impl MultiPoint {
         }
     }
 
-    /// Moves a guest over the tool's surface to where it is deeper, at the pose that is tried.
+    /// Moves a guest over the tool's surface to where it is deepest, at the pose that is tried.
     pub(super) fn slide(&mut self, obstacle: &dyn Obstacle, pose: &Pose, turn: DQuat, i: usize) {
-        let Some(shape) = self.tool.shape else { return };
-        let back = turn.inverse();
-        let mut place = self.places.there[i];
-        let stride = &mut self.features.stride[i - self.places.own];
-        let across = |place: &Place| {
-            let (g, n) = (back * place.gradient, shape.distance(place.on).1);
-            g - g.dot(n) * n
+        let stride = self.features.stride[i - self.places.own];
+        let (place, stride) = self.slid(obstacle, pose, turn, self.places.there[i], stride);
+        self.places.there[i] = place;
+        self.features.stride[i - self.places.own] = stride;
+    }
+
+    /// Part of a gradient along the tool's surface, in its axes.
+    fn slope(&self, turn: DQuat, place: &Place) -> DVec3 {
+        let Some(shape) = self.tool.shape else {
+            return DVec3::ZERO;
         };
-        let mut slope = across(&place);
+        let (g, n) = (turn.inverse() * place.gradient, shape.distance(place.on).1);
+        g - g.dot(n) * n
+    }
+
+    /// Where a place of the tool's surface gets by steepest descent of the distance, and the next stride, mm.
+    fn slid(
+        &self,
+        obstacle: &dyn Obstacle,
+        pose: &Pose,
+        turn: DQuat,
+        from: Place,
+        stride: f64,
+    ) -> (Place, f64) {
+        let Some(shape) = self.tool.shape else {
+            return (from, stride);
+        };
+        let (least, most) = (1e-3 * self.tool.spacing, 1e3 * self.tool.spacing);
+        let (mut place, mut stride) = (from, stride);
+        let mut slope = self.slope(turn, &place);
         for _ in 0..SLIDES {
             if slope.length() < LEVEL {
                 break;
             }
-            let on = shape.project(place.on - *stride * slope);
+            let on = shape.project(place.on - stride * slope);
             let next = ask(&self.tool, obstacle, pose, turn, on);
             if next.clearance < place.clearance {
-                let (way, change) = (on - place.on, across(&next) - slope);
+                let (way, change) = (on - place.on, self.slope(turn, &next) - slope);
                 // Step of Barzilai and Borwein: the way to where the slope is none if it changes on as it did.
                 let curved = way.dot(change);
-                *stride = match curved > 1e-12 {
-                    true => (way.length_squared() / curved)
-                        .clamp(1e-3 * self.tool.spacing, 1e3 * self.tool.spacing),
-                    false => 2.0 * *stride,
+                stride = if curved > 1e-12 {
+                    way.length_squared() / curved
+                } else {
+                    2.0 * stride
                 };
                 slope += change;
                 place = next;
             } else {
-                *stride *= 0.3;
+                stride *= 0.3;
             }
+            stride = stride.clamp(least, most);
         }
-        *stride = stride.max(1e-3 * self.tool.spacing);
-        self.places.there[i] = place;
+        (place, stride)
     }
 
     /// Looks for the solid between the points at the pose that is tried; what is found becomes a guest.
@@ -169,23 +192,34 @@ impl MultiPoint {
                     return;
                 }
                 self.features.left -= 1;
-                let found = ask(&self.tool, obstacle, pose, turn, on);
-                self.features.clearance[f] = found.clearance;
+                let mut found = ask(&self.tool, obstacle, pose, turn, on);
+                let hides = HIDES * self.tool.spacing;
+                // Nothing within `hides` of the point is less clear: the distance of a convex solid lies above its tangents.
+                let mut bound = found.clearance - hides * self.slope(turn, &found).length().min(1.0);
+                let mut stride = self.tool.spacing;
+                if found.clearance > hides {
+                    bound = found.clearance - hides;
+                } else if bound < -self.options.tolerance {
+                    self.features.left = self.features.left.saturating_sub(SLIDES);
+                    (found, stride) = self.slid(obstacle, pose, turn, found, stride);
+                    bound = found.clearance;
+                }
+                self.features.clearance[f] = bound;
                 self.features.when[f] = then;
                 if found.clearance < -self.options.tolerance {
-                    self.welcome(obstacle, found, twist, pose, turn, is_violated, is_too_far);
+                    self.welcome(obstacle, found, stride, twist, turn, is_violated, is_too_far);
                 }
             }
         }
     }
 
-    /// Makes a fine point that is in the solid a guest.
+    /// Makes a place between the points that is in the solid a guest.
     fn welcome(
         &mut self,
         obstacle: &dyn Obstacle,
         found: Place,
+        stride: f64,
         twist: &Twist,
-        pose: &Pose,
         turn: DQuat,
         is_violated: &mut bool,
         is_too_far: &mut bool,
@@ -209,11 +243,9 @@ impl MultiPoint {
         let Some(i) = free.or(clearest) else { return };
         self.places.counts[i] = true;
         self.places.there[i] = found;
-        self.features.stride[i - self.places.own] = self.tool.spacing;
-        self.slide(obstacle, pose, turn, i);
+        self.features.stride[i - self.places.own] = stride;
         // If it was in the solid before it was found, it leaves that as if the solid had grown.
-        let on = self.places.there[i].on;
-        let here = ask(&self.tool, obstacle, &self.pose, self.places.turn, on);
+        let here = ask(&self.tool, obstacle, &self.pose, self.places.turn, found.on);
         self.places.here[i] = here;
         self.places.level[i] = here.clearance.min(0.0);
         self.judge(i, twist, turn, is_violated, is_too_far);

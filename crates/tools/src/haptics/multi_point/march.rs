@@ -28,7 +28,11 @@ impl MultiPoint {
     /// Moves the proxy as near to the hand as it gets.
     pub(super) fn march(&mut self, obstacle: &dyn Obstacle, hand: &Pose, dt: f64) {
         self.look_again(obstacle, hand, dt);
-        let depth = -self.places.deepest().0;
+        let depth = -self.places.deepest_own().0;
+        if self.is_buried {
+            self.surface(obstacle, dt);
+            return;
+        }
         let most = self.options.step.min(0.5 * obstacle.finest().max(2.0 * SHORTEST));
         self.reach = self.reach.clamp(SHORTEST, most);
         for _ in 0..self.options.iterations {
@@ -38,9 +42,9 @@ impl MultiPoint {
             }
             self.reach = (2.0 * self.reach).min(most);
         }
-        // Only where the rows could not lift it: in growing and closing solids.
+        // Only in growing and closing solids.
         if depth > 10.0 * self.options.tolerance {
-            self.extract(obstacle, depth, dt);
+            self.extract(obstacle, depth);
         }
     }
 
@@ -65,6 +69,7 @@ impl MultiPoint {
             self.places.level[i] = (now.clearance + self.options.push_out * dt).min(0.0);
         }
         self.features.moved(grown, 0.0);
+        self.push_left = self.options.push_out * dt;
         self.settle_guests(obstacle, dt);
         if let Some(count) = self.options.deepest {
             self.choose_deepest(count);
@@ -82,7 +87,7 @@ impl MultiPoint {
     fn step(&mut self, obstacle: &dyn Obstacle, wish: &Twist) -> bool {
         self.gather(obstacle, wish);
         for _ in 0..CUTS {
-            let Some(whole) = self.rows.nearest(wish) else {
+            let Some((whole, push)) = self.goal(wish) else {
                 return false;
             };
             let size = dot(&whole, &whole).sqrt();
@@ -94,7 +99,8 @@ impl MultiPoint {
             match self.try_out(obstacle, &twist) {
                 Tried::Clear => {
                     self.accept(&twist);
-                    return share * size > STILL;
+                    self.push_left -= share * push;
+                    return true;
                 }
                 Tried::Violated => {}
                 Tried::TooFar if self.reach <= SHORTEST => return false,
@@ -103,6 +109,31 @@ impl MultiPoint {
         }
         self.reach = (0.5 * self.reach).max(SHORTEST);
         false
+    }
+
+    /// The twist that leads nearest to a wish by the rows, and how much of it pushes the tool out of the solid: no more than is left
+    /// for this tick.
+    fn goal(&mut self, wish: &Twist) -> Option<(Twist, f64)> {
+        let whole = self.rows.nearest(wish);
+        if whole.is_some() && !self.rows.lacks(self.options.tolerance) {
+            return whole.map(|whole| (whole, 0.0));
+        }
+        // As far as the tool would go if it only had to get no deeper.
+        self.rows.relax();
+        let free = self.rows.nearest(wish)?;
+        let out: Twist = whole.map_or([0.0; 6], |whole| std::array::from_fn(|k| whole[k] - free[k]));
+        let push = dot(&out, &out).sqrt();
+        let share = if push > self.push_left {
+            self.push_left / push
+        } else {
+            1.0
+        };
+        if share < 1.0 || whole.is_none() {
+            for (level, here) in self.places.level.iter_mut().zip(&self.places.here) {
+                *level = level.min(here.clearance);
+            }
+        }
+        Some((std::array::from_fn(|k| free[k] + share * out[k]), share * push))
     }
 
     /// Rows of the points that can meet the solid on the way to a wish.

@@ -50,12 +50,16 @@ pub struct MultiPoint {
     pose: Pose,
     /// Whether the tool was clear of the solid since it began.
     is_clear: bool,
+    /// Whether solid has grown over it so that no point of it knows the way out.
+    is_buried: bool,
     /// Its points, and those between them that touch.
     places: Places,
     features: Features,
     rows: Polyhedron,
     /// Step that the last ticks could take, mm.
     reach: f64,
+    /// Way by which the tool may still be pushed out in this tick, mm.
+    push_left: f64,
     random: Random,
     /// Ticks since the points were turned, with `turn_every`.
     held_for: u32,
@@ -78,10 +82,12 @@ impl MultiPoint {
             lever: (options.angular_stiffness / (1e-3 * options.coupling.stiffness)).sqrt(),
             pose: Pose::at(DVec3::ZERO),
             is_clear: false,
+            is_buried: false,
             rows: Polyhedron::with_capacity(places.len() * (2 + march::CUTS)),
             features: Features::new(&tool),
             places,
             reach: options.step,
+            push_left: 0.0,
             random: Random::new(options.seed),
             held_for: 0,
             stretching: Stretching::default(),
@@ -178,6 +184,7 @@ impl Renderer for MultiPoint {
 
     fn reset(&mut self) {
         self.is_clear = false;
+        self.is_buried = false;
         self.reach = self.options.step;
         self.places.forget();
         self.features.forget();

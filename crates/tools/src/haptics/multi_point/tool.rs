@@ -87,6 +87,8 @@ pub struct PointTool {
     /// Way between finer points, mm.
     pub(super) spacing: f64,
     pub(super) handle: DVec3,
+    /// Of the points.
+    pub(super) middle: DVec3,
 }
 
 /// A length, checked.
@@ -310,6 +312,7 @@ impl PointTool {
         Ok(Self {
             shape,
             nose,
+            middle: points.iter().sum::<DVec3>() / points.len() as f64,
             points,
             fine: owned.into_iter().map(|(_, p)| p).collect(),
             first,

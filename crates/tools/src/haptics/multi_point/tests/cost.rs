@@ -47,6 +47,14 @@ fn ticks_take_no_memory_and_few_looks() {
                 let asked = solid.asked();
                 sum += asked;
                 most = most.max(asked);
+                if name == "plate" && k % 100 == 0 {
+                    println!(
+                        "{k} {:?} {:?} {:?}",
+                        felt.contact,
+                        felt.proxy.at,
+                        hand(f64::from(k) * DT).at
+                    );
+                }
                 touching += usize::from(felt.force.length() > 0.05);
             }
             renderer.reset();

@@ -43,7 +43,7 @@ fn feature_between_the_points_of_a_cube_is_found() {
         assert!(trace.last().felt.force.z > 0.1);
         // With the points alone the rod goes in: the test can fail.
         let trace = follow(&mut renderer(&blind), &solid, 400, hand);
-        missed += usize::from(dense_depth(&blind, &solid, &trace.last().felt.proxy, 0.25) > 0.3);
+        missed += usize::from(dense_depth(&blind, &solid, &trace.last().felt.proxy, 0.25) > 0.15);
     }
     assert!(missed > 12, "{missed}");
 }
