@@ -123,15 +123,10 @@ impl MultiPoint {
         let free = self.rows.nearest(wish)?;
         let out: Twist = whole.map_or([0.0; 6], |whole| std::array::from_fn(|k| whole[k] - free[k]));
         let push = dot(&out, &out).sqrt();
-        let share = if push > self.push_left {
-            self.push_left / push
-        } else {
-            1.0
-        };
-        if share < 1.0 || whole.is_none() {
-            for (level, here) in self.places.level.iter_mut().zip(&self.places.here) {
-                *level = level.min(here.clearance);
-            }
+        let share = if whole.is_none() { 0.0 } else { (self.push_left / push.max(STILL)).clamp(0.0, 1.0) };
+        for (level, here) in self.places.level.iter_mut().zip(&self.places.here) {
+            // What that share of the push lifts a point to.
+            *level -= (1.0 - share) * (*level - here.clearance).max(0.0);
         }
         Some((std::array::from_fn(|k| free[k] + share * out[k]), share * push))
     }

@@ -18,7 +18,7 @@ fn hand(t: f64) -> Pose {
     let at = DVec3::new(
         12.0 * libm::sin(3.0 * t),
         8.0 * libm::cos(2.0 * t),
-        6.0 + 4.0 * libm::cos(5.0 * t),
+        6.0 + 4.0 * libm::cos(5.0 * t) + (30.0 - 200.0 * t).max(0.0),
     );
     turned(
         at,
@@ -47,14 +47,6 @@ fn ticks_take_no_memory_and_few_looks() {
                 let asked = solid.asked();
                 sum += asked;
                 most = most.max(asked);
-                if name == "plate" && k % 100 == 0 {
-                    println!(
-                        "{k} {:?} {:?} {:?}",
-                        felt.contact,
-                        felt.proxy.at,
-                        hand(f64::from(k) * DT).at
-                    );
-                }
                 touching += usize::from(felt.force.length() > 0.05);
             }
             renderer.reset();
