@@ -21,7 +21,7 @@ impl MultiPoint {
         if -deepest < depth - PROGRESS * step || -deepest <= self.options.tolerance {
             return;
         }
-        if self.rise(obstacle, which, step, -deepest) {
+        if self.rise(obstacle, self.out(which, step), -deepest) {
             return;
         }
         let inside = |places: &Places, i: usize| places.here[i].is_exact && places.here[i].clearance < 0.0;
@@ -31,24 +31,19 @@ impl MultiPoint {
             let nth = (0..self.places.own)
                 .filter(|i| inside(&self.places, *i))
                 .nth(chosen);
-            if nth.is_some_and(|i| self.rise(obstacle, i, step, -deepest)) {
+            if nth.is_some_and(|i| self.rise(obstacle, self.out(i, step), -deepest)) {
                 return;
             }
         }
         self.is_buried = self.middle(obstacle).0 < 0.0;
     }
 
-    /// Moves a buried tool along the normal at its middle until that is out.
-    pub(super) fn surface(&mut self, obstacle: &dyn Obstacle, dt: f64) {
+    /// Moves a buried tool along the normal at its middle: until that is out, and on as long as the deepest point rises.
+    pub(super) fn surface(&mut self, obstacle: &dyn Obstacle, depth: f64) {
         let (distance, gradient) = self.middle(obstacle);
-        let way = self.options.push_out * dt * gradient.normalize_or(DVec3::Z);
-        self.places.there.copy_from_slice(&self.places.here);
-        for there in &mut self.places.there {
-            there.clearance -= way.length();
-            there.is_exact = false;
-        }
-        self.accept(&[way.x, way.y, way.z, 0.0, 0.0, 0.0]);
-        self.is_buried = distance < 0.0;
+        let way = self.push_left * gradient.normalize_or(DVec3::Z);
+        let limit = if distance < 0.0 { f64::INFINITY } else { depth };
+        self.is_buried = depth > self.options.tolerance && self.rise(obstacle, way, limit);
     }
 
     /// Distance and gradient at the middle of the tool's points.
@@ -56,13 +51,8 @@ impl MultiPoint {
         obstacle.distance(self.pose.at + arm(&self.tool, self.places.turn, self.tool.middle))
     }
 
-    /// Moves along the normal of a point, no further than it is deep, if all of the tool is less deep by it than `depth`.
-    fn rise(&mut self, obstacle: &dyn Obstacle, i: usize, step: f64, depth: f64) -> bool {
-        let place = self.places.here[i];
-        let way = step.min(-place.clearance) * place.gradient.normalize_or_zero();
-        if way == DVec3::ZERO {
-            return false;
-        }
+    /// Moves the tool if no point of it is then as deep as a limit.
+    fn rise(&mut self, obstacle: &dyn Obstacle, way: DVec3, limit: f64) -> bool {
         let pose = Pose {
             at: self.pose.at + way,
             turn: self.pose.turn,
@@ -81,10 +71,16 @@ impl MultiPoint {
                 deepest = deepest.min(self.places.there[k].clearance);
             }
         }
-        let is_better = -deepest < depth - PROGRESS * step;
+        let is_better = -deepest < limit - PROGRESS * way.length() && way != DVec3::ZERO;
         if is_better {
             self.accept(&[way.x, way.y, way.z, 0.0, 0.0, 0.0]);
         }
         is_better
+    }
+
+    /// Way out of the solid along the normal of a point, no further than it is deep.
+    fn out(&self, i: usize, step: f64) -> DVec3 {
+        let place = &self.places.here[i];
+        step.min(-place.clearance) * place.gradient.normalize_or_zero()
     }
 }

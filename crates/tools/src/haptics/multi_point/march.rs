@@ -30,7 +30,7 @@ impl MultiPoint {
         self.look_again(obstacle, hand, dt);
         let depth = -self.places.deepest_own().0;
         if self.is_buried {
-            self.surface(obstacle, dt);
+            self.surface(obstacle, depth);
             return;
         }
         let most = self.options.step.min(0.5 * obstacle.finest().max(2.0 * SHORTEST));
@@ -123,7 +123,11 @@ impl MultiPoint {
         let free = self.rows.nearest(wish)?;
         let out: Twist = whole.map_or([0.0; 6], |whole| std::array::from_fn(|k| whole[k] - free[k]));
         let push = dot(&out, &out).sqrt();
-        let share = if whole.is_none() { 0.0 } else { (self.push_left / push.max(STILL)).clamp(0.0, 1.0) };
+        let share = if whole.is_none() {
+            0.0
+        } else {
+            (self.push_left / push.max(STILL)).clamp(0.0, 1.0)
+        };
         for (level, here) in self.places.level.iter_mut().zip(&self.places.here) {
             // What that share of the push lifts a point to.
             *level -= (1.0 - share) * (*level - here.clearance).max(0.0);

@@ -123,9 +123,14 @@ fn random_solids_keep_the_tool_out_and_give_no_energy() {
         let trace = follow(&mut renderer, &solid, 2500, hand);
         let (depth, when) = trace.depth(tool, &solid);
         let work = trace.least_work();
+        let between = trace.0[400..]
+            .iter()
+            .step_by(20)
+            .map(|t| dense_depth(tool, &solid, &t.felt.proxy, 0.25))
+            .fold(0.0, f64::max);
         let step = trace.step();
         println!(
-            "{seed} {name}: depth {depth:.4} at {when}, least work {work:.2e} J, step {step:.3} N, {:.1} N mm",
+            "{seed} {name}: depth {depth:.4} at {when}, {between:.4} between points, least work {work:.2e} J, step {step:.3} N, {:.1} N mm",
             trace.torque_step()
         );
         (deepest, least) = (deepest.max(depth), least.min(work));
