@@ -7,6 +7,8 @@ mod cli;
 mod fans;
 mod picture;
 mod pieces;
+#[allow(dead_code, reason = "not all of it is used yet")]
+mod threads;
 
 use std::process::ExitCode;
 

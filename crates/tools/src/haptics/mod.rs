@@ -7,14 +7,31 @@
 //! Units: millimetres, seconds, newtons, newton-millimetres. Stiffness is given in newtons per metre and damping in newton-seconds per
 //! metre, as data sheets give them. Distances are positive in the air and negative in the solid; forces and torques act on the hand.
 
+pub mod controls;
 mod coupling;
 mod device;
 mod feel;
+pub mod gates;
 mod multi_point;
 mod obstacle;
+mod proxy;
+mod record;
+mod servo;
+pub mod simulated;
+mod snapshot;
+mod vcp;
+mod work;
+mod workspace;
 
 pub use coupling::Coupling;
 pub use device::{Abilities, Device, DeviceError, Reading};
 pub use feel::{Contact, Felt, Pose, Renderer};
 pub use multi_point::{MultiPoint, MultiPointError, MultiPointOptions, PointTool, Sampling, ToolError};
 pub use obstacle::{Blend, Obstacle, Together, Touch};
+pub use proxy::{Friction, Magnet, Proxy, ProxyOptions};
+pub use record::TickRecord;
+pub use servo::{Servo, ServoError, ServoOptions, Tick};
+pub use snapshot::{BrickOptions, DistanceBrick, Interpolation, Surface};
+pub use vcp::{Vcp, VcpOptions};
+pub use work::{Embedding, Viscous};
+pub use workspace::Workspace;

@@ -1,0 +1,135 @@
+//! The distance round a tool, sampled: what the haptic thread asks.
+
+use bspline::Aabb;
+use glam::DVec3;
+
+use super::distances::Distances;
+use super::grid::Grid;
+use super::spline::{self, Interpolation};
+use super::surface::Surface;
+use crate::haptics::Obstacle;
+
+/// How a brick is made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BrickOptions {
+    /// From the tool to the sides of the box, mm.
+    pub reach: f64,
+    /// Distance of nodes, mm.
+    pub spacing: f64,
+    /// Up to here, on both sides of the surface, distances are exact, mm.
+    pub band: f64,
+    /// Between nodes.
+    pub interpolation: Interpolation,
+}
+
+impl Default for BrickOptions {
+    /// For a ball of some 2 mm.
+    fn default() -> Self {
+        Self::of_tool(2.0, 0.5)
+    }
+}
+
+impl BrickOptions {
+    /// For a tool of a radius on a field whose knots are so far apart, both mm.
+    pub fn of_tool(radius: f64, detail: f64) -> Self {
+        let spacing = (0.5 * radius).max(detail);
+        Self {
+            reach: 15.0,
+            spacing,
+            band: radius + 2.0 * spacing,
+            interpolation: Interpolation::default(),
+        }
+    }
+}
+
+/// Signed distance to the surface of an object, mm, positive in the air, sampled in a box. An immutable value.
+#[derive(Clone, Debug)]
+pub struct DistanceBrick {
+    grid: Grid,
+    band: f64,
+    interpolation: Interpolation,
+    /// Distances at the nodes, or coefficients of the spline through them.
+    numbers: Vec<f32>,
+    /// The part in which is interpolated.
+    inner: Aabb,
+}
+
+impl DistanceBrick {
+    /// Round a tool that is at `at`.
+    pub fn new(surface: &Surface<'_>, at: DVec3, options: &BrickOptions) -> Self {
+        let h = options.spacing;
+        // A spline needs a node more on each side.
+        let b = Aabb::new(at, at).widened(options.reach + h);
+        let distances = Distances::new(surface, Grid::round(&b, h), options.band);
+        Self::of(&distances, options.interpolation)
+    }
+
+    /// Of distances that are known.
+    pub fn of(distances: &Distances, interpolation: Interpolation) -> Self {
+        let grid = distances.grid;
+        let mut numbers = distances.phi.clone();
+        if interpolation == Interpolation::Cubic {
+            spline::coefficients(&grid, &mut numbers);
+        }
+        Self {
+            grid,
+            band: distances.band,
+            interpolation,
+            numbers,
+            inner: grid.world_box().widened(-grid.spacing),
+        }
+    }
+
+    /// The box in which the distance is known.
+    pub fn world_box(&self) -> &Aabb {
+        &self.inner
+    }
+
+    /// Distance of nodes, mm.
+    pub fn spacing(&self) -> f64 {
+        self.grid.spacing
+    }
+
+    /// Up to here distances are exact, mm; where more is told, it is no less than this.
+    pub fn band(&self) -> f64 {
+        self.band
+    }
+
+    /// Bytes of its numbers.
+    pub fn bytes(&self) -> usize {
+        self.numbers.len() * size_of::<f32>()
+    }
+
+    /// Whether a tool of some size, mm, is so far from the sides of the box that no surface beyond them is nearer than what is told.
+    pub fn covers(&self, p: DVec3, size: f64) -> bool {
+        let room = (p - self.inner.min).min(self.inner.max - p);
+        room.min_element() >= size
+    }
+}
+
+impl Obstacle for DistanceBrick {
+    /// Beyond the box it goes on as at its side, along the gradient there: off by at most twice the way to the box.
+    fn distance(&self, p: DVec3) -> (f64, DVec3) {
+        let inside = p.clamp(self.inner.min, self.inner.max);
+        let h = self.grid.spacing;
+        let q = inside / h;
+        // The last cell has two nodes behind it.
+        let at: [(usize, f32); 3] = std::array::from_fn(|a| {
+            let q = q[a] - self.grid.first[a] as f64;
+            let cell = (q as usize).clamp(1, self.grid.count[a] - 3);
+            (cell, (q - cell as f64) as f32)
+        });
+        let (cell, t) = (at.map(|(cell, _)| cell), at.map(|(_, t)| t));
+        let strides = self.grid.strides();
+        let (value, gradient) = match self.interpolation {
+            Interpolation::Cubic => spline::cubic(&self.numbers, strides, cell, t),
+            Interpolation::Linear => spline::linear(&self.numbers, strides, cell, t),
+        };
+        let gradient = gradient / h;
+        (value + gradient.dot(p - inside), gradient)
+    }
+
+    fn finest(&self) -> f64 {
+        0.5 * self.grid.spacing
+    }
+}

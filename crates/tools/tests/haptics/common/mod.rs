@@ -1,0 +1,13 @@
+//! Obstacles whose distances are exact, and what scenes share.
+
+mod obstacles;
+mod projection;
+mod renderers;
+mod scene;
+mod scripted;
+
+pub use obstacles::{Ball, Bumps, Channel, Edge, Groove, HalfSpace, Passage, Rod, Rubbing, Sheet};
+pub use projection::Projection;
+pub use renderers::{penalty, plane, proxy, vcp};
+pub use scene::{Check, Loop, omni};
+pub use scripted::scripted;
