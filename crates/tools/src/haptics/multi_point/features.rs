@@ -36,6 +36,8 @@ pub(super) struct Features {
     next: usize,
     /// Fine points that may still be asked for in this tick.
     left: usize,
+    /// Whether they did not suffice.
+    pub(super) is_unsure: bool,
     /// Step of each guest over the tool, mm.
     stride: Vec<f64>,
     /// Points that are not looked at in this tick, with `deepest`.
@@ -53,6 +55,7 @@ impl Features {
             turned: 0.0,
             next: 0,
             left: 0,
+            is_unsure: false,
             stride: vec![tool.spacing; guests],
             ignored: vec![false; tool.points.len() + guests],
             order: Vec::with_capacity(tool.points.len()),
@@ -79,6 +82,7 @@ impl MultiPoint {
     /// Guests at the pose of the proxy: those that no longer touch go, the others slide to where they are deepest.
     pub(super) fn settle_guests(&mut self, obstacle: &dyn Obstacle, dt: f64) {
         self.features.left = self.options.fine_checks;
+        self.features.is_unsure = false;
         for i in self.places.own..self.places.len() {
             if !self.places.counts[i] {
                 continue;
@@ -157,6 +161,18 @@ impl MultiPoint {
         (place, stride)
     }
 
+    /// Whether no place between the points is in the solid where the proxy is: all finer points near it are asked for.
+    pub(super) fn is_clear_between(&self, obstacle: &dyn Obstacle) -> bool {
+        (0..self.places.own).all(|i| {
+            let fine = &self.tool.fine[self.tool.first[i]..self.tool.first[i + 1]];
+            self.places.here[i].clearance > self.tool.cover[i]
+                || fine.iter().all(|on| {
+                    ask(&self.tool, obstacle, &self.pose, self.places.turn, *on).clearance
+                        >= -self.options.tolerance
+                })
+        })
+    }
+
     /// Looks for the solid between the points at the pose that is tried; what is found becomes a guest.
     pub(super) fn find_features(
         &mut self,
@@ -188,7 +204,9 @@ impl MultiPoint {
                     continue;
                 }
                 if self.features.left == 0 {
+                    // The rest has its turn in the next tick, and the march goes on in small steps.
                     self.features.next = parent;
+                    self.features.is_unsure = true;
                     return;
                 }
                 self.features.left -= 1;
@@ -202,7 +220,8 @@ impl MultiPoint {
                 } else if bound < -self.options.tolerance {
                     self.features.left = self.features.left.saturating_sub(SLIDES);
                     (found, stride) = self.slid(obstacle, pose, turn, found, stride);
-                    bound = found.clearance;
+                    // Where it has not come to rest, there is more to find.
+                    bound = found.clearance - 0.5 * hides * self.slope(turn, &found).length().min(1.0);
                 }
                 self.features.clearance[f] = bound;
                 self.features.when[f] = then;
@@ -225,14 +244,12 @@ impl MultiPoint {
         is_too_far: &mut bool,
     ) {
         let guests = self.places.own..self.places.len();
-        // Guests that slide to the same place are one.
+        // Those that slide to the same place are one.
         let near = |i: &usize| {
-            self.places.counts[*i] && self.places.there[*i].on.distance(found.on) < self.tool.spacing
+            self.places.counts[*i] && self.places.there[*i].on.distance(found.on) < 0.25 * self.tool.spacing
         };
-        if guests
-            .clone()
-            .any(|i| near(&i) && self.places.there[i].clearance <= found.clearance)
-        {
+        let same = guests.clone().find(near);
+        if same.is_some_and(|i| self.places.there[i].clearance <= found.clearance + self.options.tolerance) {
             return;
         }
         let free = guests.clone().find(|i| !self.places.counts[*i]);
@@ -240,7 +257,9 @@ impl MultiPoint {
             let clearance = |i: usize| self.places.there[i].clearance;
             clearance(*a).total_cmp(&clearance(*b))
         });
-        let Some(i) = free.or(clearest) else { return };
+        let Some(i) = same.or(free).or(clearest) else {
+            return;
+        };
         self.places.counts[i] = true;
         self.places.there[i] = found;
         self.features.stride[i - self.places.own] = stride;

@@ -12,6 +12,8 @@ use super::turn::{exponential, logarithm};
 pub(super) const CUTS: usize = 8;
 /// Way that is none, mm.
 const STILL: f64 = 1e-7;
+/// Longest step once there are no looks left for finer points, mm.
+const UNSURE: f64 = 0.03;
 /// Shortest step, mm.
 const SHORTEST: f64 = 1e-4;
 
@@ -94,7 +96,10 @@ impl MultiPoint {
             if size < STILL {
                 return false;
             }
-            let share = self.allowed(&whole);
+            let mut share = self.allowed(&whole);
+            if self.features.is_unsure {
+                share = share.min(UNSURE / size);
+            }
             let twist = whole.map(|u| share * u);
             match self.try_out(obstacle, &twist) {
                 Tried::Clear => {

@@ -116,7 +116,7 @@ impl MultiPoint {
         self.places.turn = hand.turn;
         self.held_for = 0;
         self.places.look(&self.tool, obstacle, hand);
-        self.is_clear = self.places.deepest().0 >= -self.options.tolerance;
+        self.is_clear = self.places.deepest().0 >= -self.options.tolerance && self.is_clear_between(obstacle);
         self.is_clear
     }
 

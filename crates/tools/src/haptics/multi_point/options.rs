@@ -16,7 +16,8 @@ pub struct MultiPointOptions {
     pub step: f64,
     /// Steps in a tick at most; there are fewer when the proxy has arrived.
     pub iterations: usize,
-    /// Finer points that a tick looks at, at most; the rest have their turn in the next.
+    /// Finer points that a tick looks at, at most. Where they do not suffice for a step, the rest have their turn in the next tick, and the
+    /// proxy goes on in small steps in this one.
     pub fine_checks: usize,
     /// Depth that makes no difference, mm.
     pub tolerance: f64,
@@ -45,7 +46,7 @@ impl Default for MultiPointOptions {
             angular_damping: 0.0,
             step: 0.5,
             iterations: 12,
-            fine_checks: 256,
+            fine_checks: 400,
             tolerance: 1e-3,
             push_out: 100.0,
             slew: 0.25,

@@ -7,7 +7,7 @@ use super::super::random::Random;
 use super::super::{MultiPoint, MultiPointOptions, PointTool, Sampling};
 use super::scenes::*;
 
-fn tools() -> Vec<(&'static str, PointTool)> {
+pub fn tools() -> Vec<(&'static str, PointTool)> {
     let s = Sampling::default();
     vec![
         ("sphere", PointTool::sphere(4.0, s).expect("a sphere")),
@@ -58,7 +58,7 @@ fn no_point_goes_through_a_sheet() {
 }
 
 /// A random solid with features of 2 mm and more, some hollow, some not.
-fn solid(seed: u64) -> Solid<impl Fn(DVec3) -> (f64, DVec3) + Send + Sync> {
+pub fn solid(seed: u64) -> Solid<impl Fn(DVec3) -> (f64, DVec3) + Send + Sync> {
     let mut random = Random::new(seed);
     let balls: Vec<_> = (0..12)
         .map(|_| {
@@ -97,6 +97,27 @@ fn solid(seed: u64) -> Solid<impl Fn(DVec3) -> (f64, DVec3) + Send + Sync> {
     })
 }
 
+/// A tool, and a hand that goes about in a random solid.
+pub fn run(seed: u64, tool: &PointTool) -> (MultiPoint, impl Fn(f64) -> Pose) {
+    let mut random = Random::new(1000 + seed);
+    let (a, b, c) = (vector(&mut random), vector(&mut random), vector(&mut random));
+    let renderer = MultiPoint::new(tool.clone(), MultiPointOptions::default()).expect("options");
+    // From above, then about in the solid, up to some 0.15 m/s and 3 rad/s.
+    let hand = move |t: f64| {
+        let wave = move |w: f64, v: DVec3| {
+            DVec3::new(
+                libm::sin(w * t + v.x),
+                libm::sin(1.3 * w * t + v.y),
+                libm::sin(0.7 * w * t + v.z),
+            )
+        };
+        let at = 10.0 * wave(8.0, 3.0 * a) * DVec3::new(1.0, 1.0, 0.4)
+            + DVec3::new(0.0, 0.0, (30.0 - 60.0 * t).max(2.0));
+        turned(at, 0.8 * wave(3.0, 3.0 * b) + c)
+    };
+    (renderer, hand)
+}
+
 #[test]
 fn random_solids_keep_the_tool_out_and_give_no_energy() {
     let tools = tools();
@@ -104,22 +125,7 @@ fn random_solids_keep_the_tool_out_and_give_no_energy() {
     for seed in 0..25 {
         let solid = solid(seed);
         let (name, tool) = &tools[seed as usize % tools.len()];
-        let mut random = Random::new(1000 + seed);
-        let (a, b, c) = (vector(&mut random), vector(&mut random), vector(&mut random));
-        let mut renderer = MultiPoint::new(tool.clone(), MultiPointOptions::default()).expect("options");
-        // From above, then about in the solid, up to some 0.15 m/s and 3 rad/s.
-        let hand = |t: f64| {
-            let wave = |w: f64, v: DVec3| {
-                DVec3::new(
-                    libm::sin(w * t + v.x),
-                    libm::sin(1.3 * w * t + v.y),
-                    libm::sin(0.7 * w * t + v.z),
-                )
-            };
-            let at = 10.0 * wave(8.0, 3.0 * a) * DVec3::new(1.0, 1.0, 0.4)
-                + DVec3::new(0.0, 0.0, (30.0 - 60.0 * t).max(2.0));
-            turned(at, 0.8 * wave(3.0, 3.0 * b) + c)
-        };
+        let (mut renderer, hand) = run(seed, tool);
         let trace = follow(&mut renderer, &solid, 2500, hand);
         let (depth, when) = trace.depth(tool, &solid);
         let work = trace.least_work();

@@ -5,4 +5,5 @@ mod cost;
 mod features;
 mod growth;
 mod hostile;
+mod probe;
 mod scenes;
