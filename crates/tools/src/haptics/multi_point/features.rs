@@ -11,12 +11,12 @@ use glam::{DQuat, DVec3};
 
 use super::super::{Obstacle, Pose};
 use super::MultiPoint;
-use super::places::{Place, ask};
+use super::places::{Place, arm, ask};
 use super::projection::Twist;
 use super::tool::PointTool;
 
 /// Looks of a guest on its way over the tool, in a look of the tool.
-const SLIDES: usize = 4;
+const SLIDES: usize = 6;
 /// Way from a place of the surface to the nearest fine point, over the spacing of these, at most.
 const HIDES: f64 = 0.75;
 /// Tangential part of a gradient that is none.
@@ -27,10 +27,10 @@ const LEVEL: f64 = 1e-4;
 pub(super) struct Features {
     /// Clearance of each fine point when it was last asked for; −∞ if never.
     clearance: Vec<f64>,
-    /// Way and turn of the tool until then.
-    when: Vec<(f64, f64)>,
-    /// Way, mm, with growth of the solid, and turn, rad, of the tool since it was made.
-    way: f64,
+    /// Where it was then, and growth and turn until then.
+    when: Vec<(DVec3, f64, f64)>,
+    /// Growth of the solid, mm, and turn of the tool, rad, since it was made.
+    grown: f64,
     turned: f64,
     /// Point whose fine points have their turn next.
     next: usize,
@@ -50,8 +50,8 @@ impl Features {
         let guests = super::places::GUESTS;
         Self {
             clearance: vec![f64::NEG_INFINITY; tool.fine.len()],
-            when: vec![(0.0, 0.0); tool.fine.len()],
-            way: 0.0,
+            when: vec![(DVec3::ZERO, 0.0, 0.0); tool.fine.len()],
+            grown: 0.0,
             turned: 0.0,
             next: 0,
             left: 0,
@@ -67,9 +67,9 @@ impl Features {
         self.next = 0;
     }
 
-    /// The tool moved, or the solid did.
-    pub fn moved(&mut self, way: f64, turned: f64) {
-        self.way += way;
+    /// The solid grew, mm, or the tool turned, rad.
+    pub fn changed(&mut self, grown: f64, turned: f64) {
+        self.grown += grown;
         self.turned += turned;
     }
 
@@ -142,19 +142,19 @@ impl MultiPoint {
             }
             let on = shape.project(place.on - stride * slope);
             let next = ask(&self.tool, obstacle, pose, turn, on);
-            if next.clearance < place.clearance {
-                let (way, change) = (on - place.on, self.slope(turn, &next) - slope);
-                // Step of Barzilai and Borwein: the way to where the slope is none if it changes on as it did.
-                let curved = way.dot(change);
-                stride = if curved > 1e-12 {
-                    way.length_squared() / curved
-                } else {
-                    2.0 * stride
-                };
-                slope += change;
-                place = next;
+            let (way, change) = (on - place.on, self.slope(turn, &next) - slope);
+            // Step of Barzilai and Borwein: the way to where the slope is none if it changes on as it did.
+            let curved = way.dot(change);
+            let straight = if curved > 1e-12 {
+                way.length_squared() / curved
             } else {
-                stride *= 0.3;
+                2.0 * stride
+            };
+            if next.clearance < place.clearance {
+                (place, slope) = (next, slope + change);
+                stride = straight;
+            } else {
+                stride = straight.min(0.5 * stride);
             }
             stride = stride.clamp(least, most);
         }
@@ -187,10 +187,8 @@ impl MultiPoint {
         if self.tool.fine.is_empty() {
             return;
         }
-        let (v, w) = super::march::halves(twist, self.lever);
-        let (way, turned) = (self.features.way + v.length(), self.features.turned + w.length());
-        // Whether or not the pose becomes the proxy's: from it to any later one it is no further than this says.
-        let then = (self.features.way - v.length(), self.features.turned - w.length());
+        let turned = self.features.turned + super::march::halves(twist, self.lever).1.length();
+        let hides = HIDES * self.tool.spacing;
         for k in 0..own {
             let parent = (self.features.next + k) % own;
             if self.places.there[parent].clearance > self.tool.cover[parent] {
@@ -198,8 +196,10 @@ impl MultiPoint {
             }
             for f in self.tool.first[parent]..self.tool.first[parent + 1] {
                 let on = self.tool.fine[f];
-                let since = self.features.when[f];
-                let moved = way - since.0 + (turned - since.1) * (on - self.tool.handle).length();
+                let at = pose.at + arm(&self.tool, turn, on);
+                let (then, grown, turned_then) = self.features.when[f];
+                let moved =
+                    at.distance(then) + self.features.grown - grown + hides * (turned - turned_then).abs();
                 if self.features.clearance[f] - moved >= -self.options.tolerance {
                     continue;
                 }
@@ -211,7 +211,6 @@ impl MultiPoint {
                 }
                 self.features.left -= 1;
                 let mut found = ask(&self.tool, obstacle, pose, turn, on);
-                let hides = HIDES * self.tool.spacing;
                 // Nothing within `hides` of the point is less clear: the distance of a convex solid lies above its tangents.
                 let mut bound = found.clearance - hides * self.slope(turn, &found).length().min(1.0);
                 let mut stride = self.tool.spacing;
@@ -224,7 +223,7 @@ impl MultiPoint {
                     bound = found.clearance - 0.5 * hides * self.slope(turn, &found).length().min(1.0);
                 }
                 self.features.clearance[f] = bound;
-                self.features.when[f] = then;
+                self.features.when[f] = (at, self.features.grown, turned);
                 if found.clearance < -self.options.tolerance {
                     self.welcome(obstacle, found, stride, twist, turn, is_violated, is_too_far);
                 }

@@ -14,6 +14,8 @@ pub(super) const CUTS: usize = 8;
 const STILL: f64 = 1e-7;
 /// Longest step once there are no looks left for finer points, mm.
 const UNSURE: f64 = 0.03;
+/// Depth at which a place between the points counts as found late, mm.
+const LATE: f64 = 0.01;
 /// Shortest step, mm.
 const SHORTEST: f64 = 1e-4;
 
@@ -70,7 +72,7 @@ impl MultiPoint {
             // Out of the solid at the speed that is allowed, and never deeper in.
             self.places.level[i] = (now.clearance + self.options.push_out * dt).min(0.0);
         }
-        self.features.moved(grown, 0.0);
+        self.features.changed(grown, 0.0);
         self.push_left = self.options.push_out * dt;
         self.settle_guests(obstacle, dt);
         if let Some(count) = self.options.deepest {
@@ -101,6 +103,7 @@ impl MultiPoint {
                 share = share.min(UNSURE / size);
             }
             let twist = whole.map(|u| share * u);
+            self.share = share;
             match self.try_out(obstacle, &twist) {
                 Tried::Clear => {
                     self.accept(&twist);
@@ -258,15 +261,22 @@ impl MultiPoint {
         is_too_far: &mut bool,
     ) {
         let (there, level) = (self.places.there[i], self.places.level[i]);
-        if there.clearance >= level - self.options.tolerance {
+        // A part of a push lifts by that part.
+        let here = self.places.here[i].clearance;
+        let lack = (level - here).max(0.0);
+        if there.clearance >= level - (1.0 - self.share) * lack - self.options.tolerance {
+            return;
+        }
+        // In the solid the nearest surface is soon another one: what was found there late is pushed out by the rows, and holds nothing.
+        let was_late = i >= self.places.own && here < -LATE;
+        if was_late && there.clearance > here - LATE {
             return;
         }
         let a = self.row_of(there.gradient, arm(&self.tool, turn, there.on));
         let b = level - there.clearance + dot(&a, twist);
         // Where the proxy is now must not be in the solid by it, but for what it already is.
-        let lack = (level - self.places.here[i].clearance).max(0.0);
         if b > lack + 0.1 * self.reach.min(0.1) || !self.rows.push(a, b) {
-            *is_too_far = true;
+            *is_too_far |= !was_late;
         } else {
             *is_violated = true;
         }
@@ -288,7 +298,7 @@ impl MultiPoint {
             self.places.turn = self.pose.turn;
         }
         std::mem::swap(&mut self.places.here, &mut self.places.there);
-        self.features.moved(v.length(), w.length());
+        self.features.changed(0.0, w.length());
     }
 
     /// Keeps the points turned as they are for some ticks.

@@ -60,6 +60,8 @@ pub struct MultiPoint {
     reach: f64,
     /// Way by which the tool may still be pushed out in this tick, mm.
     push_left: f64,
+    /// Share of the way to the goal that is tried.
+    share: f64,
     random: Random,
     /// Ticks since the points were turned, with `turn_every`.
     held_for: u32,
@@ -88,6 +90,7 @@ impl MultiPoint {
             places,
             reach: options.step,
             push_left: 0.0,
+            share: 1.0,
             random: Random::new(options.seed),
             held_for: 0,
             stretching: Stretching::default(),

@@ -6,7 +6,7 @@ use super::super::super::{Pose, Renderer};
 use super::super::{MultiPoint, MultiPointOptions, PointTool, Sampling};
 use super::scenes::*;
 
-fn scene(p: DVec3) -> (f64, DVec3) {
+pub fn scene(p: DVec3) -> (f64, DVec3) {
     let a = or(
         plane(p, DVec3::ZERO, DVec3::Z),
         block(p, DVec3::new(15.0, 0.0, 0.0), DVec3::splat(6.0)),
@@ -14,7 +14,7 @@ fn scene(p: DVec3) -> (f64, DVec3) {
     or(a, ball(p, DVec3::new(-5.0, 3.0, 0.0), 4.0))
 }
 
-fn hand(t: f64) -> Pose {
+pub fn hand(t: f64) -> Pose {
     let at = DVec3::new(
         12.0 * libm::sin(3.0 * t),
         8.0 * libm::cos(2.0 * t),

@@ -5,5 +5,4 @@ mod cost;
 mod features;
 mod growth;
 mod hostile;
-mod probe;
 mod scenes;
