@@ -4,10 +4,10 @@ mod allocator;
 mod charts;
 mod check;
 mod cli;
+mod devices;
 mod fans;
 mod picture;
 mod pieces;
-#[allow(dead_code, reason = "not all of it is used yet")]
 mod threads;
 
 use std::process::ExitCode;

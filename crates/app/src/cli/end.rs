@@ -33,6 +33,7 @@ pub fn tell(failure: &Failure) {
 
 /// Ends the program at once.
 pub fn now(failure: Failure) -> ! {
+    crate::devices::leave_all();
     own::end();
     formats::atomic::abandon();
     let code = failure.code();

@@ -15,6 +15,7 @@ mod charts;
 mod check;
 mod convert;
 mod cost;
+mod devices;
 mod document;
 mod end;
 mod eval;
@@ -111,6 +112,10 @@ enum Command {
     Replay(document::replay::Args),
     /// Write an object of a document as a field
     Export(document::export::Args),
+    /// Touch a document through a device, and work on it by hand
+    Feel(document::feel::Args),
+    /// List devices for touch, test one, or print the rules that let users open them
+    Devices(devices::Args),
     /// Draw speed against accuracy
     Charts(charts::Args),
 }
@@ -160,6 +165,8 @@ pub fn main() -> ExitCode {
         Command::Redo(a) => document::undo::run(a, true),
         Command::Replay(a) => document::replay::run(a),
         Command::Export(a) => document::export::run(a),
+        Command::Feel(a) => document::feel::run(a),
+        Command::Devices(a) => devices::run(a),
         Command::Charts(a) => charts::run(a),
     });
     match outcome {
@@ -221,6 +228,8 @@ impl Command {
             Self::Undo(a) | Self::Redo(a) => (a.json, false),
             Self::Replay(a) => (a.json, false),
             Self::Export(a) => (a.json, is_stdout(&a.output)),
+            Self::Feel(a) => (a.json, a.output.as_deref().is_some_and(is_stdout)),
+            Self::Devices(a) => (a.json, false),
             Self::Charts(a) => (a.json(), false),
         }
     }

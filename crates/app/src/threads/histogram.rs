@@ -36,11 +36,6 @@ impl Histogram {
         self.largest = self.largest.max(time);
     }
 
-    /// Times counted.
-    pub fn count(&self) -> u64 {
-        self.count
-    }
-
     /// Mean; nothing of none.
     pub fn mean(&self) -> Duration {
         let nanoseconds = self.sum.as_nanos() / u128::from(self.count.max(1));
@@ -102,7 +97,7 @@ mod tests {
                 "{share}: {told}"
             );
         }
-        assert_eq!(times.count(), 100_000);
+        assert_eq!(times.count, 100_000);
         assert_eq!(times.mean(), Duration::from_nanos(50_000));
         assert_eq!(times.largest(), Duration::from_nanos(100_000));
         assert_eq!(Histogram::default().quantile(0.5), Duration::ZERO);

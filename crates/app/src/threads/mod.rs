@@ -10,9 +10,11 @@ pub mod hand;
 mod haptic;
 pub mod histogram;
 mod priority;
+pub mod rehearsal;
 pub mod sculpting;
 pub mod shown;
 mod simulation;
+pub mod touch;
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
@@ -120,6 +122,7 @@ impl Session {
             let graphics = named("graphics")
                 .spawn_scoped(scope, move || graphics::run(sight_in, stop))
                 .expect(started);
+            let _stop = StopAtEnd(stop);
             // A thread that ended by itself has failed: its own join tells how.
             while goes_on() && !haptic.is_finished() && !simulation.is_finished() && !graphics.is_finished() {
                 thread::sleep(LOOK);
@@ -142,6 +145,15 @@ impl Session {
             })
         })?;
         Ok((sculpting, report))
+    }
+}
+
+/// Stops all threads when whoever started them goes, also by a panic: else they would be waited for for ever.
+struct StopAtEnd<'a>(&'a AtomicBool);
+
+impl Drop for StopAtEnd<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
     }
 }
 

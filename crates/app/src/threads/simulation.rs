@@ -8,15 +8,16 @@ use document::{DocumentError, State};
 use exchange::{Publisher, Reader};
 use fitting::Control;
 use glam::DVec3;
+use tools::haptics::Snapshot;
 
 use super::clock::{now, sleep_until};
 use super::hand::Hand;
 use super::histogram::Histogram;
 use super::sculpting::Sculpting;
-use super::shown::{Shown, Snapshot};
+use super::shown::Shown;
 
 /// Makes what may be touched of a state, round a place of the scene.
-pub type Show = Box<dyn FnMut(&State, DVec3) -> Arc<dyn Snapshot> + Send>;
+pub type Show = Box<dyn FnMut(&State, DVec3) -> Arc<Snapshot> + Send>;
 
 /// What the simulation has to do with the other threads.
 pub struct Links<'a> {
@@ -51,7 +52,6 @@ pub fn run(
 ) -> Result<SimulationReport, DocumentError> {
     let mut report = SimulationReport::default();
     let mut control = Control::default();
-    let mut to = show(sculpting.shown(), DVec3::ZERO);
     let mut sequence = 0;
     let outcome = loop {
         let start = now();
@@ -61,10 +61,10 @@ pub fn run(
         if let Err(why) = sculpting.step(&hand, &mut control) {
             break Err(why);
         }
-        let from = to;
-        to = show(sculpting.shown(), hand.pose.map_or(DVec3::ZERO, |pose| pose.at));
+        let at = hand.pose.map_or(DVec3::ZERO, |pose| pose.at);
+        let snapshot = show(sculpting.shown(), at);
         sequence += 1;
-        let shown = Shown::new(sequence, from, to.clone(), period.as_secs_f64());
+        let shown = Shown::new(sequence, snapshot, period.as_secs_f64());
         for end in &mut links.shown {
             // What comes back is freed here.
             end.publish(shown.clone());

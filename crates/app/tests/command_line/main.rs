@@ -3,6 +3,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod documents;
+mod feel;
 mod gallery;
 mod meshes;
 mod strokes;
@@ -384,6 +385,7 @@ fn a_wrong_value_is_named_with_its_option_and_its_remedy() {
     let region =
         "[region]\nmin = [-0.5, -0.5, 0.6]\nmax = [0.5, 0.5, 1.3]\n[time]\nduration = 0.01\nstep = 0.01\n";
     bench.write("scene.toml", format!("field = \"field.iclay\"\n{region}"));
+    bench.write("hand.toml", "target = [{ time = 0, at = [0, 0, 2] }]\n");
     let before = bench.files();
     let mut wrong = Vec::new();
     for (commands, options, arguments, word) in wrong_values::ROWS {

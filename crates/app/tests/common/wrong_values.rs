@@ -107,6 +107,20 @@ pub const ROWS: &[Row] = &[
     ("sculpt", "--memory", "clay.isoclay --script scene.toml --memory *lots", "2GiB"),
     ("history undo redo replay", "--memory", "clay.isoclay --memory *lots", "2GiB"),
     ("export", "--memory", "clay.isoclay -o out.iclay --memory *lots", "2GiB"),
+    // Touch.
+    ("feel", "document", "*nowhere.isoclay --device sim:omni --script hand.toml", "check the path"),
+    ("feel", "--device", "clay.isoclay --device *sim:glove --script hand.toml", "sim:omni"),
+    ("feel", "--script", "clay.isoclay --device sim:omni --script *nowhere.toml", "check the path"),
+    ("feel", "--script", "clay.isoclay --device sim:omni --script *notes.docx", "line 1"),
+    ("feel", "--object", "clay.isoclay --device sim:omni --script hand.toml --object *cow", "field"),
+    ("feel", "--output", "clay.isoclay --device sim:omni --script hand.toml -o *out.ply", ".csv"),
+    ("feel", "--stiffness", "clay.isoclay --device sim:omni --script hand.toml --stiffness *0", "above zero"),
+    ("feel", "--force", "clay.isoclay --device sim:omni --script hand.toml --force *none", "number"),
+    ("feel", "--radius", "clay.isoclay --device sim:omni --script hand.toml --radius *0", "above zero"),
+    ("feel", "--scale", "clay.isoclay --device sim:omni --script hand.toml --scale *0", "above zero"),
+    ("feel", "--contact", "clay.isoclay --device sim:omni --script hand.toml --contact *glue", "proxy"),
+    ("feel", "--seconds", "clay.isoclay --device sim:omni --script hand.toml --seconds *0", "above zero"),
+    ("feel", "--memory", "clay.isoclay --device sim:omni --script hand.toml --memory *lots", "2GiB"),
     // How a fit is made.
     ("mesh", "--triangles", "field.iclay -o out.ply --triangles *3", "whole number"),
     ("mesh", "--triangles", "field.iclay -o out.ply --triangles *1e5", "whole number"),
@@ -167,6 +181,12 @@ pub const ROWS: &[Row] = &[
     ("picture", "--zoom", "@cloud --zoom *0", "0.01 to 10000"),
     ("picture", "--at", "@cloud --at *1,2", "three numbers"),
     ("picture", "--at", "@cloud --at *50,-50,50", "another point"),
+    // Devices.
+    ("devices", "--test", "--test *joystick", "spacemouse"),
+    ("devices", "--test", "--test haptikfabriken:*polhem-2", "polhem-1"),
+    ("devices", "--test", "--test pid:*force=0", "up to 100"),
+    ("devices", "--seconds", "--test spacemouse --seconds *0", "1 to 600"),
+    ("devices", "--memory", "--memory *lots", "2GiB"),
     // Phantoms, scenes, charts.
     ("phantom", "--count", "@cloud --count *0", "1 to 100000000"),
     ("phantom", "--size", "@volume --size *3", "4 to 1024"),

@@ -31,7 +31,10 @@ pub use obstacle::{Blend, Obstacle, Together, Touch};
 pub use proxy::{Friction, Magnet, Proxy, ProxyOptions};
 pub use record::TickRecord;
 pub use servo::{Servo, ServoError, ServoOptions, Tick};
-pub use snapshot::{BrickOptions, DistanceBrick, Interpolation, Surface};
+pub use snapshot::{
+    BrickOptions, Demand, DistanceBrick, FieldObstacle, Interpolation, Moving, Part, Shape, Snapshot,
+    SnapshotMaker, Surface, TouchMap, TouchedObject, Unresolved,
+};
 pub use vcp::{Vcp, VcpOptions};
 pub use work::{Embedding, Viscous};
 pub use workspace::Workspace;

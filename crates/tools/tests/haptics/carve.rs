@@ -3,15 +3,15 @@
 use std::sync::Arc;
 
 use glam::DVec3;
-use tools::haptics::Pose;
 use tools::haptics::simulated::{Change, Mechanics, Path, SimulatedHand, World};
+use tools::haptics::{Pose, Renderer};
 
-use crate::common::{Check, HalfSpace, Loop, omni, proxy};
+use crate::common::{Check, HalfSpace, Loop, omni, proxy, vcp};
 
 const DROP: f64 = 0.1;
 
 /// 60 mm in 1.2 s over a floor that sinks at a rate, Hz.
-fn carved(rate: f64, change: Change) -> Check {
+fn carved(rate: f64, change: Change, renderer: impl Renderer) -> Check {
     let of = |x, z| DVec3::new(x, 0.0, z);
     let path = Path::smooth([
         (0.0, of(0.0, 2.0)),
@@ -32,7 +32,7 @@ fn carved(rate: f64, change: Change) -> Check {
     };
     let start = Pose::at(of(0.0, 2.0));
     let world = World::changing(rate, change, &start, floor);
-    setup.touch_world(world, proxy(2.0, 500.0))
+    setup.touch_world(world, renderer)
 }
 
 /// Largest justified change, N: that of the motion and that of the surface, which sinks over the period of the simulation.
@@ -43,32 +43,36 @@ fn justified(check: &Check, rate: f64) -> f64 {
 #[test]
 fn carving_is_felt_as_a_motion_of_the_surface() {
     for rate in [5.0, 15.0, 30.0] {
-        let check = carved(rate, Change::Blended);
-        check.assert(
-            &format!("carving at {rate} Hz"),
-            &[
-                (
-                    "it presses all the time",
-                    check.trace.between(0.4, 1.5).iter().all(|t| t.force.z > 0.1),
-                ),
-                ("P3", check.measures.jump <= justified(&check, rate)),
-                ("P4", check.stays_out()),
-            ],
-        );
-        // What the motion alone would change, tick by tick, is exceeded by no more than the surface's.
-        let surface = 1e-3 * 500.0 * DROP * 1e-3 * rate;
-        assert!(
-            check.measures.expansion < 1.05 * surface + 1e-3,
-            "{:#?}",
-            check.measures
-        );
+        for (name, check) in [
+            ("proxy", carved(rate, Change::Blended, proxy(2.0, 500.0))),
+            ("vcp", carved(rate, Change::Blended, vcp(2.0, 500.0))),
+        ] {
+            check.assert(
+                &format!("{name}, carving at {rate} Hz"),
+                &[
+                    (
+                        "it presses all the time",
+                        check.trace.between(0.4, 1.5).iter().all(|t| t.force.z > 0.1),
+                    ),
+                    ("P3", check.measures.jump <= justified(&check, rate)),
+                    ("P4", check.stays_out()),
+                ],
+            );
+            // What the motion alone would change, tick by tick, is exceeded by no more than the surface's.
+            let surface = 1e-3 * 500.0 * DROP * 1e-3 * rate;
+            assert!(
+                check.measures.expansion < 1.05 * surface + 1e-3,
+                "{:#?}",
+                check.measures
+            );
+        }
     }
 }
 
 #[test]
 fn carving_at_once_is_felt_as_steps() {
     for rate in [5.0, 15.0, 30.0] {
-        let check = carved(rate, Change::Steps);
+        let check = carved(rate, Change::Steps, proxy(2.0, 500.0));
         let surface = 1e-3 * 500.0 * DROP;
         assert!(check.measures.expansion > 0.5 * surface, "{:#?}", check.measures);
     }

@@ -4,7 +4,7 @@ use glam::DVec3;
 use tools::haptics::Renderer;
 use tools::haptics::simulated::{Path, SimulatedHand};
 
-use crate::common::{Channel, Check, Loop, Passage, penalty, proxy, vcp};
+use crate::common::{Channel, Check, Loop, Passage, penalty, plane, proxy, vcp};
 
 /// Changes of the sign of some values, those within a band about 0 left out.
 fn sign_changes(values: impl Iterator<Item = f64>, band: f64) -> usize {
@@ -101,4 +101,11 @@ fn a_ball_enters_a_slot_that_is_wide_enough_and_no_other() {
             ],
         );
     }
+}
+
+#[test]
+fn a_tangent_plane_knows_one_wall_of_a_passage() {
+    let check = drifted(plane(2.0, 500.0, 30.0));
+    let leaves = check.trace.crossings(is_between) > 0 && !check.stays_out();
+    assert!(leaves && !check.is_slewed(), "{:#?}", check.measures);
 }

@@ -6,7 +6,7 @@ use glam::DVec3;
 use tools::haptics::simulated::{Change, Path, SimulatedHand, World};
 use tools::haptics::{Obstacle, Pose, Renderer};
 
-use crate::common::{Check, HalfSpace, Loop, penalty, proxy};
+use crate::common::{Check, HalfSpace, Loop, penalty, proxy, vcp};
 
 const LAYER: f64 = 3.0;
 
@@ -54,7 +54,12 @@ fn matter_over_a_resting_tool_pushes_it_out() {
 }
 
 #[test]
-fn the_penalty_method_jumps_by_the_whole_layer() {
-    let check = buried(Change::Steps, penalty(2.0, 500.0));
-    assert!(check.measures.jump > 0.9 * 1e-3 * 500.0 * LAYER && !check.is_slewed());
+fn methods_without_memory_jump_by_the_whole_layer() {
+    for (name, check) in [
+        ("penalty", buried(Change::Steps, penalty(2.0, 500.0))),
+        ("vcp", buried(Change::Steps, vcp(2.0, 500.0))),
+    ] {
+        let layer = 1e-3 * 500.0 * LAYER;
+        assert!(check.measures.jump > 0.9 * layer, "{name}: {:#?}", check.measures);
+    }
 }

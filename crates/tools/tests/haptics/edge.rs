@@ -4,7 +4,7 @@ use glam::DVec3;
 use tools::haptics::simulated::{Path, SimulatedHand, Tick};
 use tools::haptics::{Contact, Renderer};
 
-use crate::common::{Check, Edge, Loop, penalty, proxy, vcp};
+use crate::common::{Check, Edge, Loop, penalty, plane, proxy, vcp};
 
 /// Across a roof of an opening angle, degrees, from 12 mm on one side to 12 mm on the other, the hand drawn to a height, mm,
 /// below its edge.
@@ -79,5 +79,14 @@ fn deep_below_an_edge_the_contact_changes_sides_once() {
                 ("one contact", losses(&check) <= 1),
             ],
         );
+    }
+}
+
+/// The plane of a side goes on beyond the edge until it is taken anew.
+#[test]
+fn a_tangent_plane_jumps_behind_an_edge() {
+    for (opening, height) in DEEP {
+        let check = slid(opening, height, plane(2.0, 500.0, 30.0));
+        assert!(check.measures.jump > 0.7, "{opening}°: {:#?}", check.measures);
     }
 }

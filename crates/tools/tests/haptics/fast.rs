@@ -67,11 +67,12 @@ fn no_speed_takes_the_tool_through_a_rod() {
             let (path, seconds) = through(x, speed);
             let check = scripted(&path, seconds, &rod, proxy(radius, 500.0), (radius, 500.0));
             assert!(check.measures.force > 5.0, "{name}: {:#?}", check.measures);
+            // Where it was met, or where it slid to in that tick.
             let end = check.trace.ticks.last().expect("ticks").proxy.at;
-            let wanted = ((radius + 0.5f64).powi(2) - x * x).sqrt();
+            let off = end.length() - (radius + 0.5);
             assert!(
-                (end - DVec3::new(x, 0.0, wanted)).length() < 0.01,
-                "{name}: at {end}, not {wanted} high"
+                off.abs() < 0.01 && end.z > 0.0 && end.x * x > 0.0,
+                "{name}: at {end}"
             );
             check.assert(&name, &[("P4", check.stays_out()), ("P2", check.is_passive())]);
         }

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use tools::haptics::simulated::{Path, Preset, SimulatedHand, Timing};
 
-use crate::common::{HalfSpace, Loop, omni, proxy};
+use crate::common::{Check, HalfSpace, Loop, omni, proxy, vcp};
 use crate::groove;
 
 fn shaky(seed: u64) -> Timing {
@@ -41,8 +41,14 @@ fn a_shaky_clock_shakes_no_wall() {
                 timing: shaky(seed),
                 ..Loop::new(hand, 4.0)
             };
-            let check = setup.touch(HalfSpace::floor(0.0), proxy(2.0, stiffness));
-            check.assert(&name, &[("P1", check.rests()), ("P2", check.is_passive())]);
+            let judge = |method: &str, check: Check| {
+                check.assert(
+                    &format!("{method}, {name}"),
+                    &[("P1", check.rests()), ("P2", check.is_passive())],
+                );
+            };
+            judge("proxy", setup.touch(HalfSpace::floor(0.0), proxy(2.0, stiffness)));
+            judge("vcp", setup.touch(HalfSpace::floor(0.0), vcp(2.0, stiffness)));
         }
     }
 }

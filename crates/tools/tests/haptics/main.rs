@@ -6,6 +6,7 @@
 
 mod common;
 
+mod band;
 mod bumps;
 mod carve;
 mod channel;
@@ -14,11 +15,14 @@ mod deposit;
 mod edge;
 mod fast;
 mod faults;
+mod field;
 mod friction;
 mod gated;
 mod groove;
 mod inside;
 mod jitter;
+mod memory;
+mod same;
 mod saturated;
 mod several;
 mod sheet;

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use tools::haptics::simulated::{Path, Preset, SimulatedHand, Tick};
 
-use crate::common::{Check, Groove, HalfSpace, Loop, proxy};
+use crate::common::{Check, Groove, HalfSpace, Loop, proxy, vcp};
 
 fn judge(name: &str, check: &Check) {
     let is_full = |t: &&Tick| t.force.length() > 0.999 * check.most;
@@ -62,6 +62,25 @@ fn twenty_newtons_move_the_hand_and_not_the_proxy() {
             end.force,
             DVec3::ZERO,
             "{preset:?}: it came out the way it went in"
+        );
+    }
+}
+
+/// 60 mm below no ray of the stateless contact comes out, and on the way there the side changes.
+#[test]
+fn twenty_newtons_take_the_stateless_contact_along() {
+    let of = |x, z| DVec3::new(x, 0.0, z);
+    let path = Path::smooth([(0.1, of(3.0, 12.0)), (0.5, of(1.0, -60.0)), (1.0, of(1.0, -60.0))]);
+    for preset in [Preset::Omni, Preset::Falcon, Preset::Wooden] {
+        let setup = Loop {
+            device: preset.mechanics(),
+            ..Loop::new(SimulatedHand::light(path.clone()).of_strength(20.0), 1.2)
+        };
+        let check = setup.touch(Groove { half: 0.6 }, vcp(2.0, 500.0));
+        assert!(
+            check.measures.deepest > 50.0 && !check.is_slewed(),
+            "{:#?}",
+            check.measures
         );
     }
 }

@@ -6,7 +6,7 @@ use glam::DVec3;
 use tools::haptics::simulated::{Change, Mechanics, Path, SimulatedHand, World};
 use tools::haptics::{Obstacle, Pose, Renderer};
 
-use crate::common::{Ball, Check, Loop, omni, plane, proxy};
+use crate::common::{Ball, Check, Loop, omni, plane, proxy, vcp};
 
 /// Along a great circle 2 mm below where a tool of 2 mm touches a ball, at a speed, mm/s.
 fn circled(radius: f64, speed: f64, rate: f64, renderer: impl Renderer) -> Check {
@@ -45,15 +45,19 @@ fn circled(radius: f64, speed: f64, rate: f64, renderer: impl Renderer) -> Check
 fn a_snapshot_of_the_field_hides_the_rate_of_the_simulation() {
     for (radius, speed) in [(50.0, 50.0), (50.0, 200.0), (10.0, 50.0), (10.0, 200.0)] {
         for rate in [5.0, 15.0, 30.0] {
-            let check = circled(radius, speed, rate, proxy(2.0, 500.0));
-            check.assert(
-                &format!("ball of {radius} mm at {speed} mm/s and {rate} Hz"),
-                &[
-                    ("P2", check.is_passive()),
-                    ("P3", check.is_continuous()),
-                    ("P4", check.stays_out()),
-                ],
-            );
+            for (name, check) in [
+                ("proxy", circled(radius, speed, rate, proxy(2.0, 500.0))),
+                ("vcp", circled(radius, speed, rate, vcp(2.0, 500.0))),
+            ] {
+                check.assert(
+                    &format!("{name}, ball of {radius} mm at {speed} mm/s and {rate} Hz"),
+                    &[
+                        ("P2", check.is_passive()),
+                        ("P3", check.is_continuous()),
+                        ("P4", check.stays_out()),
+                    ],
+                );
+            }
         }
     }
 }

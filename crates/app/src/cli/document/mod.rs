@@ -1,6 +1,7 @@
 //! Commands on documents.
 
 pub mod export;
+pub mod feel;
 pub mod history;
 pub mod info;
 mod knots;

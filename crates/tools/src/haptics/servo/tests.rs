@@ -264,3 +264,21 @@ fn a_record_tells_what_happened() {
     // ½ K x² = 1 mJ, less half a step of a held force, and what the device's damping took: b v² for 1 s at 3 mm/s.
     assert!((record.energy - 1e-3 - 18e-6).abs() < 1e-5, "{}", record.energy);
 }
+
+#[test]
+fn a_tick_allocates_nothing_whatever_happens() {
+    let mut servo = servo(ServoOptions::default());
+    servo.arm();
+    let gone = DeviceError::Gone("a device".into());
+    let counted = allocation_counter::measure(|| {
+        for n in 0..5000 {
+            let at = DVec3::new(0.0, 0.0, 3.0 - 2e-3 * f64::from(n));
+            tick(&mut servo, at);
+        }
+        tick(&mut servo, DVec3::NAN);
+        servo.arm();
+        servo.tick(Err(&gone), &Ground, 0.0, DT);
+    });
+    assert_eq!(servo.status().trip(), Some(Trip::Gone));
+    assert_eq!(counted.count_total, 0);
+}

@@ -7,7 +7,11 @@ use super::distances::Distances;
 use super::grid::Grid;
 use super::spline::{self, Interpolation};
 use super::surface::Surface;
+use super::thin::Unresolved;
 use crate::haptics::Obstacle;
+
+/// Shortest way that is told, in node distances: nothing is sampled more finely.
+const THINNEST: f64 = 0.1;
 
 /// How a brick is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,6 +46,15 @@ impl BrickOptions {
     }
 }
 
+impl BrickOptions {
+    /// The nodes round a tool.
+    pub(super) fn grid(&self, at: DVec3) -> Grid {
+        // A spline needs a node more on each side.
+        let b = Aabb::new(at, at).widened(self.reach + self.spacing);
+        Grid::round(&b, self.spacing)
+    }
+}
+
 /// Signed distance to the surface of an object, mm, positive in the air, sampled in a box. An immutable value.
 #[derive(Clone, Debug)]
 pub struct DistanceBrick {
@@ -52,20 +65,18 @@ pub struct DistanceBrick {
     numbers: Vec<f32>,
     /// The part in which is interpolated.
     inner: Aabb,
+    unresolved: Unresolved,
 }
 
 impl DistanceBrick {
     /// Round a tool that is at `at`.
     pub fn new(surface: &Surface<'_>, at: DVec3, options: &BrickOptions) -> Self {
-        let h = options.spacing;
-        // A spline needs a node more on each side.
-        let b = Aabb::new(at, at).widened(options.reach + h);
-        let distances = Distances::new(surface, Grid::round(&b, h), options.band);
+        let distances = Distances::new(surface, options.grid(at), options.band);
         Self::of(&distances, options.interpolation)
     }
 
     /// Of distances that are known.
-    pub fn of(distances: &Distances, interpolation: Interpolation) -> Self {
+    pub(super) fn of(distances: &Distances, interpolation: Interpolation) -> Self {
         let grid = distances.grid;
         let mut numbers = distances.phi.clone();
         if interpolation == Interpolation::Cubic {
@@ -77,6 +88,7 @@ impl DistanceBrick {
             interpolation,
             numbers,
             inner: grid.world_box().widened(-grid.spacing),
+            unresolved: distances.unresolved,
         }
     }
 
@@ -93,6 +105,11 @@ impl DistanceBrick {
     /// Up to here distances are exact, mm; where more is told, it is no less than this.
     pub fn band(&self) -> f64 {
         self.band
+    }
+
+    /// What the nodes are too far apart for.
+    pub fn unresolved(&self) -> Unresolved {
+        self.unresolved
     }
 
     /// Bytes of its numbers.
@@ -129,7 +146,13 @@ impl Obstacle for DistanceBrick {
         (value + gradient.dot(p - inside), gradient)
     }
 
+    /// Half the distance of nodes, or half of what is thinner than that. What lies [between the nodes](DistanceBrick::unresolved) unseen
+    /// is missed whatever the way.
     fn finest(&self) -> f64 {
-        0.5 * self.grid.spacing
+        let h = self.grid.spacing;
+        match self.unresolved.thin {
+            0 => 0.5 * h,
+            _ => 0.5 * self.unresolved.thinnest.clamp(THINNEST * h, h),
+        }
     }
 }

@@ -1,122 +1,135 @@
 //! Distances at the nodes of a grid, from the closest places of the surface.
 
-use bspline::Jet;
+use bspline::Aabb;
 use glam::DVec3;
 
-use super::foot::{Foot, creased};
+use super::foot::Foot;
 use super::grid::Grid;
+use super::hull::{Hull, Marks};
 use super::nearest::{NONE, nearest};
+use super::samples::{Before, Samples, meet};
+use super::seek::{Seek, Seeker};
 use super::surface::Surface;
+use super::thin::{self, Unresolved};
 
-/// Nodes along the edge of a block that is asked for at once.
-const BLOCK: i64 = 8;
-/// Newton steps of a place before it is taken for one at an edge.
-const ROUNDS: usize = 8;
-/// Step, in node distances, after which a closest place is found: what is left is of the order of its square.
-const SETTLED: f64 = 0.02;
 /// Closest places of neighbours that are tried, one after the other, each nearer than the one before.
 const WALK: usize = 6;
 
-/// What is known of a field round a tool.
+/// What is known of a field round a tool. What is found at a node follows from the field and the box alone, not from what was known before.
 #[derive(Clone, Debug)]
 pub struct Distances {
     /// The nodes.
     pub grid: Grid,
     /// Up to here distances are exact, mm; beyond, no less than this.
     pub band: f64,
-    /// `f − c`; no number where a whole block lies on one side.
-    values: Vec<f64>,
-    inside: Vec<bool>,
-    /// Number of a node's own foot, of nodes beside the surface.
-    near: Vec<u32>,
-    feet: Vec<Foot>,
     /// Signed distance, mm, positive in the air.
     pub phi: Vec<f32>,
+    /// What the nodes are too far apart for.
+    pub unresolved: Unresolved,
+    /// Nodes whose closest place was looked for anew.
+    pub renewed: usize,
+    samples: Samples,
+    /// Number among `beside` of a node beside the surface.
+    near: Vec<u32>,
+    beside: Vec<Beside>,
+    /// The node beside the surface that is nearest.
+    ways: Vec<u32>,
+    /// What each distance was made from.
+    hulls: Vec<Hull>,
 }
 
-/// Halvings of a way between neighbours.
-const HALVES: usize = 24;
-
-/// A node on the way to its closest place.
-#[derive(Clone, Copy)]
-struct Seeker {
+/// What is known of a node beside the surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Beside {
     slot: u32,
-    /// A place of the surface, near enough.
+    /// Where the surface was met first.
     start: DVec3,
-    at: DVec3,
-    /// The neighbour on the other side, of nodes beside the surface.
-    other: Option<DVec3>,
+    phi: f32,
+    foot: Foot,
+    hull: Hull,
+}
+
+/// What was known, on the way to what is.
+struct Known<'a> {
+    old: &'a Distances,
+    before: Before<'a, Samples>,
+    shift: [i64; 3],
+    /// Cells in which the field has changed.
+    changed: Marks,
 }
 
 impl Distances {
     /// Of a surface at the nodes of a grid, exact up to `band`.
     pub fn new(surface: &Surface<'_>, grid: Grid, band: f64) -> Self {
+        Self::build(surface, grid, band, None)
+    }
+
+    /// The same from what was known of an earlier field: only what can have changed is looked for anew. `changed` are boxes of the
+    /// field's own world outside which it has the bits that it had. The old surface has the same iso-value and stands at the same
+    /// place.
+    pub fn after(&self, surface: &Surface<'_>, grid: Grid, changed: &[Aabb]) -> Self {
+        if grid.spacing != self.grid.spacing {
+            return Self::new(surface, grid, self.band);
+        }
+        let before = Before {
+            known: &self.samples,
+            grid: &self.grid,
+            changed,
+        };
+        Self::build(surface, grid, self.band, Some((self, before)))
+    }
+
+    fn build(
+        surface: &Surface<'_>,
+        grid: Grid,
+        band: f64,
+        known: Option<(&Self, Before<'_, Samples>)>,
+    ) -> Self {
+        let samples = Samples::new(surface, &grid, known.as_ref().map(|(_, before)| before));
+        let known = known.map(|(old, before)| Known {
+            old,
+            shift: before.shift(&grid),
+            changed: changed_cells(surface, &grid, before.changed),
+            before,
+        });
         let mut all = Self {
             grid,
             band,
-            values: vec![f64::NAN; grid.len()],
-            inside: vec![false; grid.len()],
-            near: vec![NONE; grid.len()],
-            feet: Vec::new(),
             phi: vec![0.0; grid.len()],
+            unresolved: Unresolved::default(),
+            renewed: 0,
+            samples,
+            near: vec![NONE; grid.len()],
+            beside: Vec::new(),
+            ways: Vec::new(),
+            hulls: Vec::new(),
         };
-        all.sample(surface);
-        all.step_out(surface);
-        all.spread(surface);
+        all.step_out(surface, known.as_ref());
+        if all.beside.is_empty() {
+            all.fill(surface);
+        } else {
+            all.spread(surface, known.as_ref());
+        }
+        all.unresolved = thin::look(surface, &grid, &all.samples, |slot| all.foot_at(slot));
         all
     }
 
     /// Whether no surface is in the box.
     pub fn is_empty(&self) -> bool {
-        self.feet.is_empty()
+        self.beside.is_empty()
     }
 
-    /// Asks for values, block by block, where a block does not lie on one side as a whole.
-    fn sample(&mut self, surface: &Surface<'_>) {
-        let frame = surface.frame(&self.grid);
-        let grid = self.grid;
-        let last: [i64; 3] = std::array::from_fn(|a| grid.first[a] + grid.count[a] as i64);
-        let blocks: [Vec<i64>; 3] = std::array::from_fn(|a| {
-            let first = grid.first[a].div_euclid(BLOCK);
-            (first..=(last[a] - 1).div_euclid(BLOCK)).collect()
-        });
-        let mut values = Vec::new();
-        for &x in &blocks[0] {
-            for &y in &blocks[1] {
-                for &z in &blocks[2] {
-                    let lo = [x, y, z].map(|b| b * BLOCK);
-                    let hi = lo.map(|l| l + BLOCK);
-                    let range = surface.field().frame_bounds_about(&frame, lo, hi, surface.iso());
-                    let from: [i64; 3] = std::array::from_fn(|a| lo[a].max(grid.first[a]));
-                    let count: [usize; 3] =
-                        std::array::from_fn(|a| (hi[a].min(last[a]) - from[a]).max(0) as usize);
-                    let at: [usize; 3] = std::array::from_fn(|a| (from[a] - grid.first[a]) as usize);
-                    let is_crossed = range.lo <= surface.iso() && range.hi > surface.iso();
-                    values.clear();
-                    values.resize(count.iter().product(), f64::NAN);
-                    if is_crossed {
-                        surface.field().frame_values(&frame, from, count, &mut values);
-                        values.iter_mut().for_each(|v| *v -= surface.iso());
-                    }
-                    let is_inside = range.lo > surface.iso();
-                    for (row, values) in values.chunks_exact(count[2]).enumerate() {
-                        let start = grid.slot([at[0] + row / count[1], at[1] + row % count[1], at[2]]);
-                        let to = start..start + count[2];
-                        self.values[to.clone()].copy_from_slice(values);
-                        for (inside, value) in self.inside[to].iter_mut().zip(values) {
-                            *inside = if is_crossed { *value > 0.0 } else { is_inside };
-                        }
-                    }
-                }
-            }
-        }
+    /// The closest place of a node beside the surface.
+    fn foot_at(&self, slot: usize) -> Option<&Foot> {
+        let near = self.near[slot];
+        (near != NONE).then(|| &self.beside[near as usize].foot)
     }
 
     /// Where the surface is met, about, on the way to the neighbour that it is nearest on, and that neighbour; none if all neighbours
     /// are on the same side.
-    fn crossing(&self, at: [usize; 3]) -> Option<[DVec3; 2]> {
-        let (grid, slot) = (&self.grid, self.grid.slot(at));
-        let strides = grid.strides();
+    fn crossing(&self, at: [usize; 3], slot: usize) -> Option<[DVec3; 2]> {
+        let (grid, strides) = (&self.grid, self.grid.strides());
+        let Samples { values, inside } = &self.samples;
         let mut best: Option<(f64, usize, f64)> = None;
         for axis in 0..3 {
             for (sign, is_there) in [(-1.0, at[axis] > 0), (1.0, at[axis] + 1 < grid.count[axis])] {
@@ -124,11 +137,10 @@ impl Distances {
                     continue;
                 }
                 let other = slot.wrapping_add_signed(sign as isize * strides[axis] as isize);
-                if self.inside[other] == self.inside[slot] {
+                if inside[other] == inside[slot] {
                     continue;
                 }
-                let (a, b) = (self.values[slot], self.values[other]);
-                let share = a / (a - b);
+                let share = values[slot] / (values[slot] - values[other]);
                 // Where a block beside is known only as a whole.
                 let share = if share.is_finite() {
                     share.clamp(0.0, 1.0)
@@ -149,110 +161,156 @@ impl Distances {
     }
 
     /// Finds the closest places of the nodes beside the surface.
-    fn step_out(&mut self, surface: &Surface<'_>) {
+    fn step_out(&mut self, surface: &Surface<'_>, known: Option<&Known<'_>>) {
         let grid = self.grid;
         let mut seekers = Vec::new();
+        let mut numbers = Vec::new();
         for slot in 0..grid.len() {
-            if let Some([start, other]) = self.crossing(grid.node(slot)) {
-                self.near[slot] = seekers.len() as u32;
-                seekers.push(Seeker {
+            let at = grid.node(slot);
+            let Some([start, other]) = self.crossing(at, slot) else {
+                continue;
+            };
+            let number = self.beside.len();
+            self.near[slot] = number as u32;
+            let old = known.and_then(|known| known.beside(&grid, at, start));
+            self.beside.push(match old {
+                Some(old) => Beside {
                     slot: slot as u32,
-                    start,
-                    at: start,
-                    other: Some(other),
-                });
-            }
+                    ..old
+                },
+                None => {
+                    numbers.push(number);
+                    let hull = Hull::of(at);
+                    seekers.push(Seeker {
+                        slot: slot as u32,
+                        start,
+                        at: start,
+                        other: Some(other),
+                        hull,
+                    });
+                    Beside {
+                        slot: slot as u32,
+                        start,
+                        phi: 0.0,
+                        foot: Foot::flat(start),
+                        hull,
+                    }
+                }
+            });
         }
         let seek = Seek {
             surface,
             grid: &grid,
-            inside: &self.inside,
+            inside: &self.samples.inside,
         };
-        let found = seek.all(&seekers);
-        for (seeker, (at, _)) in seekers.iter().zip(&found) {
-            self.phi[seeker.slot as usize] = seek.signed(seeker, *at);
-        }
-        let places: Vec<DVec3> = found.iter().map(|(at, _)| *at).collect();
+        seek.all(&mut seekers);
+        let places: Vec<DVec3> = seekers.iter().map(|s| s.at).collect();
         let mut jets = Vec::new();
         surface.jets(&places, &mut jets);
-        self.feet = places
-            .iter()
-            .zip(&jets)
-            .map(|(at, jet)| Foot::new(*at, jet).unwrap_or(Foot::flat(*at)))
-            .collect();
+        for ((number, seeker), jet) in numbers.into_iter().zip(&mut seekers).zip(&jets) {
+            let beside = &mut self.beside[number];
+            seeker.hull.add_place(&grid, seeker.at);
+            beside.phi = seek.signed(seeker);
+            beside.hull = seeker.hull;
+            beside.foot = Foot::new(seeker.at, jet).unwrap_or(Foot::flat(seeker.at));
+        }
+        self.renewed = seekers.len();
     }
 
     /// Finds those of all other nodes, from those beside the surface that are nearest.
-    fn spread(&mut self, surface: &Surface<'_>) {
+    fn spread(&mut self, surface: &Surface<'_>, known: Option<&Known<'_>>) {
         let grid = self.grid;
-        let h = grid.spacing;
-        if self.feet.is_empty() {
-            self.fill(surface);
-            return;
-        }
-        let ways = nearest(&grid, |slot| self.near[slot] != NONE);
+        let same = known.filter(|known| known.has_same_marks(&grid, &self.near));
+        self.ways = match same {
+            Some(known) => known.old.ways.clone(),
+            None => nearest(&grid, |slot| self.near[slot] != NONE),
+        };
+        let kept = known.map(|known| Kept::new(self, known, same.is_some()));
+        self.hulls = vec![Hull::of([0; 3]); grid.len()];
         let mut seekers = Vec::new();
         for slot in 0..grid.len() {
             let at = grid.node(slot);
-            let p = grid.place(at);
-            let foot = self.walk(&ways, at, slot, p);
-            if self.near[slot] == foot {
+            if let Some((phi, hull)) = kept.as_ref().and_then(|kept| kept.answer(at, slot)) {
+                (self.phi[slot], self.hulls[slot]) = (phi, hull);
                 continue;
             }
-            let foot = &self.feet[foot as usize];
-            let seeker = Seeker {
-                slot: slot as u32,
-                start: foot.at,
-                at: foot.toward(p, h),
-                other: None,
-            };
-            let far = p.distance(seeker.at).min(p.distance(foot.at));
+            let p = grid.place(at);
+            let mut hull = Hull::of(at);
+            let number = self.walk(at, slot, p, &mut hull);
+            self.hulls[slot] = hull;
+            let beside = &self.beside[number as usize];
+            if self.near[slot] == number {
+                self.phi[slot] = beside.phi;
+                continue;
+            }
+            let foot = &beside.foot;
+            let there = foot.toward(p, grid.spacing);
+            let far = p.distance(there).min(p.distance(foot.at));
             if far <= self.band {
-                seekers.push(seeker);
+                seekers.push(Seeker {
+                    slot: slot as u32,
+                    start: foot.at,
+                    at: there,
+                    other: None,
+                    hull,
+                });
             } else {
-                self.phi[slot] = (if self.inside[slot] { -far } else { far }) as f32;
+                self.phi[slot] = (if self.samples.inside[slot] { -far } else { far }) as f32;
             }
         }
         let seek = Seek {
             surface,
             grid: &grid,
-            inside: &self.inside,
+            inside: &self.samples.inside,
         };
-        let found = seek.all(&seekers);
-        for (seeker, (at, _)) in seekers.iter().zip(&found) {
-            self.phi[seeker.slot as usize] = seek.signed(seeker, *at);
+        seek.all(&mut seekers);
+        for seeker in &seekers {
+            let slot = seeker.slot as usize;
+            self.phi[slot] = seek.signed(seeker);
+            self.hulls[slot] = seeker.hull;
         }
+        self.renewed += seekers.len();
     }
 
     /// The foot to begin with: of those that the node and its neighbours are nearest to the closest one, and from there on to closer
     /// ones round the place where it points to.
-    fn walk(&self, ways: &[u32], at: [usize; 3], slot: usize, p: DVec3) -> u32 {
+    fn walk(&self, at: [usize; 3], slot: usize, p: DVec3, hull: &mut Hull) -> u32 {
         let (grid, strides) = (&self.grid, self.grid.strides());
         let mut best = (f64::INFINITY, NONE);
-        let try_foot = |best: &mut (f64, u32), foot: u32| {
-            let far = p.distance_squared(self.feet[foot as usize].at);
+        let try_foot = |best: &mut (f64, u32), number: u32| {
+            let far = p.distance_squared(self.beside[number as usize].foot.at);
             if far < best.0 {
-                *best = (far, foot);
+                *best = (far, number);
             }
         };
-        try_foot(&mut best, self.near[ways[slot] as usize]);
+        let mut try_way = |best: &mut (f64, u32), from: usize| {
+            let there = self.ways[from] as usize;
+            hull.add(grid.node(there));
+            try_foot(best, self.near[there]);
+        };
+        try_way(&mut best, slot);
         for axis in 0..3 {
             if at[axis] > 0 {
-                try_foot(&mut best, self.near[ways[slot - strides[axis]] as usize]);
+                try_way(&mut best, slot - strides[axis]);
             }
             if at[axis] + 1 < grid.count[axis] {
-                try_foot(&mut best, self.near[ways[slot + strides[axis]] as usize]);
+                try_way(&mut best, slot + strides[axis]);
             }
         }
         for _ in 0..WALK {
-            let there = self.feet[best.1 as usize].toward(p, 2.0 * grid.spacing);
-            let Some(cell) = grid.cell(there) else { break };
+            let there = self.beside[best.1 as usize].foot.toward(p, 2.0 * grid.spacing);
+            let Some(cell) = grid.cell(there) else {
+                hull.leave();
+                break;
+            };
+            hull.add(cell);
+            hull.add(cell.map(|n| n + 1));
             let before = best.1;
             for corner in 0..8usize {
                 let node = std::array::from_fn(|a| cell[a] + (corner >> (2 - a) & 1));
-                let foot = self.near[grid.slot(node)];
-                if foot != NONE {
-                    try_foot(&mut best, foot);
+                let number = self.near[grid.slot(node)];
+                if number != NONE {
+                    try_foot(&mut best, number);
                 }
             }
             if best.1 == before {
@@ -276,98 +334,129 @@ impl Distances {
     }
 }
 
-/// The search for closest places, many at a time.
-struct Seek<'a> {
-    surface: &'a Surface<'a>,
-    grid: &'a Grid,
-    inside: &'a [bool],
+/// Cells of a grid that boxes of a field's own world meet.
+fn changed_cells(surface: &Surface<'_>, grid: &Grid, changed: &[Aabb]) -> Marks {
+    let mut marks = vec![false; grid.len()];
+    for b in changed {
+        let b = surface.to_world(b).widened(1e-6 * grid.spacing);
+        if !meet(&b, &grid.world_box().widened(grid.spacing)) {
+            continue;
+        }
+        let end = |p: DVec3, a: usize| {
+            let cell = (p[a] / grid.spacing).floor() - grid.first[a] as f64;
+            cell.clamp(0.0, (grid.count[a] - 1) as f64) as usize
+        };
+        let range = |a: usize| end(b.min, a)..=end(b.max, a);
+        for x in range(0) {
+            for y in range(1) {
+                for z in range(2) {
+                    marks[grid.slot([x, y, z])] = true;
+                }
+            }
+        }
+    }
+    Marks::new(grid, |slot| marks[slot])
 }
 
-impl Seek<'_> {
-    fn place(&self, seeker: &Seeker) -> DVec3 {
-        self.grid.place(self.grid.node(seeker.slot as usize))
+impl Known<'_> {
+    /// What was known of a node beside the surface, if nothing of it can have changed.
+    fn beside(&self, grid: &Grid, at: [usize; 3], start: DVec3) -> Option<Beside> {
+        let slot = self.before.slot(self.shift, at)?;
+        let number = self.old.near[slot];
+        let old = self.old.beside.get(number as usize)?;
+        let hull = old.hull.within(grid, self.shift.map(|n| -n))?;
+        let stays = old.start == start && !self.changed.any(hull);
+        stays.then(|| Beside {
+            hull: moved(&old.hull, self.shift),
+            ..*old
+        })
     }
 
-    fn signed(&self, seeker: &Seeker, at: DVec3) -> f32 {
-        let far = self.place(seeker).distance(at);
-        (if self.inside[seeker.slot as usize] {
-            -far
-        } else {
-            far
-        }) as f32
+    /// Whether the same nodes are beside the surface.
+    fn has_same_marks(&self, grid: &Grid, near: &[u32]) -> bool {
+        let both = || near.iter().zip(&self.old.near);
+        self.old.grid == *grid
+            && !self.old.ways.is_empty()
+            && both().all(|(a, b)| (*a == NONE) == (*b == NONE))
+    }
+}
+
+fn moved(hull: &Hull, shift: [i64; 3]) -> Hull {
+    hull.moved(shift.map(|n| -n))
+}
+
+/// Which old distances still hold.
+struct Kept<'a> {
+    known: &'a Known<'a>,
+    grid: Grid,
+    /// Nodes beside the surface that are other than before, and cells in which the field has changed.
+    changed: Marks,
+    /// Nodes from which another node is nearest than before.
+    turned: Vec<bool>,
+}
+
+impl<'a> Kept<'a> {
+    fn new(all: &Distances, known: &'a Known<'a>, has_same_ways: bool) -> Self {
+        let (grid, old) = (all.grid, known.old);
+        let is_still = old.grid == grid;
+        let old_slot = |slot: usize| match is_still {
+            true => Some(slot),
+            false => known.before.slot(known.shift, grid.node(slot)),
+        };
+        let is_other = |slot: usize| {
+            let now = all.foot_at(slot);
+            match old_slot(slot) {
+                Some(before) => now != old.foot_at(before),
+                None => true,
+            }
+        };
+        let cells = &known.changed;
+        let changed = Marks::new(&grid, |slot| {
+            let at = grid.node(slot);
+            cells.any([at, at]) || is_other(slot)
+        });
+        let turned = |slot: usize| {
+            let Some(before) = old_slot(slot) else { return true };
+            let Some(way) = old.ways.get(before) else {
+                return true;
+            };
+            old_slot(all.ways[slot] as usize) != Some(*way as usize)
+        };
+        let turned = match has_same_ways {
+            true => vec![false; grid.len()],
+            false => (0..grid.len()).map(turned).collect(),
+        };
+        Self {
+            known,
+            grid,
+            changed,
+            turned,
+        }
     }
 
-    /// The closest place of each, and how far from the node the field was looked at.
-    fn all(&self, seekers: &[Seeker]) -> Vec<(DVec3, f64)> {
-        let h = self.grid.spacing;
-        let mut found: Vec<(DVec3, f64)> = seekers.iter().map(|s| (s.at, 0.0)).collect();
-        let mut open: Vec<u32> = (0..seekers.len() as u32).collect();
-        let (mut places, mut jets): (Vec<DVec3>, Vec<Jet>) = (Vec::new(), Vec::new());
-        let mut stuck: Vec<u32> = Vec::new();
-        // No answer may be farther than this: a place of the surface is known that is as near.
-        let mut most: Vec<f64> = seekers
-            .iter()
-            .map(|s| self.place(s).distance(s.start) + 0.02 * h)
-            .collect();
-        for round in 0..ROUNDS {
-            if open.is_empty() {
-                break;
-            }
-            places.clear();
-            places.extend(open.iter().map(|i| found[*i as usize].0));
-            self.surface.jets(&places, &mut jets);
-            let mut left = Vec::new();
-            for (i, jet) in open.iter().zip(&jets) {
-                let seeker = &seekers[*i as usize];
-                let p = self.place(seeker);
-                let (at, looked) = &mut found[*i as usize];
-                *looked = looked.max(p.distance(*at));
-                let Some(foot) = Foot::new(*at, jet) else {
-                    stuck.push(*i);
-                    continue;
-                };
-                if round == 0 && seeker.other.is_some() {
-                    most[*i as usize] += foot.depth.abs();
-                }
-                let next = foot.toward(p, h);
-                let step = next.distance(*at);
-                *at = next;
-                if step > SETTLED * h {
-                    left.push(*i);
-                    continue;
-                }
-                if p.distance(next) > most[*i as usize] {
-                    stuck.push(*i);
-                }
-            }
-            open = left;
+    /// The distance of a node, if it is as before.
+    fn answer(&self, at: [usize; 3], slot: usize) -> Option<(f32, Hull)> {
+        let (known, strides) = (self.known, self.grid.strides());
+        let before = known.before.slot(known.shift, at)?;
+        let is_still = known.old.grid == self.grid;
+        if self.turned[slot] {
+            return None;
         }
-        stuck.extend(open);
-        for i in stuck {
-            let seeker = &seekers[i as usize];
-            let (p, is_inside) = (self.place(seeker), self.inside[seeker.slot as usize]);
-            let start = seeker
-                .other
-                .map_or(seeker.start, |other| self.between(p, other, is_inside));
-            let (at, looked) = &mut found[i as usize];
-            let (better, far) = creased(self.surface, p, is_inside, start, h);
-            (*at, *looked) = (better, looked.max(far));
-        }
-        found
-    }
-
-    /// Where the surface lies between two neighbours, by halves.
-    fn between(&self, p: DVec3, other: DVec3, is_inside: bool) -> DVec3 {
-        let (mut same, mut beyond) = (0.0, 1.0);
-        for _ in 0..HALVES {
-            let middle = 0.5 * (same + beyond);
-            let value = self.surface.value_gradient(p.lerp(other, middle)).0;
-            if (value > 0.0) == is_inside {
-                same = middle;
-            } else {
-                beyond = middle;
+        for axis in 0..3 {
+            let is_rim = |grid: &Grid, n: usize| n == 0 || n + 1 == grid.count[axis];
+            if at[axis] > 0 && self.turned[slot - strides[axis]]
+                || at[axis] + 1 < self.grid.count[axis] && self.turned[slot + strides[axis]]
+            {
+                return None;
+            }
+            // At a rim a neighbour is missing.
+            let old_at = (at[axis] as i64 + known.shift[axis]) as usize;
+            if !is_still && (is_rim(&self.grid, at[axis]) || is_rim(&known.old.grid, old_at)) {
+                return None;
             }
         }
-        p.lerp(other, beyond)
+        let hull = known.old.hulls.get(before)?;
+        let b = hull.within(&self.grid, known.shift.map(|n| -n))?;
+        (!self.changed.any(b)).then(|| (known.old.phi[before], moved(hull, known.shift)))
     }
 }

@@ -87,16 +87,23 @@ struct Plane {
 }
 
 /// The closest place of a surface that has edges or bends more sharply than Newton can follow: by planes that cut off what is not
-/// reached, of which the last three stay. `start` is on the surface and is the answer where nothing nearer is found. Returns the place and how
-/// far from `p` the field was looked at.
-pub fn creased(surface: &Surface<'_>, p: DVec3, is_inside: bool, start: DVec3, spacing: f64) -> (DVec3, f64) {
+/// reached, of which the last three stay. `start` is on the surface and is the answer where nothing nearer is found. `look` is told
+/// where the field is asked.
+pub fn creased(
+    surface: &Surface<'_>,
+    p: DVec3,
+    is_inside: bool,
+    start: DVec3,
+    spacing: f64,
+    mut look: impl FnMut(DVec3),
+) -> DVec3 {
     let side = if is_inside { -1.0 } else { 1.0 };
     let reach = p.distance(start) + spacing;
-    let (mut best, mut looked) = (start, 0.0_f64);
+    let mut best = start;
     let mut planes: Vec<Plane> = Vec::with_capacity(PLANES + 1);
     let (mut x, mut jets) = (start, Vec::new());
     for _ in 0..PATIENCE {
-        looked = looked.max(p.distance(x));
+        look(x);
         surface.jets(&[x], &mut jets);
         let Some(foot) = Foot::new(x, &jets[0]) else { break };
         if foot.depth.abs() <= 1e-5 * spacing && p.distance_squared(x) < p.distance_squared(best) {
@@ -116,7 +123,7 @@ pub fn creased(surface: &Surface<'_>, p: DVec3, is_inside: bool, start: DVec3, s
         }
         x = next;
     }
-    (best, looked)
+    best
 }
 
 /// The place nearest to `p` on the inner side of at most three planes: the nearest of those on one, two or three of them.

@@ -5,14 +5,27 @@
 
 mod brick;
 mod distances;
+mod field_obstacle;
 mod foot;
 mod grid;
+mod hull;
+mod maker;
 mod nearest;
+mod samples;
+mod seek;
 mod spline;
+mod state;
 mod surface;
 #[cfg(test)]
 mod tests;
+mod thin;
+mod touch_map;
 
 pub use brick::{BrickOptions, DistanceBrick};
+pub use field_obstacle::FieldObstacle;
+pub use maker::{Demand, SnapshotMaker, TouchedObject};
 pub use spline::Interpolation;
+pub use state::{Moving, Part, Shape, Snapshot};
 pub use surface::Surface;
+pub use thin::Unresolved;
+pub use touch_map::TouchMap;

@@ -1,0 +1,100 @@
+//! A hand on a document, by a script.
+
+use super::common::Bench;
+
+/// Down on the top of a ball of radius 1, a stroke along it, and up again; the force comes two seconds after arming.
+const HAND: &str = r#"
+[stroke.carve]
+along = []
+shape.sphere.radius = 0.06
+tolerance = 0.01
+[[target]]
+time = 2.2
+at = [0.0, 0.0, 1.2]
+[[target]]
+time = 2.8
+at = [0.0, 0.0, 0.9]
+[[target]]
+time = 3.2
+at = [-0.1, 0.0, 0.9]
+buttons = 1
+[[target]]
+time = 3.8
+at = [0.2, 0.0, 0.9]
+[[target]]
+time = 4.2
+at = [0.2, 0.0, 1.3]
+buttons = 0
+"#;
+
+fn ball() -> Bench {
+    let bench = Bench::new();
+    bench.json("phantom sphere -o cloud.ply --count 2000");
+    bench.json("fit cloud.ply -o ball.iclay --max-depth 6");
+    bench.write("hand.toml", HAND);
+    bench
+}
+
+#[test]
+fn a_session_by_a_hand_is_the_same_every_time_and_replays() {
+    let bench = ball();
+    let felt = |document: &str| {
+        bench.json(&format!("new {document}.isoclay ball.iclay"));
+        let told = bench.json(&format!(
+            "feel {document}.isoclay --device sim:omni --script hand.toml -o {document}.csv"
+        ));
+        (
+            told,
+            std::fs::read_to_string(bench.path(&format!("{document}.csv"))).unwrap(),
+        )
+    };
+    let (told, trace) = felt("one");
+    let (same, again) = felt("two");
+    assert_eq!(told["state_sha256"], same["state_sha256"]);
+    assert!(trace == again, "the traces differ");
+    let number = |key: &str| told[key].as_f64().unwrap_or_else(|| panic!("{key} in {told}"));
+    assert_eq!(trace.lines().count() as f64, number("ticks") + 1.0);
+    assert!(
+        number("contact_share") > 0.1 && number("contact_share") < 0.6,
+        "{told}"
+    );
+    assert!(
+        number("largest_force_n") > 0.3 && number("largest_force_n") <= 3.3,
+        "{told}"
+    );
+    assert!(number("largest_step_n") <= 0.2501, "{told}");
+    assert_eq!((number("strokes"), number("done")), (1.0, 1.0), "{told}");
+    assert!(told["tripped"].is_null(), "{told}");
+    let replayed = bench.json("replay one.isoclay");
+    assert_eq!(replayed["state_sha256"], told["state_sha256"]);
+    assert!(bench.json("history one.isoclay").to_string().contains("by hand"));
+}
+
+#[test]
+fn a_stiffness_that_the_device_cannot_hold_is_lowered_and_said() {
+    let bench = ball();
+    bench.json("new clay.isoclay ball.iclay");
+    bench.write(
+        "still.toml",
+        "target = [{ time = 0, at = [0, 0, 1.3] }, { time = 1, at = [0, 0, 1.2] }]",
+    );
+    let told = bench.json("feel clay.isoclay --device sim:omni --script still.toml --stiffness 90000");
+    let stiffness = told["stiffness_n_per_m"].as_f64().unwrap();
+    assert!(stiffness < 90_000.0, "{told}");
+    assert!(
+        told["notes"].to_string().contains("90000 N/m was wished"),
+        "{told}"
+    );
+    assert_eq!(told["done"].as_f64().unwrap(), 0.0);
+}
+
+#[test]
+fn three_threads_by_the_clock_leave_a_journal_that_replays() {
+    let bench = ball();
+    bench.json("new clay.isoclay ball.iclay");
+    let told = bench.json("feel clay.isoclay --device sim:omni --script hand.toml --real-time --contact vcp");
+    assert_eq!(told["threads"]["torn"].as_f64().unwrap(), 0.0, "{told}");
+    assert!(told["largest_step_n"].as_f64().unwrap() <= 0.2501, "{told}");
+    let replayed = bench.json("replay clay.isoclay");
+    assert_eq!(replayed["state_sha256"], told["state_sha256"]);
+}

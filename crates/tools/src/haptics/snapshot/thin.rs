@@ -1,0 +1,130 @@
+//! Parts of a solid, and gaps in it, that are too thin for a grid.
+
+use bspline::Jet;
+use glam::DVec3;
+
+use super::foot::Foot;
+use super::grid::Grid;
+use super::samples::Samples;
+use super::surface::Surface;
+
+/// Share of the steepest fall to a neighbour within which a node may be near a surface that no neighbour is behind. From a surface that
+/// is seen, nodes with all neighbours on their side are farther away.
+const NEAR: f64 = 0.75;
+/// Cosine between the normals of two surfaces that face one another, rather than meet at an edge.
+const FACING: f64 = -0.5;
+/// Newton steps towards a surface that may be there.
+const STEPS: usize = 4;
+
+/// What the nodes of a grid are too far apart for.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Unresolved {
+    /// Places where a sheet or a gap is only one node thick.
+    pub thin: usize,
+    /// Thickness of the thinnest of these, mm.
+    pub thinnest: f64,
+    /// Nodes beside a surface that passes between the nodes unseen. What lies there cannot be touched.
+    pub missed: usize,
+}
+
+impl Unresolved {
+    /// Whether anything is.
+    pub fn any(&self) -> bool {
+        self.thin + self.missed > 0
+    }
+}
+
+/// Looks through a grid. `foot` gives the closest place of a node beside the surface.
+pub fn look<'a>(
+    surface: &Surface<'_>,
+    grid: &Grid,
+    samples: &Samples,
+    foot: impl Fn(usize) -> Option<&'a Foot>,
+) -> Unresolved {
+    let mut found = Unresolved {
+        thinnest: f64::INFINITY,
+        ..Unresolved::default()
+    };
+    let strides = grid.strides();
+    let [nx, ny, nz] = grid.count;
+    let mut doubtful = Vec::new();
+    for x in 1..nx - 1 {
+        for y in 1..ny - 1 {
+            for z in 1..nz - 1 {
+                let slot = grid.slot([x, y, z]);
+                if foot(slot).is_some() {
+                    let between = strides.iter().filter_map(|stride| {
+                        let both = [slot - stride, slot + stride];
+                        let is_alone = both.iter().all(|s| samples.inside[*s] != samples.inside[slot]);
+                        is_alone.then(|| both.map(&foot)).and_then(thickness)
+                    });
+                    if let Some(thick) = between.reduce(f64::min) {
+                        found.thin += 1;
+                        found.thinnest = found.thinnest.min(thick);
+                    }
+                    continue;
+                }
+                let value = samples.values[slot];
+                let steepest = strides
+                    .iter()
+                    .flat_map(|stride| [slot - stride, slot + stride])
+                    .fold(0.0, |m: f64, other| m.max((samples.values[other] - value).abs()));
+                // No number is not near.
+                if value.abs() < NEAR * steepest && is_among_its_like(grid, samples, slot) {
+                    doubtful.push(grid.place([x, y, z]));
+                }
+            }
+        }
+    }
+    found.missed = doubtful
+        .iter()
+        .filter(|p| is_unseen(surface, grid, samples, **p))
+        .count();
+    if found.thin == 0 {
+        found.thinnest = 0.0;
+    }
+    found
+}
+
+/// Distance of two surfaces that face one another, by their closest places.
+fn thickness(feet: [Option<&Foot>; 2]) -> Option<f64> {
+    let [a, b] = [feet[0]?, feet[1]?];
+    let faces = a.inward.dot(b.inward) < FACING;
+    faces.then(|| (a.at - b.at).dot(a.inward).abs())
+}
+
+/// Whether all 26 neighbours are on the side of a node that is not at the rim.
+fn is_among_its_like(grid: &Grid, samples: &Samples, slot: usize) -> bool {
+    let [sx, sy, _] = grid.strides();
+    let first = slot - sx - sy - 1;
+    let side = samples.inside[slot];
+    (0..9).all(|row| {
+        let start = first + row / 3 * sx + row % 3 * sy;
+        samples.inside[start..start + 3].iter().all(|s| *s == side)
+    })
+}
+
+/// Whether there is a surface near a node in a cell whose corners are all on one side.
+fn is_unseen(surface: &Surface<'_>, grid: &Grid, samples: &Samples, p: DVec3) -> bool {
+    let (mut x, mut jets): (DVec3, Vec<Jet>) = (p, Vec::new());
+    for _ in 0..STEPS {
+        surface.jets(&[x], &mut jets);
+        let Some(foot) = Foot::new(x, &jets[0]) else {
+            return false;
+        };
+        x -= foot.depth.clamp(-grid.spacing, grid.spacing) * foot.inward;
+        if foot.depth.abs() < 0.02 * grid.spacing {
+            break;
+        }
+    }
+    surface.jets(&[x], &mut jets);
+    let is_there = Foot::new(x, &jets[0]).is_some_and(|f| f.depth.abs() < 0.02 * grid.spacing);
+    let Some(cell) = grid
+        .cell(x)
+        .filter(|_| is_there && x.distance(p) < 1.2 * grid.spacing)
+    else {
+        return false;
+    };
+    let corner = |n: usize| samples.inside[grid.slot(std::array::from_fn(|a| cell[a] + (n >> a & 1)))];
+    (1..8).all(|n| corner(n) == corner(0))
+}
