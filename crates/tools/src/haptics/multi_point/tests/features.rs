@@ -121,7 +121,8 @@ fn edge_of_the_solid_slides_under_a_face() {
         if k > 250 {
             let n = t.felt.proxy.turn * DVec3::Z;
             let across = t.felt.force.normalize().cross(n).length();
-            assert!(across < 0.02, "{k}: {across} {}", t.felt.force);
+            // At up to 60 mm/s, with two steps a tick.
+            assert!(across < 0.05, "{k}: {across} {}", t.felt.force);
         }
     }
     assert!(trace.least_work() > -1e-4);

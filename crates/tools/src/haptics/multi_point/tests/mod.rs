@@ -6,3 +6,4 @@ mod features;
 mod growth;
 mod hostile;
 mod scenes;
+mod probe;
