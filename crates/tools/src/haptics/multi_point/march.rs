@@ -16,6 +16,8 @@ const STILL: f64 = 1e-7;
 const UNSURE: f64 = 0.03;
 /// Depth at which a place between the points counts as found late, mm.
 const LATE: f64 = 0.01;
+/// Depth up to which a place between the points may have been in the solid unseen, mm: it slides to where it is deepest.
+const GUESSED: f64 = 0.1;
 /// Shortest step, mm.
 const SHORTEST: f64 = 1e-4;
 
@@ -38,7 +40,8 @@ impl MultiPoint {
             return;
         }
         let most = self.options.step.min(0.5 * obstacle.finest().max(2.0 * SHORTEST));
-        self.reach = self.reach.clamp(SHORTEST, most);
+        // What one tick could not do is no reason for the next to crawl.
+        self.reach = most.max(SHORTEST);
         for _ in 0..self.options.iterations {
             let wish = self.wish(hand);
             if dot(&wish, &wish).sqrt() < STILL || !self.step(obstacle, &wish) {
@@ -275,7 +278,8 @@ impl MultiPoint {
         let a = self.row_of(there.gradient, arm(&self.tool, turn, there.on));
         let b = level - there.clearance + dot(&a, twist);
         // Where the proxy is now must not be in the solid by it, but for what it already is.
-        if b > lack + 0.1 * self.reach.min(0.1) || !self.rows.push(a, b) {
+        let slack = if i < self.places.own { LATE } else { GUESSED };
+        if b > lack + slack || !self.rows.push(a, b) {
             *is_too_far |= !was_late;
         } else {
             *is_violated = true;

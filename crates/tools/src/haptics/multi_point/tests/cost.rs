@@ -57,8 +57,8 @@ fn ticks_take_no_memory_and_few_looks() {
             sum / 4000
         );
         assert!(touching > 1000, "{name}: {touching}");
-        assert!(sum / 4000 < 600, "{name}: {}", sum / 4000);
-        assert!(most < 4000, "{name}: {most}");
+        assert!(sum / 4000 < 300, "{name}: {}", sum / 4000);
+        assert!(most < 1500, "{name}: {most}");
     }
 }
 

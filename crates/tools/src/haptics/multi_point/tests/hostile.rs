@@ -122,6 +122,7 @@ pub fn run(seed: u64, tool: &PointTool) -> (MultiPoint, impl Fn(f64) -> Pose) {
 fn random_solids_keep_the_tool_out_and_give_no_energy() {
     let tools = tools();
     let (mut deepest, mut least, mut touching) = (0.0f64, 0.0f64, 0);
+    let mut hidden = 0.0f64;
     for seed in 0..25 {
         let solid = solid(seed);
         let (name, tool) = &tools[seed as usize % tools.len()];
@@ -140,6 +141,7 @@ fn random_solids_keep_the_tool_out_and_give_no_energy() {
             trace.torque_step()
         );
         (deepest, least) = (deepest.max(depth), least.min(work));
+        hidden = hidden.max(between);
         assert!(step <= 0.25 + 1e-12 && trace.torque_step() <= 25.0 + 1e-9);
         touching += trace.0.iter().filter(|t| t.felt.force.length() > 0.05).count();
         assert!(
@@ -151,6 +153,8 @@ fn random_solids_keep_the_tool_out_and_give_no_energy() {
     }
     assert!(touching > 20_000, "{touching}");
     assert!(deepest < 0.01, "{deepest}");
+    // For single ticks, where looks do not suffice: fast and flush.
+    assert!(hidden < 0.2, "{hidden}");
     assert!(least > -1e-4, "{least}");
 }
 
@@ -198,6 +202,44 @@ fn force_changes_no_faster_than_the_hand_in_hollows() {
             }
             assert!(touching > 500, "{name} {seed}: {touching}");
             assert!(trace.depth(&tool, &solid as &dyn Obstacle).0 < 0.01);
+        }
+    }
+}
+
+/// No tool hangs on the solid when the hand has left it, even where there were too few looks between its points: edges of the block,
+/// and a gap between it and the ball as wide as the tool.
+#[test]
+fn tools_follow_a_hand_that_has_left() {
+    let s = Sampling::default();
+    let tools = [PointTool::sphere(4.5, s), PointTool::cylinder(4.0, 12.0, s)];
+    let solid = Solid::new(2.0, super::cost::scene);
+    for tool in tools.map(|tool| tool.expect("a tool")) {
+        for variant in 0..8 {
+            let options = MultiPointOptions {
+                fine_checks: 100,
+                ..MultiPointOptions::default()
+            };
+            let mut renderer = MultiPoint::new(tool.clone(), options).expect("options");
+            let aside = 0.03 * f64::from(variant) * DVec3::new(1.0, -1.0, 0.3);
+            let hand = |t: f64| {
+                let hand = super::cost::hand(t);
+                Pose {
+                    at: hand.at + aside,
+                    ..hand
+                }
+            };
+            let trace = follow(&mut renderer, &solid, 4000, hand);
+            let mut free_for = 0;
+            for (k, t) in trace.0.iter().enumerate() {
+                let clear = |q: &DVec3| solid.distance(place(&tool, &t.hand, *q)).0 > tool.nose() + 0.5;
+                free_for = if tool.points().iter().all(clear) {
+                    free_for + 1
+                } else {
+                    0
+                };
+                let way = t.hand.at.distance(t.felt.proxy.at);
+                assert!(free_for < 200 || way < 1.0, "{variant} {k}: {way}");
+            }
         }
     }
 }

@@ -6,4 +6,3 @@ mod features;
 mod growth;
 mod hostile;
 mod scenes;
-mod probe;
