@@ -56,7 +56,7 @@ pub struct MultiPoint {
     places: Places,
     features: Features,
     rows: Polyhedron,
-    /// Step that the last ticks could take, mm.
+    /// Step that this tick can take near the surface, mm.
     reach: f64,
     /// Way by which the tool may still be pushed out in this tick, mm.
     push_left: f64,

@@ -11,7 +11,7 @@ pub struct MultiPointOptions {
     pub angular_stiffness: f64,
     /// Damping of that turn, N mm s/rad.
     pub angular_damping: f64,
-    /// Way that a point near the surface goes between two looks at the solid, mm, at most. It is halved where a step fails, doubled where
+    /// Way that a point near the surface goes between two looks at the solid, mm, at most. Within a tick it is halved where a step fails, doubled where
     /// one is taken, and never above half of [`finest`](super::super::Obstacle::finest).
     pub step: f64,
     /// Steps in a tick at most; there are fewer when the proxy has arrived.
