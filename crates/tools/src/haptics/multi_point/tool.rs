@@ -206,12 +206,13 @@ impl PointTool {
                     if d.abs() > 2.0 * step || !d.is_finite() {
                         continue;
                     }
-                    for _ in 0..8 {
-                        p -= d * g / g.length_squared().max(0.1);
+                    // To where the points' balls are in the surface. Beyond a corner that takes a step for each of its sides.
+                    for _ in 0..12 {
+                        p -= (d + sampling.nose) * g / g.length_squared().max(0.1);
                         (d, g) = object.distance(p);
                     }
-                    if d.abs() < 1e-6 * step && (p - centre).abs().cmple(half).all() {
-                        found.push(p - centre - sampling.nose * g.normalize_or_zero());
+                    if (d + sampling.nose).abs() < 1e-6 * step && (p - centre).abs().cmple(half).all() {
+                        found.push(p - centre);
                     }
                 }
             }
