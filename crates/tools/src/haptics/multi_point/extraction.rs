@@ -1,10 +1,10 @@
-//! The way out of solid that has grown over the tool, where planes do not lead out [SVO Fig. 7C, Figs. 16A-B].
+//! The way out of solid that has grown over the tool, where planes do not lead out [SensAble99 fig. 7C, Figs. 16A-B].
 
 use glam::DVec3;
 
 use super::super::{Obstacle, Pose};
 use super::MultiPoint;
-use super::places::ask;
+use super::places::{Places, arm, ask};
 
 /// Random directions that are tried in a tick.
 const TRIES: usize = 6;
@@ -13,47 +13,53 @@ const PROGRESS: f64 = 1e-3;
 
 impl MultiPoint {
     /// Lifts the proxy if the march has not: along the normal of the deepest point, then along those of points chosen at random.
-    /// A move counts if the deepest point rises by it. `depth` is where that was when the tick began.
-    pub(super) fn extract(&mut self, obstacle: &dyn Obstacle, depth: f64, dt: f64) {
-        let step = self.options.push_out * dt;
-        let (deepest, which) = self.places.deepest();
+    /// A move counts if the deepest point rises by it. If none does, the tool is buried. `depth` is where the deepest point was when
+    /// the tick began.
+    pub(super) fn extract(&mut self, obstacle: &dyn Obstacle, depth: f64) {
+        let step = self.push_left.max(0.0);
+        let (deepest, which) = self.places.deepest_own();
         if -deepest < depth - PROGRESS * step || -deepest <= self.options.tolerance {
             return;
         }
-        let mut now = -deepest;
-        if self.rise(obstacle, which, step, &mut now) {
+        if self.rise(obstacle, self.out(which, step), -deepest) {
             return;
         }
-        for _ in 0..TRIES {
-            let inside = |i: &usize| self.places.counts[*i] && self.places.here[*i].clearance < 0.0;
-            let count = (0..self.places.len()).filter(inside).count();
-            if count == 0 {
-                return;
-            }
+        let inside = |places: &Places, i: usize| places.here[i].is_exact && places.here[i].clearance < 0.0;
+        let count = (0..self.places.own).filter(|i| inside(&self.places, *i)).count();
+        for _ in 0..TRIES.min(count) {
             let chosen = (self.random.next() % count as u64) as usize;
-            let Some(i) = (0..self.places.len()).filter(inside).nth(chosen) else {
-                return;
-            };
-            if self.rise(obstacle, i, step, &mut now) {
+            let nth = (0..self.places.own)
+                .filter(|i| inside(&self.places, *i))
+                .nth(chosen);
+            if nth.is_some_and(|i| self.rise(obstacle, self.out(i, step), -deepest)) {
                 return;
             }
         }
+        self.is_buried = self.middle(obstacle).0 < 0.0;
     }
 
-    /// Moves along the normal of a point, no further than it is deep, if that makes the tool less deep.
-    fn rise(&mut self, obstacle: &dyn Obstacle, i: usize, step: f64, depth: &mut f64) -> bool {
-        let place = self.places.here[i];
-        let normal = place.gradient.normalize_or_zero();
-        let way = step.min(-place.clearance) * normal;
-        if way == DVec3::ZERO {
-            return false;
-        }
+    /// Moves a buried tool along the normal at its middle: until that is out, and on as long as the deepest point rises.
+    pub(super) fn surface(&mut self, obstacle: &dyn Obstacle, depth: f64) {
+        let (distance, gradient) = self.middle(obstacle);
+        let way = self.push_left * gradient.normalize_or(DVec3::Z);
+        let limit = if distance < 0.0 { f64::INFINITY } else { depth };
+        self.is_buried = depth > self.options.tolerance && self.rise(obstacle, way, limit);
+    }
+
+    /// Distance and gradient at the middle of the tool's points.
+    fn middle(&self, obstacle: &dyn Obstacle) -> (f64, DVec3) {
+        obstacle.distance(self.pose.at + arm(&self.tool, self.places.turn, self.tool.middle))
+    }
+
+    /// Moves the tool if no point of it is then as deep as a limit.
+    fn rise(&mut self, obstacle: &dyn Obstacle, way: DVec3, limit: f64) -> bool {
         let pose = Pose {
             at: self.pose.at + way,
             turn: self.pose.turn,
         };
         let mut deepest = 0.0f64;
         for k in 0..self.places.len() {
+            self.places.there[k] = self.places.here[k];
             if self.places.counts[k] {
                 self.places.there[k] = ask(
                     &self.tool,
@@ -63,15 +69,18 @@ impl MultiPoint {
                     self.places.here[k].on,
                 );
                 deepest = deepest.min(self.places.there[k].clearance);
-            } else {
-                self.places.there[k] = self.places.here[k];
             }
         }
-        if -deepest >= *depth - PROGRESS * step {
-            return false;
+        let is_better = -deepest < limit - PROGRESS * way.length() && way != DVec3::ZERO;
+        if is_better {
+            self.accept(&[way.x, way.y, way.z, 0.0, 0.0, 0.0]);
         }
-        *depth = -deepest;
-        self.accept(&[way.x, way.y, way.z, 0.0, 0.0, 0.0]);
-        true
+        is_better
+    }
+
+    /// Way out of the solid along the normal of a point, no further than it is deep.
+    fn out(&self, i: usize, step: f64) -> DVec3 {
+        let place = &self.places.here[i];
+        step.min(-place.clearance) * place.gradient.normalize_or_zero()
     }
 }

@@ -1,22 +1,24 @@
 //! Features of the solid between the tool's points, and which points are looked at.
 //!
-//! The source notes that a feature can enter the tool between two points, and mends flat contact of spheres alone [SVO Figs. 20-22].
+//! The source notes that a feature can enter the tool between two points, and mends flat contact of spheres alone [SensAble99 figs. 20–22].
 //! Here every place of the tool's surface belongs to a point and is at most its `cover` away, so only points that are less clear
 //! than that can hide a feature: finer points about these are looked at, as many in a tick as are allowed. One in the solid
 //! becomes a guest: it joins the tool's points and slides over the tool's surface to where it is deepest, in every tick that
 //! it touches. At rest a guest's gradient is across the tool's surface, so a sharp edge of the solid under a face of
 //! the tool presses along the face's normal.
 
-use glam::DQuat;
+use glam::{DQuat, DVec3};
 
 use super::super::{Obstacle, Pose};
 use super::MultiPoint;
-use super::places::{Place, ask};
+use super::places::{Place, arm, ask};
 use super::projection::Twist;
 use super::tool::PointTool;
 
 /// Looks of a guest on its way over the tool, in a look of the tool.
-const SLIDES: usize = 4;
+const SLIDES: usize = 6;
+/// Way from a place of the surface to the nearest fine point, over the spacing of these, at most.
+const HIDES: f64 = 0.75;
 /// Tangential part of a gradient that is none.
 const LEVEL: f64 = 1e-4;
 
@@ -25,15 +27,17 @@ const LEVEL: f64 = 1e-4;
 pub(super) struct Features {
     /// Clearance of each fine point when it was last asked for; −∞ if never.
     clearance: Vec<f64>,
-    /// Way and turn of the tool until then.
-    when: Vec<(f64, f64)>,
-    /// Way, mm, with growth of the solid, and turn, rad, of the tool since it was made.
-    way: f64,
+    /// Where it was then, and growth and turn until then.
+    when: Vec<(DVec3, f64, f64)>,
+    /// Growth of the solid, mm, and turn of the tool, rad, since it was made.
+    grown: f64,
     turned: f64,
     /// Point whose fine points have their turn next.
     next: usize,
     /// Fine points that may still be asked for in this tick.
     left: usize,
+    /// Whether they did not suffice.
+    pub(super) is_unsure: bool,
     /// Step of each guest over the tool, mm.
     stride: Vec<f64>,
     /// Points that are not looked at in this tick, with `deepest`.
@@ -46,11 +50,12 @@ impl Features {
         let guests = super::places::GUESTS;
         Self {
             clearance: vec![f64::NEG_INFINITY; tool.fine.len()],
-            when: vec![(0.0, 0.0); tool.fine.len()],
-            way: 0.0,
+            when: vec![(DVec3::ZERO, 0.0, 0.0); tool.fine.len()],
+            grown: 0.0,
             turned: 0.0,
             next: 0,
             left: 0,
+            is_unsure: false,
             stride: vec![tool.spacing; guests],
             ignored: vec![false; tool.points.len() + guests],
             order: Vec::with_capacity(tool.points.len()),
@@ -62,9 +67,9 @@ impl Features {
         self.next = 0;
     }
 
-    /// The tool moved, or the solid did.
-    pub fn moved(&mut self, way: f64, turned: f64) {
-        self.way += way;
+    /// The solid grew, mm, or the tool turned, rad.
+    pub fn changed(&mut self, grown: f64, turned: f64) {
+        self.grown += grown;
         self.turned += turned;
     }
 
@@ -77,6 +82,7 @@ impl MultiPoint {
     /// Guests at the pose of the proxy: those that no longer touch go, the others slide to where they are deepest.
     pub(super) fn settle_guests(&mut self, obstacle: &dyn Obstacle, dt: f64) {
         self.features.left = self.options.fine_checks;
+        self.features.is_unsure = false;
         for i in self.places.own..self.places.len() {
             if !self.places.counts[i] {
                 continue;
@@ -98,40 +104,73 @@ impl MultiPoint {
         }
     }
 
-    /// Moves a guest over the tool's surface to where it is deeper, at the pose that is tried.
+    /// Moves a guest over the tool's surface to where it is deepest, at the pose that is tried.
     pub(super) fn slide(&mut self, obstacle: &dyn Obstacle, pose: &Pose, turn: DQuat, i: usize) {
-        let Some(shape) = self.tool.shape else { return };
-        let back = turn.inverse();
-        let mut place = self.places.there[i];
-        let stride = &mut self.features.stride[i - self.places.own];
-        let across = |place: &Place| {
-            let (g, n) = (back * place.gradient, shape.distance(place.on).1);
-            g - g.dot(n) * n
+        let stride = self.features.stride[i - self.places.own];
+        let (place, stride) = self.slid(obstacle, pose, turn, self.places.there[i], stride);
+        self.places.there[i] = place;
+        self.features.stride[i - self.places.own] = stride;
+    }
+
+    /// Part of a gradient along the tool's surface, in its axes.
+    fn slope(&self, turn: DQuat, place: &Place) -> DVec3 {
+        let Some(shape) = self.tool.shape else {
+            return DVec3::ZERO;
         };
-        let mut slope = across(&place);
+        let (g, n) = (turn.inverse() * place.gradient, shape.distance(place.on).1);
+        g - g.dot(n) * n
+    }
+
+    /// Where a place of the tool's surface gets by steepest descent of the distance, and the next stride, mm.
+    fn slid(
+        &self,
+        obstacle: &dyn Obstacle,
+        pose: &Pose,
+        turn: DQuat,
+        from: Place,
+        stride: f64,
+    ) -> (Place, f64) {
+        let Some(shape) = self.tool.shape else {
+            return (from, stride);
+        };
+        let (least, most) = (1e-3 * self.tool.spacing, 1e3 * self.tool.spacing);
+        let (mut place, mut stride) = (from, stride);
+        let mut slope = self.slope(turn, &place);
         for _ in 0..SLIDES {
             if slope.length() < LEVEL {
                 break;
             }
-            let on = shape.project(place.on - *stride * slope);
+            let on = shape.project(place.on - stride * slope);
             let next = ask(&self.tool, obstacle, pose, turn, on);
-            if next.clearance < place.clearance {
-                let (way, change) = (on - place.on, across(&next) - slope);
-                // Step of Barzilai and Borwein: the way to where the slope is none if it changes on as it did.
-                let curved = way.dot(change);
-                *stride = match curved > 1e-12 {
-                    true => (way.length_squared() / curved)
-                        .clamp(1e-3 * self.tool.spacing, 1e3 * self.tool.spacing),
-                    false => 2.0 * *stride,
-                };
-                slope += change;
-                place = next;
+            let (way, change) = (on - place.on, self.slope(turn, &next) - slope);
+            // Step of Barzilai and Borwein: the way to where the slope is none if it changes on as it did.
+            let curved = way.dot(change);
+            let straight = if curved > 1e-12 {
+                way.length_squared() / curved
             } else {
-                *stride *= 0.3;
+                2.0 * stride
+            };
+            if next.clearance < place.clearance {
+                (place, slope) = (next, slope + change);
+                stride = straight;
+            } else {
+                stride = straight.min(0.5 * stride);
             }
+            stride = stride.clamp(least, most);
         }
-        *stride = stride.max(1e-3 * self.tool.spacing);
-        self.places.there[i] = place;
+        (place, stride)
+    }
+
+    /// Whether no place between the points is in the solid where the proxy is: all finer points near it are asked for.
+    pub(super) fn is_clear_between(&self, obstacle: &dyn Obstacle) -> bool {
+        (0..self.places.own).all(|i| {
+            let fine = &self.tool.fine[self.tool.first[i]..self.tool.first[i + 1]];
+            self.places.here[i].clearance > self.tool.cover[i]
+                || fine.iter().all(|on| {
+                    ask(&self.tool, obstacle, &self.pose, self.places.turn, *on).clearance
+                        >= -self.options.tolerance
+                })
+        })
     }
 
     /// Looks for the solid between the points at the pose that is tried; what is found becomes a guest.
@@ -148,10 +187,8 @@ impl MultiPoint {
         if self.tool.fine.is_empty() {
             return;
         }
-        let (v, w) = super::march::halves(twist, self.lever);
-        let (way, turned) = (self.features.way + v.length(), self.features.turned + w.length());
-        // Whether or not the pose becomes the proxy's: from it to any later one it is no further than this says.
-        let then = (self.features.way - v.length(), self.features.turned - w.length());
+        let turned = self.features.turned + super::march::halves(twist, self.lever).1.length();
+        let hides = HIDES * self.tool.spacing;
         for k in 0..own {
             let parent = (self.features.next + k) % own;
             if self.places.there[parent].clearance > self.tool.cover[parent] {
@@ -159,46 +196,59 @@ impl MultiPoint {
             }
             for f in self.tool.first[parent]..self.tool.first[parent + 1] {
                 let on = self.tool.fine[f];
-                let since = self.features.when[f];
-                let moved = way - since.0 + (turned - since.1) * (on - self.tool.handle).length();
+                let at = pose.at + arm(&self.tool, turn, on);
+                let (then, grown, turned_then) = self.features.when[f];
+                let moved =
+                    at.distance(then) + self.features.grown - grown + hides * (turned - turned_then).abs();
                 if self.features.clearance[f] - moved >= -self.options.tolerance {
                     continue;
                 }
                 if self.features.left == 0 {
+                    // The rest has its turn in the next tick, and the march goes on in small steps.
                     self.features.next = parent;
+                    self.features.is_unsure = true;
                     return;
                 }
                 self.features.left -= 1;
-                let found = ask(&self.tool, obstacle, pose, turn, on);
-                self.features.clearance[f] = found.clearance;
-                self.features.when[f] = then;
+                let mut found = ask(&self.tool, obstacle, pose, turn, on);
+                // Nothing within `hides` of the point is less clear: the distance of a convex solid lies above its tangents.
+                let mut bound = found.clearance - hides * self.slope(turn, &found).length().min(1.0);
+                let mut stride = self.tool.spacing;
+                if found.clearance > hides {
+                    bound = found.clearance - hides;
+                } else if bound < -self.options.tolerance {
+                    self.features.left = self.features.left.saturating_sub(SLIDES);
+                    (found, stride) = self.slid(obstacle, pose, turn, found, stride);
+                    // Where it has not come to rest, there is more to find.
+                    bound = found.clearance - 0.5 * hides * self.slope(turn, &found).length().min(1.0);
+                }
+                self.features.clearance[f] = bound;
+                self.features.when[f] = (at, self.features.grown, turned);
                 if found.clearance < -self.options.tolerance {
-                    self.welcome(obstacle, found, twist, pose, turn, is_violated, is_too_far);
+                    self.welcome(obstacle, found, stride, twist, turn, is_violated, is_too_far);
                 }
             }
         }
     }
 
-    /// Makes a fine point that is in the solid a guest.
+    /// Makes a place between the points that is in the solid a guest.
     fn welcome(
         &mut self,
         obstacle: &dyn Obstacle,
         found: Place,
+        stride: f64,
         twist: &Twist,
-        pose: &Pose,
         turn: DQuat,
         is_violated: &mut bool,
         is_too_far: &mut bool,
     ) {
         let guests = self.places.own..self.places.len();
-        // Guests that slide to the same place are one.
+        // Those that slide to the same place are one.
         let near = |i: &usize| {
-            self.places.counts[*i] && self.places.there[*i].on.distance(found.on) < self.tool.spacing
+            self.places.counts[*i] && self.places.there[*i].on.distance(found.on) < 0.25 * self.tool.spacing
         };
-        if guests
-            .clone()
-            .any(|i| near(&i) && self.places.there[i].clearance <= found.clearance)
-        {
+        let same = guests.clone().find(near);
+        if same.is_some_and(|i| self.places.there[i].clearance <= found.clearance + self.options.tolerance) {
             return;
         }
         let free = guests.clone().find(|i| !self.places.counts[*i]);
@@ -206,14 +256,14 @@ impl MultiPoint {
             let clearance = |i: usize| self.places.there[i].clearance;
             clearance(*a).total_cmp(&clearance(*b))
         });
-        let Some(i) = free.or(clearest) else { return };
+        let Some(i) = same.or(free).or(clearest) else {
+            return;
+        };
         self.places.counts[i] = true;
         self.places.there[i] = found;
-        self.features.stride[i - self.places.own] = self.tool.spacing;
-        self.slide(obstacle, pose, turn, i);
+        self.features.stride[i - self.places.own] = stride;
         // If it was in the solid before it was found, it leaves that as if the solid had grown.
-        let on = self.places.there[i].on;
-        let here = ask(&self.tool, obstacle, &self.pose, self.places.turn, on);
+        let here = ask(&self.tool, obstacle, &self.pose, self.places.turn, found.on);
         self.places.here[i] = here;
         self.places.level[i] = here.clearance.min(0.0);
         self.judge(i, twist, turn, is_violated, is_too_far);

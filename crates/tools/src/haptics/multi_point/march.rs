@@ -12,6 +12,12 @@ use super::turn::{exponential, logarithm};
 pub(super) const CUTS: usize = 8;
 /// Way that is none, mm.
 const STILL: f64 = 1e-7;
+/// Longest step once there are no looks left for finer points, mm.
+const UNSURE: f64 = 0.03;
+/// Depth at which a place between the points counts as found late, mm.
+const LATE: f64 = 0.01;
+/// Depth up to which a place between the points may have been in the solid unseen, mm: it slides to where it is deepest.
+const GUESSED: f64 = 0.1;
 /// Shortest step, mm.
 const SHORTEST: f64 = 1e-4;
 
@@ -28,9 +34,14 @@ impl MultiPoint {
     /// Moves the proxy as near to the hand as it gets.
     pub(super) fn march(&mut self, obstacle: &dyn Obstacle, hand: &Pose, dt: f64) {
         self.look_again(obstacle, hand, dt);
-        let depth = -self.places.deepest().0;
+        let depth = -self.places.deepest_own().0;
+        if self.is_buried {
+            self.surface(obstacle, depth);
+            return;
+        }
         let most = self.options.step.min(0.5 * obstacle.finest().max(2.0 * SHORTEST));
-        self.reach = self.reach.clamp(SHORTEST, most);
+        // What one tick could not do is no reason for the next to crawl.
+        self.reach = most.max(SHORTEST);
         for _ in 0..self.options.iterations {
             let wish = self.wish(hand);
             if dot(&wish, &wish).sqrt() < STILL || !self.step(obstacle, &wish) {
@@ -38,9 +49,9 @@ impl MultiPoint {
             }
             self.reach = (2.0 * self.reach).min(most);
         }
-        // Only where the rows could not lift it: in growing and closing solids.
+        // Only in growing and closing solids.
         if depth > 10.0 * self.options.tolerance {
-            self.extract(obstacle, depth, dt);
+            self.extract(obstacle, depth);
         }
     }
 
@@ -64,7 +75,8 @@ impl MultiPoint {
             // Out of the solid at the speed that is allowed, and never deeper in.
             self.places.level[i] = (now.clearance + self.options.push_out * dt).min(0.0);
         }
-        self.features.moved(grown, 0.0);
+        self.features.changed(grown, 0.0);
+        self.push_left = self.options.push_out * dt;
         self.settle_guests(obstacle, dt);
         if let Some(count) = self.options.deepest {
             self.choose_deepest(count);
@@ -82,19 +94,24 @@ impl MultiPoint {
     fn step(&mut self, obstacle: &dyn Obstacle, wish: &Twist) -> bool {
         self.gather(obstacle, wish);
         for _ in 0..CUTS {
-            let Some(whole) = self.rows.nearest(wish) else {
+            let Some((whole, push)) = self.goal(wish) else {
                 return false;
             };
             let size = dot(&whole, &whole).sqrt();
             if size < STILL {
                 return false;
             }
-            let share = self.allowed(&whole);
+            let mut share = self.allowed(&whole);
+            if self.features.is_unsure {
+                share = share.min(UNSURE / size);
+            }
             let twist = whole.map(|u| share * u);
+            self.share = share;
             match self.try_out(obstacle, &twist) {
                 Tried::Clear => {
                     self.accept(&twist);
-                    return share * size > STILL;
+                    self.push_left -= share * push;
+                    return true;
                 }
                 Tried::Violated => {}
                 Tried::TooFar if self.reach <= SHORTEST => return false,
@@ -103,6 +120,30 @@ impl MultiPoint {
         }
         self.reach = (0.5 * self.reach).max(SHORTEST);
         false
+    }
+
+    /// The twist that leads nearest to a wish by the rows, and how much of it pushes the tool out of the solid: no more than is left
+    /// for this tick.
+    fn goal(&mut self, wish: &Twist) -> Option<(Twist, f64)> {
+        let whole = self.rows.nearest(wish);
+        if whole.is_some() && !self.rows.lacks(self.options.tolerance) {
+            return whole.map(|whole| (whole, 0.0));
+        }
+        // As far as the tool would go if it only had to get no deeper.
+        self.rows.relax();
+        let free = self.rows.nearest(wish)?;
+        let out: Twist = whole.map_or([0.0; 6], |whole| std::array::from_fn(|k| whole[k] - free[k]));
+        let push = dot(&out, &out).sqrt();
+        let share = if whole.is_none() {
+            0.0
+        } else {
+            (self.push_left / push.max(STILL)).clamp(0.0, 1.0)
+        };
+        for (level, here) in self.places.level.iter_mut().zip(&self.places.here) {
+            // What that share of the push lifts a point to.
+            *level -= (1.0 - share) * (*level - here.clearance).max(0.0);
+        }
+        Some((std::array::from_fn(|k| free[k] + share * out[k]), share * push))
     }
 
     /// Rows of the points that can meet the solid on the way to a wish.
@@ -223,15 +264,23 @@ impl MultiPoint {
         is_too_far: &mut bool,
     ) {
         let (there, level) = (self.places.there[i], self.places.level[i]);
-        if there.clearance >= level - self.options.tolerance {
+        // A part of a push lifts by that part.
+        let here = self.places.here[i].clearance;
+        let lack = (level - here).max(0.0);
+        if there.clearance >= level - (1.0 - self.share) * lack - self.options.tolerance {
+            return;
+        }
+        // In the solid the nearest surface is soon another one: what was found there late is pushed out by the rows, and holds nothing.
+        let was_late = i >= self.places.own && here < -LATE;
+        if was_late && there.clearance > here - LATE {
             return;
         }
         let a = self.row_of(there.gradient, arm(&self.tool, turn, there.on));
         let b = level - there.clearance + dot(&a, twist);
         // Where the proxy is now must not be in the solid by it, but for what it already is.
-        let lack = (level - self.places.here[i].clearance).max(0.0);
-        if b > lack + 0.1 * self.reach.min(0.1) || !self.rows.push(a, b) {
-            *is_too_far = true;
+        let slack = if i < self.places.own { LATE } else { GUESSED };
+        if b > lack + slack || !self.rows.push(a, b) {
+            *is_too_far |= !was_late;
         } else {
             *is_violated = true;
         }
@@ -253,7 +302,7 @@ impl MultiPoint {
             self.places.turn = self.pose.turn;
         }
         std::mem::swap(&mut self.places.here, &mut self.places.there);
-        self.features.moved(v.length(), w.length());
+        self.features.changed(0.0, w.length());
     }
 
     /// Keeps the points turned as they are for some ticks.

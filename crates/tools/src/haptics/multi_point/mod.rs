@@ -1,4 +1,4 @@
-//! Tools that touch with many points and turn: a god-object of six degrees of freedom [SVO; Zilles95, Ortega07].
+//! Tools that touch with many points and turn: a god-object of six degrees of freedom [SensAble99; Zilles94, Ortega07].
 //!
 //! The proxy is a pose of the tool. It goes where `½K|x − x_h|² + ½K_θ|θ|²` is least, θ the turn from hand to proxy, among
 //! the poses that keep all points out of the solid: `φ(x + R qᵢ) ≥ ρ`, ρ the radius of a point's ball. A step linearises
@@ -50,12 +50,18 @@ pub struct MultiPoint {
     pose: Pose,
     /// Whether the tool was clear of the solid since it began.
     is_clear: bool,
+    /// Whether solid has grown over it so that no point of it knows the way out.
+    is_buried: bool,
     /// Its points, and those between them that touch.
     places: Places,
     features: Features,
     rows: Polyhedron,
-    /// Step that the last ticks could take, mm.
+    /// Step that this tick can take near the surface, mm.
     reach: f64,
+    /// Way by which the tool may still be pushed out in this tick, mm.
+    push_left: f64,
+    /// Share of the way to the goal that is tried.
+    share: f64,
     random: Random,
     /// Ticks since the points were turned, with `turn_every`.
     held_for: u32,
@@ -78,10 +84,13 @@ impl MultiPoint {
             lever: (options.angular_stiffness / (1e-3 * options.coupling.stiffness)).sqrt(),
             pose: Pose::at(DVec3::ZERO),
             is_clear: false,
+            is_buried: false,
             rows: Polyhedron::with_capacity(places.len() * (2 + march::CUTS)),
             features: Features::new(&tool),
             places,
             reach: options.step,
+            push_left: 0.0,
+            share: 1.0,
             random: Random::new(options.seed),
             held_for: 0,
             stretching: Stretching::default(),
@@ -110,7 +119,7 @@ impl MultiPoint {
         self.places.turn = hand.turn;
         self.held_for = 0;
         self.places.look(&self.tool, obstacle, hand);
-        self.is_clear = self.places.deepest().0 >= -self.options.tolerance;
+        self.is_clear = self.places.deepest().0 >= -self.options.tolerance && self.is_clear_between(obstacle);
         self.is_clear
     }
 
@@ -178,6 +187,7 @@ impl Renderer for MultiPoint {
 
     fn reset(&mut self) {
         self.is_clear = false;
+        self.is_buried = false;
         self.reach = self.options.step;
         self.places.forget();
         self.features.forget();

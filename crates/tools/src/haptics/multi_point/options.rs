@@ -11,12 +11,13 @@ pub struct MultiPointOptions {
     pub angular_stiffness: f64,
     /// Damping of that turn, N mm s/rad.
     pub angular_damping: f64,
-    /// Way that a point near the surface goes between two looks at the solid, mm, at most. It is halved where a step fails, doubled where
+    /// Way that a point near the surface goes between two looks at the solid, mm, at most. Within a tick it is halved where a step fails, doubled where
     /// one is taken, and never above half of [`finest`](super::super::Obstacle::finest).
     pub step: f64,
     /// Steps in a tick at most; there are fewer when the proxy has arrived.
     pub iterations: usize,
-    /// Finer points that a tick looks at, at most; the rest have their turn in the next.
+    /// Finer points that a tick looks at, at most. Where they do not suffice for a step, the rest have their turn in the next tick, and the
+    /// proxy goes on in small steps in this one.
     pub fine_checks: usize,
     /// Depth that makes no difference, mm.
     pub tolerance: f64,
@@ -28,10 +29,10 @@ pub struct MultiPointOptions {
     pub torque_slew: f64,
     /// Seed of random extraction.
     pub seed: u64,
-    /// Looks at that many points alone after the first look of a tick, the deepest [SVO]. A point that was not among them can go
+    /// Looks at that many points alone after the first look of a tick, the deepest [SensAble99]. A point that was not among them can go
     /// through; nothing looks at all points in every step, so it is off.
     pub deepest: Option<usize>,
-    /// Turns the points to the hand's turn every so many ticks and leaves them turned so between [SVO]. The solid then has no hold on
+    /// Turns the points to the hand's turn every so many ticks and leaves them turned so between [SensAble99]. The solid then has no hold on
     /// the turn and there is no torque; 0, off, solves for the turn.
     pub turn_every: u32,
 }
@@ -44,8 +45,8 @@ impl Default for MultiPointOptions {
             angular_stiffness: 2000.0,
             angular_damping: 0.0,
             step: 0.5,
-            iterations: 12,
-            fine_checks: 256,
+            iterations: 2,
+            fine_checks: 400,
             tolerance: 1e-3,
             push_out: 100.0,
             slew: 0.25,

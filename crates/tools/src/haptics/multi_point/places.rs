@@ -83,7 +83,16 @@ impl Places {
 
     /// The least clearance of those that were asked for, and whose.
     pub fn deepest(&self) -> (f64, usize) {
-        let asked = (0..self.len()).filter(|i| self.counts[*i] && self.here[*i].is_exact);
+        self.deepest_of(self.len())
+    }
+
+    /// That of the tool's own points.
+    pub fn deepest_own(&self) -> (f64, usize) {
+        self.deepest_of(self.own)
+    }
+
+    fn deepest_of(&self, count: usize) -> (f64, usize) {
+        let asked = (0..count).filter(|i| self.counts[*i] && self.here[*i].is_exact);
         let all = asked.map(|i| (self.here[i].clearance, i));
         all.fold((f64::INFINITY, 0), |a, b| if b.0 < a.0 { b } else { a })
     }

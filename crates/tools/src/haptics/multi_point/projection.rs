@@ -60,6 +60,18 @@ impl Polyhedron {
         room
     }
 
+    /// Whether the origin violates a row by more than a length.
+    pub fn lacks(&self, most: f64) -> bool {
+        self.rows.iter().any(|(_, b)| *b > most)
+    }
+
+    /// Asks of no row more than the origin gives.
+    pub fn relax(&mut self) {
+        for (_, b) in &mut self.rows {
+            *b = b.min(0.0);
+        }
+    }
+
     /// The point nearest to `d`; nothing if the polyhedron is empty.
     pub fn nearest(&mut self, d: &Twist) -> Option<Twist> {
         let mut u = *d;

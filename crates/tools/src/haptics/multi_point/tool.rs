@@ -13,7 +13,7 @@ const LATTICE: i32 = 48;
 /// How many points stand for a shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampling {
-    /// Points that each tick looks at, at most; evenly spread. The second source's tools have some 80 [SVO].
+    /// Points that each tick looks at, at most; evenly spread. The second source's tools have some 80 [SensAble99].
     pub points: usize,
     /// Parts of the spacing of these at which finer points look for features between them; 1 for none.
     pub refinement: usize,
@@ -87,6 +87,8 @@ pub struct PointTool {
     /// Way between finer points, mm.
     pub(super) spacing: f64,
     pub(super) handle: DVec3,
+    /// Of the points.
+    pub(super) middle: DVec3,
 }
 
 /// A length, checked.
@@ -204,12 +206,13 @@ impl PointTool {
                     if d.abs() > 2.0 * step || !d.is_finite() {
                         continue;
                     }
-                    for _ in 0..8 {
-                        p -= d * g / g.length_squared().max(0.1);
+                    // To where the points' balls are in the surface. Beyond a corner that takes a step for each of its sides.
+                    for _ in 0..12 {
+                        p -= (d + sampling.nose) * g / g.length_squared().max(0.1);
                         (d, g) = object.distance(p);
                     }
-                    if d.abs() < 1e-6 * step && (p - centre).abs().cmple(half).all() {
-                        found.push(p - centre - sampling.nose * g.normalize_or_zero());
+                    if (d + sampling.nose).abs() < 1e-6 * step && (p - centre).abs().cmple(half).all() {
+                        found.push(p - centre);
                     }
                 }
             }
@@ -310,6 +313,7 @@ impl PointTool {
         Ok(Self {
             shape,
             nose,
+            middle: points.iter().sum::<DVec3>() / points.len() as f64,
             points,
             fine: owned.into_iter().map(|(_, p)| p).collect(),
             first,

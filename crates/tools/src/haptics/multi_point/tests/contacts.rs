@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::super::super::{Contact, Pose};
-use super::super::{MultiPoint, MultiPointOptions, PointTool, Sampling};
+use super::super::{MultiPoint, MultiPointOptions, PointTool, Sampling, ToolError};
 use super::scenes::*;
 
 fn cube() -> PointTool {
@@ -196,4 +196,88 @@ fn torque_of_a_plate_pressed_off_centre_is_arm_times_force() {
             assert!(dense_depth(&tool, &solid, &felt.proxy, 0.05) < 0.01);
         }
     }
+}
+
+/// Points carved from a block press a plane with its corners, as the block itself would.
+#[test]
+fn carved_tools_touch_as_what_they_were_carved_from() {
+    let half = DVec3::new(4.0, 3.0, 2.0);
+    let object = Solid::new(4.0, move |p| block(p, DVec3::new(50.0, 0.0, 0.0), half));
+    let tool = PointTool::carved(
+        &object,
+        DVec3::new(50.0, 0.0, 0.0),
+        DVec3::splat(5.0),
+        Sampling::default(),
+    );
+    let tool = tool.expect("a surface");
+    assert_eq!(tool.points().len(), 80);
+    let solid = Solid::new(1e3, |p| plane(p, DVec3::ZERO, DVec3::Z));
+    let hand = |t: f64| Pose::at(DVec3::new(0.0, 0.0, (4.0 - 20.0 * t).max(1.0)));
+    let last = follow(&mut renderer(tool), &solid, 400, hand).last();
+    assert!(
+        (last.felt.force - DVec3::new(0.0, 0.0, 0.5)).length() < 0.01,
+        "{}",
+        last.felt.force
+    );
+    let air = PointTool::carved(&object, DVec3::ZERO, DVec3::ONE, Sampling::default());
+    assert!(matches!(air, Err(ToolError::NoSurface { .. })));
+}
+
+/// The handle moves in the tool while it touches: the tool stays, and the torque is about the new handle.
+#[test]
+fn handle_moves_without_moving_the_tool() {
+    let points = vec![
+        DVec3::ZERO,
+        DVec3::new(10.0, 0.0, 0.0),
+        DVec3::new(0.0, 10.0, 0.0),
+    ];
+    let tool = PointTool::from_points(points, 0.5).expect("points");
+    // A knob under the first point alone.
+    let solid = Solid::new(2.0, |p| ball(p, DVec3::new(0.0, 0.0, -1.0), 1.0));
+    let mut renderer = renderer(tool);
+    let down = |t: f64| DVec3::new(0.0, 0.0, (2.0 - 20.0 * t).max(-0.5));
+    let before = follow(&mut renderer, &solid, 400, |t| Pose::at(down(t))).last();
+    assert!((before.felt.force.z - 0.5).abs() < 0.01 && before.felt.torque.length() < 0.01);
+    let handle = DVec3::new(10.0, 0.0, 0.0);
+    renderer.set_handle(handle);
+    let after = follow(&mut renderer, &solid, 1000, |_| Pose::at(handle + down(1.0)));
+    let first = after.0[0].felt;
+    assert!(
+        (first.proxy.at - before.felt.proxy.at - handle).length() < 0.1,
+        "{}",
+        first.proxy.at
+    );
+    let felt = after.last().felt;
+    // The knob's contact is 10 mm from the handle now.
+    let arm = felt.proxy.turn * -handle - 0.5 * DVec3::Z;
+    let expected = arm.cross(felt.force);
+    assert!(
+        (felt.torque - expected).length() < 0.02 * expected.length(),
+        "{} {expected}",
+        felt.torque
+    );
+}
+
+#[test]
+fn options_and_tools_that_make_no_sense_are_refused() {
+    let tool = || PointTool::from_points(vec![DVec3::ZERO], 0.0).expect("a point");
+    let refused = |options| MultiPoint::new(tool(), options).is_err();
+    let good = MultiPointOptions::default();
+    assert!(!refused(good));
+    assert!(refused(MultiPointOptions { slew: 0.0, ..good }));
+    assert!(refused(MultiPointOptions {
+        angular_stiffness: f64::NAN,
+        ..good
+    }));
+    assert!(refused(MultiPointOptions {
+        iterations: 0,
+        ..good
+    }));
+    assert!(refused(MultiPointOptions {
+        deepest: Some(0),
+        ..good
+    }));
+    assert!(PointTool::from_points(vec![DVec3::NAN], 0.0).is_err());
+    assert!(PointTool::from_points(Vec::new(), 0.0).is_err());
+    assert!(PointTool::sphere(0.01, Sampling::default()).is_err());
 }

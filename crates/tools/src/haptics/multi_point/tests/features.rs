@@ -10,7 +10,7 @@ fn renderer(tool: &PointTool) -> MultiPoint {
     MultiPoint::new(tool.clone(), MultiPointOptions::default()).expect("options")
 }
 
-/// [SVO Fig. 20]: a thin rod that stands on a floor meets a face of a cube between its points, wherever that is.
+/// [SensAble99 fig. 20]: a thin rod that stands on a floor meets a face of a cube between its points, wherever that is.
 #[test]
 fn feature_between_the_points_of_a_cube_is_found() {
     let tool = PointTool::block(DVec3::splat(10.0), Sampling::default()).expect("a cube");
@@ -43,12 +43,12 @@ fn feature_between_the_points_of_a_cube_is_found() {
         assert!(trace.last().felt.force.z > 0.1);
         // With the points alone the rod goes in: the test can fail.
         let trace = follow(&mut renderer(&blind), &solid, 400, hand);
-        missed += usize::from(dense_depth(&blind, &solid, &trace.last().felt.proxy, 0.25) > 0.3);
+        missed += usize::from(dense_depth(&blind, &solid, &trace.last().felt.proxy, 0.25) > 0.15);
     }
     assert!(missed > 12, "{missed}");
 }
 
-/// [SVO Fig. 21]: a sphere between whose points a plane would enter; it slides and turns without a bump.
+/// [SensAble99 fig. 21]: a sphere between whose points a plane would enter; it slides and turns without a bump.
 #[test]
 fn sphere_rolls_on_a_plane_without_bumps() {
     let tool = PointTool::sphere(8.0, Sampling::default()).expect("a sphere");
@@ -121,7 +121,8 @@ fn edge_of_the_solid_slides_under_a_face() {
         if k > 250 {
             let n = t.felt.proxy.turn * DVec3::Z;
             let across = t.felt.force.normalize().cross(n).length();
-            assert!(across < 0.02, "{k}: {across} {}", t.felt.force);
+            // At up to 60 mm/s, with two steps a tick.
+            assert!(across < 0.05, "{k}: {across} {}", t.felt.force);
         }
     }
     assert!(trace.least_work() > -1e-4);

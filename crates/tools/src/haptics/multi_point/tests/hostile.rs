@@ -7,7 +7,7 @@ use super::super::random::Random;
 use super::super::{MultiPoint, MultiPointOptions, PointTool, Sampling};
 use super::scenes::*;
 
-fn tools() -> Vec<(&'static str, PointTool)> {
+pub fn tools() -> Vec<(&'static str, PointTool)> {
     let s = Sampling::default();
     vec![
         ("sphere", PointTool::sphere(4.0, s).expect("a sphere")),
@@ -58,7 +58,7 @@ fn no_point_goes_through_a_sheet() {
 }
 
 /// A random solid with features of 2 mm and more, some hollow, some not.
-fn solid(seed: u64) -> Solid<impl Fn(DVec3) -> (f64, DVec3) + Send + Sync> {
+pub fn solid(seed: u64) -> Solid<impl Fn(DVec3) -> (f64, DVec3) + Send + Sync> {
     let mut random = Random::new(seed);
     let balls: Vec<_> = (0..12)
         .map(|_| {
@@ -97,38 +97,51 @@ fn solid(seed: u64) -> Solid<impl Fn(DVec3) -> (f64, DVec3) + Send + Sync> {
     })
 }
 
+/// A tool, and a hand that goes about in a random solid.
+pub fn run(seed: u64, tool: &PointTool) -> (MultiPoint, impl Fn(f64) -> Pose) {
+    let mut random = Random::new(1000 + seed);
+    let (a, b, c) = (vector(&mut random), vector(&mut random), vector(&mut random));
+    let renderer = MultiPoint::new(tool.clone(), MultiPointOptions::default()).expect("options");
+    // From above, then about in the solid, up to some 0.15 m/s and 3 rad/s.
+    let hand = move |t: f64| {
+        let wave = move |w: f64, v: DVec3| {
+            DVec3::new(
+                libm::sin(w * t + v.x),
+                libm::sin(1.3 * w * t + v.y),
+                libm::sin(0.7 * w * t + v.z),
+            )
+        };
+        let at = 10.0 * wave(8.0, 3.0 * a) * DVec3::new(1.0, 1.0, 0.4)
+            + DVec3::new(0.0, 0.0, (30.0 - 60.0 * t).max(2.0));
+        turned(at, 0.8 * wave(3.0, 3.0 * b) + c)
+    };
+    (renderer, hand)
+}
+
 #[test]
 fn random_solids_keep_the_tool_out_and_give_no_energy() {
     let tools = tools();
     let (mut deepest, mut least, mut touching) = (0.0f64, 0.0f64, 0);
+    let mut hidden = 0.0f64;
     for seed in 0..25 {
         let solid = solid(seed);
         let (name, tool) = &tools[seed as usize % tools.len()];
-        let mut random = Random::new(1000 + seed);
-        let (a, b, c) = (vector(&mut random), vector(&mut random), vector(&mut random));
-        let mut renderer = MultiPoint::new(tool.clone(), MultiPointOptions::default()).expect("options");
-        // From above, then about in the solid, up to some 0.15 m/s and 3 rad/s.
-        let hand = |t: f64| {
-            let wave = |w: f64, v: DVec3| {
-                DVec3::new(
-                    libm::sin(w * t + v.x),
-                    libm::sin(1.3 * w * t + v.y),
-                    libm::sin(0.7 * w * t + v.z),
-                )
-            };
-            let at = 10.0 * wave(8.0, 3.0 * a) * DVec3::new(1.0, 1.0, 0.4)
-                + DVec3::new(0.0, 0.0, (30.0 - 60.0 * t).max(2.0));
-            turned(at, 0.8 * wave(3.0, 3.0 * b) + c)
-        };
+        let (mut renderer, hand) = run(seed, tool);
         let trace = follow(&mut renderer, &solid, 2500, hand);
         let (depth, when) = trace.depth(tool, &solid);
         let work = trace.least_work();
+        let between = trace.0[400..]
+            .iter()
+            .step_by(20)
+            .map(|t| dense_depth(tool, &solid, &t.felt.proxy, 0.25))
+            .fold(0.0, f64::max);
         let step = trace.step();
         println!(
-            "{seed} {name}: depth {depth:.4} at {when}, least work {work:.2e} J, step {step:.3} N, {:.1} N mm",
+            "{seed} {name}: depth {depth:.4} at {when}, {between:.4} between points, least work {work:.2e} J, step {step:.3} N, {:.1} N mm",
             trace.torque_step()
         );
         (deepest, least) = (deepest.max(depth), least.min(work));
+        hidden = hidden.max(between);
         assert!(step <= 0.25 + 1e-12 && trace.torque_step() <= 25.0 + 1e-9);
         touching += trace.0.iter().filter(|t| t.felt.force.length() > 0.05).count();
         assert!(
@@ -140,6 +153,8 @@ fn random_solids_keep_the_tool_out_and_give_no_energy() {
     }
     assert!(touching > 20_000, "{touching}");
     assert!(deepest < 0.01, "{deepest}");
+    // For single ticks, where looks do not suffice: fast and flush.
+    assert!(hidden < 0.2, "{hidden}");
     assert!(least > -1e-4, "{least}");
 }
 
@@ -187,6 +202,44 @@ fn force_changes_no_faster_than_the_hand_in_hollows() {
             }
             assert!(touching > 500, "{name} {seed}: {touching}");
             assert!(trace.depth(&tool, &solid as &dyn Obstacle).0 < 0.01);
+        }
+    }
+}
+
+/// No tool hangs on the solid when the hand has left it, even where there were too few looks between its points: edges of the block,
+/// and a gap between it and the ball as wide as the tool.
+#[test]
+fn tools_follow_a_hand_that_has_left() {
+    let s = Sampling::default();
+    let tools = [PointTool::sphere(4.5, s), PointTool::cylinder(4.0, 12.0, s)];
+    let solid = Solid::new(2.0, super::cost::scene);
+    for tool in tools.map(|tool| tool.expect("a tool")) {
+        for variant in 0..8 {
+            let options = MultiPointOptions {
+                fine_checks: 100,
+                ..MultiPointOptions::default()
+            };
+            let mut renderer = MultiPoint::new(tool.clone(), options).expect("options");
+            let aside = 0.03 * f64::from(variant) * DVec3::new(1.0, -1.0, 0.3);
+            let hand = |t: f64| {
+                let hand = super::cost::hand(t);
+                Pose {
+                    at: hand.at + aside,
+                    ..hand
+                }
+            };
+            let trace = follow(&mut renderer, &solid, 4000, hand);
+            let mut free_for = 0;
+            for (k, t) in trace.0.iter().enumerate() {
+                let clear = |q: &DVec3| solid.distance(place(&tool, &t.hand, *q)).0 > tool.nose() + 0.5;
+                free_for = if tool.points().iter().all(clear) {
+                    free_for + 1
+                } else {
+                    0
+                };
+                let way = t.hand.at.distance(t.felt.proxy.at);
+                assert!(free_for < 200 || way < 1.0, "{variant} {k}: {way}");
+            }
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 
 use super::super::super::{Contact, Felt, Obstacle, Pose, Renderer};
 use super::super::turn::{exponential, logarithm};
@@ -184,13 +184,4 @@ pub fn dense_depth(tool: &PointTool, solid: &dyn Obstacle, pose: &Pose, spacing:
         .iter()
         .map(depth)
         .fold(f64::NEG_INFINITY, f64::max)
-}
-
-/// Turn of a pose from that of another, rad.
-pub fn turn_between(a: &Pose, b: &Pose) -> f64 {
-    logarithm(a.turn * b.turn.inverse()).length()
-}
-
-pub fn identity() -> DQuat {
-    DQuat::IDENTITY
 }
