@@ -32,7 +32,7 @@ mod spacemouse;
 mod transport;
 
 mod devices {
-    pub use crate::{report, transport};
+    pub(crate) use crate::{report, transport};
 }
 
 use descriptor::Descriptor;

@@ -10,15 +10,39 @@ use super::input::{Input, bounding_box};
 
 /// What a field remembers of its input.
 pub fn provenance(input: &Input, name: Option<String>) -> String {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let arguments = std::env::args_os()
+        .skip(1)
+        .map(|a| a.to_string_lossy().into_owned());
     json!({
         "program": concat!("isoclay ", env!("CARGO_PKG_VERSION")),
         "input": name,
         "input_kind": kind(input),
         "input_digest": digest(input),
-        "arguments": arguments,
+        "arguments": that_matter(arguments),
     })
     .to_string()
+}
+
+/// The arguments without those that no bit of the field depends on: a fit written elsewhere, or on more threads, is the
+/// same file.
+fn that_matter(arguments: impl Iterator<Item = String>) -> Vec<String> {
+    let mut kept = Vec::new();
+    let mut arguments = arguments.peekable();
+    while let Some(argument) = arguments.next() {
+        match argument.as_str() {
+            "--json" => {}
+            "-o" | "--output" | "--threads" => drop(arguments.next()),
+            a if a.starts_with("--output=") || a.starts_with("--threads=") => {}
+            a if a.starts_with("-o") => {}
+            "--" => {
+                kept.push(argument);
+                kept.extend(arguments);
+                break;
+            }
+            _ => kept.push(argument),
+        }
+    }
+    kept
 }
 
 /// Whether a field says that it was fitted to a mesh.

@@ -22,6 +22,10 @@ const SLACK: u64 = 10 << 20;
 const LOST: f64 = 0.05;
 /// What the program holds before it has read anything.
 pub const PROGRAM: u64 = 12 << 20;
+/// What a process holds that only watches others, with the figures of some thousand inputs.
+const OVERSEER: u64 = 32 << 20;
+/// With less no file at all can be fitted.
+const LEAST: u64 = 32 << 20;
 /// Addresses of a thread's stack, of which it holds hardly any memory.
 const STACK: u64 = 2 << 20;
 
@@ -55,6 +59,14 @@ pub fn hold(ceiling: Memory) -> Outcome {
         .or_limit()?;
     let _ = CEILING.set(ceiling);
     Ok(())
+}
+
+/// What each of `jobs` processes may be told to hold, so that all of them and this one stay below `whole` together, slack
+/// included; `None` if that is too little to work with.
+pub fn share(whole: Memory, jobs: usize) -> Option<Memory> {
+    let of_one = (whole.0.checked_sub(OVERSEER)? / jobs as u64).checked_sub(SLACK)?;
+    let told = (of_one as f64 / (1.0 + LOST)) as u64;
+    (told >= LEAST).then_some(Memory(told))
 }
 
 /// Ends the program because an allocation of `size` bytes was refused. Comes back only if there is no memory for the end

@@ -18,7 +18,10 @@ use super::progress::Bar;
 use super::quantity::between;
 use super::source::{SAMPLES, Source, scratch};
 use super::staged::{StagedFiles, publish};
-use super::{chart_dynamics, chart_edits, chart_fields, chart_masks, chart_mesh, chart_orient, chart_tools};
+use super::{
+    chart_dynamics, chart_edits, chart_fields, chart_haptics, chart_masks, chart_mesh, chart_orient,
+    chart_tools,
+};
 use crate::charts::{Chart, Configuration, Input, Measurement, Scene, noise, outliers, sweeps};
 
 /// Arguments of `isoclay charts`.
@@ -46,6 +49,8 @@ enum Subject {
     Fields(chart_fields::Args),
     /// Force tools: exactness of integrals, sampling and number of paths against the error; times of whole loops
     Tools(chart_tools::Args),
+    /// Touch: accuracy of contact against the cost of a tick, over snapshots, searches and methods; scenes; sizes of fields
+    Haptics(chart_haptics::Args),
     /// Noise against the resolution chosen and the error, and outliers against the error with and without --robust
     Hard(HardArgs),
 }
@@ -97,6 +102,7 @@ impl Args {
             Subject::Edits(a) => a.json,
             Subject::Fields(a) => a.json,
             Subject::Tools(a) => a.json,
+            Subject::Haptics(a) => a.json,
             Subject::Orient(_) | Subject::Mesh(_) | Subject::Hard(_) => false,
         }
     }
@@ -114,6 +120,7 @@ pub fn run(args: &Args) -> Outcome {
         Subject::Edits(args) => chart_edits::run(args, &cancel),
         Subject::Fields(args) => chart_fields::run(args, &cancel),
         Subject::Tools(args) => chart_tools::run(args, &cancel),
+        Subject::Haptics(args) => chart_haptics::run(args, &cancel),
         Subject::Hard(args) => hard(args, &cancel),
     }
 }

@@ -32,6 +32,11 @@ pub fn peak_rss_bytes() -> Option<u64> {
     status_bytes("VmHWM:")
 }
 
+/// The same of another process.
+pub fn peak_rss_bytes_of(process: u32) -> Option<u64> {
+    bytes_in(&format!("/proc/{process}/status"), "VmHWM:")
+}
+
 /// Resident size of this process now; `None` where the system does not tell.
 pub fn rss_bytes() -> Option<u64> {
     status_bytes("VmRSS:")
@@ -42,9 +47,13 @@ pub fn data_bytes() -> Option<u64> {
     status_bytes("VmData:")
 }
 
-/// Reads one size line of `/proc/self/status`, which counts in KiB.
 fn status_bytes(name: &str) -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    bytes_in("/proc/self/status", name)
+}
+
+/// Reads one size line of a status, which counts in KiB.
+fn bytes_in(status: &str, name: &str) -> Option<u64> {
+    let status = std::fs::read_to_string(status).ok()?;
     let line = status.lines().find_map(|l| l.strip_prefix(name))?;
     line.split_whitespace()
         .next()?

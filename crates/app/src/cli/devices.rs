@@ -138,6 +138,10 @@ fn failure(error: OpenError) -> Failure {
 const SHOWN: Duration = Duration::from_millis(100);
 
 fn test(name: &Name, args: &Args) -> Outcome {
+    if name.force().is_some() {
+        // Nobody is asked about a device that is not there.
+        devices::open(name, Force::Withheld).map_err(failure)?;
+    }
     let force = match name.force() {
         Some(most) if asks_for_force(most * GENTLE, args.seconds)? => Force::Allowed,
         _ => Force::Withheld,

@@ -15,20 +15,35 @@ pub fn tell_as(json: bool, data_on_stdout: bool) {
     let _ = ERRORS.set((json, data_on_stdout));
 }
 
+/// Whether the last word has been said.
+static TOLD: Mutex<bool> = Mutex::new(false);
+
 /// Prints an error, as text and as the user asked for besides. Only the first one counts.
 pub fn tell(failure: &Failure) {
-    static TOLD: Mutex<bool> = Mutex::new(false);
+    tell_with(failure, |form| match form {
+        Some((true, false)) => print_quietly(&failure.json()),
+        Some((true, true)) => eprint_quietly(&failure.json()),
+        _ => {}
+    });
+}
+
+/// Prints an error as text, for a command whose own last object holds it too: `object`.
+pub fn tell_within(failure: &Failure, object: &str) {
+    tell_with(failure, |form| {
+        if matches!(form, Some((true, _))) {
+            print_quietly(object);
+        }
+    });
+}
+
+fn tell_with(failure: &Failure, as_object: impl FnOnce(Option<&(bool, bool)>)) {
     // Held while it is said: who comes second may end the program when this returns.
     let mut told = TOLD.lock().unwrap_or_else(PoisonError::into_inner);
     if std::mem::replace(&mut *told, true) {
         return;
     }
     eprint_quietly(&format!("isoclay: {failure}"));
-    match ERRORS.get() {
-        Some((true, false)) => print_quietly(&failure.json()),
-        Some((true, true)) => eprint_quietly(&failure.json()),
-        _ => {}
-    }
+    as_object(ERRORS.get());
 }
 
 /// Ends the program at once.

@@ -2,11 +2,13 @@
 //!
 //! Exit codes: 0 done, 2 wrong usage, 3 bad input, 4 a limit was reached or the work was cancelled.
 
+mod batch;
 mod belongs;
 mod ceiling;
 mod chart_dynamics;
 mod chart_edits;
 mod chart_fields;
+mod chart_haptics;
 mod chart_masks;
 mod chart_mesh;
 mod chart_orient;
@@ -80,6 +82,8 @@ const EXIT_CODES: &str =
 enum Command {
     /// Fit a field to a point cloud, a mesh or a volume
     Fit(fit::Args),
+    /// Fit many clouds, meshes and volumes, each isolated from the others, and report on all
+    Batch(batch::Args),
     /// Turn a field into a closed triangle mesh
     Mesh(mesh::Args),
     /// Write the field at the voxel centres of a volume
@@ -134,6 +138,7 @@ fn command() -> clap::Command {
 
 /// Reads the command line, does what it says, and turns the outcome into an exit code.
 pub fn main() -> ExitCode {
+    own::follow();
     let cli = match command()
         .try_get_matches()
         .and_then(|m| Cli::from_arg_matches(&m))
@@ -149,6 +154,7 @@ pub fn main() -> ExitCode {
     let ready = interrupt::listen().and_then(|()| cli.memory.map_or(Ok(()), ceiling::hold));
     let outcome = ready.and_then(|()| match &cli.command {
         Command::Fit(a) => fit::run(a),
+        Command::Batch(a) => batch::run(a),
         Command::Mesh(a) => mesh::run(a),
         Command::Sample(a) => sample::run(a),
         Command::Eval(a) => eval::run(a),
@@ -213,6 +219,7 @@ impl Command {
         let is_stdout = |path: &Path| path == Path::new("-");
         match self {
             Self::Fit(a) => (a.json, is_stdout(&a.output)),
+            Self::Batch(a) => (a.json, false),
             Self::Mesh(a) => (a.json, is_stdout(&a.output)),
             Self::Sample(a) => (a.json, is_stdout(&a.output)),
             Self::Eval(_) => (false, true),

@@ -1,7 +1,9 @@
 //! Whether an output is a file that is being read, under whatever name.
 
+use std::ffi::OsStr;
 use std::fs::File;
 use std::io::Read;
+use std::os::unix::ffi::OsStrExt;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
@@ -74,23 +76,27 @@ fn holds(directory: &Path, target: &Path, depth: usize) -> bool {
 
 /// A file that the input's header names: the other half of a NIfTI pair, voxels of NRRD and MetaImage, a buffer of glTF.
 fn is_named(input: &Path, target: &Path) -> bool {
+    named_files(input).iter().any(|named| is_same(named, target))
+}
+
+/// Files that an input's header names, some of which may not be there, and the input itself where it is half of a pair.
+pub fn named_files(input: &Path) -> Vec<PathBuf> {
     let directory = input.parent().unwrap_or(Path::new(""));
     let name = input.to_string_lossy().to_ascii_lowercase();
     let ends_in = |e: &&str| name.ends_with(*e);
     if let Some(ending) = [".hdr", ".img", ".hdr.gz", ".img.gz"].iter().find(|e| ends_in(e)) {
-        let whole = input.to_string_lossy();
-        let stem = &whole[..whole.len() - ending.len()];
-        return ["hdr", "img", "hdr.gz", "img.gz"]
-            .iter()
-            .any(|e| is_same(Path::new(&format!("{stem}.{e}")), target));
+        let bytes = input.as_os_str().as_bytes();
+        let stem = &bytes[..bytes.len() - ending.len()];
+        let other = |e: &str| OsStr::from_bytes(&[stem, e.as_bytes()].concat()).into();
+        return [".hdr", ".img", ".hdr.gz", ".img.gz"].map(other).into();
     }
     if ![".nhdr", ".nhdr.gz", ".mhd", ".gltf"].iter().any(ends_in) {
-        return false;
+        return Vec::new();
     }
     let mut header = Vec::new();
     let read = File::open(input).and_then(|f| f.take(HEADER).read_to_end(&mut header));
     if read.is_err() {
-        return false;
+        return Vec::new();
     }
     let text = String::from_utf8_lossy(&header);
     // Whole lines, what stands behind their key, and single words: names may hold blanks.
@@ -102,19 +108,19 @@ fn is_named(input: &Path, target: &Path) -> bool {
     lines
         .chain(words)
         .filter(|name| !name.is_empty() && name.len() < LONGEST_NAME)
-        .any(|name| match name.split_once('%') {
-            None => is_same(&directory.join(name), target),
+        .flat_map(|name| match name.split_once('%') {
+            None => vec![directory.join(name)],
             // A pattern such as slice%03d.raw, or an escaped character of a URI: all files that start like it.
             Some((head, _)) => {
                 let (folder, start) = head.rsplit_once('/').unwrap_or(("", head));
-                files_of(&directory.join(folder))
-                    .filter(|f| {
-                        f.file_name()
-                            .is_some_and(|n| n.to_string_lossy().starts_with(start))
-                    })
-                    .any(|f| is_same(&f, target))
+                let starts = |f: &PathBuf| {
+                    f.file_name()
+                        .is_some_and(|n| n.to_string_lossy().starts_with(start))
+                };
+                files_of(&directory.join(folder)).filter(starts).collect()
             }
         })
+        .collect()
 }
 
 fn files_of(directory: &Path) -> impl Iterator<Item = PathBuf> + use<> {

@@ -3,6 +3,7 @@ use std::path::PathBuf;
 
 use bspline::polygonize::{Mesh, Placement, PolygonizeOptions};
 use clap::ValueEnum;
+use fitting::LeafIndex;
 use glam::DVec3;
 
 use super::cost::Cost;
@@ -14,7 +15,8 @@ use super::progress::Bar;
 use super::quantity::{between, finite, human_number, positive, threads};
 use super::summary::Summary;
 use super::{interrupt, set_threads};
-use crate::picture::{Part, Scene, Surface, View, draw};
+use crate::check::viridis;
+use crate::picture::{Drawing, Part, Scene, Surface, View, clay};
 
 /// Arguments of `isoclay picture`.
 #[derive(clap::Args)]
@@ -48,6 +50,10 @@ pub struct Args {
     /// Point in the middle of the picture, in the field's coordinates [default: the middle of the solid]
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     at: Option<DVec3>,
+    /// Draw the same view once more, coloured by the error of the fit, into another PNG picture: violet is none, green the
+    /// tolerance, yellow twice the tolerance or more
+    #[arg(long, value_name = "OUT")]
+    errors: Option<PathBuf>,
     /// Threads to work with [default: all cores]
     #[arg(long, value_name = "N", value_parser = threads)]
     threads: Option<NonZeroUsize>,
@@ -98,8 +104,21 @@ pub fn run(args: &Args) -> Outcome {
     let cancel = interrupt::cancel();
     let source = args.field.source(&cancel)?;
     let output = Output::check("-o", &args.output, &["png"], None, &[&source])?;
+    let errors = (args.errors.as_ref())
+        .map(|path| Output::check("--errors", path, &["png"], None, &[&source]))
+        .transpose()?;
+    if errors.as_ref().is_some_and(Output::is_stdout) {
+        return Err(Failure::usage(
+            "--errors -: standard output takes one picture; name a file",
+        ));
+    }
     set_threads(args.threads)?;
     let open = args.field.load_placed(&source)?;
+    if args.errors.is_some() && open.report().leaves.is_empty() {
+        return Err(Failure::usage(
+            "--errors: the field knows of no errors, as one that was fitted does; leave it out",
+        ));
+    }
     let bar = Bar::new();
     let options = PolygonizeOptions {
         iso: open.iso_or(args.iso, &source)?,
@@ -141,16 +160,15 @@ pub fn run(args: &Args) -> Outcome {
         seen: surface_of(&mesh),
         shading: surface_of(&whole),
     };
-    let pixels = draw(&scene, &view);
+    let drawing = Drawing::new(&scene, &view);
+    let pixels = drawing.pixels(&clay);
+    let of_errors = errors.map(|output| (output, drawing.pixels(&error_color(&open))));
     interrupt::check(&cancel)?;
-    let [width, height] = args.size.map(|n| n as u32);
-    formats::atomic::replace(output.path(), |out| {
-        let mut encoder = png::Encoder::new(out, width, height);
-        encoder.set_color(png::ColorType::Rgb);
-        let mut writer = encoder.write_header()?;
-        Ok(writer.write_image_data(&pixels)?)
-    })
-    .map_err(|e| output.writing(e))?;
+    if let Some((output, pixels)) = &of_errors {
+        write(output, args.size, pixels)?;
+        output.finish()?;
+    }
+    write(&output, args.size, &pixels)?;
     bar.clear();
     Summary {
         vertices: Some(mesh.positions.len()),
@@ -162,6 +180,42 @@ pub fn run(args: &Args) -> Outcome {
     .with_cost(&cost)
     .print_after(&output, args.json)
 }
+
+fn write(output: &Output, size: [usize; 2], pixels: &[u8]) -> Outcome {
+    let [width, height] = size.map(|n| n as u32);
+    formats::atomic::replace(output.path(), |out| {
+        let mut encoder = png::Encoder::new(out, width, height);
+        encoder.set_color(png::ColorType::Rgb);
+        let mut writer = encoder.write_header()?;
+        Ok(writer.write_image_data(pixels)?)
+    })
+    .map_err(|e| output.writing(e))
+}
+
+/// Colours by the rms residual of the leaf that holds a point; grey where there is none.
+fn error_color(open: &OpenField) -> impl Fn(DVec3) -> DVec3 + Sync {
+    let report = open.report();
+    let index = LeafIndex::new(open.lattice(), &report.leaves);
+    // An interpolating fit aims at no tolerance.
+    let middle = if report.tolerance > 0.0 {
+        report.tolerance
+    } else {
+        0.5 * report.max
+    };
+    move |p| {
+        let leaf = index.find(p).map(|i| &report.leaves[i]);
+        match leaf.filter(|l| l.sample_count > 0) {
+            Some(leaf) => {
+                let share = f64::from(leaf.rms) / (2.0 * middle).max(f64::MIN_POSITIVE);
+                DVec3::from_array(viridis(share).map(f64::from)) / 255.0
+            }
+            None => NO_DATA,
+        }
+    }
+}
+
+/// Colour of surface that no sample speaks for.
+const NO_DATA: DVec3 = DVec3::splat(0.6);
 
 impl Args {
     fn view(&self, whole: &Mesh) -> View {

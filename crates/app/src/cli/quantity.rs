@@ -1,6 +1,7 @@
 use std::fmt;
 use std::num::NonZeroUsize;
 use std::str::FromStr;
+use std::time::Duration;
 
 use formats::Unit;
 
@@ -98,6 +99,24 @@ where
     move |s| match s.parse::<T>() {
         Ok(n) if low <= n && n <= high => Ok(n),
         _ => Err(format!("write a whole number from {low} to {high}")),
+    }
+}
+
+/// A time, as in 90s, 10m or 2h; seconds without a unit.
+///
+/// # Errors
+/// A sentence, if it is something else.
+pub fn duration(s: &str) -> Result<Duration, String> {
+    let text = s.trim();
+    let units = [("s", 1.0), ("m", 60.0), ("h", 3600.0), ("d", 86400.0)];
+    let (number, unit) = (units.iter())
+        .find_map(|(name, seconds)| Some((text.strip_suffix(name)?, *seconds)))
+        .unwrap_or((text, 1.0));
+    let time = positive(number.trim_end()).map(|n| Duration::try_from_secs_f64(n * unit));
+    match time {
+        Ok(Ok(time)) => Ok(time),
+        Ok(Err(_)) => Err("too long; write a time: 90s, 10m, 2h".into()),
+        Err(e) => Err(format!("{e}; write a time: 90s, 10m, 2h")),
     }
 }
 
@@ -242,6 +261,16 @@ mod tests {
         assert_eq!(Tolerance::Plain(3.0).density(100.0), Ok(3.0));
         assert_eq!(Tolerance::Percent(0.5).density(200.0), Ok(1.0));
         assert!(Tolerance::Mm(0.5).density(200.0).unwrap_err().contains("density"));
+    }
+
+    #[test]
+    fn time_grammar() {
+        assert_eq!(duration("90"), Ok(Duration::from_secs(90)));
+        assert_eq!(duration("1.5 m"), Ok(Duration::from_secs(90)));
+        assert_eq!(duration("2h"), Ok(Duration::from_secs(7200)));
+        for bad in ["", "0", "-1s", "1w", "nan", "1e300h"] {
+            assert!(duration(bad).unwrap_err().contains("10m"), "{bad:?}");
+        }
     }
 
     #[test]

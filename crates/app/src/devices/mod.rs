@@ -5,6 +5,7 @@
 
 mod clock;
 mod find;
+mod forceless;
 mod frame;
 mod hid;
 mod lag;

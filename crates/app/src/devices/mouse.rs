@@ -10,6 +10,7 @@ use glam::{DMat3, DQuat, DVec3};
 use tools::haptics::{Abilities, Device, DeviceError, Pose, Reading};
 
 use super::clock::Clock;
+use super::forceless;
 use super::lag::{Lag, Ticks};
 use super::mailbox::Mailbox;
 
@@ -92,18 +93,7 @@ pub struct Pointer {
 /// Both halves of a mouse whose tool is in the middle of its room.
 pub fn pair(steps: Steps, clock: Clock) -> (Mouse, Pointer) {
     let told = Arc::<Mailbox<4>>::default();
-    let abilities = Abilities {
-        name: "mouse".into(),
-        force: 0.0,
-        continuous_force: 0.0,
-        torque: 0.0,
-        damping: 0.0,
-        stiffness: f64::INFINITY,
-        resolution: steps.pixel,
-        period: 1.0 / 60.0,
-        delay: 0.0,
-        reach: steps.reach,
-    };
+    let abilities = forceless::abilities("mouse", steps.pixel, 1.0 / 60.0, steps.reach);
     let mouse = Mouse {
         steps,
         // A picture seen from the front: up is up, and what is far is ahead.

@@ -2,6 +2,8 @@
 
 use std::str::FromStr;
 
+use tools::haptics::simulated::Preset;
+
 use super::pid::Scale;
 use super::pid::effects::Kind as Effect;
 use super::rawhid::variants::{VARIANTS, Variant};
@@ -18,6 +20,7 @@ pub const FORMS: &[(&str, &str)] = &[
         "force device by the HID class for it, with its largest force and half its way",
     ),
     ("script:FILE", "poses over time from a text file"),
+    ("sim:DEVICE", "simulated device in a light hand that holds still"),
 ];
 
 /// A device by name.
@@ -39,6 +42,8 @@ pub enum Name {
         /// Its force and way.
         scale: Scale,
     },
+    /// A simulated device.
+    Simulated(Preset),
     /// A trajectory.
     Script {
         /// The file.
@@ -61,6 +66,12 @@ pub enum NameError {
         /// What was asked for.
         arm: String,
     },
+    /// No device is simulated under this name.
+    #[error("{device:?} is no simulated device; write one of {}", Preset::ALL.map(|p| format!("sim:{}", p.name())).join(", "))]
+    Simulated {
+        /// What was asked for.
+        device: String,
+    },
     /// An option that the device has not.
     #[error("{option:?} is no option of {device}; {remedy}")]
     Option {
@@ -79,7 +90,8 @@ impl Name {
         match self {
             Self::Board { arm, .. } => Some(arm.force),
             Self::Stick { scale, .. } => Some(scale.force),
-            Self::SpaceMouse | Self::Script { .. } => None,
+            // What is simulated pushes nobody.
+            Self::SpaceMouse | Self::Script { .. } | Self::Simulated(_) => None,
         }
     }
 }
@@ -93,6 +105,9 @@ impl FromStr for Name {
             "spacemouse" if rest.is_empty() => Ok(Self::SpaceMouse),
             "script" if !rest.is_empty() => Ok(Self::Script { file: rest.into() }),
             "haptikfabriken" => board(rest),
+            "sim" => Preset::named(rest)
+                .map(Self::Simulated)
+                .ok_or(NameError::Simulated { device: rest.into() }),
             "pid" => stick(rest),
             _ => Err(NameError::Unknown { name: name.into() }),
         }
@@ -149,6 +164,7 @@ mod tests {
             ("joystick", "pid[:spring|:constant]"),
             ("spacemouse:pro", "spacemouse"),
             ("script:", "script:FILE"),
+            ("sim:touch", "sim:omni, sim:phantom"),
             ("haptikfabriken", "woodenhaptics-2019"),
             ("haptikfabriken:polhem-2", "polhem-1"),
             ("haptikfabriken:polhem-1,fast", "write gravity"),
@@ -178,6 +194,7 @@ mod tests {
         let arm: Name = "haptikfabriken:polhem-1,gravity".parse().unwrap();
         assert_eq!(arm.force(), Some(5.0));
         assert_eq!("spacemouse".parse::<Name>().unwrap().force(), None);
+        assert_eq!("sim:falcon".parse(), Ok(Name::Simulated(Preset::Falcon)));
         assert_eq!("script:a:b".parse(), Ok(Name::Script { file: "a:b".into() }));
     }
 }

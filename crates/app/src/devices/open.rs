@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use glam::DVec3;
+use tools::haptics::simulated::{Path, Preset, SimulatedDevice, SimulatedHand};
 use tools::haptics::{Abilities, Device, DeviceError, Reading};
 
 use super::clock::Clock;
@@ -104,6 +105,8 @@ pub enum Opened {
     Linked(Linked),
     /// A trajectory.
     Scripted(Scripted),
+    /// A simulated one.
+    Simulated(Box<SimulatedDevice>),
 }
 
 impl Opened {
@@ -111,6 +114,7 @@ impl Opened {
         match self {
             Self::Linked(device) => device,
             Self::Scripted(device) => device,
+            Self::Simulated(device) => &**device,
         }
     }
 
@@ -118,6 +122,7 @@ impl Opened {
         match self {
             Self::Linked(device) => device,
             Self::Scripted(device) => device,
+            Self::Simulated(device) => &mut **device,
         }
     }
 
@@ -125,7 +130,7 @@ impl Opened {
     pub fn counts(&self) -> Counts {
         match self {
             Self::Linked(device) => device.counts(),
-            Self::Scripted(_) => Counts::default(),
+            Self::Scripted(_) | Self::Simulated(_) => Counts::default(),
         }
     }
 }
@@ -142,6 +147,13 @@ impl Device for Opened {
     fn send(&mut self, force: DVec3, torque: DVec3) -> Result<(), DeviceError> {
         self.device_mut().send(force, torque)
     }
+}
+
+fn simulated(preset: Preset) -> SimulatedDevice {
+    let hand = SimulatedHand::light(Path::still(DVec3::ZERO));
+    SimulatedDevice::new(preset.mechanics(), hand)
+        .self_timed()
+        .fading()
 }
 
 fn script(file: &str) -> Result<Scripted, OpenError> {
@@ -169,6 +181,7 @@ pub fn open(name: &Name, force: Force) -> Result<Opened, OpenError> {
         } => board(arm, *holds_its_weight, force).map(Opened::Linked),
         Name::Stick { kind, scale } => stick(*kind, *scale, force).map(Opened::Linked),
         Name::Script { file } => script(file).map(Opened::Scripted),
+        Name::Simulated(preset) => Ok(Opened::Simulated(Box::new(simulated(*preset)))),
     }
 }
 

@@ -8,6 +8,7 @@ use glam::{DQuat, DVec3};
 use tools::haptics::{Abilities, Device, DeviceError, Pose, Reading};
 
 use super::clock::Clock;
+use super::forceless;
 
 /// Most poses: an hour at a thousand a second.
 const MOST: usize = 3_600_000;
@@ -183,18 +184,7 @@ impl Scripted {
     /// A hand that begins when it is first looked at.
     pub fn new(trajectory: Trajectory, clock: Clock) -> Self {
         let furthest = trajectory.keys.iter().map(|key| key.pose.at.abs().max_element());
-        let abilities = Abilities {
-            name: "script".into(),
-            force: 0.0,
-            continuous_force: 0.0,
-            torque: 0.0,
-            damping: 0.0,
-            stiffness: f64::INFINITY,
-            resolution: 0.0,
-            period: 0.001,
-            delay: 0.0,
-            reach: furthest.fold(1.0, f64::max),
-        };
+        let abilities = forceless::abilities("script", 0.0, 0.001, furthest.fold(1.0, f64::max));
         Self {
             trajectory,
             abilities,

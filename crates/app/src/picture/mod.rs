@@ -72,41 +72,72 @@ impl View {
     }
 }
 
-/// Draws the scene; RGB bytes, rows from the top.
-pub fn draw(scene: &Scene, view: &View) -> Vec<u8> {
-    let [w, h] = view.size;
-    let scale = view.pixels_per_length * SAMPLES as f64;
-    let camera = DepthMap::draw(
-        &scene.seen,
-        view.axes,
-        [w * SAMPLES, h * SAMPLES],
-        view.center,
-        scale,
-    );
-    let up = view.axes.row(1);
-    let sky: Vec<DepthMap> = (0..SKY)
-        .into_par_iter()
-        .map(|i| {
-            // A spiral of equal areas over the sphere.
-            let z = 1.0 - (2 * i + 1) as f64 / SKY as f64;
-            let angle = PI * (3.0 - 5f64.sqrt()) * i as f64;
-            let r = (1.0 - z * z).sqrt();
-            let d = view.axes.transpose() * DVec3::new(r * angle.cos(), z, r * angle.sin());
-            DepthMap::filled(&scene.shading, axes(d, up), [288, 288])
-        })
-        .collect();
-    let sun_direction = view.axes.transpose() * DVec3::new(-0.45, 0.65, 0.62);
-    let sun = DepthMap::filled(&scene.shading, axes(sun_direction, up), [1024, 1024]);
-    let lights = Lights {
-        sky: &sky,
-        sun: &sun,
-        up,
-    };
-    let rows: Vec<Vec<u8>> = (0..h)
-        .into_par_iter()
-        .map(|y| draw_row(scene, &camera, &lights, y))
-        .collect();
-    rows.concat()
+/// A scene with its lights, ready to be coloured.
+pub struct Drawing<'a> {
+    scene: &'a Scene<'a>,
+    camera: DepthMap,
+    sky: Vec<DepthMap>,
+    sun: DepthMap,
+    up: DVec3,
+}
+
+/// Colour of the solid at a point, in sRGB, each component in `[0, 1]`.
+pub type Color<'a> = &'a (dyn Fn(DVec3) -> DVec3 + Sync);
+
+/// Clay everywhere.
+pub fn clay(_: DVec3) -> DVec3 {
+    CLAY
+}
+
+impl<'a> Drawing<'a> {
+    /// Finds what is seen, and what each light reaches.
+    pub fn new(scene: &'a Scene, view: &View) -> Self {
+        let [w, h] = view.size;
+        let scale = view.pixels_per_length * SAMPLES as f64;
+        let camera = DepthMap::draw(
+            &scene.seen,
+            view.axes,
+            [w * SAMPLES, h * SAMPLES],
+            view.center,
+            scale,
+        );
+        let up = view.axes.row(1);
+        let sky: Vec<DepthMap> = (0..SKY)
+            .into_par_iter()
+            .map(|i| {
+                // A spiral of equal areas over the sphere.
+                let z = 1.0 - (2 * i + 1) as f64 / SKY as f64;
+                let angle = PI * (3.0 - 5f64.sqrt()) * i as f64;
+                let r = (1.0 - z * z).sqrt();
+                let d = view.axes.transpose() * DVec3::new(r * angle.cos(), z, r * angle.sin());
+                DepthMap::filled(&scene.shading, axes(d, up), [288, 288])
+            })
+            .collect();
+        let sun_direction = view.axes.transpose() * DVec3::new(-0.45, 0.65, 0.62);
+        let sun = DepthMap::filled(&scene.shading, axes(sun_direction, up), [1024, 1024]);
+        Self {
+            scene,
+            camera,
+            sky,
+            sun,
+            up,
+        }
+    }
+
+    /// RGB bytes, rows from the top.
+    pub fn pixels(&self, color: Color) -> Vec<u8> {
+        let lights = Lights {
+            sky: &self.sky,
+            sun: &self.sun,
+            up: self.up,
+        };
+        let height = self.camera.size[1] / SAMPLES;
+        let rows: Vec<Vec<u8>> = (0..height)
+            .into_par_iter()
+            .map(|y| draw_row(self.scene, &self.camera, &lights, color, y))
+            .collect();
+        rows.concat()
+    }
 }
 
 struct Lights<'a> {
@@ -124,7 +155,7 @@ struct Shaded {
 }
 
 /// RGB bytes of one row of pixels.
-fn draw_row(scene: &Scene, camera: &DepthMap, lights: &Lights, y: usize) -> Vec<u8> {
+fn draw_row(scene: &Scene, camera: &DepthMap, lights: &Lights, color: Color, y: usize) -> Vec<u8> {
     let width = camera.size[0] / SAMPLES;
     let (mut points, mut shaded) = (Vec::new(), Vec::new());
     let fade = 1.0 - 0.25 * y as f64 * SAMPLES as f64 / camera.size[1] as f64;
@@ -171,7 +202,7 @@ fn draw_row(scene: &Scene, camera: &DepthMap, lights: &Lights, y: usize) -> Vec<
         // Where the solid was cut at its box, the field's normal is not that of the cut.
         let n = if smooth.dot(s.flat) > 0.5 { smooth } else { s.flat };
         let n = if n.dot(camera.axes.row(2)) < -0.2 { -n } else { n };
-        row[s.pixel] += lights.color(p, n) * s.samples as f64;
+        row[s.pixel] += color(p).powf(2.2) * lights.reaching(p, n) * s.samples as f64;
     }
     let mut bytes = Vec::with_capacity(3 * width);
     for sum in row {
@@ -186,8 +217,8 @@ fn draw_row(scene: &Scene, camera: &DepthMap, lights: &Lights, y: usize) -> Vec<
 }
 
 impl Lights<'_> {
-    /// Linear colour of clay at `p` with normal `n`.
-    fn color(&self, p: DVec3, n: DVec3) -> DVec3 {
+    /// Light that reaches `p` with normal `n`.
+    fn reaching(&self, p: DVec3, n: DVec3) -> f64 {
         let (mut light, mut all) = (0.0, 0.0);
         for d in self.sky {
             let toward = d.axes.row(2);
@@ -205,7 +236,7 @@ impl Lights<'_> {
         } else {
             0.0
         };
-        CLAY.powf(2.2) * (0.05 + light / all.max(1e-9) + 0.95 * direct)
+        0.05 + light / all.max(1e-9) + 0.95 * direct
     }
 }
 

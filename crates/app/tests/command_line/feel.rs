@@ -67,7 +67,7 @@ fn a_session_by_a_hand_is_the_same_every_time_and_replays() {
     assert!(told["tripped"].is_null(), "{told}");
     let replayed = bench.json("replay one.isoclay");
     assert_eq!(replayed["state_sha256"], told["state_sha256"]);
-    assert!(bench.run("history one.isoclay").stdout.contains("by hand"));
+    assert!(bench.run("history one.isoclay --json").stdout.contains("by hand"));
 }
 
 #[test]
@@ -97,4 +97,37 @@ fn three_threads_by_the_clock_leave_a_journal_that_replays() {
     assert!(told["largest_step_n"].as_f64().unwrap() <= 0.2501, "{told}");
     let replayed = bench.json("replay clay.isoclay");
     assert_eq!(replayed["state_sha256"], told["state_sha256"]);
+}
+
+/// The threads with a device that is not simulated: a trajectory, since nothing is plugged in. Its button works as any other.
+#[test]
+fn a_session_by_a_trajectory_is_an_edit_like_any_other() {
+    let bench = ball();
+    bench.json("new clay.isoclay ball.iclay");
+    bench.write(
+        "stroke.toml",
+        "[stroke.carve]\nalong = []\nshape.sphere.radius = 0.06\ntolerance = 0.01\n",
+    );
+    // In the device's room, of which the ball fills the width: down on its top, along it, and up again.
+    bench.write(
+        "way.txt",
+        "0 0 0 120\n0.5 0 0 98\n0.6 0 0 98 1\n1.2 12 0 98 1\n1.3 12 0 98 0\n1.6 12 0 120 0\n",
+    );
+    let told = bench.json("feel clay.isoclay --device script:way.txt --script stroke.toml --seconds 3");
+    assert_eq!(told["strokes"], 1, "{told}");
+    assert!(told["threads"].is_object() && told["tripped"].is_null(), "{told}");
+    let replayed = bench.json("replay clay.isoclay");
+    assert_eq!(replayed["state_sha256"], told["state_sha256"]);
+    let run = bench.run("feel clay.isoclay --device sim:omni --script stroke.toml");
+    assert!(
+        run.code == 3 && run.stderr.contains("[[target]]"),
+        "{}",
+        run.stderr
+    );
+    let run = bench.run("feel clay.isoclay --device script:nowhere.txt --script stroke.toml");
+    assert!(
+        run.code == 3 && run.stderr.contains("check the path"),
+        "{}",
+        run.stderr
+    );
 }

@@ -1,7 +1,9 @@
 //! The grammar of the command line, its exit codes, and what goes to stdout.
 
+mod batch;
 #[path = "../common/mod.rs"]
 mod common;
+mod devices;
 mod documents;
 mod feel;
 mod gallery;

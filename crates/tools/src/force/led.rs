@@ -169,6 +169,20 @@ impl<T: Real> ForceStroke<T> {
         each.sum()
     }
 
+    /// How much more force all paths together ask for when their ends go on by one world length, to first order, and how much they would in
+    /// unpainted matter; 0 before the first step.
+    ///
+    /// A path whose end goes on by `δ` is short of `½|∇f|δ` more in the mean; forces in proportion to what the paths stand for bring it
+    /// [so far](Acting::stiffness) by each unit.
+    pub fn rigidity(&self) -> [f64; 2] {
+        let acting = self.acting.iter().filter(|a| a.is_free && a.stiffness > 0.0);
+        acting.fold([0.0; 2], |[own, plain], acting| {
+            let each = 0.5 * self.field.slope() / acting.stiffness;
+            let weight = self.targets[acting.index].weight;
+            [own + each * acting.worth, plain + each * weight]
+        })
+    }
+
     /// The field as it is now.
     ///
     /// # Errors

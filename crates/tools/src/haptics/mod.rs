@@ -14,11 +14,13 @@ mod feel;
 pub mod gates;
 mod multi_point;
 mod obstacle;
+mod probe;
 mod proxy;
 mod record;
 mod servo;
 pub mod simulated;
 mod snapshot;
+mod stroke_force;
 mod vcp;
 mod work;
 mod workspace;
@@ -28,6 +30,7 @@ pub use device::{Abilities, Device, DeviceError, Reading};
 pub use feel::{Contact, Felt, Pose, Renderer};
 pub use multi_point::{MultiPoint, MultiPointError, MultiPointOptions, PointTool, Sampling, ToolError};
 pub use obstacle::{Blend, Obstacle, Together, Touch};
+pub use probe::{MatterMap, Probe, ProbeOptions, Probed};
 pub use proxy::{Friction, Magnet, Proxy, ProxyOptions};
 pub use record::TickRecord;
 pub use servo::{Servo, ServoError, ServoOptions, Tick};
@@ -35,6 +38,7 @@ pub use snapshot::{
     BrickOptions, Demand, DistanceBrick, FieldObstacle, Interpolation, Moving, Part, Shape, Snapshot,
     SnapshotMaker, Surface, TouchMap, TouchedObject, Unresolved,
 };
+pub use stroke_force::{StrokeForce, StrokeForceOptions, StrokeStep, newtons_per_unit};
 pub use vcp::{Vcp, VcpOptions};
 pub use work::{Embedding, Viscous};
 pub use workspace::Workspace;

@@ -7,7 +7,7 @@ use tools::haptics::simulated::{Path, SimulatedHand};
 use crate::common::{Bumps, Check, Loop, penalty, proxy, vcp};
 
 /// Waves of 1.2 mm, 4 and 7 mm long; there and back over 45 mm.
-fn slid(renderer: impl Renderer) -> Check {
+fn slid(renderer: impl Renderer + 'static) -> Check {
     let of = |x, y| DVec3::new(x, y, -1.0);
     let path = Path::straight([
         (0.0, DVec3::new(0.0, 0.0, 6.0)),

@@ -11,7 +11,7 @@ use crate::common::{Check, HalfSpace, Loop, omni, proxy, vcp};
 const DROP: f64 = 0.1;
 
 /// 60 mm in 1.2 s over a floor that sinks at a rate, Hz.
-fn carved(rate: f64, change: Change, renderer: impl Renderer) -> Check {
+fn carved(rate: f64, change: Change, renderer: impl Renderer + 'static) -> Check {
     let of = |x, z| DVec3::new(x, 0.0, z);
     let path = Path::smooth([
         (0.0, of(0.0, 2.0)),

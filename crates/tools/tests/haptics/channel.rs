@@ -13,7 +13,7 @@ fn sign_changes(values: impl Iterator<Item = f64>, band: f64) -> usize {
 }
 
 /// Along a passage between thin walls at 20 mm/s, pushed to one side, to the other and back.
-fn drifted(renderer: impl Renderer) -> Check {
+fn drifted(renderer: impl Renderer + 'static) -> Check {
     let of = |x, z| DVec3::new(x, 0.0, z);
     let path = Path::smooth([
         (0.2, of(0.0, 0.0)),
@@ -65,7 +65,7 @@ fn methods_without_memory_leave_a_passage_through_its_walls() {
 }
 
 /// Down onto the mouth of a slot of a width, mm, 1 mm beside its middle, then to the middle, then on.
-fn entered(gap: f64, renderer: impl Renderer) -> Check {
+fn entered(gap: f64, renderer: impl Renderer + 'static) -> Check {
     let of = |x, z| DVec3::new(x, 0.0, z);
     let path = Path::smooth([
         (0.2, of(1.0, 6.0)),

@@ -12,7 +12,12 @@ fn of(z: f64) -> DVec3 {
     DVec3::new(0.0, 0.0, z)
 }
 
-fn pressed(device: Mechanics, hand: SimulatedHand, stiffness: f64, renderer: impl Renderer) -> Check {
+fn pressed(
+    device: Mechanics,
+    hand: SimulatedHand,
+    stiffness: f64,
+    renderer: impl Renderer + 'static,
+) -> Check {
     let setup = Loop {
         device,
         stiffness,

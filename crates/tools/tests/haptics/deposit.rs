@@ -10,7 +10,7 @@ use crate::common::{Check, HalfSpace, Loop, penalty, proxy, vcp};
 
 const LAYER: f64 = 3.0;
 
-fn buried(change: Change, renderer: impl Renderer) -> Check {
+fn buried(change: Change, renderer: impl Renderer + 'static) -> Check {
     let of = |z| DVec3::new(0.0, 0.0, z);
     let path = Path::smooth([(0.0, of(4.0)), (0.5, of(0.5))]);
     let setup = Loop::new(SimulatedHand::light(path), 3.0);

@@ -8,7 +8,7 @@ use crate::common::{Check, Edge, Loop, penalty, plane, proxy, vcp};
 
 /// Across a roof of an opening angle, degrees, from 12 mm on one side to 12 mm on the other, the hand drawn to a height, mm,
 /// below its edge.
-fn slid(opening: f64, height: f64, renderer: impl Renderer) -> Check {
+fn slid(opening: f64, height: f64, renderer: impl Renderer + 'static) -> Check {
     let of = |x| DVec3::new(x, 0.0, height);
     let path = Path::straight([(0.2, of(-12.0)), (0.44, of(12.0))]);
     let setup = Loop::new(SimulatedHand::light(path), 1.0);

@@ -18,7 +18,7 @@ fn through(x: f64, speed: f64) -> (Path, f64) {
     )
 }
 
-fn sheet(speed: f64, radius: f64, renderer: impl Renderer) -> Check {
+fn sheet(speed: f64, radius: f64, renderer: impl Renderer + 'static) -> Check {
     let (path, seconds) = through(0.0, speed);
     scripted(
         &path,
@@ -29,7 +29,7 @@ fn sheet(speed: f64, radius: f64, renderer: impl Renderer) -> Check {
     )
 }
 
-fn slid_past(x: f64, speed: f64, radius: f64, renderer: impl Renderer) -> Check {
+fn slid_past(x: f64, speed: f64, radius: f64, renderer: impl Renderer + 'static) -> Check {
     let (path, seconds) = through(x, speed);
     scripted(&path, seconds, &Rod { radius: 0.5 }, renderer, (radius, 500.0))
 }

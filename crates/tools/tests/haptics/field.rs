@@ -32,7 +32,7 @@ fn bumpy() -> TensorSpline<f64> {
 }
 
 /// There and back over the bumps at 0.15 m/s.
-fn over_bumps(field: &TensorSpline<f64>, renderer: impl Renderer) -> Check {
+fn over_bumps(field: &TensorSpline<f64>, renderer: impl Renderer + 'static) -> Check {
     let path = Path::straight([
         (0.0, DVec3::new(0.0, 0.0, 6.0)),
         (0.15, DVec3::new(0.0, 0.0, 1.0)),

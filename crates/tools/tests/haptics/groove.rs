@@ -11,7 +11,7 @@ pub const RADIUS: f64 = 0.5;
 pub const HALVES: [f64; 3] = [20.0, 10.0, 5.0];
 
 /// Down one side of a groove of a half angle, degrees, to its bottom, and 9 mm towards the solid below.
-pub fn pressed(half: f64, timing: Timing, renderer: impl Renderer) -> Check {
+pub fn pressed(half: f64, timing: Timing, renderer: impl Renderer + 'static) -> Check {
     let half = half.to_radians();
     let of = |x, z| DVec3::new(x, 0.0, z);
     let top = 12.5 * half.tan();

@@ -7,7 +7,7 @@ use tools::haptics::{Contact, Renderer};
 use crate::common::{Check, HalfSpace, Loop, proxy, vcp};
 
 /// From 10 mm below where it would rest, out, and back onto the surface.
-fn began(renderer: impl Renderer) -> Check {
+fn began(renderer: impl Renderer + 'static) -> Check {
     let of = |z| DVec3::new(0.0, 0.0, z);
     let path = Path::smooth([(0.5, of(-8.0)), (1.0, of(6.0)), (1.2, of(6.0)), (1.7, of(-2.0))]);
     Loop::new(SimulatedHand::light(path), 3.0).touch(HalfSpace::floor(0.0), renderer)

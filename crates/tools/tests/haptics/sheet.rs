@@ -7,7 +7,7 @@ use tools::haptics::simulated::{Path, SimulatedHand};
 use crate::common::{Check, Loop, Sheet, penalty, plane, proxy, vcp};
 
 /// At half a metre a second towards 12 mm behind the sheet, and held there.
-fn hit(stiffness: f64, renderer: impl Renderer) -> Check {
+fn hit(stiffness: f64, renderer: impl Renderer + 'static) -> Check {
     let of = |z| DVec3::new(0.0, 0.0, z);
     let hand = SimulatedHand::light(Path::straight([(0.1, of(15.0)), (0.154, of(-12.0))]));
     let setup = Loop {

@@ -9,7 +9,7 @@ use tools::haptics::{Obstacle, Pose, Renderer};
 use crate::common::{Ball, Check, Loop, omni, plane, proxy, vcp};
 
 /// Along a great circle 2 mm below where a tool of 2 mm touches a ball, at a speed, mm/s.
-fn circled(radius: f64, speed: f64, rate: f64, renderer: impl Renderer) -> Check {
+fn circled(radius: f64, speed: f64, rate: f64, renderer: impl Renderer + 'static) -> Check {
     let deep = radius - 2.0;
     let of = |angle: f64| deep * DVec3::new(angle.sin(), 0.0, angle.cos());
     let turn = (60.0 / deep).min(1.5);

@@ -16,7 +16,7 @@ fn press() -> Path {
     Path::smooth([(0.1, of(14.0)), (0.6, of(-4.0))])
 }
 
-fn pressed(hand: &SimulatedHand, stiffness: f64, renderer: impl Renderer) -> Check {
+fn pressed(hand: &SimulatedHand, stiffness: f64, renderer: impl Renderer + 'static) -> Check {
     let setup = Loop {
         stiffness,
         ..Loop::new(hand.clone(), 3.0)

@@ -25,14 +25,17 @@ pub use ends::leave_all;
 pub use reader::Reader;
 pub use writer::{Compose, Out, Writer};
 
-/// Time after which a force that nobody asked for again is zero, s. Below the 10 ms within which it has to be, by a step of the writer.
-pub const STALE: f64 = 0.009;
+/// Age of what the device told from which there is no force, s, unless it tells less often. Below the 10 ms within which it has to be
+/// zero, by a step of the writer.
+pub const SILENCE: f64 = 0.009;
 
 /// What the haptic thread wants of a device: numbers whose meaning is the device's, and what they were computed from.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Order {
-    /// Currents, shares of the largest force, places: by device. All zero is no force, of every device.
-    pub values: [f64; 6],
+    /// What grows with the force: currents, or shares of the largest force. Zero is no force, of every device.
+    pub force: [f64; 3],
+    /// Where the device was.
+    pub at: [f64; 3],
     /// What the device said of itself in the sample that was answered.
     pub flags: u32,
 }
@@ -88,14 +91,14 @@ impl Link {
     }
 
     fn put_order(&self, order: &Order, told: f64) {
-        let v = order.values.map(f64::to_bits);
+        let (f, q) = (order.force.map(f64::to_bits), order.at.map(f64::to_bits));
         self.orders.put([
-            v[0],
-            v[1],
-            v[2],
-            v[3],
-            v[4],
-            v[5],
+            f[0],
+            f[1],
+            f[2],
+            q[0],
+            q[1],
+            q[2],
             order.flags.into(),
             told.to_bits(),
         ]);
@@ -105,7 +108,8 @@ impl Link {
     fn order(&self) -> Option<(Order, f64)> {
         let (_, words) = self.orders.get()?;
         let order = Order {
-            values: std::array::from_fn(|i| f64::from_bits(words[i])),
+            force: std::array::from_fn(|i| f64::from_bits(words[i])),
+            at: std::array::from_fn(|i| f64::from_bits(words[3 + i])),
             flags: words[6] as u32,
         };
         Some((order, f64::from_bits(words[7])))

@@ -4,7 +4,9 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use super::{Link, Order, STALE};
+use tools::haptics::gates::held;
+
+use super::{Link, Order, SILENCE};
 use crate::devices::clock::Clock;
 use crate::devices::transport::{Transport, TransportError};
 
@@ -56,20 +58,26 @@ impl Writer {
             composer,
             link,
             clock,
-            silence: STALE.max(3.0 * period),
+            silence: SILENCE.max(3.0 * period),
             failures: 0,
         }
     }
 
-    /// What may be ordered now: nothing, where the last order or what it answers is old.
+    /// What may be ordered now: less and less where no order follows, as the servo reckons with, and nothing where the device is silent.
     fn order(&self, now: f64) -> Order {
         let (Some((order, given)), Some((_, told))) = (self.link.order(), self.link.sample()) else {
             return Order::default();
         };
-        let is_fresh = now - given < STALE && now - told < self.silence;
-        let is_finite = order.values.iter().all(|v| v.is_finite());
-        match is_fresh && is_finite {
-            true => order,
+        let is_finite = order.force.iter().chain(&order.at).all(|v| v.is_finite());
+        let share = match is_finite && now - told < self.silence {
+            true => held(now - given),
+            false => 0.0,
+        };
+        match share > 0.0 {
+            true => Order {
+                force: order.force.map(|v| v * share),
+                ..order
+            },
             false => Order {
                 flags: order.flags,
                 ..Order::default()

@@ -139,9 +139,9 @@ impl Model for Stick {
 
     fn order(&mut self, force: DVec3, _torque: DVec3) -> Order {
         let share = room_from_hid(force).clamp_length_max(self.scale.force) / self.scale.force;
-        let (f, q) = (share, self.at);
         Order {
-            values: [f.x, f.y, f.z, q.x, q.y, q.z],
+            force: share.to_array(),
+            at: self.at.to_array(),
             flags: 0,
         }
     }
@@ -252,7 +252,7 @@ impl Compose for Effects {
         let mut pushes = false;
         for i in 0..self.effects.len() {
             let (axis, index) = self.effects[i];
-            let (force, at) = (order.values[axis], order.values[3 + axis]);
+            let (force, at) = (order.force[axis], order.at[axis]);
             pushes |= force != 0.0;
             let report = self.say(axis, index, force, at);
             if report.is_some() && report != self.last[i] {

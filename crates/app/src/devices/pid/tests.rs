@@ -1,4 +1,7 @@
+use std::sync::Arc;
+
 use proptest::prelude::*;
+use tools::haptics::{Device, DeviceError};
 
 use super::descriptor::{Descriptor, DescriptorError, Usage, Way};
 use super::effects::{Kind, Spring};
@@ -9,6 +12,7 @@ use super::slot::Part;
 use super::*;
 use crate::devices::clock::Clock;
 use crate::devices::fake::Fake;
+use crate::devices::link::{Link, Linked, Reader, Writer};
 use crate::devices::report::{Parse, Rejected};
 
 fn layout(bytes: &[u8]) -> Layout {
@@ -196,27 +200,24 @@ fn a_stick_is_in_the_room_as_a_hand_holds_it() {
     assert!((stick.abilities().stiffness - 83.333).abs() < 1e-3);
     let order = stick.order(DVec3::new(0.0, 3.0, 9.0), DVec3::ZERO);
     let share = 3.0 / 90.0_f64.sqrt();
-    assert!(
-        (order.values[1] + share).abs() < 1e-12,
-        "away is against the axis"
-    );
+    assert!((order.force[1] + share).abs() < 1e-12, "away is against the axis");
 }
 
 /// Runs the effects of a maker under some orders, each a millisecond after the other.
 fn said(bytes: &[u8], kind: Kind, orders: &[[f64; 6]]) -> (Vec<Vec<u8>>, Vec<Vec<u8>>) {
     let load = layout(bytes).load.index.report;
     let mut fake = Fake::new(Clock::standing());
-    let mut next = 0;
     fake.answer(Box::new(move |_, features| {
-        next = features.len() as u8;
-        vec![load, next, 1, 0, 1]
+        vec![load, features.len() as u8, 1, 0, 1]
     }));
     let mut effects = Effects::begin(layout(bytes), kind, &mut fake).unwrap();
     let begun: Vec<_> = fake.written().into_iter().map(|(_, report)| report).collect();
     let mut said = Vec::new();
     for (ms, values) in orders.iter().enumerate() {
+        let [x, y, z, a, b, c] = *values;
         let order = Order {
-            values: *values,
+            force: [x, y, z],
+            at: [a, b, c],
             flags: 0,
         };
         let mut out = |report: &[u8]| {
@@ -297,6 +298,48 @@ fn the_springs_force_is_the_one_asked_for() {
         assert!((law(at) - force).abs() < 1e-4, "{force} at {at}: {}", law(at));
         assert_eq!(law(centre + 0.2 * force.signum()), 0.0, "beyond the surface");
     }
+}
+
+/// Silent while nothing changes, as sticks are: the reader asks, so that the hand may hold still under a force.
+#[test]
+fn a_stick_held_still_keeps_its_force_until_it_answers_no_more() {
+    let (clock, link) = (Clock::standing(), Arc::<Link>::default());
+    let mut fake = Fake::new(clock.clone());
+    let layout = layout(&rhino());
+    let load = layout.load.index.report;
+    fake.answer(Box::new(move |_, features| {
+        vec![load, features.len() as u8, 1, 0, 1]
+    }));
+    fake.answer_input(&[1, 0x00, 0x08, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
+    let parser = Reports::new(layout.input.clone());
+    let stick = Stick::new("stick", &layout, Kind::Constant, Scale::default());
+    let effects = Effects::begin(layout, Kind::Constant, &mut fake).unwrap();
+    let ends = || (Box::new(fake.clone()), link.clone(), clock.clone());
+    let (transport, its, time) = ends();
+    let mut reader = Reader::new(transport, Box::new(parser), its, time).asking(1);
+    let (transport, its, time) = ends();
+    let mut writer = Writer::new(transport, Box::new(effects), its, time, PERIOD);
+    let mut device = Linked::new(Box::new(stick), link.clone(), clock.clone());
+    let mut tick = |ms: u32| {
+        clock.set(f64::from(ms) * 1e-3);
+        reader.step();
+        let done = device.read().and_then(|_| device.send(DVec3::X, DVec3::ZERO));
+        writer.step();
+        done
+    };
+    let begun = (1..10).filter(|ms| tick(*ms).is_ok()).count();
+    assert!(begun > 4, "it is asked after 4 ms");
+    for ms in 10..300 {
+        tick(ms).unwrap();
+    }
+    let written = fake.written();
+    let forces: Vec<_> = written.iter().filter(|(_, r)| r[..2] == [105, 1]).collect();
+    // A fifth of 4096, said once and never taken back.
+    assert_eq!(forces.last().unwrap().1, [105, 1, 0x33, 0x03]);
+    assert!(forces.last().unwrap().0 < 0.01);
+    fake.unplug();
+    let gone = (300..310).find(|ms| matches!(tick(*ms), Err(DeviceError::Gone(_))));
+    assert!(gone.is_some());
 }
 
 #[test]
@@ -425,10 +468,10 @@ fn a_usage_of_four_bytes_brings_its_page_and_a_range_has_places() {
 proptest! {
     #[test]
     fn any_descriptor_is_read_or_refused(bytes in prop::collection::vec(any::<u8>(), 0..200), report in any::<[u8; 20]>()) {
-        if let Ok(descriptor) = Descriptor::parse(&bytes) {
-            if let Ok(layout) = Layout::of(descriptor) {
-                let _ = Reports::new(layout.input).take(&report);
-            }
+        if let Ok(descriptor) = Descriptor::parse(&bytes)
+            && let Ok(layout) = Layout::of(descriptor)
+        {
+            let _ = Reports::new(layout.input).take(&report);
         }
     }
 

@@ -118,8 +118,8 @@ impl Model for Arm {
         let largest = current.abs().max_element();
         let current = current * (CURRENT / largest.max(CURRENT));
         Order {
-            values: [current.x, current.y, current.z, 0.0, 0.0, 0.0],
-            flags: 0,
+            force: current.to_array(),
+            ..Order::default()
         }
     }
 }
@@ -157,7 +157,7 @@ impl Compose for Board {
             return out(&report::with_preset(self.preset));
         }
         let current = |i: usize| match self.may_push {
-            true => order.values[i].round().clamp(-CURRENT, CURRENT) as i16,
+            true => order.force[i].round().clamp(-CURRENT, CURRENT) as i16,
             false => 0,
         };
         self.currents([current(0), current(1), current(2)], now, out)

@@ -95,13 +95,13 @@ fn a_count_is_43_54_and_64_micrometres_of_woodenhaptics() {
     let arm = Variant::named("woodenhaptics-2019").unwrap();
     assert_eq!(resolution(arm).map(|r| (r * 1e6).round()), [43.0, 54.0, 64.0]);
     // And that is how far the handle goes.
-    let angles = DVec3::new(0.0, 0.3, PI / 2.0);
-    let counts = counts_at(arm, angles);
+    let bent = DVec3::new(0.0, 0.3, PI / 2.0);
+    let counts = counts_at(arm, bent);
     for (motor, way) in [(1, 53.7e-6), (2, 64.1e-6)] {
         let mut next = counts;
         next[motor] += 1;
-        let here = position(arm, kinematics::angles(arm, counts));
-        let there = position(arm, kinematics::angles(arm, next));
+        let here = position(arm, angles(arm, counts));
+        let there = position(arm, angles(arm, next));
         assert!((here.distance(there) - way).abs() < 0.1e-6);
     }
 }
@@ -112,14 +112,14 @@ fn the_place_of_calibration_has_right_angles() {
     for name in ["woodenhaptics-2019", "woodenhaptics-2015", "polhem-1"] {
         let arm = Variant::named(name).unwrap();
         let counts = [0, 1, 2].map(|i| arm.preset[i].into());
-        let angles = kinematics::angles(arm, counts);
+        let rest = angles(arm, counts);
         assert!(
-            angles.distance(DVec3::new(0.0, 0.0, PI / 2.0)) < 1e-12,
-            "{name}: {angles}"
+            rest.distance(DVec3::new(0.0, 0.0, PI / 2.0)) < 1e-12,
+            "{name}: {rest}"
         );
         let [la, lb, lc] = arm.length;
         let place = DVec3::new(lc, 0.0, la + lb) - DVec3::from(arm.origin);
-        assert!(position(arm, angles).distance(place) < 1e-12);
+        assert!(position(arm, rest).distance(place) < 1e-12);
     }
 }
 
@@ -138,7 +138,7 @@ fn more_force_than_the_motors_have_keeps_its_direction() {
     arm.pose(Some((&sample, 0.0)), 0.0).unwrap();
     let direction = DVec3::new(0.6, 0.64, 0.48);
     let currents =
-        |arm: &mut Arm, force: f64| DVec3::from_slice(&arm.order(direction * force, DVec3::ZERO).values[..3]);
+        |arm: &mut Arm, force: f64| DVec3::from_slice(&arm.order(direction * force, DVec3::ZERO).force);
     let (small, large) = (currents(&mut arm, 0.01), currents(&mut arm, 100.0));
     assert!(large.abs().max_element() <= 1999.0);
     assert!(large.normalize().distance(small.normalize()) < 1e-9);
@@ -148,8 +148,8 @@ fn more_force_than_the_motors_have_keeps_its_direction() {
 #[test]
 fn a_board_pushes_only_when_it_may_and_never_before_it_is_calibrated() {
     let order = Order {
-        values: [100.0, -50.0, 3000.0, 0.0, 0.0, 0.0],
-        flags: 0,
+        force: [100.0, -50.0, 3000.0],
+        ..Order::default()
     };
     let asks = Order { flags: ASKS, ..order };
     let variant = Variant::named("woodenhaptics-2019").unwrap();
@@ -215,7 +215,7 @@ proptest! {
         // Within a third of the room, where every one of the arms reaches.
         let place = DVec3::from(way.map(f64::from)) / 128.0 * arm.radius / 3.0;
         let counts = counts_at(arm, angles_at(arm, place));
-        let nearest = position(arm, kinematics::angles(arm, counts));
+        let nearest = position(arm, angles(arm, counts));
         let [a, b, c] = resolution(arm);
         prop_assert!(nearest.distance(place) < a + b + c, "half a count of each, nearer or further out than the middle");
         prop_assert_eq!(counts_at(arm, angles_at(arm, nearest)), counts);
@@ -280,6 +280,6 @@ proptest! {
         let sample = Sample { axes: all, ..Sample::default() };
         arm.pose(Some((&sample, 0.0)), 0.0).unwrap();
         let order = arm.order(DVec3::from(force.map(f64::from)), DVec3::ZERO);
-        prop_assert!(order.values.iter().all(|v| v.is_finite() && v.abs() < 2000.0));
+        prop_assert!(order.force.iter().all(|v| v.is_finite() && v.abs() < 2000.0));
     }
 }

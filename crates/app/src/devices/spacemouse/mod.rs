@@ -15,6 +15,7 @@ mod tests;
 use glam::{DQuat, DVec3};
 use tools::haptics::{Abilities, Pose};
 
+use crate::devices::forceless;
 use crate::devices::frame::room_from_hid;
 use crate::devices::lag::{Lag, Ticks};
 use crate::devices::link::{Compose, Model, Order, Out};
@@ -77,19 +78,9 @@ pub struct SpaceMouse {
 impl SpaceMouse {
     /// A tool in the middle of its room, at rest.
     pub fn new(name: &str, rate: Rate) -> Self {
-        let abilities = Abilities {
-            name: name.into(),
-            force: 0.0,
-            continuous_force: 0.0,
-            torque: 0.0,
-            damping: 0.0,
-            stiffness: f64::INFINITY,
-            // The way of one count in the time between two reports.
-            resolution: rate.speed / FULL * PERIOD,
-            period: PERIOD,
-            delay: 0.0,
-            reach: rate.reach,
-        };
+        // The way of one count in the time between two reports.
+        let resolution = rate.speed / FULL * PERIOD;
+        let abilities = forceless::abilities(name, resolution, PERIOD, rate.reach);
         Self {
             abilities,
             ticks: Ticks::default(),

@@ -23,15 +23,14 @@ pub trait Drive {
 }
 
 /// A renderer and the limit of a device's force, without any gate: what stability is asked of first.
-#[derive(Clone, Debug)]
-pub struct Bare<R> {
+pub struct Bare {
     /// The renderer.
-    pub renderer: R,
+    pub renderer: Box<dyn Renderer>,
     /// Largest force, N.
     pub force: f64,
 }
 
-impl<R: Renderer> Drive for Bare<R> {
+impl Drive for Bare {
     /// Nothing where nothing was told.
     fn tick(
         &mut self,

@@ -30,7 +30,11 @@ pub struct World<'a> {
 impl<'a> World<'a> {
     /// One that stays.
     pub fn still(obstacle: impl Obstacle + 'static) -> Self {
-        let obstacle: Arc<dyn Obstacle> = Arc::new(obstacle);
+        Self::shared(Arc::new(obstacle))
+    }
+
+    /// One that stays, and that others have as well.
+    pub fn shared(obstacle: Arc<dyn Obstacle>) -> Self {
         let same = Arc::clone(&obstacle);
         Self {
             make: Box::new(move |_, _| Arc::clone(&same)),

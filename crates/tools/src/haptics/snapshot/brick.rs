@@ -13,6 +13,9 @@ use crate::haptics::Obstacle;
 /// Shortest way that is told, in node distances: nothing is sampled more finely.
 const THINNEST: f64 = 0.1;
 
+/// Distance of nodes, mm, with which a ball of 5 mm rolls over a scan within 0.1 mm of the exact offset, and not with a third more.
+const COARSEST: f64 = 0.75;
+
 /// How a brick is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BrickOptions {
@@ -20,7 +23,7 @@ pub struct BrickOptions {
     pub reach: f64,
     /// Distance of nodes, mm.
     pub spacing: f64,
-    /// Up to here, on both sides of the surface, distances are exact, mm.
+    /// Up to here in the air distances are exact, mm; in the solid up to two nodes.
     pub band: f64,
     /// Between nodes.
     pub interpolation: Interpolation,
@@ -36,7 +39,8 @@ impl Default for BrickOptions {
 impl BrickOptions {
     /// For a tool of a radius on a field whose knots are so far apart, both mm.
     pub fn of_tool(radius: f64, detail: f64) -> Self {
-        let spacing = (0.5 * radius).max(detail);
+        // Where a ball touches two places at once its offset has an edge, which nodes round by a tenth of their distance.
+        let spacing = (0.5 * radius).min(COARSEST).max(detail);
         Self {
             reach: 15.0,
             spacing,
@@ -102,7 +106,7 @@ impl DistanceBrick {
         self.grid.spacing
     }
 
-    /// Up to here distances are exact, mm; where more is told, it is no less than this.
+    /// Up to here in the air, and up to two nodes in the solid, distances are exact, mm; where more is told, it is no less than this.
     pub fn band(&self) -> f64 {
         self.band
     }

@@ -12,6 +12,8 @@ use super::seek::{Seek, Seeker};
 use super::surface::Surface;
 use super::thin::{self, Unresolved};
 
+/// Node distances beyond the band in which distances are as exact as in it.
+const MARGIN: f64 = 2.0;
 /// Closest places of neighbours that are tried, one after the other, each nearer than the one before.
 const WALK: usize = 6;
 
@@ -20,7 +22,7 @@ const WALK: usize = 6;
 pub struct Distances {
     /// The nodes.
     pub grid: Grid,
-    /// Up to here distances are exact, mm; beyond, no less than this.
+    /// Up to here in the air, and up to [`MARGIN`] nodes in the solid, distances are exact, mm; beyond, no less than this.
     pub band: f64,
     /// Signed distance, mm, positive in the air.
     pub phi: Vec<f32>,
@@ -41,7 +43,7 @@ pub struct Distances {
 /// What is known of a node beside the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Beside {
-    slot: u32,
+    node: [u16; 3],
     /// Where the surface was met first.
     start: DVec3,
     phi: f32,
@@ -114,11 +116,6 @@ impl Distances {
         all
     }
 
-    /// Whether no surface is in the box.
-    pub fn is_empty(&self) -> bool {
-        self.beside.is_empty()
-    }
-
     /// The closest place of a node beside the surface.
     fn foot_at(&self, slot: usize) -> Option<&Foot> {
         let near = self.near[slot];
@@ -165,19 +162,15 @@ impl Distances {
         let grid = self.grid;
         let mut seekers = Vec::new();
         let mut numbers = Vec::new();
-        for slot in 0..grid.len() {
-            let at = grid.node(slot);
+        for (slot, at) in grid.nodes().enumerate() {
             let Some([start, other]) = self.crossing(at, slot) else {
                 continue;
             };
-            let number = self.beside.len();
+            let (number, node) = (self.beside.len(), at.map(|n| n as u16));
             self.near[slot] = number as u32;
             let old = known.and_then(|known| known.beside(&grid, at, start));
             self.beside.push(match old {
-                Some(old) => Beside {
-                    slot: slot as u32,
-                    ..old
-                },
+                Some(old) => Beside { node, ..old },
                 None => {
                     numbers.push(number);
                     let hull = Hull::of(at);
@@ -189,7 +182,7 @@ impl Distances {
                         hull,
                     });
                     Beside {
-                        slot: slot as u32,
+                        node,
                         start,
                         phi: 0.0,
                         foot: Foot::flat(start),
@@ -228,34 +221,38 @@ impl Distances {
         let kept = known.map(|known| Kept::new(self, known, same.is_some()));
         self.hulls = vec![Hull::of([0; 3]); grid.len()];
         let mut seekers = Vec::new();
-        for slot in 0..grid.len() {
-            let at = grid.node(slot);
+        let mut coarse = Vec::new();
+        let is_inside = |slot: usize| self.samples.inside[slot];
+        for (slot, at) in grid.nodes().enumerate() {
+            if self.is_coarse(at, slot) {
+                coarse.push((slot, at));
+                continue;
+            }
             if let Some((phi, hull)) = kept.as_ref().and_then(|kept| kept.answer(at, slot)) {
                 (self.phi[slot], self.hulls[slot]) = (phi, hull);
                 continue;
             }
             let p = grid.place(at);
             let mut hull = Hull::of(at);
-            let number = self.walk(at, slot, p, &mut hull);
+            let (number, there) = self.walk(at, slot, p, &mut hull);
             self.hulls[slot] = hull;
-            let beside = &self.beside[number as usize];
             if self.near[slot] == number {
-                self.phi[slot] = beside.phi;
+                self.phi[slot] = self.beside[number as usize].phi;
                 continue;
             }
-            let foot = &beside.foot;
-            let there = foot.toward(p, grid.spacing);
-            let far = p.distance(there).min(p.distance(foot.at));
-            if far <= self.band {
+            let start = self.beside[number as usize].foot.at;
+            let far = p.distance(there).min(p.distance(start));
+            // A spline between nodes also follows those two further on.
+            if far <= self.exact(slot) {
                 seekers.push(Seeker {
                     slot: slot as u32,
-                    start: foot.at,
+                    start,
                     at: there,
                     other: None,
                     hull,
                 });
             } else {
-                self.phi[slot] = (if self.samples.inside[slot] { -far } else { far }) as f32;
+                self.phi[slot] = (if is_inside(slot) { -far } else { far }) as f32;
             }
         }
         let seek = Seek {
@@ -270,11 +267,73 @@ impl Distances {
             self.hulls[slot] = seeker.hull;
         }
         self.renewed += seekers.len();
+        for (slot, at) in coarse {
+            self.phi[slot] = self.mean(at, slot);
+        }
     }
 
-    /// The foot to begin with: of those that the node and its neighbours are nearest to the closest one, and from there on to closer
-    /// ones round the place where it points to.
-    fn walk(&self, at: [usize; 3], slot: usize, p: DVec3, hull: &mut Hull) -> u32 {
+    /// Distance up to which closest places are looked for on a node's side.
+    fn exact(&self, slot: usize) -> f64 {
+        let margin = MARGIN * self.grid.spacing;
+        if self.samples.inside[slot] {
+            2.0 * margin
+        } else {
+            self.band + margin
+        }
+    }
+
+    /// Whether a node is so far from the surface, and between others, that the mean of those will do: those of even numbers.
+    fn is_coarse(&self, at: [usize; 3], slot: usize) -> bool {
+        let grid = &self.grid;
+        let is_odd = |a: usize| (grid.first[a] + at[a] as i64) & 1 == 1;
+        let has_both = |a: usize| at[a] > 0 && at[a] + 1 < grid.count[a];
+        if !(0..3).any(is_odd) || !(0..3).all(|a| !is_odd(a) || has_both(a)) {
+            return false;
+        }
+        let there = self.beside[self.near[self.ways[slot] as usize] as usize].node;
+        let square: usize = (0..3).map(|a| at[a].abs_diff(there[a] as usize).pow(2)).sum();
+        // A node beside the surface is at most one away from it.
+        square as f64 > (self.exact(slot) / grid.spacing + 1.0).powi(2)
+    }
+
+    /// Mean of the nodes of even numbers round one.
+    fn mean(&self, at: [usize; 3], slot: usize) -> f32 {
+        let (grid, strides) = (&self.grid, self.grid.strides());
+        let (mut sum, mut count, mut is_mixed) = (0.0, 0.0, false);
+        let step = |a: usize| {
+            if (grid.first[a] + at[a] as i64) & 1 == 1 {
+                strides[a]
+            } else {
+                0
+            }
+        };
+        let steps: [usize; 3] = std::array::from_fn(step);
+        for corner in 0..8usize {
+            let is_twice = (0..3).any(|a| steps[a] == 0 && corner >> a & 1 == 1);
+            if is_twice {
+                continue;
+            }
+            let back: usize = steps.iter().sum();
+            let on: usize = (0..3).map(|a| (corner >> a & 1) * 2 * steps[a]).sum();
+            let phi = self.phi[slot - back + on];
+            is_mixed |= (phi < 0.0) != self.samples.inside[slot];
+            sum += phi;
+            count += 1.0;
+        }
+        if !is_mixed {
+            return sum / count;
+        }
+        let p = grid.place(at);
+        let (number, there) = self.walk(at, slot, p, &mut Hull::of(at));
+        let far = p
+            .distance(there)
+            .min(p.distance(self.beside[number as usize].foot.at));
+        (if self.samples.inside[slot] { -far } else { far }) as f32
+    }
+
+    /// The foot to begin with, and where it points to: of those that the node and its neighbours are nearest to the closest one, and from
+    /// there on to closer ones round the place that it points to.
+    fn walk(&self, at: [usize; 3], slot: usize, p: DVec3, hull: &mut Hull) -> (u32, DVec3) {
         let (grid, strides) = (&self.grid, self.grid.strides());
         let mut best = (f64::INFINITY, NONE);
         let try_foot = |best: &mut (f64, u32), number: u32| {
@@ -283,10 +342,14 @@ impl Distances {
                 *best = (far, number);
             }
         };
+        let mut last = NONE;
         let mut try_way = |best: &mut (f64, u32), from: usize| {
-            let there = self.ways[from] as usize;
-            hull.add(grid.node(there));
-            try_foot(best, self.near[there]);
+            let number = self.near[self.ways[from] as usize];
+            if number != last {
+                last = number;
+                hull.add(self.beside[number as usize].node.map(usize::from));
+                try_foot(best, number);
+            }
         };
         try_way(&mut best, slot);
         for axis in 0..3 {
@@ -297,8 +360,9 @@ impl Distances {
                 try_way(&mut best, slot + strides[axis]);
             }
         }
+        let point = |best: (f64, u32)| self.beside[best.1 as usize].foot.toward(p, grid.spacing);
+        let mut there = point(best);
         for _ in 0..WALK {
-            let there = self.beside[best.1 as usize].foot.toward(p, 2.0 * grid.spacing);
             let Some(cell) = grid.cell(there) else {
                 hull.leave();
                 break;
@@ -316,8 +380,9 @@ impl Distances {
             if best.1 == before {
                 break;
             }
+            there = point(best);
         }
-        best.1
+        (best.1, there)
     }
 
     /// Without a surface in the box: how far it is at least, as the field falls in the middle.

@@ -48,6 +48,12 @@ impl Grid {
         (at[0] * self.count[1] + at[1]) * self.count[2] + at[2]
     }
 
+    /// All nodes in the order of lists.
+    pub fn nodes(&self) -> impl Iterator<Item = [usize; 3]> + use<> {
+        let [nx, ny, nz] = self.count;
+        (0..nx).flat_map(move |x| (0..ny).flat_map(move |y| (0..nz).map(move |z| [x, y, z])))
+    }
+
     /// The node at a place of lists.
     pub fn node(&self, slot: usize) -> [usize; 3] {
         let [_, ny, nz] = self.count;

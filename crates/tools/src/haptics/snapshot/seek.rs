@@ -11,7 +11,7 @@ use super::surface::Surface;
 /// Newton steps of a place before it is taken for one at an edge.
 const ROUNDS: usize = 8;
 /// Step, in node distances, after which a closest place is found: what is left is of the order of its square.
-const SETTLED: f64 = 0.02;
+const SETTLED: f64 = 0.05;
 /// Halvings of a way between neighbours.
 const HALVES: usize = 24;
 

@@ -13,6 +13,8 @@ use super::surface::Surface;
 const NEAR: f64 = 0.75;
 /// Cosine between the normals of two surfaces that face one another, rather than meet at an edge.
 const FACING: f64 = -0.5;
+/// Share of a cell beyond which a place is not in it.
+const TOUCHES: f64 = 0.1;
 /// Newton steps towards a surface that may be there.
 const STEPS: usize = 4;
 
@@ -118,13 +120,19 @@ fn is_unseen(surface: &Surface<'_>, grid: &Grid, samples: &Samples, p: DVec3) ->
         }
     }
     surface.jets(&[x], &mut jets);
-    let is_there = Foot::new(x, &jets[0]).is_some_and(|f| f.depth.abs() < 0.02 * grid.spacing);
-    let Some(cell) = grid
-        .cell(x)
-        .filter(|_| is_there && x.distance(p) < 1.2 * grid.spacing)
-    else {
+    let Some(foot) = Foot::new(x, &jets[0]) else {
         return false;
     };
-    let corner = |n: usize| samples.inside[grid.slot(std::array::from_fn(|a| cell[a] + (n >> a & 1)))];
-    (1..8).all(|n| corner(n) == corner(0))
+    if foot.depth.abs() > 0.02 * grid.spacing || x.distance(p) > 1.2 * grid.spacing {
+        return false;
+    }
+    // Of all cells that nearly hold it: edges and faces that pass through nodes are seen from the other side.
+    let end = |by: f64| grid.cell(x + by * grid.spacing);
+    let (Some(lo), Some(hi)) = (end(-TOUCHES), end(TOUCHES)) else {
+        return false;
+    };
+    let side = samples.inside[grid.slot(lo)];
+    let mut nodes = (lo[0]..=hi[0] + 1)
+        .flat_map(|x| (lo[1]..=hi[1] + 1).flat_map(move |y| (lo[2]..=hi[2] + 1).map(move |z| [x, y, z])));
+    nodes.all(|node| samples.inside[grid.slot(node)] == side)
 }

@@ -44,7 +44,7 @@ impl Loop {
     }
 
     /// Against what stays.
-    pub fn touch(&self, obstacle: impl Obstacle + 'static, renderer: impl Renderer) -> Check {
+    pub fn touch(&self, obstacle: impl Obstacle + 'static, renderer: impl Renderer + 'static) -> Check {
         self.touch_world(World::still(obstacle), renderer)
     }
 
@@ -102,10 +102,10 @@ impl Loop {
     }
 
     /// Against what changes.
-    pub fn touch_world(&self, world: World<'_>, renderer: impl Renderer) -> Check {
+    pub fn touch_world(&self, world: World<'_>, renderer: impl Renderer + 'static) -> Check {
         let device = SimulatedDevice::new(self.device.clone(), self.hand.clone());
         let drive = Bare {
-            renderer,
+            renderer: Box::new(renderer),
             force: self.device.force,
         };
         let mut rig = Rig::new(device, drive, world);

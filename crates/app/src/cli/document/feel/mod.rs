@@ -11,7 +11,7 @@ use clap::ValueEnum;
 use document::{Object, State};
 use glam::DVec3;
 use tools::haptics::gates::GateOptions;
-use tools::haptics::simulated::{Preset, SimulatedDevice};
+use tools::haptics::simulated::SimulatedDevice;
 use tools::haptics::{
     Abilities, Coupling, Demand, Device, Proxy, ProxyOptions, Servo, ServoOptions, TickRecord, Vcp,
     VcpOptions, Workspace,
@@ -25,7 +25,7 @@ use crate::cli::progress::Bar;
 use crate::cli::quantity::positive;
 use crate::cli::simulate;
 use crate::cli::source::Source;
-use crate::devices;
+use crate::devices::{self, Force, Name};
 use crate::threads::rehearsal::Rehearsal;
 use crate::threads::sculpting::Sculpting;
 use crate::threads::touch::Toucher;
@@ -40,8 +40,10 @@ const STEP: f64 = 1.0 / 30.0;
 const REACH: f64 = 15.0;
 /// Nodes of what may be touched of an object, where thin parts want them close: as many as are made anew in a step of the simulation.
 const NODES: usize = 60_000;
-/// Time from tick to tick by the clock.
-const TICK: Duration = Duration::from_millis(1);
+/// Longest time from tick to tick, s.
+const TICK: f64 = 1e-3;
+/// Time of a session with a device that is not simulated, s.
+const REAL: f64 = 60.0;
 /// Time after the last target, s.
 const REST: f64 = 0.5;
 
@@ -50,10 +52,10 @@ const REST: f64 = 0.5;
 pub struct Args {
     /// Document (.isoclay)
     document: PathBuf,
-    /// Device in the hand: sim:ideal, sim:omni, sim:phantom, sim:falcon or sim:wooden, or one that `isoclay devices` lists
+    /// Device in the hand: sim:omni and others that are simulated, or one of those that `isoclay devices` names
     #[arg(long, value_name = "DEVICE")]
     device: String,
-    /// What the hand does (.toml, or .jsonl with an object a line); - reads standard input. docs/guide.md lists what it may say
+    /// What the hand does, or of a real one only what its first button does (.toml, or .jsonl with an object a line); - reads standard input. docs/guide.md lists what it may say
     #[arg(long, value_name = "SCRIPT")]
     script: PathBuf,
     /// Object to work on, where there are several
@@ -65,7 +67,7 @@ pub struct Args {
     /// Stiffness at the hand, N/m, as far as the device holds it
     #[arg(long, value_name = "N/M", default_value = "500", value_parser = positive)]
     stiffness: f64,
-    /// Largest force, N; that of the device counts besides. Without it a device that is plugged in does not push
+    /// Largest force, N; that of the device counts besides. A device that is plugged in pushes only if this is said
     #[arg(long, value_name = "N", value_parser = positive)]
     force: Option<f64>,
     /// Radius of the ball that touches, mm of the device
@@ -77,10 +79,10 @@ pub struct Args {
     /// How contact is found: by a proxy that the solid keeps out, or anew in every tick
     #[arg(long, value_name = "MODE", default_value = "proxy")]
     contact: ContactMode,
-    /// Time that it takes, s [default: half a second more than the script]
+    /// Time that it takes, s [default: half a second more than the script; of a device that is not simulated 60]
     #[arg(long, value_name = "S", value_parser = positive)]
     seconds: Option<f64>,
-    /// Use three threads and the clock in place of virtual time
+    /// Use three threads and the clock in place of virtual time; any device that is not simulated does
     #[arg(long)]
     real_time: bool,
     /// Print one JSON object instead of a table
@@ -101,20 +103,48 @@ pub fn run(args: &Args) -> Outcome {
     let source = Source::open(&args.script, None, "scripts .toml or .jsonl", &cancel)?.under("--script");
     let about = |why: String| Failure::input(format!("{}: {why}", source.name()));
     let script = Script::parse(&simulate::text(&source)?).map_err(about)?;
-    let held = Held::named(args)?;
+    let named: Name = args
+        .device
+        .parse()
+        .map_err(|why| Failure::usage(format!("--device {}: {why}", args.device)))?;
+    let is_real = !matches!(named, Name::Simulated(_));
+    if !is_real && !script.has_targets() {
+        let why = "there is no target; write one [[target]] with time and at, or more";
+        return Err(about(why.into()));
+    }
     let output = args.output.as_ref();
     let output = output.map(|path| Output::check("-o", path, &["csv"], None, &[&source]));
     let output = output.transpose()?;
-    let seconds = args.seconds.unwrap_or(script.end() + REST);
+    let usual = if is_real { REAL } else { script.end() + REST };
+    let seconds = args.seconds.unwrap_or(usual);
     let mut notes = Vec::new();
     let document = open(&args.document, &mut notes)?;
     let name = chosen(document.state(), args.object.as_deref())?.to_string();
-    let abilities = held.abilities();
-    let workspace = workspace(document.state(), &name, abilities.reach, args.scale)?;
-    let servo = servo(args, &abilities, workspace)?;
-    let granted = servo.granted();
-    notes.extend(granted.note());
+    let (held, workspace) = match &named {
+        Name::Simulated(preset) => {
+            let mechanics = preset.mechanics();
+            let workspace = workspace(document.state(), &name, mechanics.reach, args.scale)?;
+            let hand = script.hand(&workspace, seconds);
+            let device = SimulatedDevice::new(mechanics, hand);
+            (Held::Simulated(Box::new(device)), workspace)
+        }
+        named => {
+            // Nobody is pushed who did not say how hard.
+            let force = match args.force {
+                Some(_) => Force::Allowed,
+                None => Force::Withheld,
+            };
+            let device = devices::open(named, force)
+                .map_err(|why| Failure::input(format!("--device {}: {why}", args.device)))?;
+            let reach = device.abilities().reach;
+            let workspace = workspace(document.state(), &name, reach, args.scale)?;
+            (Held::Real(Box::new(device)), workspace)
+        }
+    };
+    let servo = servo(args, held.abilities(), workspace)?;
+    notes.extend(servo.granted().note());
     let show = show(args, document.state(), &name, &workspace)?;
+    let granted = servo.granted();
     let sculpting = Sculpting::new(document, name, script.stroke.clone());
     let mut tally = Tally::default();
     let mut records = Vec::new();
@@ -129,14 +159,31 @@ pub fn run(args: &Args) -> Outcome {
         bar.show("feeling", passed / seconds);
         !cancel.is_cancelled()
     };
-    let simulated = |mechanics| {
-        let hand = script.hand(&workspace, seconds).map_err(about)?;
-        Ok::<_, Failure>(SimulatedDevice::new(mechanics, hand))
+    let held = match held {
+        Held::Simulated(device) if args.real_time => Held::Real(Box::new(device.self_timed())),
+        held => held,
     };
-    let device: Box<dyn Device> = match held {
-        Held::Simulated(preset) if !args.real_time => {
+    let (sculpting, threads) = match held {
+        Held::Real(device) => {
+            let session = Session {
+                tick: Duration::from_secs_f64(device.abilities().period.min(TICK)),
+                device,
+                servo,
+                sculpting,
+                show,
+                step: Duration::from_secs_f64(STEP),
+            };
+            let start = std::time::Instant::now();
+            let lasts = || {
+                let passed = start.elapsed().as_secs_f64();
+                passed < seconds && goes_on(passed)
+            };
+            let (sculpting, report) = session.run(lasts, &mut keep).map_err(failure)?;
+            (sculpting, Some(report))
+        }
+        Held::Simulated(device) => {
             let mut rehearsal = Rehearsal {
-                device: simulated(preset.mechanics())?,
+                device: *device,
                 servo,
                 sculpting,
                 show,
@@ -145,118 +192,45 @@ pub fn run(args: &Args) -> Outcome {
             let mut control = bar.control(&cancel);
             let run = rehearsal.run(seconds, &mut control, goes_on, &mut keep);
             run.map_err(failure)?;
-            bar.clear();
-            interrupt::check(&cancel)?;
-            let felt = |tally, strokes| Felt::new(&args.device, granted, &workspace, tally, strokes, None);
-            return told(
-                args,
-                rehearsal.sculpting,
-                felt,
-                tally,
-                &records,
-                notes,
-                output.as_ref(),
-            );
+            (rehearsal.sculpting, None)
         }
-        Held::Simulated(preset) => Box::new(simulated(preset.mechanics())?.self_timed()),
-        Held::Plugged(device) => device,
     };
-    let session = Session {
-        device,
-        servo,
-        sculpting,
-        show,
-        tick: TICK,
-        step: Duration::from_secs_f64(STEP),
-    };
-    let start = std::time::Instant::now();
-    let lasts = || {
-        let passed = start.elapsed().as_secs_f64();
-        passed < seconds && goes_on(passed)
-    };
-    let (sculpting, report) = session.run(lasts, &mut keep).map_err(failure)?;
     bar.clear();
     interrupt::check(&cancel)?;
-    let felt = |tally, strokes| Felt::new(&args.device, granted, &workspace, tally, strokes, Some(&report));
-    told(args, sculpting, felt, tally, &records, notes, output.as_ref())
-}
-
-/// Tells of the end: the document, the trace, and what was counted.
-fn told(
-    args: &Args,
-    sculpting: Sculpting,
-    felt: impl FnOnce(Tally, usize) -> Felt,
-    tally: Tally,
-    records: &[TickRecord],
-    mut notes: Vec<String>,
-    output: Option<&Output>,
-) -> Outcome {
     let (mut document, strokes, told) = sculpting.close();
     notes.extend(told);
-    let felt = felt(tally, strokes);
+    let felt = Felt::new(
+        &args.device,
+        granted,
+        &workspace,
+        tally,
+        strokes,
+        threads.as_ref(),
+    );
     let told = Told::of(&mut document, notes)?;
-    if let Some(output) = output {
-        let written = formats::atomic::replace(output.path(), |out| write_trace(records, out));
-        written.map_err(|e| output.writing(e.into()))?;
+    if let Some(output) = &output {
+        let written = formats::atomic::replace(output.path(), |out| write_trace(&records, out));
+        written.map_err(|e| output.writing(e))?;
         output.finish()?;
     }
-    felt.print(told, args.json, output.is_some_and(Output::is_stdout))
+    felt.print(told, args.json, output.as_ref().is_some_and(Output::is_stdout))
 }
 
 /// What is in the hand.
 enum Held {
-    Simulated(Preset),
-    Plugged(Box<dyn Device>),
+    /// A device that is computed, with the hand.
+    Simulated(Box<SimulatedDevice>),
+    /// One that only the clock moves on.
+    Real(Box<dyn Device>),
 }
 
 impl Held {
-    /// The device of a name. One that is plugged in pushes only if the user says how much.
-    fn named(args: &Args) -> Outcome<Self> {
-        let name = &args.device;
-        if name.starts_with("sim:") {
-            return preset(name).map(Self::Simulated);
-        }
-        let about = |e: &dyn std::fmt::Display| format!("--device {name}: {e}");
-        let known: devices::Name = name.parse().map_err(|e| {
-            Failure::usage(format!(
-                "{}, and {} that are computed",
-                about(&e),
-                simulated_names()
-            ))
-        })?;
-        if args.seconds.is_none() {
-            let why = "a device in a real hand has no end of its own; say --seconds";
-            return Err(Failure::usage(about(&why)));
-        }
-        let force = match args.force {
-            Some(_) => devices::Force::Allowed,
-            None => devices::Force::Withheld,
-        };
-        let opened = devices::open(&known, force).map_err(|e| Failure::input(about(&e)))?;
-        Ok(Self::Plugged(Box::new(opened)))
-    }
-
-    fn abilities(&self) -> Abilities {
+    fn abilities(&self) -> &Abilities {
         match self {
-            Self::Simulated(preset) => preset.mechanics().abilities(),
-            Self::Plugged(device) => device.abilities().clone(),
+            Self::Simulated(device) => device.abilities(),
+            Self::Real(device) => device.abilities(),
         }
     }
-}
-
-fn simulated_names() -> String {
-    Preset::ALL.map(|p| format!("sim:{}", p.name())).join(", ")
-}
-
-/// The computed device of a name.
-fn preset(name: &str) -> Outcome<Preset> {
-    let preset = name.strip_prefix("sim:").and_then(Preset::named);
-    preset.ok_or_else(|| {
-        Failure::usage(format!(
-            "--device {name}: names no device that is known here; write one of {}",
-            simulated_names()
-        ))
-    })
 }
 
 /// The object in the middle of the device's room.
@@ -288,7 +262,7 @@ fn servo(args: &Args, abilities: &Abilities, workspace: Workspace) -> Outcome<Se
     let scale = workspace.scale;
     let options = ServoOptions {
         stiffness: args.stiffness,
-        period: abilities.period.min(1e-3),
+        period: abilities.period.min(TICK),
         workspace,
         gates: GateOptions {
             force: args.force.unwrap_or(f64::INFINITY),

@@ -1,7 +1,7 @@
-//! Solids whose distance is a formula.
+//! Solids whose distance is a formula: what scenes touch. Lengths are mm, angles radians; each goes on without end along y unless said.
 
+use super::super::{Obstacle, Touch};
 use glam::{DVec2, DVec3};
-use tools::haptics::{Obstacle, Touch};
 
 /// Distance and direction from the nearest of some points or rays in the plane of x and z, as a 3D answer.
 fn flat((distance, g): (f64, DVec2)) -> (f64, DVec3) {
@@ -11,6 +11,7 @@ fn flat((distance, g): (f64, DVec2)) -> (f64, DVec3) {
 /// Everything below a plane.
 #[derive(Clone, Copy, Debug)]
 pub struct HalfSpace {
+    /// Into the air, of length 1.
     pub normal: DVec3,
     /// Distance of the plane from the origin along the normal.
     pub height: f64,
@@ -39,6 +40,7 @@ impl Obstacle for HalfSpace {
 /// |z| below half a thickness, without end.
 #[derive(Clone, Copy, Debug)]
 pub struct Sheet {
+    /// From face to face.
     pub thickness: f64,
 }
 
@@ -110,7 +112,9 @@ impl Obstacle for Edge {
 /// A ball.
 #[derive(Clone, Copy, Debug)]
 pub struct Ball {
+    /// Its middle.
     pub middle: DVec3,
+    /// Its radius.
     pub radius: f64,
 }
 
@@ -128,6 +132,7 @@ impl Obstacle for Ball {
 /// A rod along y through the origin.
 #[derive(Clone, Copy, Debug)]
 pub struct Rod {
+    /// Its radius.
     pub radius: f64,
 }
 
@@ -145,6 +150,7 @@ impl Obstacle for Rod {
 /// z below 0 but for a slot |x| below half a gap, without bottom.
 #[derive(Clone, Copy, Debug)]
 pub struct Channel {
+    /// Width of the slot.
     pub gap: f64,
 }
 
@@ -202,7 +208,9 @@ impl Obstacle for Passage {
 /// An obstacle with friction.
 #[derive(Clone, Copy, Debug)]
 pub struct Rubbing<O> {
+    /// What is touched.
     pub solid: O,
+    /// Of friction.
     pub coefficient: f64,
 }
 
@@ -249,10 +257,11 @@ impl Obstacle for Bumps {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use fitting::phantoms::SplitMix64;
 
     /// Distances have slope 1 towards the nearest point: φ(p − φ n) = 0, and the gradient is the derivative.
     fn is_distance(name: &str, obstacle: &dyn Obstacle, inside_too: bool) {
-        let mut random = fitting::phantoms::SplitMix64::new(5);
+        let mut random = SplitMix64::new(5);
         for _ in 0..2000 {
             let p = 8.0 * (random.uniform3() - 0.5);
             let (d, n) = obstacle.distance(p);

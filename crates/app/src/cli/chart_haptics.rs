@@ -1,0 +1,57 @@
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+use fitting::{Cancel, FitError};
+
+use super::failure::{Failure, OrFail, Outcome};
+use super::progress::Bar;
+use super::staged::{StagedFiles, publish};
+use crate::charts::{HapticLine, HapticRun, haptic_costs};
+
+/// Arguments of `isoclay charts haptics`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Directory for the charts haptics-NAME.svg; made if missing
+    #[arg(short, long, value_name = "DIR", default_value = "docs/charts")]
+    output: PathBuf,
+    /// Small sizes only: takes seconds
+    #[arg(long)]
+    quick: bool,
+    /// Print one JSON object for each scene and model
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Measures touch, and draws it.
+pub fn run(args: &Args, cancel: &Cancel) -> Outcome {
+    let mut staged = StagedFiles::new("-o", &args.output)?;
+    let bar = Bar::new();
+    let mut closed = None;
+    let mut show = |line: &HapticLine| {
+        if args.json {
+            let text = serde_json::to_string(line).expect("a struct of plain fields is always JSON");
+            if let Err(e) = writeln!(io::stdout().lock(), "{text}") {
+                closed.get_or_insert(e);
+            }
+        }
+    };
+    let mut go_on = |fraction: f64| {
+        bar.show("touching", fraction);
+        !cancel.is_cancelled()
+    };
+    let costs = haptic_costs(&mut HapticRun {
+        quick: args.quick,
+        go_on: &mut go_on,
+        show: &mut show,
+    });
+    bar.clear();
+    let costs = costs.map_err(|_| FitError::Cancelled)?;
+    if let Some(e) = closed {
+        return Err(e).or_limit();
+    }
+    for (name, chart) in costs.charts() {
+        let svg = chart.svg().map_err(Failure::limit)?;
+        staged.write_text(&format!("haptics-{name}.svg"), &svg)?;
+    }
+    publish(staged, args.json)
+}
