@@ -38,6 +38,8 @@ use tally::{Tally, write_trace};
 const STEP: f64 = 1.0 / 30.0;
 /// What may be touched is known so far about the hand, mm of the device.
 const REACH: f64 = 15.0;
+/// Nodes of what may be touched of an object, where thin parts want them close: as many as are made anew in a step of the simulation.
+const NODES: usize = 60_000;
 /// Longest time from tick to tick, s.
 const TICK: f64 = 1e-3;
 /// Time of a session with a device that is not simulated, s.
@@ -314,6 +316,7 @@ fn show(args: &Args, state: &State, name: &str, workspace: &Workspace) -> Outcom
     let mut toucher = Toucher::new(Demand {
         reach: (REACH * workspace.scale).max(4.0 * usual.radius),
         detail: knots,
+        most_nodes: NODES,
         ..usual
     });
     Ok(Box::new(move |state, at| toucher.show(state, at)))
