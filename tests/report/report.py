@@ -115,7 +115,7 @@ def small(driver, report):
     for image in images:
         driver.execute_script("arguments[0].scrollIntoView({block: 'center'})", image)
         WebDriverWait(driver, 10).until(
-            lambda d: d.execute_script("return arguments[0].complete && arguments[0].naturalWidth", image) == 320)
+            lambda d: d.execute_script("return arguments[0].complete && arguments[0].naturalWidth", image) == 240)
     for link in driver.find_elements(By.CSS_SELECTOR, "#table a"):
         address = driver.execute_script("return new URL(arguments[0].href)", link)["href"]
         assert address.startswith(report.parent.resolve().as_uri() + "/"), address
