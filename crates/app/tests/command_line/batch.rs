@@ -427,7 +427,12 @@ fn hangs_and_crashes_are_failures_like_others() {
             &bench,
             &format!("a.ply b.ply -o out --jobs 1 --json --no-report --resume --time-limit {time}"),
         );
-        let fit = wait_for("the fit", || children(child.id()).first().copied());
+        // Not before it is the program: what stops between fork and exec stops whoever starts it.
+        let is_fit = |p: &Pid| {
+            fs::read(format!("/proc/{}/cmdline", p.as_raw_nonzero()))
+                .is_ok_and(|line| line.split(|b| *b == 0).any(|word| word == b"fit"))
+        };
+        let fit = wait_for("the fit", || children(child.id()).into_iter().find(is_fit));
         kill_process(fit, signal).unwrap();
         let lines: Vec<Value> = lines.collect();
         assert_eq!(child.wait().unwrap().code(), Some(3));
