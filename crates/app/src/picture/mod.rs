@@ -49,8 +49,9 @@ pub struct View {
 
 /// Samples of a pixel along one side.
 const SAMPLES: usize = 2;
-/// Directions of the sky.
+/// Directions of the sky, and pixels of the longest side of a picture for each where there are fewer.
 const SKY: usize = 64;
+const SKY_PIXELS: usize = 10;
 /// Cosine between the triangles of a pixel's samples above which one colour will do for them all.
 const SMOOTH: f64 = 0.95;
 /// The same for their depths: the most that they differ, in sides of a sample.
@@ -102,19 +103,22 @@ impl<'a> Drawing<'a> {
             scale,
         );
         let up = view.axes.row(1);
-        let sky: Vec<DepthMap> = (0..SKY)
+        // Small pictures show no more of a shadow than they have pixels.
+        let side = |share: f64, most: usize| ((w.max(h) as f64 * share) as usize).clamp(most / 4, most);
+        let directions = (w.max(h) / SKY_PIXELS).clamp(SKY / 4, SKY);
+        let sky: Vec<DepthMap> = (0..directions)
             .into_par_iter()
             .map(|i| {
                 // A spiral of equal areas over the sphere.
-                let z = 1.0 - (2 * i + 1) as f64 / SKY as f64;
+                let z = 1.0 - (2 * i + 1) as f64 / directions as f64;
                 let angle = PI * (3.0 - 5f64.sqrt()) * i as f64;
                 let r = (1.0 - z * z).sqrt();
                 let d = view.axes.transpose() * DVec3::new(r * angle.cos(), z, r * angle.sin());
-                DepthMap::filled(&scene.shading, axes(d, up), [288, 288])
+                DepthMap::filled(&scene.shading, axes(d, up), [side(0.5, 288); 2])
             })
             .collect();
         let sun_direction = view.axes.transpose() * DVec3::new(-0.45, 0.65, 0.62);
-        let sun = DepthMap::filled(&scene.shading, axes(sun_direction, up), [1024, 1024]);
+        let sun = DepthMap::filled(&scene.shading, axes(sun_direction, up), [side(2.0, 1024); 2]);
         Self {
             scene,
             camera,

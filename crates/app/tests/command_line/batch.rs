@@ -140,7 +140,7 @@ fn bad_inputs_stop_nothing_and_are_named() {
         "secret.ply",
         fs::read(bench.path("scans/clouds/sphere.ply")).unwrap(),
     );
-    fs::set_permissions(bench.path("secret.ply"), fs::Permissions::from_mode(0)).unwrap();
+    fs::set_permissions(bench.path("secret.ply"), fs::Permissions::from_mode(0o0)).unwrap();
     // The superuser reads it all the same.
     let secret = usize::from(!geteuid().is_root());
     let run = batch(
@@ -174,7 +174,7 @@ fn bad_inputs_stop_nothing_and_are_named() {
     for (name, words) in [
         ("cut.ply", "ends too early"),
         ("empty.ply", "0 bytes"),
-        ("nan.xyz", "NaN"),
+        ("nan.xyz", "not finite"),
         ("wrong.nii", "wrong.nii"),
         ("words.stl", "words.stl"),
         ("pipe.xyz", "is a pipe"),
@@ -417,19 +417,22 @@ fn a_cancel_ends_all_and_leaves_what_can_be_resumed() {
 fn hangs_and_crashes_are_failures_like_others() {
     let bench = Bench::new();
     bench.json("phantom sphere -o b.ply --count 800");
-    bench.json("phantom gyroid -o a.ply --count 300000");
+    bench.json("phantom gyroid -o a.ply --count 150000");
     for (signal, time, words, code) in [
         (Signal::STOP, "4s", "--time-limit", None),
-        (Signal::SEGV, "2h", "signal 11", Some(11)),
+        (Signal::ABORT, "2h", "signal 6", Some(6)),
         (Signal::KILL, "2h", "memory", Some(9)),
     ] {
         let (mut child, lines) = start(
             &bench,
-            &format!(
-                "a.ply b.ply -o out --jobs 1 --json --no-report --resume --time-limit {time} --tolerance 0.001%"
-            ),
+            &format!("a.ply b.ply -o out --jobs 1 --json --no-report --resume --time-limit {time}"),
         );
-        let fit = wait_for("the fit", || children(child.id()).first().copied());
+        // Not before it is the program: what stops between fork and exec stops whoever starts it.
+        let is_fit = |p: &Pid| {
+            fs::read(format!("/proc/{}/cmdline", p.as_raw_nonzero()))
+                .is_ok_and(|line| line.split(|b| *b == 0).any(|word| word == b"fit"))
+        };
+        let fit = wait_for("the fit", || children(child.id()).into_iter().find(is_fit));
         kill_process(fit, signal).unwrap();
         let lines: Vec<Value> = lines.collect();
         assert_eq!(child.wait().unwrap().code(), Some(3));
@@ -503,13 +506,9 @@ fn hostile_names_stay_names() {
     let bench = Bench::new();
     let text = sphere_text([0.0; 3], 1.0, 300);
     let directory = bench.path("in");
-    fs::create_dir_all(directory.join("..up")).unwrap();
+    fs::create_dir_all(directory.join("up..")).unwrap();
     let hostile: [&[u8]; 9] = [
-        b"</script><script>alert(1)</script>.xyz"
-            .as_slice()
-            .split(|b| *b == b'/')
-            .next()
-            .unwrap(),
+        b"<script>alert(1)<script>.xyz",
         b"--json.xyz",
         b"-o.xyz",
         b"new\nline.xyz",
@@ -517,7 +516,7 @@ fn hostile_names_stay_names() {
         b"not\xfftext.xyz",
         b"javascript:alert(1).xyz",
         b"%2e%2e%2f.xyz",
-        b"..up/..xyz.xyz",
+        b"up../x..xyz",
     ];
     for name in hostile {
         fs::write(directory.join(std::ffi::OsStr::from_bytes(name)), &text).unwrap();

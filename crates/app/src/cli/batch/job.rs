@@ -43,7 +43,7 @@ pub struct Plan<'a> {
 }
 
 /// Width and height of the pictures of a report.
-const PICTURE: &str = "320x240";
+const PICTURE: &str = "240x180";
 /// Share of the work that the fit is, before mesh and pictures.
 const FIT: f64 = 0.8;
 

@@ -161,7 +161,11 @@ fn fit_all(args: &Args, directory: &Path) -> Outcome {
     }
     manifest::replace(&path, &run, &entries)?;
     drop(manifest);
-    let mut totals = Totals::new(&[run.clone()], &entries, start.elapsed().as_secs_f64());
+    let mut totals = Totals::new(
+        std::slice::from_ref(&run),
+        &entries,
+        start.elapsed().as_secs_f64(),
+    );
     totals.kept = kept;
     totals.skipped = gathered.skipped.iter().map(|p| p.display().to_string()).collect();
     if args.shard.is_none() {

@@ -131,7 +131,9 @@ impl Totals {
         let mut object = json!(self);
         if let Some(f) = &failure {
             let about: Map<String, Value> = serde_json::from_str(&f.json()).unwrap_or_default();
-            object.as_object_mut().map(|o| o.extend(about));
+            if let Some(o) = object.as_object_mut() {
+                o.extend(about);
+            }
         }
         if !is_json {
             print(&self.text(directory), false)?;

@@ -132,11 +132,17 @@
     return td;
   };
   const all = rows.map((r, i) => {
-    const tr = document.createElement("tr");
-    for (const [key, , , format] of columns) tr.append(cell(r, key, format));
     const words = [r.input, r.kind, r.unit, r.reason, r.hash, ...r.notes].filter(Boolean).join("\n").toLowerCase();
-    return { r, tr, i, words };
+    return { r, tr: null, i, words };
   });
+  // Rows are made when they are first seen.
+  const rowOf = (x) => {
+    if (!x.tr) {
+      x.tr = document.createElement("tr");
+      for (const [key, , , format] of columns) x.tr.append(cell(x.r, key, format));
+    }
+    return x.tr;
+  };
   if (rows.some((r) => r.errors)) at("legend").hidden = false;
 
   const body = document.querySelector("#table tbody");
@@ -161,11 +167,25 @@
     if (state === "notes" ? !r.notes.length : state && r.state !== state) return false;
     return at("find").value.toLowerCase().split(/\s+/).every((w) => words.includes(w));
   };
+  // As many rows as have been scrolled to: a browser takes seconds to lay out thousands with their pictures.
+  const PART = 100;
+  let [seen, drawn] = [[], 0];
+  const draw = (most) => {
+    body.append(...seen.slice(drawn, most).map(rowOf));
+    drawn = Math.min(most, seen.length);
+    at("more").hidden = drawn === seen.length;
+  };
   const show = () => {
-    const seen = sorted.filter(passes);
-    body.replaceChildren(...seen.map((x) => x.tr));
+    seen = sorted.filter(passes);
+    body.replaceChildren();
+    drawn = 0;
+    draw(PART);
     at("shown").textContent = `${count(seen.length)} of ${count(all.length)}`;
   };
+  at("more").addEventListener("click", () => draw(drawn + PART));
+  new IntersectionObserver((all) => {
+    if (all.some((x) => x.isIntersecting)) draw(drawn + PART);
+  }, { rootMargin: "600px" }).observe(at("more"));
   at("find").addEventListener("input", show);
   at("state").addEventListener("change", show);
   show();
@@ -242,8 +262,10 @@
     at("find").value = "";
     at("state").value = "";
     show();
-    for (const x of all) x.tr.classList.toggle("marked", x.r === r);
-    all.find((x) => x.r === r).tr.scrollIntoView({ block: "center" });
+    const place = seen.findIndex((x) => x.r === r);
+    if (place >= drawn) draw(place + PART);
+    for (const x of all) if (x.tr) x.tr.classList.toggle("marked", x.r === r);
+    seen[place].tr.scrollIntoView({ block: "center" });
   };
   at("measure").addEventListener("change", scatter);
   at("unit").addEventListener("change", scatter);
@@ -251,6 +273,7 @@
 
   // Paper has no scrolling that would load them.
   addEventListener("beforeprint", () => {
+    draw(seen.length);
     for (const img of document.images) img.loading = "eager";
   });
 })();
