@@ -245,7 +245,7 @@ fn unplugged_in_contact_the_force_is_gone_and_stays_so() {
     for step in 0..100 {
         let z = 0.97 - 0.03 * f64::from(step);
         let force = tick(&mut servo, z * DVec3::Z).wrench.force.z;
-        assert!(force >= 0.0 && force <= 0.5e-3 * 2e3 * 0.11, "{force}");
+        assert!((0.0..=0.5e-3 * 2e3 * 0.11).contains(&force), "{force}");
     }
 }
 

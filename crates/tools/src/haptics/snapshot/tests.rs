@@ -26,7 +26,7 @@ struct Off {
 }
 
 /// Places that fill a box evenly.
-fn places(b: &bspline::Aabb, count: usize) -> impl Iterator<Item = DVec3> {
+fn places(b: &Aabb, count: usize) -> impl Iterator<Item = DVec3> {
     let part = |n: usize, root: f64| (n as f64 / root) % 1.0;
     let (min, size) = (b.min, b.size());
     // The irrational numbers of [Roberts18].
@@ -88,7 +88,7 @@ impl<F: Field> Field for Steep<F> {
             hessian: f.hessian * first + outer * second,
         }
     }
-    fn bounds(&self, b: &bspline::Aabb) -> bspline::Interval {
+    fn bounds(&self, b: &Aabb) -> bspline::Interval {
         let i = self.0.bounds(b);
         let map = |v: f64| 300.0 + 200.0 * v + v.powi(3);
         bspline::Interval::new(map(i.lo), map(i.hi)).widened(1e-6)
@@ -267,7 +267,7 @@ fn renewed_distances_have_the_bits_of_fresh_ones() {
 /// The distance of a place from the surface of a field, by looking everywhere: from places of the surface that are found on rays through all
 /// cells, the nearest by Newton.
 struct BruteForce {
-    feet: Vec<super::foot::Foot>,
+    feet: Vec<foot::Foot>,
 }
 
 impl BruteForce {
@@ -297,7 +297,7 @@ impl BruteForce {
                                 x -= jets[0].gradient * (jets[0].value / jets[0].gradient.length_squared());
                             }
                             surface.jets(&[x], &mut jets);
-                            feet.extend(super::foot::Foot::new(x, &jets[0]));
+                            feet.extend(foot::Foot::new(x, &jets[0]));
                         }
                         last = value;
                     }
