@@ -159,7 +159,7 @@ fn key(content: &str) -> Result<Key, String> {
     })
 }
 
-/// Turns evenly on the shorter way [Shoemake85], with the same bits on every machine.
+/// Turns evenly on the shorter way \[Shoemake85\], with the same bits on every machine.
 fn between(from: DQuat, to: DQuat, share: f64) -> DQuat {
     let dot = from.dot(to);
     let to = if dot < 0.0 { -to } else { to };

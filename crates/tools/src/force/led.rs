@@ -173,7 +173,7 @@ impl<T: Real> ForceStroke<T> {
     /// unpainted matter; 0 before the first step.
     ///
     /// A path whose end goes on by `δ` is short of `½|∇f|δ` more in the mean; forces in proportion to what the paths stand for bring it
-    /// [so far](Acting::stiffness) by each unit.
+    /// so far (`Acting::stiffness`) by each unit.
     pub fn rigidity(&self) -> [f64; 2] {
         let acting = self.acting.iter().filter(|a| a.is_free && a.stiffness > 0.0);
         acting.fold([0.0; 2], |[own, plain], acting| {

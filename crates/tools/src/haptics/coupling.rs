@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-/// Spring and damper between hand and proxy [Colgate95].
+/// Spring and damper between hand and proxy \[Colgate95\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coupling {
     /// Stiffness, N/m.

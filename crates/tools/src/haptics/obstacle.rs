@@ -51,7 +51,7 @@ impl<O: Obstacle + ?Sized> Obstacle for &O {
     }
 }
 
-/// Several obstacles at once: the nearest counts [Kim03 eq. 4.10].
+/// Several obstacles at once: the nearest counts \[Kim03 eq. 4.10\].
 #[derive(Clone, Copy, Debug)]
 pub struct Together<'a, O>(pub &'a [O]);
 

@@ -1,4 +1,4 @@
-//! The stateless contact of the second source: a ray along the gradient at the hand [Kim03 §4.2, §4.3].
+//! The stateless contact of the second source: a ray along the gradient at the hand \[Kim03 §4.2, §4.3\].
 //!
 //! Kept beside [`Proxy`](super::Proxy) for comparison: it has no memory of the side from which the hand came, so it lets the hand
 //! through thin solid. Mended: the midpoint is a sum, not a difference; the search ends when the value is small *or* the steps

@@ -146,7 +146,7 @@ fn the_limit_of_stability_is_that_of_the_formula() {
     }
 }
 
-/// [Diolaiti06]: dry friction lifts the limit far above that of damping, and a delay takes the gift back.
+/// \[Diolaiti06\]: dry friction lifts the limit far above that of damping, and a delay takes the gift back.
 #[test]
 fn friction_lifts_the_limit_and_delay_lowers_it() {
     let above = DVec3::new(0.0, 0.0, 2.11);

@@ -2,7 +2,7 @@ use glam::DVec3;
 
 use super::super::{Contact, Felt, Obstacle, Pose, Renderer};
 
-/// The intermediate plane of [Adachi95]: the solid is taken for a half-space that a slow loop finds anew from time to time.
+/// The intermediate plane of \[Adachi95\]: the solid is taken for a half-space that a slow loop finds anew from time to time.
 ///
 /// At each refresh the force jumps by about K v² / (2 R f²), with v the speed along a surface of radius R and f the rate.
 #[derive(Clone, Copy, Debug, PartialEq)]

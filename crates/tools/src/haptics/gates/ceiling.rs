@@ -5,8 +5,8 @@ use super::super::Abilities;
 /// The stiffness above which a device trembles, and why.
 ///
 /// A spring that is felt half a period and a delay late takes from the damping of device and hand: `K < (b + b_hand − B)/(T/2 + t_d)`
-/// [Colgate97], with the coupling's damping B. Where the friction f_c of the device is known, a hand at rest between two counts is
-/// held by it as long as `K ≤ 2 f_c/Δ` [Abbott05]. What its makers allow counts beside both.
+/// \[Colgate97\], with the coupling's damping B. Where the friction f_c of the device is known, a hand at rest between two counts is
+/// held by it as long as `K ≤ 2 f_c/Δ` \[Abbott05\]. What its makers allow counts beside both.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ceiling {
     /// By damping and lateness, N/m.

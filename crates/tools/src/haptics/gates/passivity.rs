@@ -1,4 +1,4 @@
-//! Passivity observer and controller [Hannaford02].
+//! Passivity observer and controller \[Hannaford02\].
 
 use glam::DVec3;
 
@@ -12,10 +12,10 @@ const FREE: u32 = 8;
 /// Counts the energy that the hand puts in, and damps when it would get more back.
 ///
 /// Of the interval between two poses the force is known that was on the hand then: what was sent as many ticks before as the device
-/// is late. So `E ← E − F·Δx` [Hannaford02 eq. 7] is exact for a force that is held, but for the quantum of Δx. To it comes what
+/// is late. So `E ← E − F·Δx` \[Hannaford02 eq. 7\] is exact for a force that is held, but for the quantum of Δx. To it comes what
 /// the device's own damping takes, `b Δx²/T`: without that, a hand at rest between two counts would seem to get energy. It is never
 /// more than the coupling can hold, `F²/2K`: energy that friction took is no credit for what comes later. If it falls below 0,
-/// `d = −E/(T (v² + v₀²))` [Hannaford02 eq. 9] is added, with v₀ = Δ/T against the division by nothing, and at most so much as a
+/// `d = −E/(T (v² + v₀²))` \[Hannaford02 eq. 9\] is added, with v₀ = Δ/T against the division by nothing, and at most so much as a
 /// late device can use.
 #[derive(Clone, Debug)]
 pub struct Passivity {

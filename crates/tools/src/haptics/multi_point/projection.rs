@@ -1,4 +1,4 @@
-//! The nearest point of a polyhedron in six dimensions, by the dual active set method [Goldfarb83].
+//! The nearest point of a polyhedron in six dimensions, by the dual active set method \[Goldfarb83\].
 
 /// A displacement of a tool: a way, mm, and a turn times the lever of its coupling, mm.
 pub(super) type Twist = [f64; 6];

@@ -1,4 +1,4 @@
-//! Numbers that look random and are the same every time [Steele14].
+//! Numbers that look random and are the same every time \[Steele14\].
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Random(u64);

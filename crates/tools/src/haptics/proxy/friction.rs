@@ -5,7 +5,7 @@ use glam::DVec3;
 /// A law of friction. The coefficient is the surface's own, [`Touch::friction`](crate::haptics::Touch).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Friction {
-    /// Stick and slip by a cone: the force on the hand leans by no more than the angle of friction [Ruspini97].
+    /// Stick and slip by a cone: the force on the hand leans by no more than the angle of friction \[Ruspini97\].
     Cone {
         /// Coefficient at rest over that in motion, 1 or above.
         at_rest: f64,

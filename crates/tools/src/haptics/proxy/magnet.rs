@@ -1,6 +1,6 @@
 //! The magnetic band.
 
-/// A band in front of the surface in which the hand is drawn to it [Kim03 §4.5]: so the tool keeps to the surface while it is
+/// A band in front of the surface in which the hand is drawn to it \[Kim03 §4.5\]: so the tool keeps to the surface while it is
 /// led over it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Magnet {

@@ -13,7 +13,7 @@ pub struct Path {
 }
 
 impl Path {
-    /// From place to place, at rest in each, by the way of least jerk [Flash85 eq. 3]. Times, s, must rise; before the first and after the last
+    /// From place to place, at rest in each, by the way of least jerk \[Flash85 eq. 3\]. Times, s, must rise; before the first and after the last
     /// it stays there.
     ///
     /// # Panics

@@ -142,7 +142,7 @@ impl Moving<'_> {
         }
     }
 
-    /// The nearest object, its distance and gradient [Kim03 eq. 4.10].
+    /// The nearest object, its distance and gradient \[Kim03 eq. 4.10\].
     fn nearest(&self, p: DVec3) -> Option<(&Part, (f64, DVec3))> {
         let all = self.snapshot.parts.iter().map(|part| (part, self.of(part, p)));
         all.min_by(|a, b| a.1.0.total_cmp(&b.1.0))
