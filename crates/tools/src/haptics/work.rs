@@ -9,7 +9,7 @@ use super::{Contact, Felt, Obstacle, Pose, Renderer};
 const HALVINGS: usize = 40;
 
 /// How a tool goes into the solid: it is put on the surface, goes in by what the rate allows, and what it takes up there
-/// is composed with the solid \[SensAble99 fig. 19\]. So a cut does not depend on how fast the hand pressed.
+/// is composed with the solid \[Sensable99 fig. 19\]. So a cut does not depend on how fast the hand pressed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Embedding {
     /// Way into the solid per second, mm/s.
@@ -46,7 +46,7 @@ fn touching(is_clear: impl Fn(DVec3) -> bool, clear: DVec3, hand: DVec3) -> DVec
     outside
 }
 
-/// The feel of a tool that takes solid away, or lays it on, wherever it is: a thick liquid \[SensAble99\].
+/// The feel of a tool that takes solid away, or lays it on, wherever it is: a thick liquid \[Sensable99\].
 ///
 /// A point follows the hand, at once where there is nothing to work on, else by what the rate allows; a spring draws the hand
 /// to it. Out of the solid the point catches up at a bounded rate, so that the force does not break off.

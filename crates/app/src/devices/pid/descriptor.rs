@@ -1,4 +1,4 @@
-//! Report descriptors: what a HID device says about its reports \[USB01 6.2.2\].
+//! Report descriptors: what a HID device says about its reports \[Usb01 6.2.2\].
 //!
 //! `hidreport`, the crate for this, expands usages and counts as the device states them, so that 12 bytes ask for gigabytes, and
 //! panics where a usage comes without its page. Here ranges stay ranges, and every size has a bound.

@@ -1,4 +1,4 @@
-//! Where a force device has what: every report of the physical interface page is found by its usages \[USB99\].
+//! Where a force device has what: every report of the physical interface page is found by its usages \[Usb99\].
 //!
 //! Numbers, widths, the order of fields and even the kind of a field differ between makers, and some leave fields out. What is
 //! missing and not needed is not written.

@@ -1,4 +1,4 @@
-//! The way out of solid that has grown over the tool, where planes do not lead out \[SensAble99 fig. 7C, Figs. 16A-B\].
+//! The way out of solid that has grown over the tool, where planes do not lead out \[Sensable99 fig. 7C, Figs. 16A-B\].
 
 use glam::DVec3;
 

@@ -1,6 +1,6 @@
 //! Features of the solid between the tool's points, and which points are looked at.
 //!
-//! The source notes that a feature can enter the tool between two points, and mends flat contact of spheres alone \[SensAble99 figs. 20–22\].
+//! The source notes that a feature can enter the tool between two points, and mends flat contact of spheres alone \[Sensable99 figs. 20–22\].
 //! Here every place of the tool's surface belongs to a point and is at most its `cover` away, so only points that are less clear
 //! than that can hide a feature: finer points about these are looked at, as many in a tick as are allowed. One in the solid
 //! becomes a guest: it joins the tool's points and slides over the tool's surface to where it is deepest, in every tick that

@@ -1,4 +1,4 @@
-//! Tools that touch with many points and turn: a god-object of six degrees of freedom \[SensAble99; Zilles94, Ortega07\].
+//! Tools that touch with many points and turn: a god-object of six degrees of freedom \[Sensable99; Zilles94, Ortega07\].
 //!
 //! The proxy is a pose of the tool. It goes where `½K|x − x_h|² + ½K_θ|θ|²` is least, θ the turn from hand to proxy, among
 //! the poses that keep all points out of the solid: `φ(x + R qᵢ) ≥ ρ`, ρ the radius of a point's ball. A step linearises

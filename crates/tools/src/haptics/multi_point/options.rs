@@ -29,10 +29,10 @@ pub struct MultiPointOptions {
     pub torque_slew: f64,
     /// Seed of random extraction.
     pub seed: u64,
-    /// Looks at that many points alone after the first look of a tick, the deepest \[SensAble99\]. A point that was not among them can go
+    /// Looks at that many points alone after the first look of a tick, the deepest \[Sensable99\]. A point that was not among them can go
     /// through; nothing looks at all points in every step, so it is off.
     pub deepest: Option<usize>,
-    /// Turns the points to the hand's turn every so many ticks and leaves them turned so between \[SensAble99\]. The solid then has no hold on
+    /// Turns the points to the hand's turn every so many ticks and leaves them turned so between \[Sensable99\]. The solid then has no hold on
     /// the turn and there is no torque; 0, off, solves for the turn.
     pub turn_every: u32,
 }

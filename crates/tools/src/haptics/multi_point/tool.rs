@@ -13,7 +13,7 @@ const LATTICE: i32 = 48;
 /// How many points stand for a shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampling {
-    /// Points that each tick looks at, at most; evenly spread. The second source's tools have some 80 \[SensAble99\].
+    /// Points that each tick looks at, at most; evenly spread. The second source's tools have some 80 \[Sensable99\].
     pub points: usize,
     /// Parts of the spacing of these at which finer points look for features between them; 1 for none.
     pub refinement: usize,

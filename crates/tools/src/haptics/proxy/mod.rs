@@ -1,4 +1,4 @@
-//! The surface contact point: a proxy of the tool that the solid keeps out \[Zilles94, Ruspini97; Kim03 §4.2; SensAble99 figs. 13–15\].
+//! The surface contact point: a proxy of the tool that the solid keeps out \[Zilles94, Ruspini97; Kim03 §4.2; Sensable99 figs. 13–15\].
 //!
 //! A tick moves the proxy from where it was as near to the hand as it gets without crossing the solid: free until it
 //! meets the surface, then along tangent planes, of which those of a hollow are kept together, and back onto the surface by its
@@ -34,7 +34,7 @@ pub struct ProxyOptions {
     /// Draws the tool to the surface.
     pub magnet: Option<Magnet>,
     /// Height of humps, mm, that the proxy gets over though the hand draws it back: its spring may stretch by as much
-    /// \[SensAble99\].
+    /// \[Sensable99\].
     pub stretch: f64,
     /// Speed at which solid that has grown over the tool pushes it out, mm/s.
     pub push_out: f64,

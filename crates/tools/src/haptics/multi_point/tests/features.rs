@@ -10,7 +10,7 @@ fn renderer(tool: &PointTool) -> MultiPoint {
     MultiPoint::new(tool.clone(), MultiPointOptions::default()).expect("options")
 }
 
-/// \[SensAble99 fig. 20\]: a thin rod that stands on a floor meets a face of a cube between its points, wherever that is.
+/// \[Sensable99 fig. 20\]: a thin rod that stands on a floor meets a face of a cube between its points, wherever that is.
 #[test]
 fn feature_between_the_points_of_a_cube_is_found() {
     let tool = PointTool::block(DVec3::splat(10.0), Sampling::default()).expect("a cube");
@@ -48,7 +48,7 @@ fn feature_between_the_points_of_a_cube_is_found() {
     assert!(missed > 12, "{missed}");
 }
 
-/// \[SensAble99 fig. 21\]: a sphere between whose points a plane would enter; it slides and turns without a bump.
+/// \[Sensable99 fig. 21\]: a sphere between whose points a plane would enter; it slides and turns without a bump.
 #[test]
 fn sphere_rolls_on_a_plane_without_bumps() {
     let tool = PointTool::sphere(8.0, Sampling::default()).expect("a sphere");

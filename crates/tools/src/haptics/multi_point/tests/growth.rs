@@ -71,7 +71,7 @@ fn solid_that_grows_over_the_tool_pushes_it_out_at_a_bounded_rate() {
     assert!((before.proxy.at.z - 8.0).abs() < 0.002 && (before.force.z - 0.5 * 3.5).abs() < 0.01);
 }
 
-/// Walls close on a sphere from both sides, tighter than it is \[SensAble99 figs. 16A–B\], under a floor: no direction is better at
+/// Walls close on a sphere from both sides, tighter than it is \[Sensable99 figs. 16A–B\], under a floor: no direction is better at
 /// first. It may not oscillate, and leaves as soon as there is a way.
 #[test]
 fn tool_in_a_channel_that_is_too_narrow_stays_and_does_not_buzz() {
