@@ -90,7 +90,11 @@ impl Zone {
 
     /// Least and largest share over a box, sound.
     pub fn range(&self, b: &Aabb) -> Interval {
-        let falling = |lo: f64, hi: f64| Interval::new(fade(hi)[0], fade(lo)[0]);
+        // Close together, rounding may turn them round.
+        let falling = |lo: f64, hi: f64| {
+            let (far, near) = (fade(hi)[0], fade(lo)[0]);
+            Interval::new(far.min(near), far.max(near))
+        };
         // Of a straight coordinate, widened by what rounding may do to it.
         let height = |from: DVec3, along: DVec3| {
             let middle = along.dot(b.center() - from);
