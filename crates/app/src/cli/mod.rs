@@ -12,6 +12,7 @@ mod chart_haptics;
 mod chart_masks;
 mod chart_mesh;
 mod chart_orient;
+mod chart_output;
 mod chart_tools;
 mod charts;
 mod check;

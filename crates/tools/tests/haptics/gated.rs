@@ -171,7 +171,10 @@ fn what_comes_back_after_a_long_stall_gives_no_energy() {
         let world = World::changing(1.0 / silent, Change::Steps, &start, |_, _| floor());
         let mut rig = setup.rig(world, setup.served(), |k| Box::new(proxy(2.0, k)));
         let check = setup.check(rig.run(setup.seconds), &Workspace::default());
-        println!("{silent} s: {} J, {} N", check.measures.returned, check.measures.force);
+        println!(
+            "{silent} s: {} J, {} N",
+            check.measures.returned, check.measures.force
+        );
         check.assert(
             &format!("{silent} s without a word"),
             &[

@@ -5,6 +5,7 @@ mod script;
 mod tally;
 
 use std::path::PathBuf;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use clap::ValueEnum;
@@ -14,7 +15,7 @@ use tools::haptics::gates::GateOptions;
 use tools::haptics::simulated::SimulatedDevice;
 use tools::haptics::{
     Abilities, Coupling, Demand, Device, Embedding, Proxy, ProxyOptions, Servo, ServoOptions, TickRecord,
-    Vcp, VcpOptions, Workspace,
+    Unresolved, Vcp, VcpOptions, Workspace,
 };
 
 use super::{Told, chosen, failure, open};
@@ -22,7 +23,7 @@ use crate::cli::failure::{Failure, Outcome};
 use crate::cli::interrupt;
 use crate::cli::output::Output;
 use crate::cli::progress::Bar;
-use crate::cli::quantity::positive;
+use crate::cli::quantity::{human_count, human_number, positive};
 use crate::cli::simulate;
 use crate::cli::source::Source;
 use crate::devices::{self, Force, Name};
@@ -143,7 +144,8 @@ pub fn run(args: &Args) -> Outcome {
     };
     let servo = servo(args, held.abilities(), workspace)?;
     notes.extend(servo.granted().note());
-    let show = show(args, document.state(), &name, &workspace)?;
+    let unresolved = Arc::default();
+    let show = show(args, document.state(), &name, &workspace, &unresolved)?;
     let granted = servo.granted();
     let mut sculpting = Sculpting::new(document, name, script.stroke.clone());
     if let Some(rate) = script.rate {
@@ -202,6 +204,7 @@ pub fn run(args: &Args) -> Outcome {
     interrupt::check(&cancel)?;
     let (mut document, strokes, told) = sculpting.close();
     notes.extend(told);
+    notes.extend(unresolved.lock().ok().and_then(|worst| worst.map(too_thin)));
     let felt = Felt::new(
         &args.device,
         granted,
@@ -301,8 +304,14 @@ fn servo(args: &Args, abilities: &Abilities, workspace: Workspace) -> Outcome<Se
     servo.map_err(Failure::usage)
 }
 
-/// What may be touched.
-fn show(args: &Args, state: &State, name: &str, workspace: &Workspace) -> Outcome<Show> {
+/// What may be touched, and the worst that was too thin for it.
+fn show(
+    args: &Args,
+    state: &State,
+    name: &str,
+    workspace: &Workspace,
+    unresolved: &Arc<Mutex<Option<Unresolved>>>,
+) -> Outcome<Show> {
     let object = object(state, name)?;
     if object.meta.iso.is_none() {
         let why = format!("object {name:?} names no surface; fit it with an iso-value");
@@ -319,5 +328,30 @@ fn show(args: &Args, state: &State, name: &str, workspace: &Workspace) -> Outcom
         most_nodes: NODES,
         ..usual
     });
-    Ok(Box::new(move |state, at| toucher.show(state, at)))
+    let unresolved = Arc::clone(unresolved);
+    Ok(Box::new(move |state, at| {
+        let snapshot = toucher.show(state, at);
+        // Nobody else looks before the end.
+        if let (Some(now), Ok(mut worst)) = (snapshot.unresolved(), unresolved.lock()) {
+            let before = worst.filter(|before| (before.missed, before.thin) > (now.missed, now.thin));
+            *worst = before.or(Some(now));
+        }
+        snapshot
+    }))
+}
+
+/// What a hand cannot feel, and what helps.
+fn too_thin(found: Unresolved) -> String {
+    let helps = "a smaller --radius shows finer parts";
+    match found.missed {
+        0 => format!(
+            "at {} places sheets or gaps are only {} thick and feel blurred; {helps}",
+            human_count(found.thin),
+            human_number(found.thinnest)
+        ),
+        missed => format!(
+            "at {} places what is there is too thin to be felt; {helps}",
+            human_count(missed)
+        ),
+    }
 }
