@@ -26,6 +26,7 @@ mod same;
 mod saturated;
 mod scans;
 mod several;
+mod sharp;
 mod sheet;
 mod slow_field;
 mod snapshots;

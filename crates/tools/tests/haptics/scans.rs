@@ -29,7 +29,7 @@ fn data(name: &str) -> PathBuf {
 }
 
 /// Its voxels are 1 mm; the surface is the skin, at half the value between air and tissue: no value that was fitted.
-static HEAD: LazyLock<Scan> = LazyLock::new(|| {
+fn head(options: VolumeOptions) -> Scan {
     let (as_it_is, limits) = (formats::volumes::VolumeOptions::default(), ReadLimits::default());
     let volume = formats::volumes::read(&data("head.nii.gz"), &as_it_is, &limits).unwrap();
     let view = VolumeView {
@@ -37,15 +37,27 @@ static HEAD: LazyLock<Scan> = LazyLock::new(|| {
         values: &volume.values,
         world_from_voxel: volume.header.world_from_voxel,
     };
-    let options = VolumeOptions {
-        method: VolumeMethod::Interpolate,
-        ..VolumeOptions::default()
-    };
     Scan {
         field: Arc::new(fit_volume(&view, &options, &mut Control::default()).unwrap().0),
         iso: 0.5 * otsu_threshold(&volume.values).unwrap(),
         world_from_object: DAffine3::IDENTITY,
     }
+}
+
+/// With a quarter of the coefficients that an ordinary fit takes, so that it is quick.
+static HEAD: LazyLock<Scan> = LazyLock::new(|| {
+    head(VolumeOptions {
+        coefficients: Some(60_000),
+        ..VolumeOptions::default()
+    })
+});
+
+/// Through every voxel, with all its noise.
+static NOISY: LazyLock<Scan> = LazyLock::new(|| {
+    head(VolumeOptions {
+        method: VolumeMethod::Interpolate,
+        ..VolumeOptions::default()
+    })
 });
 
 /// Some 10 units high, here 100 mm.
@@ -139,7 +151,7 @@ impl Scan {
         around.map(slid).fold(near, f64::min)
     }
 
-    fn snapshot(&self, radius: f64, at: DVec3) -> Arc<Snapshot> {
+    fn snapshot(&self, demand: Demand, at: DVec3) -> Arc<Snapshot> {
         let layers = Layers::new();
         let object = TouchedObject {
             id: 0,
@@ -149,16 +161,16 @@ impl Scan {
             layers: &layers,
             default: Touch::default(),
         };
-        SnapshotMaker::new(Demand::of_ball(radius)).make(at, &[object], 0)
+        SnapshotMaker::new(demand).make(at, &[object], 0)
     }
 
     /// Rolls a ball in two circles about a place of the surface, the hand 2 mm too deep, and returns what its middle is off by from the surface's
     /// offset, wherever it is pressed, least first.
-    fn rolled(&self, radius: f64, at: DVec3) -> Vec<f64> {
-        let step = 0.3;
+    fn rolled(&self, demand: Demand, at: DVec3) -> Vec<f64> {
+        let (radius, step) = (demand.radius, 0.3);
         let inward = self.look(at).1;
         let (u, v) = inward.any_orthonormal_pair();
-        let snapshot = self.snapshot(radius, at);
+        let snapshot = self.snapshot(demand, at);
         let all = self.places(&Aabb::new(at, at).widened(5.0 + 2.0 * radius + 2.0), step);
         let mut proxy = Proxy::new(ProxyOptions {
             radius,
@@ -177,7 +189,8 @@ impl Scan {
         }
         off.sort_by(f64::total_cmp);
         println!(
-            "ball {radius} mm at {at}: off by {:.5} mm (median), {:.5} (95 %), {:.5} (worst) at {} places; {:?}",
+            "ball {radius} mm at {at}, nodes {} mm: off by {:.5} mm (median), {:.5} (95 %), {:.5} (worst) at {} places; {:?}",
+            snapshot.parts()[0].shape.spacing(),
             off[off.len() / 2],
             off[off.len() * 95 / 100],
             off[off.len() - 1],
@@ -188,51 +201,67 @@ impl Scan {
     }
 }
 
-/// On the forehead, beside the nose and on the neck side, say.
-fn places_of_the_head() -> [DVec3; 3] {
-    let from = |x: f64, z: f64| HEAD.first(DVec3::new(x, 110.0, z), DVec3::NEG_Y);
+/// Three places where a way from the front first meets the skin: on the forehead, beside the eye, on the cheek.
+fn places_of(head: &Scan) -> [DVec3; 3] {
+    let from = |x: f64, z: f64| head.first(DVec3::new(x, 110.0, z), DVec3::NEG_Y);
     [from(15.0, 20.0), from(43.0, -7.0), from(43.0, -37.0)]
 }
 
+/// At the distance of nodes that is chosen; and where every voxel's noise is kept, whose hollows are sharper, at half of it.
 #[test]
 fn a_ball_of_5_mm_rolls_over_the_head_within_a_tenth_of_a_millimetre() {
-    for at in places_of_the_head() {
-        let off = HEAD.rolled(5.0, at);
-        assert!(off.len() > 100 && off[off.len() - 1] < 0.1, "{:?}", off.last());
+    let closer = Demand {
+        spacing: Some(0.5),
+        reach: 12.0,
+        ..Demand::of_ball(5.0)
+    };
+    for (head, demand) in [(&*HEAD, Demand::of_ball(5.0)), (&*NOISY, closer)] {
+        for at in places_of(head) {
+            let off = head.rolled(demand, at);
+            assert!(off.len() > 100 && off[off.len() - 1] < 0.1, "{:?}", off.last());
+        }
     }
 }
 
 #[test]
 fn a_point_rests_on_the_skin_within_10_micrometres() {
-    for at in places_of_the_head() {
-        let off = HEAD.rolled(0.0, at);
-        assert!(off.len() > 100 && off[off.len() - 1] < 0.01, "{:?}", off.last());
+    for head in [&*HEAD, &*NOISY] {
+        for at in places_of(head) {
+            let off = head.rolled(Demand::of_ball(0.0), at);
+            assert!(off.len() > 100 && off[off.len() - 1] < 0.01, "{:?}", off.last());
+        }
     }
 }
 
 #[test]
 fn the_bunny_is_touched_where_it_is() {
     let back = BUNNY.first(DVec3::new(-15.0, 200.0, 0.0), DVec3::NEG_Y);
-    for (radius, most) in [(5.0, 0.1), (2.0, 0.1), (0.0, 0.01)] {
-        let off = BUNNY.rolled(radius, back);
+    for (radius, most) in [(5.0, 0.1), (2.0, 0.05), (0.0, 0.01)] {
+        let off = BUNNY.rolled(Demand::of_ball(radius), back);
         assert!(off.len() > 100 && off[off.len() - 1] < most, "{:?}", off.last());
     }
     // Straight from the field it is where the brick says.
     let (snapshot, field) = (
-        BUNNY.snapshot(0.0, back),
+        BUNNY.snapshot(Demand::of_ball(0.0), back),
         FieldObstacle::new(BUNNY.field.clone(), 0.0, BUNNY.world_from_object, 2.0),
     );
     let inward = BUNNY.look(back).1;
     let (u, v) = inward.any_orthonormal_pair();
+    let mut count = 0;
     for n in 0..200 {
         let (sine, cosine) = libm::sincos(f64::from(n));
         let near = back + 0.02 * f64::from(n) * (sine * u + cosine * v) + 0.3 * cosine * inward;
         let ((a, g), (b, h)) = (snapshot.distance(near), field.distance(near));
-        assert!(
-            (a - b).abs() < 0.01 && g.angle_between(h) < 0.02,
-            "{near}: {a} and {b}, {g} and {h}"
-        );
+        // The field itself is first of all a distance near its surface.
+        if b.abs() < 0.3 {
+            count += 1;
+            assert!(
+                (a - b).abs() < 0.01 && g.angle_between(h) < 0.03,
+                "{near}: {a} and {b}, {g} and {h}"
+            );
+        }
     }
+    assert!(count > 50, "{count}");
 }
 
 /// From readings at rest alone, on a grid of places, a stiff ball buried in the head is found: where it is and how large, within a tenth of its
@@ -240,7 +269,7 @@ fn the_bunny_is_touched_where_it_is() {
 #[test]
 fn a_stiff_ball_in_the_head_is_found_by_readings_alone() {
     let (at, radius) = (DVec3::new(20.0, 40.0, -5.0), 4.0);
-    let whole = Layer::empty(HEAD.field.lattice(), 1);
+    let whole = Layer::empty(HEAD.field.lattice(), HEAD.field.level_count());
     let about = Aabb::new(at, at).widened(radius + 1.0);
     let painted = whole.painted(&about, |p, _| {
         Ok::<_, LayerError>((p.distance(at) < radius).then_some(9.0))

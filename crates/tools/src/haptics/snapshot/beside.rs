@@ -114,11 +114,6 @@ impl BesideNodes {
         self.places[number as usize]
     }
 
-    /// The number in the world of the node of that.
-    pub fn node(&self, number: u32) -> [i32; 3] {
-        self.list[number as usize].node
-    }
-
     /// What is known of that of a number.
     pub fn at(&self, number: u32) -> &Beside {
         &self.list[number as usize]

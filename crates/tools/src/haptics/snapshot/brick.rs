@@ -17,6 +17,10 @@ const THINNEST: f64 = 0.1;
 /// Distance of nodes, mm, with which a ball of 5 mm rolls over a scan within 0.1 mm of the exact offset, and not with a third more.
 const COARSEST: f64 = 0.75;
 
+/// Distance of nodes, over that of knots, with which a point is on the surface of a scan within 10 µm: it is off by 1.7 µm in 95 of 100
+/// places, 8 µm in the worst.
+const POINT: f64 = 0.375;
+
 /// How a brick is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BrickOptions {
@@ -45,7 +49,7 @@ impl BrickOptions {
         let spacing = if radius > 0.0 {
             (0.5 * radius).min(COARSEST).max(detail)
         } else {
-            0.5 * detail
+            POINT * detail
         };
         Self {
             reach: 15.0,

@@ -53,9 +53,9 @@ impl Far {
             let is_turned = before.as_ref().is_some_and(|before| before[at] != self.near[at]);
             let far = if is_new || is_turned || changes.touch(&Hull::unpack(&self.hulls[at])) {
                 let p = grid.place(ijk.map(|n| n * STEP));
-                let first = self.near[at].iter().map(|slot| *slot as usize);
+                let first = self.near[at].map(|slot| (slot as usize, grid.number(grid.node(slot as usize))));
                 let mut hull = Hull::of(grid.number(ijk.map(|n| n * STEP)));
-                let walked = walk(grid, nodes, p, first, &mut hull);
+                let walked = walk(grid, nodes, p, first.as_slice(), &mut hull);
                 self.hulls[at] = hull.pack();
                 walked.map_or(f64::INFINITY, |walked| walked.far(p)) as f32
             } else {

@@ -49,7 +49,8 @@ impl Foot {
         self.toward_with_trust(p, longest).0
     }
 
-    /// The same, and the least eigenvalue of `1 + sC`: 0 where the step was cut or went downhill, and says little.
+    /// The same, and what the least eigenvalue of `1 + sC` is at least, a half of it or more: 0 where the step was cut or went downhill, and says
+    /// little.
     pub fn toward_with_trust(&self, p: DVec3, longest: f64) -> (DVec3, f64) {
         let n = self.inward;
         if n == DVec3::ZERO {
@@ -69,19 +70,20 @@ impl Foot {
             true => ((m22 * r1 - m12 * r2) / det, (m11 * r2 - m12 * r1) / det),
             false => (r1, r2),
         };
-        let length = (u1 * u1 + u2 * u2).sqrt();
-        if length > longest {
-            (u1, u2) = (u1 * longest / length, u2 * longest / length);
+        let square = u1 * u1 + u2 * u2;
+        let is_whole = is_upright && square < longest * longest && a.abs() < longest;
+        if square > longest * longest {
+            let cut = longest / square.sqrt();
+            (u1, u2) = (u1 * cut, u2 * cut);
         }
-        let length = length.min(longest);
-        let sag = 0.5 * (c11 * u1 * u1 + 2.0 * c12 * u1 * u2 + c22 * u2 * u2) + a * (b1 * u1 + b2 * u2);
-        let sag = sag.clamp(-0.5 * length, 0.5 * length);
-        let half = 0.5 * (m11 + m22);
-        let least = half - (half * half - det).max(0.0).sqrt();
-        let is_whole = is_upright && length < longest && a.abs() < longest;
+        let mut sag = 0.5 * (c11 * u1 * u1 + 2.0 * c12 * u1 * u2 + c22 * u2 * u2) + a * (b1 * u1 + b2 * u2);
+        let square = u1 * u1 + u2 * u2;
+        if sag * sag > 0.25 * square {
+            sag = (0.5 * square.sqrt()).copysign(sag);
+        }
         (
             self.at + u1 * t1 + u2 * t2 + (a.clamp(-longest, longest) - sag) * n,
-            if is_whole { least } else { 0.0 },
+            if is_whole { det / (m11 + m22) } else { 0.0 },
         )
     }
 

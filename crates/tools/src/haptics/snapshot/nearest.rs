@@ -28,7 +28,8 @@ impl Way {
         Self(x << 16 | y << 8 | z)
     }
 
-    fn step(self) -> Option<[i32; 3]> {
+    /// On each axis.
+    pub fn step(self) -> Option<[i32; 3]> {
         let at = |shift: u32| (self.0 >> shift & 0xFF) as i32 - MIDDLE;
         (self.0 < Self::UNKNOWN.0).then(|| [at(16), at(8), at(0)])
     }

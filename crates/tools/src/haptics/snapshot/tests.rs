@@ -130,7 +130,7 @@ fn a_ball_has_its_distance() {
             let brick = DistanceBrick::new(&Surface::new(field, iso), at, &options);
             let off = off(&brick, &of_sphere, &|p| of_sphere(p).0 < -6.0);
             println!("h {h}: {off:?}");
-            assert!(off.zero < 1e-3 && off.slope < 2e-3, "{off:?}");
+            assert!(off.zero < 5e-5 && off.slope < 2e-3, "{off:?}");
         }
     }
 }
@@ -148,12 +148,13 @@ fn a_torus_has_its_distance() {
         let fields: [(&dyn Field, f64); 2] = [(&plain, 0.0), (&steep, 300.0)];
         for (field, iso) in fields {
             let brick = DistanceBrick::new(&Surface::new(field, iso), at, &options);
-            // Three nodes from where the distance itself has no gradient.
+            // A spline follows nodes up to four away, of which the farthest hardly count: so far from where the distance itself has no
+            // gradient it is as good as elsewhere.
             let skip =
-                |p: DVec3| of_torus(p).0 < -4.0 + 3.5 * h || DVec3::new(p.x, p.y, 0.0).length() < 3.5 * h;
+                |p: DVec3| of_torus(p).0 < -4.0 + 2.5 * h || DVec3::new(p.x, p.y, 0.0).length() < 2.5 * h;
             let off = off(&brick, &of_torus, &skip);
             println!("h {h}: {off:?}");
-            assert!(off.zero < 1e-2 && off.slope < 1e-2, "{off:?}");
+            assert!(off.zero < 1.5e-3 && off.slope < 1e-2, "{off:?}");
         }
     }
 }
@@ -338,14 +339,15 @@ fn a_ball_rolls_over_a_scan_on_the_exact_offset() {
         let at = DVec3::new(0.0, 17.0, 0.0);
         let reach = DVec3::splat(9.0);
         let exact = BruteForce::new(&field, iso, &Aabb::new(at - 2.0 * reach, at + 2.0 * reach), 0.4);
+        // Where a ball touches two places at once its offset has an edge; nodes round it by a tenth of their distance, and by no less.
         for (radius, h, most) in [
-            (5.0, 1.0, 0.15),
-            (5.0, 0.75, 0.1),
-            (5.0, 2.5, 0.5),
-            (2.0, 1.0, 0.15),
-            (2.0, 0.5, 0.1),
-            (0.5, 0.5, 0.02),
-            (0.0, 0.5, 0.02),
+            (5.0, 1.0, 0.1),
+            (5.0, 0.75, 0.07),
+            (5.0, 2.5, 0.4),
+            (2.0, 1.0, 0.125),
+            (2.0, 0.5, 0.06),
+            (0.5, 0.5, 0.012),
+            (0.0, 0.5, 0.007),
         ] {
             let options = BrickOptions {
                 reach: 15.0,
@@ -461,7 +463,8 @@ fn boolean_solids_have_their_distance() {
             distances.unresolved
         );
         assert!(worst < 1e-3, "{worst}");
-        assert!(two < 0.04 * h && edge < 0.25 * h && !distances.unresolved.any());
+        // Nodes beside the edge are exact; a spline between them rounds it by a share of their distance.
+        assert!(two < 0.03 * h && edge < 0.17 * h && !distances.unresolved.any());
     }
     let ball = |x: f64| -> Arc<dyn Field> { Arc::new(Steep(Sphere::new(DVec3::X * x, 5.0).unwrap())) };
     let rounding = bspline::csg::Rounding::Bounded { range: 1200.0 };

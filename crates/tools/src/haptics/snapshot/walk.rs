@@ -15,7 +15,7 @@ pub struct Walked<'a> {
     pub beside: &'a Beside,
     /// Where that node's surface is nearest, to second order.
     pub there: DVec3,
-    /// Least eigenvalue of `1 + sC` on the way there; 0 where it says little.
+    /// What the least eigenvalue of `1 + sC` is at least on the way there; 0 where it says little.
     pub trust: f64,
 }
 
@@ -37,13 +37,16 @@ impl Walked<'_> {
     }
 }
 
-/// From the nodes `first`, of which some are beside the surface, to those at the corners of the cell that the nearest points to, while they are
-/// nearer. `hull` gets what was looked at; none if none of the nodes is beside the surface.
+/// A node beside the surface: its place in lists, and its number in the world.
+pub type First = (usize, [i32; 3]);
+
+/// From the nodes `first` to those at the corners of the cell that the nearest points to, while they are nearer. `hull` gets what was
+/// looked at; none if there are no first ones.
 pub fn walk<'a>(
     grid: &Grid,
     nodes: &'a BesideNodes,
     p: DVec3,
-    first: impl Iterator<Item = usize>,
+    first: &[First],
     hull: &mut Hull,
 ) -> Option<Walked<'a>> {
     let [sx, sy, _] = grid.strides();
@@ -56,15 +59,10 @@ pub fn walk<'a>(
         }
         is_nearer
     };
-    let mut last = usize::MAX;
-    for slot in first {
-        if slot == last {
-            continue;
-        }
-        last = slot;
-        if let Some(number) = nodes.number(slot) {
+    for (slot, node) in first {
+        if let Some(number) = nodes.number(*slot) {
+            hull.add(*node);
             try_node(&mut best, number);
-            hull.add(nodes.node(number));
         }
     }
     if best.1 == u32::MAX {
