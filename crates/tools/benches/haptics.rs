@@ -2,7 +2,8 @@
 //!
 //! `cargo bench -p tools --bench haptics`. Balls with knots of 0.5 mm that fill boxes of 64³ to 512³ cells show that nothing grows with the model;
 //! the default fits of `data/bunny.obj.gz` and, at an iso-value that is not the fitted one, `data/head.nii.gz` what a scan costs. First a
-//! table: what is lost by wider nodes and by linear interpolation, against the distance to the surface by looking everywhere.
+//! table: what is lost by wider nodes and by linear interpolation, against the distance to the surface by looking everywhere; and what a tick
+//! of the proxy costs.
 
 use std::hint::black_box;
 use std::sync::Arc;
@@ -283,7 +284,22 @@ fn snapshots(c: &mut Criterion<CpuTime>, piece: &Piece) {
                 b.iter(|| black_box(next()));
             },
         );
-        let snapshot = next();
+        let mut maker = SnapshotMaker::new(demand);
+        let mut n = 0;
+        let mut follow = || {
+            n += 1;
+            maker.free();
+            let along = DVec3::X * if n % 2 == 0 { 0.0 } else { 0.3 * demand.reach };
+            maker.make(piece.at + along, &[piece.object(&fields[0], &layers)], 0)
+        };
+        follow();
+        group.bench_function(
+            BenchmarkId::new(format!("ball {radius} mm"), "box follows"),
+            |b| {
+                b.iter(|| black_box(follow()));
+            },
+        );
+        let snapshot = follow();
         let asked = places(piece.at, 6.0, 4096);
         let mut sum = 0.0;
         group.bench_function(
@@ -341,11 +357,17 @@ fn ticks(piece: &Piece) {
 
 fn haptics(c: &mut Criterion<CpuTime>) {
     let scans = scanned();
-    scans.iter().for_each(accuracy);
-    scans.iter().for_each(ticks);
+    // Tables come without a filter.
+    let is_whole = std::env::args().skip(1).all(|a| a.starts_with("--"));
+    if is_whole {
+        scans.iter().for_each(accuracy);
+        scans.iter().for_each(ticks);
+    }
     for depth in 1..=4 {
         let ball = Piece::ball(depth);
-        ticks(&ball);
+        if is_whole {
+            ticks(&ball);
+        }
         snapshots(c, &ball);
     }
     scans.iter().for_each(|piece| snapshots(c, piece));

@@ -79,12 +79,6 @@ impl Region {
         (0..3).all(|a| node[a] >= self.lo[a] && node[a] < self.end[a])
     }
 
-    /// Place of one of its nodes in lists of the region alone.
-    pub fn slot(&self, node: [usize; 3]) -> usize {
-        let [_, ny, nz] = self.count();
-        ((node[0] - self.lo[0]) * ny + node[1] - self.lo[1]) * nz + node[2] - self.lo[2]
-    }
-
     /// Its rows along z: their first nodes and their places in lists of the grid.
     pub fn rows(self, grid: &Grid) -> impl Iterator<Item = ([usize; 3], Range<usize>)> + use<> {
         let Self { lo, end } = self;
@@ -101,41 +95,60 @@ impl Region {
     }
 }
 
+/// Rows round a region whose marks are never set, so that neighbours need no question whether they are there.
+const SIDE: usize = 2;
+
 /// Marks on the nodes of a region.
 #[derive(Clone, Debug)]
 pub struct Flags {
     region: Region,
+    /// Steps to the next node on each axis.
+    strides: [usize; 3],
     set: Vec<bool>,
 }
 
 impl Flags {
     /// None set.
     pub fn new(region: Region) -> Self {
+        let [nx, ny, nz] = region.count().map(|n| n + 2 * SIDE);
+        let all = if region.is_empty() { 0 } else { nx * ny * nz };
         Self {
             region,
-            set: vec![false; region.len()],
+            strides: [ny * nz, nz, 1],
+            set: vec![false; all],
         }
+    }
+
+    /// Of a node that is at most [`SIDE`] outside.
+    fn slot(&self, node: [usize; 3]) -> usize {
+        (0..3)
+            .map(|a| (node[a] + SIDE - self.region.lo[a]) * self.strides[a])
+            .sum()
     }
 
     /// Sets that of a node of the region.
     pub fn set(&mut self, node: [usize; 3]) {
-        let slot = self.region.slot(node);
+        let slot = self.slot(node);
         self.set[slot] = true;
     }
 
     /// Whether that of a node is set.
     pub fn get(&self, node: [usize; 3]) -> bool {
-        self.region.contains(node) && self.set[self.region.slot(node)]
+        self.region.contains(node) && self.set[self.slot(node)]
     }
 
     /// Whether that of a node or of one next to it on an axis is set.
     pub fn any_beside(&self, node: [usize; 3]) -> bool {
-        let moved = |a: usize, by: isize| {
-            let mut other = node;
-            other[a] = node[a].wrapping_add_signed(by);
-            self.get(other)
-        };
-        self.get(node) || (0..3).any(|a| moved(a, -1) || moved(a, 1))
+        let Region { lo, end } = self.region;
+        if self.set.is_empty() || (0..3).any(|a| node[a] + 1 < lo[a] || node[a] > end[a]) {
+            return false;
+        }
+        let slot = self.slot(node);
+        self.set[slot]
+            || self
+                .strides
+                .iter()
+                .any(|stride| self.set[slot - stride] || self.set[slot + stride])
     }
 
     /// Where some may be set.

@@ -206,9 +206,17 @@ fn bits(d: &Distances) -> Vec<u32> {
 /// box has moved, and with it.
 #[test]
 fn renewed_distances_have_the_bits_of_fresh_ones() {
-    let before = spline(0.5, 16.0, |p| {
-        12.0 - p.length() + 0.3 * libm::sin(p.x) * libm::cos(1.3 * p.y)
-    });
+    let bumps = |p: DVec3| 12.0 - p.length() + 0.3 * libm::sin(p.x) * libm::cos(1.3 * p.y);
+    // Full of sheets and holes that are too thin for the nodes, where Newton goes astray.
+    let noise = |p: DVec3| {
+        let n = p.dot(DVec3::new(127.1, 311.7, 74.7));
+        4.0 * (43_758.545 * libm::sin(n)).fract()
+    };
+    renewed_as_fresh(&spline(0.5, 16.0, bumps), true);
+    renewed_as_fresh(&spline(1.0, 16.0, |p| bumps(p) + noise(p)), false);
+}
+
+fn renewed_as_fresh(before: &HierarchicalSpline<f32>, is_smooth: bool) {
     let edit = |first: [u32; 3], by: f32| BlockEdit {
         level: 0,
         first,
@@ -216,11 +224,16 @@ fn renewed_distances_have_the_bits_of_fresh_ones() {
         change: Change::Set(vec![by; 27]),
     };
     // On the surface, inside it and away from it.
+    let cells = before.lattice().cells[0];
     let edits = [
         edit([56, 34, 33], 2.0),
         edit([46, 30, 38], -6.0),
         edit([62, 52, 33], -30.0),
     ];
+    let edits = edits.map(|edit| BlockEdit {
+        first: edit.first.map(|n| n * cells / 64),
+        ..edit
+    });
     let map = glam::DAffine3::from_axis_angle(DVec3::new(0.3, 1.0, 0.2).normalize(), 0.4);
     for map in [glam::DAffine3::IDENTITY, map] {
         let options = BrickOptions {
@@ -230,11 +243,11 @@ fn renewed_distances_have_the_bits_of_fresh_ones() {
             ..BrickOptions::default()
         };
         let grid = options.grid(DVec3::new(11.0, 1.0, 0.5));
-        let old = Distances::new(&Surface::new(&before, 0.0).placed(map), grid, options.band);
+        let old = Distances::new(&Surface::new(before, 0.0).placed(map), grid, options.band);
         for (n, edit) in edits.iter().enumerate() {
             let now = before.edited_blocks(std::slice::from_ref(edit)).unwrap();
             let surface = Surface::new(&now, 0.0).placed(map);
-            let changed = now.changed_boxes(&before, &before.lattice().world_box());
+            let changed = now.changed_boxes(before, &before.lattice().world_box());
             for shift in [[0; 3], [4, 0, -4], [-8, 4, 12]] {
                 let there = Grid {
                     first: std::array::from_fn(|a| grid.first[a] + shift[a]),
@@ -245,12 +258,12 @@ fn renewed_distances_have_the_bits_of_fresh_ones() {
                 renewed.renew(&surface, there, &changed);
                 assert!(bits(&fresh) == bits(&renewed), "edit {n}, shift {shift:?}");
                 assert_eq!(fresh.unresolved, renewed.unresolved);
-                assert!(bits(&fresh) != bits(&old) || n == 2);
+                assert!(bits(&fresh) != bits(&old) || n == 2 || !is_smooth);
                 println!(
                     "edit {n}, shift {shift:?}: {} of {}",
                     renewed.renewed, fresh.renewed
                 );
-                if shift == [0; 3] {
+                if shift == [0; 3] && is_smooth {
                     assert!(
                         renewed.renewed * 2 < fresh.renewed,
                         "{} of {}",
@@ -260,7 +273,7 @@ fn renewed_distances_have_the_bits_of_fresh_ones() {
                 }
                 // And once more from there.
                 let mut back = renewed.clone();
-                back.renew(&Surface::new(&before, 0.0).placed(map), grid, &changed);
+                back.renew(&Surface::new(before, 0.0).placed(map), grid, &changed);
                 assert!(bits(&old) == bits(&back));
             }
         }
