@@ -41,6 +41,8 @@ pub struct Distances {
     ways: Vec<Way>,
     /// What each exact distance was made from.
     hulls: Vec<[i32; 6]>,
+    /// Whether the field was asked for it: what was not follows from nodes beside the surface alone.
+    asked: Vec<bool>,
     /// Nodes whose distance was made from more than what is near.
     strays: Vec<u32>,
     far: Far,
@@ -83,6 +85,7 @@ impl Distances {
             nodes,
             ways: vec![Way::UNKNOWN; grid.len()],
             hulls: vec![[0; 6]; grid.len()],
+            asked: vec![false; grid.len()],
             strays: Vec::new(),
             far: Far::default(),
             thin: Thin::new(&grid),
@@ -118,7 +121,8 @@ impl Distances {
                 .expect("a node of both");
             all.phi[to.clone()].copy_from_slice(&self.phi[there.clone()]);
             all.ways[to.clone()].copy_from_slice(&self.ways[there.clone()]);
-            all.hulls[to].copy_from_slice(&self.hulls[there]);
+            all.hulls[to.clone()].copy_from_slice(&self.hulls[there.clone()]);
+            all.asked[to].copy_from_slice(&self.asked[there]);
         }
         let kept = self.strays.iter().filter_map(|slot| {
             let at = grid.find(self.grid.number(self.grid.node(*slot as usize)))?;
@@ -136,25 +140,26 @@ impl Distances {
         self.renewed = done.sought;
         self.changed = Region::NONE;
         // Of a box of which nothing was known, everything is new.
-        let changes = match known {
-            Known::Nothing => changes,
-            _ => changes.with(&done.others),
+        let others: &[usize] = match known {
+            Known::Nothing => &[],
+            _ => &done.others,
         };
+        let (changes, others) = (changes.with(others), Changes::of_nodes(&grid, others));
         let has_moved = known != Known::Same;
         if self.nodes.is_empty() {
             self.fill(surface);
             self.changed = Region::whole(&grid);
         } else if has_moved || !done.others.is_empty() || !changes.hull().region(&grid).is_empty() {
-            let mut others = Region::NONE;
+            let mut came = Region::NONE;
             done.came_or_went
                 .iter()
-                .for_each(|slot| others.add(grid.node(*slot)));
-            let turned = self.turn(if has_moved { Region::whole(&grid) } else { others });
-            self.spread(surface, &changes, &turned, has_moved);
+                .for_each(|slot| came.add(grid.node(*slot)));
+            let turned = self.turn(if has_moved { Region::whole(&grid) } else { came });
+            self.spread(surface, (&changes, &others), &turned, has_moved);
             let is_same = done.came_or_went.is_empty();
             let mut cells = self
                 .far
-                .update(&grid, &self.samples, &self.nodes, (&changes, is_same));
+                .update(&grid, &self.samples, &self.nodes, (&others, is_same));
             cells.mark(seen);
             let (limits, ways) = (self.limits(), &self.ways);
             let (samples, least) = (&self.samples, [self.exact(false), self.exact(true)]);
@@ -232,7 +237,14 @@ impl Distances {
     }
 
     /// Finds the closest places of the nodes near the surface, from those beside it that are nearest.
-    fn spread(&mut self, surface: &Surface<'_>, changes: &Changes, turned: &Flags, has_moved: bool) {
+    /// Where the field has changed, only those that it was asked for are looked at; where nodes beside the surface are `others`, all.
+    fn spread(
+        &mut self,
+        surface: &Surface<'_>,
+        (changes, others): (&Changes, &Changes),
+        turned: &Flags,
+        has_moved: bool,
+    ) {
         let grid = self.grid;
         let limits = self.limits();
         let mut seekers = Vec::new();
@@ -243,7 +255,9 @@ impl Distances {
                 return;
             }
             let known = Hull::unpack(&all.hulls[slot]);
-            let is_other = changes.touch(&known)
+            let cause = if all.asked[slot] { changes } else { others };
+            let is_other = cause.touch(&known)
+                || (all.phi[slot] < 0.0) != inside
                 || turned.any_beside(at)
                 || has_moved && (grid.is_rim(at) || !known.is_within(&grid));
             if !is_other {
@@ -269,7 +283,7 @@ impl Distances {
                 });
                 return;
             };
-            all.found(slot, phi, hull, &mut found);
+            all.found(slot, phi, (hull, false), &mut found);
         };
         let mut near = Region::whole(&grid);
         if !has_moved {
@@ -295,7 +309,7 @@ impl Distances {
         seek.all(&mut seekers, None);
         let sought: Vec<f32> = seekers.iter().map(|seeker| seek.signed(seeker)).collect();
         for (seeker, phi) in seekers.iter().zip(sought) {
-            self.found(seeker.slot as usize, phi, seeker.hull, &mut found);
+            self.found(seeker.slot as usize, phi, (seeker.hull, true), &mut found);
         }
         self.renewed += seekers.len();
         self.changed = self.changed.hull(found);
@@ -327,10 +341,10 @@ impl Distances {
         found
     }
 
-    /// Notes an exact distance and what it was made from.
-    fn found(&mut self, slot: usize, phi: f32, hull: Hull, changed: &mut Region) {
+    /// Notes an exact distance, what it was made from and whether the field was asked.
+    fn found(&mut self, slot: usize, phi: f32, (hull, asked): (Hull, bool), changed: &mut Region) {
         let at = self.grid.node(slot);
-        self.hulls[slot] = hull.pack();
+        (self.hulls[slot], self.asked[slot]) = (hull.pack(), asked);
         if hull.is_wider(self.grid.number(at), self.wide()) {
             self.strays.push(slot as u32);
         }

@@ -116,7 +116,8 @@ impl Far {
                 for z in 0..grid.count[2] {
                     let tz = part(z, grid.count[2]);
                     let slot = start + z;
-                    if !is_other(tz.0) && !(may_turn && is_turned([x, y, z])) || is_exact(slot) {
+                    let is_open = is_other(tz.0) || may_turn && is_turned([x, y, z]);
+                    if !is_open || is_exact(slot) {
                         continue;
                     }
                     let linear = line[tz.0] + tz.1 * (line[tz.0 + 1] - line[tz.0]);

@@ -135,6 +135,11 @@ impl Changes {
         Self::of(&self.grid, self.cells, self.boxes, nodes)
     }
 
+    /// Of nodes alone.
+    pub fn of_nodes(grid: &Grid, nodes: &[usize]) -> Self {
+        Self::of(grid, Hull::NONE, Vec::new(), nodes)
+    }
+
     fn of(grid: &Grid, cells: Hull, boxes: Vec<Hull>, nodes: &[usize]) -> Self {
         let mut all = cells;
         nodes
