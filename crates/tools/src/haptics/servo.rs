@@ -137,7 +137,7 @@ impl Servo {
         dt: f64,
     ) -> Tick {
         self.ticks += 1;
-        let (felt, wrench) = match self.gates.admit(told, dt) {
+        let (felt, wished, wrench) = match self.gates.admit(told, dt) {
             None => {
                 self.gates.shut();
                 let nothing = Felt {
@@ -145,7 +145,7 @@ impl Servo {
                     torque: DVec3::ZERO,
                     ..self.last
                 };
-                (nothing, Wrench::ZERO)
+                (nothing, Wrench::ZERO, Wrench::ZERO)
             }
             Some(reading) => {
                 self.buttons = reading.buttons;
@@ -155,7 +155,8 @@ impl Servo {
                     force: felt.force,
                     torque: felt.torque,
                 });
-                (felt, self.gates.pass(wished, felt.contact, heartbeat, dt))
+                let sent = self.gates.pass(wished, felt.contact, heartbeat, dt);
+                (felt, wished, sent)
             }
         };
         self.last = felt;
@@ -172,6 +173,8 @@ impl Servo {
                 wished: felt.force.length() as f32,
                 energy: self.gates.energy() as f32,
                 dt: dt as f32,
+                torque: wished.torque.as_vec3().to_array(),
+                torque_sent: wrench.torque.length() as f32,
             },
         }
     }

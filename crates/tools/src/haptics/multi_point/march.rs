@@ -4,7 +4,8 @@ use glam::DVec3;
 
 use super::super::{Obstacle, Pose};
 use super::MultiPoint;
-use super::places::{arm, ask, row};
+use super::friction::Meeting;
+use super::places::{Place, arm, ask};
 use super::projection::{Twist, dot};
 use super::turn::{exponential, logarithm};
 
@@ -34,6 +35,7 @@ impl MultiPoint {
     /// Moves the proxy as near to the hand as it gets.
     pub(super) fn march(&mut self, obstacle: &dyn Obstacle, hand: &Pose, dt: f64) {
         self.look_again(obstacle, hand, dt);
+        self.pressings.begin();
         let depth = -self.places.deepest_own().0;
         if self.is_buried {
             self.surface(obstacle, depth);
@@ -94,9 +96,12 @@ impl MultiPoint {
     fn step(&mut self, obstacle: &dyn Obstacle, wish: &Twist) -> bool {
         self.gather(obstacle, wish);
         for _ in 0..CUTS {
-            let Some((whole, push)) = self.goal(wish) else {
+            let Some((mut whole, mut push)) = self.goal(obstacle, wish) else {
                 return false;
             };
+            if let Some(air) = self.in_the_air(wish) {
+                (whole, push) = (air, 0.0);
+            }
             let size = dot(&whole, &whole).sqrt();
             if size < STILL {
                 return false;
@@ -109,6 +114,7 @@ impl MultiPoint {
             self.share = share;
             match self.try_out(obstacle, &twist) {
                 Tried::Clear => {
+                    self.pressings.moved(&twist);
                     self.accept(&twist);
                     self.push_left -= share * push;
                     return true;
@@ -124,14 +130,14 @@ impl MultiPoint {
 
     /// The twist that leads nearest to a wish by the rows, and how much of it pushes the tool out of the solid: no more than is left
     /// for this tick.
-    fn goal(&mut self, wish: &Twist) -> Option<(Twist, f64)> {
-        let whole = self.rows.nearest(wish);
+    fn goal(&mut self, obstacle: &dyn Obstacle, wish: &Twist) -> Option<(Twist, f64)> {
+        let whole = self.nearest(obstacle, wish);
         if whole.is_some() && !self.rows.lacks(self.options.tolerance) {
             return whole.map(|whole| (whole, 0.0));
         }
         // As far as the tool would go if it only had to get no deeper.
         self.rows.relax();
-        let free = self.rows.nearest(wish)?;
+        let free = self.nearest(obstacle, wish)?;
         let out: Twist = whole.map_or([0.0; 6], |whole| std::array::from_fn(|k| whole[k] - free[k]));
         let push = dot(&out, &out).sqrt();
         let share = if whole.is_none() {
@@ -150,6 +156,8 @@ impl MultiPoint {
     fn gather(&mut self, obstacle: &dyn Obstacle, wish: &Twist) {
         let way = dot(wish, wish).sqrt();
         self.rows.clear();
+        self.meetings.clear();
+        self.pressings.clear();
         for i in 0..self.places.len() {
             if !self.places.counts[i] {
                 continue;
@@ -169,19 +177,22 @@ impl MultiPoint {
                     self.places.here[i].on,
                 );
             }
-            let place = &self.places.here[i];
+            let place = self.places.here[i];
             if place.clearance <= most {
                 let a = self.row_of(place.gradient, arm);
-                self.rows.push(a, self.places.level[i] - place.clearance);
+                let meeting = self.meeting(&place, self.pose.at, arm);
+                self.meet(a, self.places.level[i] - place.clearance, meeting);
             }
         }
     }
 
-    fn row_of(&self, gradient: DVec3, arm: DVec3) -> Twist {
-        match self.options.turn_every {
-            0 => row(gradient, arm, self.lever),
-            // The turn is the hand's.
-            _ => [gradient.x, gradient.y, gradient.z, 0.0, 0.0, 0.0],
+    /// Where a point's row comes from.
+    fn meeting(&self, place: &Place, handle: DVec3, arm: DVec3) -> Meeting {
+        let down = (place.clearance + self.tool.nose) * place.gradient;
+        Meeting {
+            at: handle + arm - down,
+            arm: arm - self.tool.nose * place.gradient,
+            gradient: place.gradient,
         }
     }
 
@@ -230,7 +241,7 @@ impl MultiPoint {
             let here = self.places.here[i];
             let bound = here.clearance - self.way(v, w, here.on);
             if bound > 0.0 || self.features.is_ignored(i) {
-                self.places.there[i] = super::places::Place {
+                self.places.there[i] = Place {
                     clearance: bound,
                     is_exact: false,
                     ..here
@@ -275,11 +286,13 @@ impl MultiPoint {
         if was_late && there.clearance > here - LATE {
             return;
         }
-        let a = self.row_of(there.gradient, arm(&self.tool, turn, there.on));
+        let arm = arm(&self.tool, turn, there.on);
+        let a = self.row_of(there.gradient, arm);
         let b = level - there.clearance + dot(&a, twist);
         // Where the proxy is now must not be in the solid by it, but for what it already is.
         let slack = if i < self.places.own { LATE } else { GUESSED };
-        if b > lack + slack || !self.rows.push(a, b) {
+        let meeting = self.meeting(&there, self.pose.at + halves(twist, self.lever).0, arm);
+        if b > lack + slack || !self.meet(a, b, meeting) {
             *is_too_far |= !was_late;
         } else {
             *is_violated = true;

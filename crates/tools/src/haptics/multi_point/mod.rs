@@ -12,12 +12,15 @@
 
 mod extraction;
 mod features;
+mod friction;
 mod march;
 mod options;
 mod places;
 mod projection;
 mod random;
+mod scaled;
 mod shape;
+mod slide;
 #[cfg(test)]
 mod tests;
 mod tool;
@@ -26,11 +29,13 @@ mod turn;
 use glam::DVec3;
 
 pub use options::{MultiPointError, MultiPointOptions};
+pub use scaled::Scaled;
 pub use tool::{PointTool, Sampling, ToolError};
 
 use super::coupling::{Coupling, Stretching, pressing};
 use super::{Contact, Felt, Obstacle, Pose, Renderer};
 use features::Features;
+use friction::{Meeting, Pressings};
 use places::Places;
 use projection::Polyhedron;
 use random::Random;
@@ -56,6 +61,9 @@ pub struct MultiPoint {
     places: Places,
     features: Features,
     rows: Polyhedron,
+    /// Where each row comes from.
+    meetings: Vec<Meeting>,
+    pressings: Pressings,
     /// Step that this tick can take near the surface, mm.
     reach: f64,
     /// Way by which the tool may still be pushed out in this tick, mm.
@@ -80,12 +88,15 @@ impl MultiPoint {
     pub fn new(tool: PointTool, options: MultiPointOptions) -> Result<Self, MultiPointError> {
         options.check()?;
         let places = Places::new(&tool);
+        let most_rows = places.len() * (2 + march::CUTS);
         Ok(Self {
             lever: (options.angular_stiffness / (1e-3 * options.coupling.stiffness)).sqrt(),
             pose: Pose::at(DVec3::ZERO),
             is_clear: false,
             is_buried: false,
-            rows: Polyhedron::with_capacity(places.len() * (2 + march::CUTS)),
+            rows: Polyhedron::with_capacity(most_rows),
+            meetings: Vec::with_capacity(most_rows),
+            pressings: Pressings::default(),
             features: Features::new(&tool),
             places,
             reach: options.step,
@@ -132,10 +143,9 @@ impl MultiPoint {
         let force = pressing(stretch, 1e-3 * stiffness, damping, speed);
         // `pressing` takes N s/m.
         let damping = 1e3 * self.options.angular_damping;
-        (
-            force,
-            pressing(turn, self.options.angular_stiffness, damping, spin),
-        )
+        let torque = pressing(turn, self.options.angular_stiffness, damping, spin);
+        let (soft, slack) = self.pressings.softness(1e-3 * stiffness);
+        (force - soft, torque - slack)
     }
 }
 
@@ -177,10 +187,10 @@ impl Renderer for MultiPoint {
             force: self.force,
             torque: self.torque,
             proxy: self.pose,
-            contact: if is_touching {
-                Contact::Slides
-            } else {
-                Contact::Free
+            contact: match is_touching {
+                true if self.pressings.sticks() => Contact::Sticks,
+                true => Contact::Slides,
+                false => Contact::Free,
             },
         }
     }
@@ -190,6 +200,7 @@ impl Renderer for MultiPoint {
         self.is_buried = false;
         self.reach = self.options.step;
         self.places.forget();
+        self.pressings.clear();
         self.features.forget();
         self.stretching.end();
         self.turning.end();

@@ -6,7 +6,7 @@ use super::super::super::{Contact, Pose};
 use super::super::{MultiPoint, MultiPointOptions, PointTool, Sampling, ToolError};
 use super::scenes::*;
 
-fn cube() -> PointTool {
+pub fn cube() -> PointTool {
     PointTool::block(DVec3::splat(10.0), Sampling::default()).expect("a cube")
 }
 
@@ -14,7 +14,7 @@ fn renderer(tool: PointTool) -> MultiPoint {
     MultiPoint::new(tool, MultiPointOptions::default()).expect("options")
 }
 
-fn all_tools() -> Vec<(&'static str, PointTool)> {
+pub fn all_tools() -> Vec<(&'static str, PointTool)> {
     let s = Sampling::default();
     vec![
         ("sphere", PointTool::sphere(5.0, s).expect("a sphere")),
