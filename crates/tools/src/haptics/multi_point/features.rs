@@ -114,7 +114,7 @@ impl MultiPoint {
 
     /// Part of a gradient along the tool's surface, in its axes.
     fn slope(&self, turn: DQuat, place: &Place) -> DVec3 {
-        let Some(shape) = self.tool.shape else {
+        let Some(shape) = &self.tool.shape else {
             return DVec3::ZERO;
         };
         let (g, n) = (turn.inverse() * place.gradient, shape.distance(place.on).1);
@@ -130,7 +130,7 @@ impl MultiPoint {
         from: Place,
         stride: f64,
     ) -> (Place, f64) {
-        let Some(shape) = self.tool.shape else {
+        let Some(shape) = &self.tool.shape else {
             return (from, stride);
         };
         let (least, most) = (1e-3 * self.tool.spacing, 1e3 * self.tool.spacing);
@@ -140,7 +140,11 @@ impl MultiPoint {
             if slope.length() < LEVEL {
                 break;
             }
-            let on = shape.project(place.on - stride * slope);
+            let Some(on) = shape.project(place.on - stride * slope) else {
+                // There the tool ends.
+                stride = (0.5 * stride).max(least);
+                continue;
+            };
             let next = ask(&self.tool, obstacle, pose, turn, on);
             let (way, change) = (on - place.on, self.slope(turn, &next) - slope);
             // Step of Barzilai and Borwein: the way to where the slope is none if it changes on as it did.

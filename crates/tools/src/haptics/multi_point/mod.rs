@@ -10,6 +10,7 @@
 //! normals at edges, averages at convex ones, pushes along normals in holes. A polyhedron of all points has the cases as its
 //! numbers of active rows, 0 to 6, and no rule to choose wrongly.
 
+mod carved;
 mod extraction;
 mod features;
 mod friction;

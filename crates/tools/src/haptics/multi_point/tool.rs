@@ -1,8 +1,11 @@
 //! Tools as many points: what shape they have, and where on it they touch.
 
+use std::sync::Arc;
+
 use glam::{DVec2, DVec3};
 
 use super::super::Obstacle;
+use super::carved::Carved;
 use super::shape::{Outline, Shape};
 
 /// Points of a tool at most: a tick looks at each of them.
@@ -207,7 +210,7 @@ impl PointTool {
         Self::new(None, sampling.nose, coarse, fine, spacing)
     }
 
-    /// The part of an object's surface in a box: its points become the tool, the middle of the box its origin. The solid side is the
+    /// The part of an object's surface in a box, with the object's distance there: its points become the tool, the middle of the box its origin. The solid side is the
     /// tool's inside. `sampling.points` of them, the farthest from all others first, so that corners are among them.
     ///
     /// # Errors
@@ -247,7 +250,9 @@ impl PointTool {
         if coarse.is_empty() {
             return Err(ToolError::NoSurface { centre, half });
         }
-        Self::new(None, sampling.nose, coarse, fine, spacing)
+        let carved = Carved::new(object, centre, half, sampling.nose, step);
+        let shape = Shape::Carved(Arc::new(carved));
+        Self::new(Some(shape), sampling.nose, coarse, fine, spacing)
     }
 
     /// Moves the handle point: where the hand holds the tool, and about which torques are told.
@@ -281,7 +286,7 @@ impl PointTool {
 
     /// Signed distance to the tool's surface, mm, positive outside it; nothing for tools that are points alone.
     pub fn distance(&self, p: DVec3) -> Option<f64> {
-        self.shape.map(|shape| shape.distance(p).0 - self.nose)
+        self.shape.as_ref().map(|shape| shape.distance(p).0 - self.nose)
     }
 
     fn shaped(shape: Shape, sampling: Sampling) -> Result<Self, ToolError> {
@@ -306,7 +311,8 @@ impl PointTool {
         } else {
             Vec::new()
         };
-        Self::new(Some(shape), sampling.nose, shape.points(most), fine, spacing)
+        let points = shape.points(most);
+        Self::new(Some(shape), sampling.nose, points, fine, spacing)
     }
 
     fn new(

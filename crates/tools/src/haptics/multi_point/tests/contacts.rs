@@ -35,7 +35,7 @@ fn steady_force_on_a_plane_is_stiffness_times_depth() {
     for (name, tool) in all_tools() {
         let solid = Solid::new(1e3, |p| plane(p, DVec3::ZERO, DVec3::Z));
         // Height at which the lowest place of the surface touches, not turned.
-        let shape = tool.shape.expect("a shape");
+        let shape = tool.shape.as_ref().expect("a shape");
         let touch = tool.nose
             - shape
                 .points(0.02 * tool.spacing.max(1.0))

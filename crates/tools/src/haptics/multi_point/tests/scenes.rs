@@ -185,7 +185,7 @@ pub fn place(tool: &PointTool, pose: &Pose, q: DVec3) -> DVec3 {
 
 /// Deepest place of a dense set on the tool's surface.
 pub fn dense_depth(tool: &PointTool, solid: &dyn Obstacle, pose: &Pose, spacing: f64) -> f64 {
-    let shape = tool.shape.expect("a shape");
+    let shape = tool.shape.as_ref().expect("a shape");
     let depth = |q: &DVec3| tool.nose() - solid.distance(place(tool, pose, *q)).0;
     shape
         .points(spacing)
