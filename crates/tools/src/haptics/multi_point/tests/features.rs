@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::super::super::Pose;
+use super::super::super::{Obstacle, Pose};
 use super::super::{MultiPoint, MultiPointOptions, PointTool, Sampling};
 use super::scenes::*;
 
@@ -168,7 +168,7 @@ fn feature_between_the_points_of_a_carved_tool_is_found() {
             let floor = plane(p, DVec3::new(0.0, 0.0, -9.0), DVec3::Z);
             or(floor, rod(p, foot, foot + DVec3::new(0.0, 0.0, 4.7), 0.3))
         });
-        let hand = |t: f64| Pose::at(DVec3::new(3.0, 0.0, (3.0 - 40.0 * t).max(-1.0)));
+        let hand = |t: f64| Pose::at(DVec3::new(3.0, 0.0, (2.0 - 40.0 * t).max(-3.0)));
         let depth = |pose: &Pose| {
             let depths = all
                 .iter()
