@@ -6,7 +6,6 @@
 //! of the force from that of the default options.
 
 #[path = "common/cpu_time.rs"]
-#[expect(dead_code, reason = "its groups")]
 mod cpu_time;
 
 use std::sync::Arc;

@@ -17,17 +17,19 @@ use super::slide::{self, Rubs};
 /// Turns of pressures and frictions at most.
 const ROUNDS: usize = 12;
 /// Change of a friction that ends them, mm.
-const SAME: f64 = 1e-7;
+const SAME: f64 = 1e-6;
 /// A tool that would go no further stays where it is, mm: steps of that size are what friction is softened by.
 const RESTS: f64 = 10.0 * slide::SOFT;
 /// Slip in a tick that counts as none, mm.
-const HELD: f64 = 1e-5;
+const HELD: f64 = 2e-5;
 /// Way in the air, mm, that is gone before friction counts.
 const AIR: f64 = 0.01;
 
 /// Where a row comes from.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Meeting {
+    /// Which of the tool's points it is.
+    pub point: usize,
     /// Place of the solid's surface, mm.
     pub at: DVec3,
     /// From the handle point to it.
@@ -39,7 +41,8 @@ pub(super) struct Meeting {
 /// A place where the tool presses.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pressing {
-    row: usize,
+    /// None of those there are, if it is of an earlier step.
+    row: Option<usize>,
     meeting: Meeting,
     touch: Touch,
     /// Over the coupling's stiffness, mm.
@@ -62,6 +65,13 @@ impl Pressings {
     /// Nothing presses.
     pub fn clear(&mut self) {
         self.all = [None; 6];
+    }
+
+    /// A step begins, with other rows.
+    pub fn next(&mut self) {
+        for p in self.iter_mut() {
+            p.row = None;
+        }
     }
 
     /// A tick begins.
@@ -110,8 +120,11 @@ impl Pressings {
 impl Pressing {
     /// On the tool, over the coupling's stiffness, mm.
     fn force(&self) -> DVec3 {
-        let [a, b] = self.tangents;
-        self.pressure * self.meeting.gradient + self.friction[0] * a + self.friction[1] * b
+        self.pressure * self.meeting.gradient + self.rubbing()
+    }
+
+    fn rubbing(&self) -> DVec3 {
+        self.friction[0] * self.tangents[0] + self.friction[1] * self.tangents[1]
     }
 
     /// Largest friction, mm.
@@ -123,7 +136,10 @@ impl Pressing {
 impl MultiPoint {
     /// The twist that leads nearest to a wish by the rows and by friction; nothing if the rows leave no room.
     pub(super) fn nearest(&mut self, obstacle: &dyn Obstacle, wish: &Twist) -> Option<Twist> {
-        let mut twist = self.rows.nearest(wish)?;
+        let Some(mut twist) = self.rows.nearest_again(wish) else {
+            self.pressings.clear();
+            return None;
+        };
         self.find_pressings(obstacle);
         if !self.pressings.is_rough() {
             return Some(twist);
@@ -164,19 +180,26 @@ impl MultiPoint {
     fn find_pressings(&mut self, obstacle: &dyn Obstacle) {
         let mut all = [None; 6];
         for (place, (row, pressure)) in all.iter_mut().zip(self.rows.active()) {
-            let known = self.pressings.iter().find(|p| p.row == row);
+            let meeting = self.meetings[row];
+            let known = self.pressings.iter().find(|p| p.row == Some(row));
             let mut pressing = known.copied().unwrap_or_else(|| {
-                let meeting = self.meetings[row];
+                // What held the point before is a good guess.
+                let same = |p: &&Pressing| p.meeting.point == meeting.point;
+                let before = self
+                    .pressings
+                    .iter()
+                    .find(same)
+                    .map_or(DVec3::ZERO, Pressing::rubbing);
                 let normal = meeting.gradient.normalize_or(DVec3::Z);
                 let (a, b) = normal.any_orthonormal_pair();
                 Pressing {
-                    row,
+                    row: Some(row),
                     meeting,
                     touch: obstacle.touch(meeting.at),
                     pressure,
                     tangents: [a, b],
                     slips: [a, b].map(|t| self.row_of(t, meeting.arm)),
-                    friction: [0.0; 2],
+                    friction: [a, b].map(|t| t.dot(before)),
                 }
             });
             pressing.pressure = pressure;
@@ -192,15 +215,33 @@ impl MultiPoint {
         let (mut free, mut way) = (*twist, *wish);
         add(&mut way, -1.0, twist);
         add(&mut free, 1.0, &rows.across(&way));
-        let mut rubs = [Rubs::default(); 6];
+        let (mut expected, mut rubs) = (free, [Rubs::default(); 6]);
         for (rub, p) in rubs.iter_mut().zip(pressings.iter()) {
             *rub = Rubs {
                 most: p.most(),
                 slips: p.slips,
                 yields: p.slips.map(|slip| rows.across(&slip)),
             };
+            for (yields, friction) in rub.yields.iter().zip(p.friction) {
+                add(&mut expected, friction, yields);
+            }
         }
-        slide::slide(&free, &rubs, pressings.iter_mut().map(|p| &mut p.friction))
+        slide::slide(
+            &free,
+            &expected,
+            &rubs,
+            pressings.iter_mut().map(|p| &mut p.friction),
+        )
+    }
+
+    /// Begins the next solution with the points that pressed in the last one.
+    pub(super) fn expect_the_same(&mut self) {
+        for p in self.pressings.iter() {
+            if let Some(row) = self.meetings.iter().position(|m| m.point == p.meeting.point) {
+                self.rows.expect(row);
+            }
+        }
+        self.pressings.next();
     }
 
     /// A row and where it comes from. Whether there was room.

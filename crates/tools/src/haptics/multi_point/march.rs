@@ -1,6 +1,6 @@
 //! The way of the proxy to the hand in a tick.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 use super::super::{Obstacle, Pose};
 use super::MultiPoint;
@@ -38,6 +38,7 @@ impl MultiPoint {
         self.pressings.begin();
         let depth = -self.places.deepest_own().0;
         if self.is_buried {
+            self.pressings.clear();
             self.surface(obstacle, depth);
             return;
         }
@@ -46,7 +47,11 @@ impl MultiPoint {
         self.reach = most.max(SHORTEST);
         for _ in 0..self.options.iterations {
             let wish = self.wish(hand);
-            if dot(&wish, &wish).sqrt() < STILL || !self.step(obstacle, &wish) {
+            if dot(&wish, &wish).sqrt() < STILL {
+                self.pressings.clear();
+                break;
+            }
+            if !self.step(obstacle, &wish) {
                 break;
             }
             self.reach = (2.0 * self.reach).min(most);
@@ -62,7 +67,7 @@ impl MultiPoint {
         if self.options.turn_every > 0 {
             self.hold_turn(hand);
         } else {
-            self.places.turn = self.pose.turn;
+            self.places.turn = DMat3::from_quat(self.pose.turn);
         }
         let mut grown = 0.0f64;
         for i in 0..self.places.len() {
@@ -70,7 +75,7 @@ impl MultiPoint {
                 continue;
             }
             let before = self.places.here[i];
-            let now = ask(&self.tool, obstacle, &self.pose, self.places.turn, before.on);
+            let now = ask(&self.tool, obstacle, &self.pose, &self.places.turn, before.on);
             let change = before.clearance - now.clearance;
             grown = grown.max(if before.is_exact { change.abs() } else { change });
             self.places.here[i] = now;
@@ -157,12 +162,11 @@ impl MultiPoint {
         let way = dot(wish, wish).sqrt();
         self.rows.clear();
         self.meetings.clear();
-        self.pressings.clear();
         for i in 0..self.places.len() {
             if !self.places.counts[i] {
                 continue;
             }
-            let arm = arm(&self.tool, self.places.turn, self.places.here[i].on);
+            let arm = arm(&self.tool, &self.places.turn, self.places.here[i].on);
             // No twist of that size moves the point further.
             let most = way * (1.0 + arm.length_squared() / (self.lever * self.lever)).sqrt();
             if self.places.here[i].clearance > most {
@@ -173,23 +177,25 @@ impl MultiPoint {
                     &self.tool,
                     obstacle,
                     &self.pose,
-                    self.places.turn,
+                    &self.places.turn,
                     self.places.here[i].on,
                 );
             }
             let place = self.places.here[i];
             if place.clearance <= most {
                 let a = self.row_of(place.gradient, arm);
-                let meeting = self.meeting(&place, self.pose.at, arm);
+                let meeting = self.meeting(i, &place, self.pose.at, arm);
                 self.meet(a, self.places.level[i] - place.clearance, meeting);
             }
         }
+        self.expect_the_same();
     }
 
     /// Where a point's row comes from.
-    fn meeting(&self, place: &Place, handle: DVec3, arm: DVec3) -> Meeting {
+    fn meeting(&self, point: usize, place: &Place, handle: DVec3, arm: DVec3) -> Meeting {
         let down = (place.clearance + self.tool.nose) * place.gradient;
         Meeting {
+            point,
             at: handle + arm - down,
             arm: arm - self.tool.nose * place.gradient,
             gradient: place.gradient,
@@ -221,7 +227,7 @@ impl MultiPoint {
         } else {
             w
         };
-        v.length() + turned.cross(arm(&self.tool, self.places.turn, on)).length()
+        v.length() + turned.cross(arm(&self.tool, &self.places.turn, on)).length()
     }
 
     /// Looks at the pose after a twist.
@@ -231,7 +237,7 @@ impl MultiPoint {
         let turn = if self.options.turn_every > 0 {
             self.places.turn
         } else {
-            pose.turn
+            DMat3::from_quat(pose.turn)
         };
         let (mut is_violated, mut is_too_far) = (false, false);
         for i in 0..self.places.len() {
@@ -248,15 +254,15 @@ impl MultiPoint {
                 };
                 continue;
             }
-            let there = ask(&self.tool, obstacle, &pose, turn, here.on);
+            let there = ask(&self.tool, obstacle, &pose, &turn, here.on);
             self.places.there[i] = there;
             if i >= self.places.own {
-                self.slide(obstacle, &pose, turn, i);
+                self.slide(obstacle, &pose, &turn, i);
             }
-            self.judge(i, twist, turn, &mut is_violated, &mut is_too_far);
+            self.judge(i, twist, &turn, &mut is_violated, &mut is_too_far);
         }
         if !is_violated && !is_too_far {
-            self.find_features(obstacle, twist, &pose, turn, &mut is_violated, &mut is_too_far);
+            self.find_features(obstacle, twist, &pose, &turn, &mut is_violated, &mut is_too_far);
         }
         match (is_violated, is_too_far) {
             (_, true) => Tried::TooFar,
@@ -270,7 +276,7 @@ impl MultiPoint {
         &mut self,
         i: usize,
         twist: &Twist,
-        turn: glam::DQuat,
+        turn: &DMat3,
         is_violated: &mut bool,
         is_too_far: &mut bool,
     ) {
@@ -291,7 +297,7 @@ impl MultiPoint {
         let b = level - there.clearance + dot(&a, twist);
         // Where the proxy is now must not be in the solid by it, but for what it already is.
         let slack = if i < self.places.own { LATE } else { GUESSED };
-        let meeting = self.meeting(&there, self.pose.at + halves(twist, self.lever).0, arm);
+        let meeting = self.meeting(i, &there, self.pose.at + halves(twist, self.lever).0, arm);
         if b > lack + slack || !self.meet(a, b, meeting) {
             *is_too_far |= !was_late;
         } else {
@@ -312,7 +318,7 @@ impl MultiPoint {
         let (v, w) = halves(twist, self.lever);
         self.pose = self.after(v, w);
         if self.options.turn_every == 0 {
-            self.places.turn = self.pose.turn;
+            self.places.turn = DMat3::from_quat(self.pose.turn);
         }
         std::mem::swap(&mut self.places.here, &mut self.places.there);
         self.features.changed(0.0, w.length());
@@ -324,7 +330,7 @@ impl MultiPoint {
         self.held_for += 1;
         if self.held_for >= self.options.turn_every {
             self.held_for = 0;
-            self.places.turn = hand.turn;
+            self.places.turn = DMat3::from_quat(hand.turn);
         }
     }
 }

@@ -27,7 +27,7 @@ mod tests;
 mod tool;
 mod turn;
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 pub use options::{MultiPointError, MultiPointOptions};
 pub use scaled::Scaled;
@@ -128,7 +128,7 @@ impl MultiPoint {
     /// Whether a hand at a pose has the tool clear of the solid; sets the tool there if so.
     fn begin(&mut self, obstacle: &dyn Obstacle, hand: &Pose) -> bool {
         self.pose = *hand;
-        self.places.turn = hand.turn;
+        self.places.turn = DMat3::from_quat(hand.turn);
         self.held_for = 0;
         self.places.look(&self.tool, obstacle, hand);
         self.is_clear = self.places.deepest().0 >= -self.options.tolerance && self.is_clear_between(obstacle);

@@ -73,12 +73,14 @@ impl Polyhedron {
     }
 
     /// The point nearest to `d`; nothing if the polyhedron is empty.
+    #[cfg(test)]
     pub fn nearest(&mut self, d: &Twist) -> Option<Twist> {
         self.count = 0;
         self.go_on(*d)
     }
 
-    /// The same for another `d`, from the rows that were active last: where many sets of rows say the same, those stay.
+    /// The point nearest to `d`; nothing if the polyhedron is empty. It is looked for from the rows that were active last, or are expected to
+    /// be: it is the same from any, but where many sets of rows say the same, those stay.
     pub fn nearest_again(&mut self, d: &Twist) -> Option<Twist> {
         let mut u = *d;
         while self.count > 0 {
@@ -94,6 +96,18 @@ impl Polyhedron {
             add(&mut u, multiplier, &self.rows[row].0);
         }
         self.go_on(u)
+    }
+
+    /// Begins with a row that is likely to be active; it is left out if the others say as much.
+    pub fn expect(&mut self, row: usize) {
+        if self.count == 6 || self.active[..self.count].contains(&row) {
+            return;
+        }
+        self.enter(row, 0.0);
+        let (j, a) = (self.count - 1, &self.rows[row].0);
+        if self.r[j][j] * self.r[j][j] <= DEPENDENT * dot(a, a) {
+            self.count = j;
+        }
     }
 
     /// Multipliers by which all active rows hold exactly.
@@ -138,6 +152,7 @@ impl Polyhedron {
                 }
                 let step = full.min(most);
                 if step == f64::INFINITY {
+                    self.count = 0;
                     return None;
                 }
                 if !dependent {

@@ -6,13 +6,17 @@
 use super::projection::{Twist, add, dot};
 
 /// Slip below which friction is softened, mm.
-pub(super) const SOFT: f64 = 1e-7;
+pub(super) const SOFT: f64 = 1e-6;
 /// Widths of the softening, from the widest on, over the one before.
-const NARROWER: f64 = 0.1;
+const NARROWER: f64 = 0.03;
 /// Steps at most with a width.
 const STEPS: usize = 12;
+/// Steps at most from what is expected.
+const TRIES: usize = 4;
+/// Halvings of a step at most.
+const HALVINGS: usize = 20;
 /// Length of a step that ends them, over the width.
-const DONE: f64 = 1e-3;
+const DONE: f64 = 1e-2;
 
 /// What a contact does against slipping.
 #[derive(Clone, Copy, Debug, Default)]
@@ -32,37 +36,48 @@ impl Rubs {
 }
 
 /// Frictions of contacts when the body would go to `free` without them. The largest change of one, mm.
+/// `frictions` are what they are expected to be, and then are.
 pub(super) fn slide<'a>(
     free: &Twist,
+    expected: &Twist,
     rubs: &[Rubs],
     frictions: impl Iterator<Item = &'a mut [f64; 2]>,
 ) -> f64 {
-    let size = |t: [f64; 2]| libm::hypot(t[0], t[1]);
-    let widest = rubs.iter().map(|r| size(r.slip(free))).fold(0.0, f64::max);
-    let mut u = *free;
-    let mut width = widest.max(SOFT);
-    loop {
-        for _ in 0..STEPS {
-            let (way, is_short) = step(free, &u, rubs, width);
-            add(&mut u, 1.0, &way);
-            if is_short {
-                break;
-            }
+    let mut u = *expected;
+    let mut width = SOFT;
+    if !settle(free, &mut u, rubs, SOFT, TRIES) {
+        u = *free;
+        width = rubs.iter().map(|r| length(r.slip(free))).fold(SOFT, f64::max);
+        while width > SOFT {
+            settle(free, &mut u, rubs, width, STEPS);
+            width = (NARROWER * width).max(SOFT);
         }
-        if width <= SOFT {
-            break;
-        }
-        width = (NARROWER * width).max(SOFT);
+        settle(free, &mut u, rubs, width, STEPS);
     }
     let mut most = 0.0f64;
     for (friction, rub) in frictions.zip(rubs) {
         let slip = rub.slip(&u);
-        let share = -rub.most / size(slip).max(width);
+        let share = -rub.most / length(slip).max(width);
         let new = slip.map(|t| share * t);
-        most = most.max(size([new[0] - friction[0], new[1] - friction[1]]));
+        most = most.max(length([new[0] - friction[0], new[1] - friction[1]]));
         *friction = new;
     }
     most
+}
+
+fn length(t: [f64; 2]) -> f64 {
+    (t[0] * t[0] + t[1] * t[1]).sqrt()
+}
+
+/// Goes where the function is least. Whether it got there.
+fn settle(free: &Twist, u: &mut Twist, rubs: &[Rubs], width: f64, steps: usize) -> bool {
+    let mut now = value(free, u, rubs, width);
+    for _ in 0..steps {
+        if step(free, u, rubs, width, &mut now) {
+            return true;
+        }
+    }
+    false
 }
 
 /// The function, with a width.
@@ -72,8 +87,7 @@ fn value(free: &Twist, u: &Twist, rubs: &[Rubs], width: f64) -> f64 {
         sum += 0.5 * (u[k] - free[k]) * (u[k] - free[k]);
     }
     for rub in rubs.iter().filter(|r| r.most > 0.0) {
-        let [a, b] = rub.slip(u);
-        let t = libm::hypot(a, b);
+        let t = length(rub.slip(u));
         sum += rub.most
             * if t > width {
                 t - 0.5 * width
@@ -84,8 +98,8 @@ fn value(free: &Twist, u: &Twist, rubs: &[Rubs], width: f64) -> f64 {
     sum
 }
 
-/// A step of Newton's method, shortened until it leads down, and whether it is too short to matter.
-fn step(free: &Twist, u: &Twist, rubs: &[Rubs], width: f64) -> (Twist, bool) {
+/// A step of Newton's method, shortened until it leads down; whether it is too short to matter. `now` is the function there.
+fn step(free: &Twist, u: &mut Twist, rubs: &[Rubs], width: f64, now: &mut f64) -> bool {
     let mut matrix = [[0.0; 6]; 6];
     let mut down: Twist = std::array::from_fn(|k| free[k] - u[k]);
     for (k, row) in matrix.iter_mut().enumerate() {
@@ -93,7 +107,7 @@ fn step(free: &Twist, u: &Twist, rubs: &[Rubs], width: f64) -> (Twist, bool) {
     }
     for rub in rubs.iter().filter(|r| r.most > 0.0) {
         let t = rub.slip(u);
-        let size = libm::hypot(t[0], t[1]);
+        let size = length(t);
         let stiff = rub.most / size.max(width);
         for k in 0..2 {
             add(&mut down, -stiff * t[k], &rub.yields[k]);
@@ -107,16 +121,17 @@ fn step(free: &Twist, u: &Twist, rubs: &[Rubs], width: f64) -> (Twist, bool) {
         }
     }
     let mut way = solved(&mut matrix, &down);
-    let now = value(free, u, rubs, width);
-    for _ in 0..30 {
+    let is_short = dot(&way, &way).sqrt() < DONE * width;
+    for _ in 0..HALVINGS {
         let there = std::array::from_fn(|k| u[k] + way[k]);
-        if value(free, &there, rubs, width) <= now {
+        let then = value(free, &there, rubs, width);
+        if then <= *now {
+            (*u, *now) = (there, then);
             break;
         }
         way = way.map(|w| 0.5 * w);
     }
-    let is_short = dot(&way, &way).sqrt() < DONE * width;
-    (way, is_short)
+    is_short
 }
 
 fn add_square(matrix: &mut [[f64; 6]; 6], share: f64, a: &Twist) {
