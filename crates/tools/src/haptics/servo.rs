@@ -140,7 +140,7 @@ impl Servo {
         dt: f64,
     ) -> Tick {
         self.ticks += 1;
-        let (felt, wrench) = match self.gates.admit(told, dt) {
+        let (felt, wished, wrench) = match self.gates.admit(told, dt) {
             None => {
                 self.gates.shut();
                 let nothing = Felt {
@@ -148,7 +148,7 @@ impl Servo {
                     torque: DVec3::ZERO,
                     ..self.last
                 };
-                (nothing, Wrench::ZERO)
+                (nothing, Wrench::ZERO, Wrench::ZERO)
             }
             Some(reading) => {
                 self.buttons = reading.buttons;
@@ -162,7 +162,7 @@ impl Servo {
                 if self.gates.is_faded() {
                     self.lose_hold();
                 }
-                (felt, sent)
+                (felt, wished, sent)
             }
         };
         self.last = felt;
@@ -179,6 +179,8 @@ impl Servo {
                 wished: felt.force.length() as f32,
                 energy: self.gates.energy() as f32,
                 dt: dt as f32,
+                torque: wished.torque.as_vec3().to_array(),
+                torque_sent: wrench.torque.length() as f32,
             },
         }
     }
