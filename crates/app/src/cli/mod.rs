@@ -33,7 +33,7 @@ mod fitted;
 mod flags;
 mod info;
 mod input;
-mod interrupt;
+pub mod interrupt;
 mod keep;
 mod mesh;
 mod mesh_check;

@@ -73,6 +73,10 @@ fn views(ui: &mut egui::Ui, bench: &mut Bench) {
     ui.separator();
     ui.checkbox(&mut bench.look.camera.perspective, "Perspective (5)");
     ui.checkbox(&mut bench.look.paint, "Painted stiffness");
+    let mut has_slices = bench.slices.is_some();
+    if ui.checkbox(&mut has_slices, "Slices").changed() {
+        bench.slices = has_slices.then(super::Slices::new);
+    }
     let mut is_cut = bench.look.cut.is_some();
     if ui.checkbox(&mut is_cut, "Clipping plane").changed() {
         let toward_eye = bench.look.camera.axes()[2];

@@ -3,6 +3,7 @@
 mod document;
 mod menu;
 mod path_box;
+mod slices;
 mod start;
 mod status;
 mod tools;
@@ -10,6 +11,7 @@ mod tools;
 pub use document::document;
 pub use menu::menu;
 pub use path_box::{PathBox, path_box};
+pub use slices::{Slices, slices};
 pub use start::start;
 pub use status::status;
 pub use tools::{RADII, tools};

@@ -4,8 +4,10 @@ mod camera;
 mod canvas;
 mod pick;
 mod shape;
+mod slice;
 
 pub use camera::{Camera, Ray};
 pub use canvas::{Canvas, Look};
 pub use pick::pick;
 pub use shape::{Patch, Shape};
+pub use slice::{Slice, sides};

@@ -180,6 +180,7 @@ impl Desk {
                 iso: object.meta.iso?,
                 own_box: object.field.world_box(),
                 world_from_object: open.shown.placement(name).ok()?,
+                is_volume: object.meta.source == formats::field::SourceKind::Volume,
                 unit: match object.meta.unit {
                     formats::Unit::Unknown => "",
                     unit => unit.symbol(),

@@ -15,7 +15,7 @@ use super::desk::Desk;
 use super::gesture::{Gesture, Way};
 use super::orders::{News, Order, Sheet};
 use super::tool::{Kind, Tool};
-use crate::cli::desk_files;
+use crate::cli::{desk_files, interrupt};
 use crate::panels;
 use crate::view::{Camera, Canvas, Look, Ray, pick};
 
@@ -44,6 +44,8 @@ pub struct Bench {
     pub messages: VecDeque<(Instant, String, bool)>,
     /// Triangles that are shown.
     pub triangles: usize,
+    /// Planes through the chosen object, if they are shown.
+    pub slices: Option<panels::Slices>,
     /// The path that is being asked for.
     pub asks: Option<panels::PathBox>,
     /// Where sample scans are written.
@@ -119,6 +121,7 @@ impl Modeler {
     pub fn new(context: &eframe::CreationContext<'_>, files: Vec<PathBuf>) -> Self {
         let canvas = context.wgpu_render_state.clone().map(Canvas::new);
         let modeler = Self::on(&context.egui_ctx, canvas, desk_files::home());
+        close_when_asked(&context.egui_ctx);
         for file in files {
             modeler.bench.order(Order::Open(file));
         }
@@ -153,6 +156,7 @@ impl Modeler {
                 busy: None,
                 messages: VecDeque::new(),
                 triangles: 0,
+                slices: None,
                 asks: None,
                 scratch: None,
                 orders,
@@ -413,6 +417,18 @@ fn at(rect: Rect, p: Pos2) -> DVec2 {
     DVec2::new(f64::from(way.x), -f64::from(way.y)) / f64::from(rect.height())
 }
 
+/// Closes the window on Ctrl-C and SIGTERM, as its own button does.
+fn close_when_asked(context: &egui::Context) {
+    let (asked, context) = (interrupt::in_window(), context.clone());
+    std::thread::spawn(move || {
+        while !asked.is_cancelled() {
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        context.send_viewport_cmd(egui::ViewportCommand::Close);
+        context.request_repaint();
+    });
+}
+
 fn wake(context: &egui::Context) -> Box<dyn Fn() + Send> {
     let context = context.clone();
     Box::new(move || context.request_repaint())
@@ -450,6 +466,7 @@ impl Modeler {
             Some(_) => self.viewport(ui),
             None => panels::start(ui, &mut self.bench),
         });
+        panels::slices(ui.ctx(), &mut self.bench);
         panels::path_box(ui.ctx(), &mut self.bench);
         if self.bench.message().is_some() {
             ui.ctx().request_repaint_after(Duration::from_secs(1));

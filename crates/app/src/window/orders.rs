@@ -104,6 +104,8 @@ pub struct Thing {
     pub own_box: Aabb,
     /// Where it stands.
     pub world_from_object: DAffine3,
+    /// Whether it was fitted to a volume: then its world is a patient's.
+    pub is_volume: bool,
     /// Of its lengths, as people write it.
     pub unit: &'static str,
     /// Coefficients of its field.
