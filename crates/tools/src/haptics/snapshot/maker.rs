@@ -24,8 +24,8 @@ const SLACK: f64 = 0.25;
 const ROOM: f64 = 9.0;
 /// Closest nodes for tools of many points, mm.
 const FINEST: f64 = 0.5;
-/// Nodes on an axis for such a tool, where they are not closer than that.
-const TOOL_NODES: f64 = 100.0;
+/// Nodes on an axis for such a tool, where they are not closer than that: a box that follows is made anew in two steps of a simulation.
+const TOOL_NODES: f64 = 64.0;
 /// Most nodes on an axis.
 const MOST: f64 = 200.0;
 
