@@ -2,7 +2,8 @@
 //!
 //! `cargo bench -p tools --bench haptics`. Balls with knots of 0.5 mm that fill boxes of 64³ to 512³ cells show that nothing grows with the model;
 //! the default fits of `data/bunny.obj.gz` and, at an iso-value that is not the fitted one, `data/head.nii.gz` what a scan costs. First a
-//! table: what is lost by wider nodes and by linear interpolation, against the distance to the surface by looking everywhere.
+//! table: what is lost by wider nodes and by linear interpolation, against the distance to the surface by looking everywhere; and what a tick
+//! of the proxy costs.
 
 use std::hint::black_box;
 use std::sync::Arc;
@@ -13,8 +14,8 @@ use criterion::measurement::Measurement;
 use criterion::{BenchmarkId, Criterion};
 use glam::{DAffine3, DVec3};
 use tools::haptics::{
-    BrickOptions, Demand, DistanceBrick, Interpolation, Obstacle, SnapshotMaker, Surface, Touch,
-    TouchedObject,
+    BrickOptions, Demand, DistanceBrick, Interpolation, Obstacle, Pose, Proxy, ProxyOptions, Renderer,
+    SnapshotMaker, Surface, Touch, TouchedObject,
 };
 use tools::paint::Layers;
 
@@ -206,11 +207,16 @@ fn accuracy(piece: &Piece) {
     let step = 0.3;
     let all = surface(piece, &Aabb::new(piece.at, piece.at).widened(13.0), step);
     println!("{}: {} places of the surface", piece.name, all.len());
-    for radius in [5.0, 2.0, 0.5] {
+    for radius in [5.0, 2.0, 0.5, 0.0] {
         for interpolation in [Interpolation::Cubic, Interpolation::Linear] {
-            for spacing in [0.4, 0.5, 0.75, 1.0, 1.5, 2.5] {
+            let spacings = if radius > 0.0 {
+                [0.4, 0.5, 0.75, 1.0, 1.5, 2.5]
+            } else {
+                [0.15, 0.2, 0.25, 0.375, 0.5, 1.0]
+            };
+            for spacing in spacings {
                 let options = BrickOptions {
-                    reach: 15.0,
+                    reach: if radius > 0.0 { 15.0 } else { 7.5 },
                     spacing,
                     band: radius + 2.0 * spacing,
                     interpolation,
@@ -278,7 +284,22 @@ fn snapshots(c: &mut Criterion<CpuTime>, piece: &Piece) {
                 b.iter(|| black_box(next()));
             },
         );
-        let snapshot = next();
+        let mut maker = SnapshotMaker::new(demand);
+        let mut n = 0;
+        let mut follow = || {
+            n += 1;
+            maker.free();
+            let along = DVec3::X * if n % 2 == 0 { 0.0 } else { 0.3 * demand.reach };
+            maker.make(piece.at + along, &[piece.object(&fields[0], &layers)], 0)
+        };
+        follow();
+        group.bench_function(
+            BenchmarkId::new(format!("ball {radius} mm"), "box follows"),
+            |b| {
+                b.iter(|| black_box(follow()));
+            },
+        );
+        let snapshot = follow();
         let asked = places(piece.at, 6.0, 4096);
         let mut sum = 0.0;
         group.bench_function(
@@ -292,11 +313,62 @@ fn snapshots(c: &mut Criterion<CpuTime>, piece: &Piece) {
     group.finish();
 }
 
+/// What a tick of the proxy costs, over the surface with the hand 2 mm inside: mean and 99 %, of the least time that each tick took in
+/// some rounds, so that what else the machine did is left out.
+fn ticks(piece: &Piece) {
+    let field: Arc<dyn Field> = Arc::new(piece.field.clone());
+    let layers = Layers::new();
+    let inward = piece.field.value_gradient(piece.at).1.normalize();
+    let (u, v) = inward.any_orthonormal_pair();
+    for radius in [0.0, 0.5, 2.0, 5.0] {
+        let mut maker = SnapshotMaker::new(Demand::of_ball(radius));
+        let snapshot = maker.make(piece.at, &[piece.object(&field, &layers)], 0);
+        let hand = |n: usize| {
+            let (sine, cosine) = libm::sincos(1e-3 * n as f64);
+            let depth = 2.0 - (radius + 4.0) * (1.0 - n as f64 / 500.0).max(0.0);
+            Pose::at(piece.at + 3.0 * (sine * u + cosine * v) + (depth - radius) * inward)
+        };
+        let mut least = vec![f64::INFINITY; 6000];
+        let mut touched = 0;
+        for _ in 0..4 {
+            let mut proxy = Proxy::new(ProxyOptions {
+                radius,
+                ..ProxyOptions::default()
+            });
+            touched = 0;
+            for (n, least) in least.iter_mut().enumerate() {
+                let pose = hand(n);
+                let start = std::time::Instant::now();
+                let felt = black_box(proxy.tick(&*snapshot, &pose, 1e-3));
+                *least = least.min(start.elapsed().as_secs_f64() * 1e6);
+                touched += usize::from(felt.force != DVec3::ZERO);
+            }
+        }
+        let mean = least.iter().sum::<f64>() / least.len() as f64;
+        least.sort_by(f64::total_cmp);
+        println!(
+            "{}, ball {radius} mm: tick {mean:.2} µs on the mean, {:.2} µs at 99 %; {touched} of {} touch",
+            piece.name,
+            least[least.len() * 99 / 100],
+            least.len()
+        );
+    }
+}
+
 fn haptics(c: &mut Criterion<CpuTime>) {
     let scans = scanned();
-    scans.iter().for_each(accuracy);
+    // Tables come without a filter.
+    let is_whole = std::env::args().skip(1).all(|a| a.starts_with("--"));
+    if is_whole {
+        scans.iter().for_each(accuracy);
+        scans.iter().for_each(ticks);
+    }
     for depth in 1..=4 {
-        snapshots(c, &Piece::ball(depth));
+        let ball = Piece::ball(depth);
+        if is_whole {
+            ticks(&ball);
+        }
+        snapshots(c, &ball);
     }
     scans.iter().for_each(|piece| snapshots(c, piece));
 }

@@ -37,8 +37,8 @@ pub use proxy::{Friction, Magnet, Proxy, ProxyOptions};
 pub use record::TickRecord;
 pub use servo::{Servo, ServoError, ServoOptions, Tick};
 pub use snapshot::{
-    BrickOptions, Demand, DistanceBrick, FieldObstacle, Interpolation, Moving, Part, Shape, Snapshot,
-    SnapshotMaker, Surface, TouchMap, TouchedObject, Unresolved,
+    BrickOptions, Demand, DistanceBrick, FieldObstacle, Interpolation, Moving, Part, Snapshot, SnapshotMaker,
+    Surface, TouchMap, TouchedObject, Unresolved,
 };
 pub use stroke_force::{StrokeForce, StrokeForceOptions, StrokeStep, newtons_per_unit};
 pub use vcp::{Vcp, VcpOptions};

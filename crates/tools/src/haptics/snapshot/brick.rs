@@ -4,7 +4,8 @@ use bspline::Aabb;
 use glam::DVec3;
 
 use super::distances::Distances;
-use super::grid::Grid;
+use super::grid::{Grid, STEP};
+use super::region::Region;
 use super::spline::{self, Interpolation};
 use super::surface::Surface;
 use super::thin::Unresolved;
@@ -15,6 +16,10 @@ const THINNEST: f64 = 0.1;
 
 /// Distance of nodes, mm, with which a ball of 5 mm rolls over a scan within 0.1 mm of the exact offset, and not with a third more.
 const COARSEST: f64 = 0.75;
+
+/// Distance of nodes, over that of knots, with which a point is on the surface of a scan within 10 µm: it is off by 1.7 µm in 95 of 100
+/// places, 8 µm in the worst.
+const POINT: f64 = 0.375;
 
 /// How a brick is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,10 +42,15 @@ impl Default for BrickOptions {
 }
 
 impl BrickOptions {
-    /// For a tool of a radius on a field whose knots are so far apart, both mm.
+    /// For a tool of a radius, 0 for a point, on a field whose knots are so far apart, both mm.
     pub fn of_tool(radius: f64, detail: f64) -> Self {
-        // Where a ball touches two places at once its offset has an edge, which nodes round by a tenth of their distance.
-        let spacing = (0.5 * radius).min(COARSEST).max(detail);
+        // Where a ball touches two places at once its offset has an edge, which nodes round by a tenth of their distance. A point is
+        // on the surface itself, which is as smooth as its knots are far apart.
+        let spacing = if radius > 0.0 {
+            (0.5 * radius).min(COARSEST).max(detail)
+        } else {
+            POINT * detail
+        };
         Self {
             reach: 15.0,
             spacing,
@@ -56,6 +66,12 @@ impl BrickOptions {
         // A spline needs a node more on each side.
         let b = Aabb::new(at, at).widened(self.reach + self.spacing);
         Grid::round(&b, self.spacing)
+    }
+
+    /// Nodes round a tool, wherever it is.
+    pub(super) fn most_nodes(&self) -> usize {
+        let needed = 2.0 * (self.reach + self.spacing) / self.spacing;
+        (needed.ceil() as usize + 2 * STEP).pow(3)
     }
 }
 
@@ -76,16 +92,26 @@ impl DistanceBrick {
     /// Round a tool that is at `at`.
     pub fn new(surface: &Surface<'_>, at: DVec3, options: &BrickOptions) -> Self {
         let distances = Distances::new(surface, options.grid(at), options.band);
-        Self::of(&distances, options.interpolation)
+        Self::of(&distances, options.interpolation, None)
     }
 
-    /// Of distances that are known.
-    pub(super) fn of(distances: &Distances, interpolation: Interpolation) -> Self {
+    /// Of distances that are known, and of the brick of those that they were renewed from.
+    pub(super) fn of(distances: &Distances, interpolation: Interpolation, before: Option<&Self>) -> Self {
         let grid = distances.grid;
-        let mut numbers = distances.phi.clone();
-        if interpolation == Interpolation::Cubic {
-            spline::coefficients(&grid, &mut numbers);
-        }
+        let before = before.filter(|b| b.grid == grid && b.interpolation == interpolation);
+        let numbers = match (interpolation, before) {
+            (Interpolation::Linear, _) => distances.phi.clone(),
+            (Interpolation::Cubic, Some(before)) => {
+                let mut numbers = before.numbers.clone();
+                spline::coefficients(&grid, &distances.phi, distances.changed, &mut numbers);
+                numbers
+            }
+            (Interpolation::Cubic, None) => {
+                let mut numbers = vec![0.0; grid.len()];
+                spline::coefficients(&grid, &distances.phi, Region::whole(&grid), &mut numbers);
+                numbers
+            }
+        };
         Self {
             grid,
             band: distances.band,
@@ -99,9 +125,10 @@ impl DistanceBrick {
     /// Of any obstacle, as it tells its distance, in a box.
     pub(in crate::haptics) fn sampled(obstacle: &dyn Obstacle, within: &Aabb, spacing: f64) -> Self {
         let grid = Grid::round(&within.widened(2.0 * spacing), spacing);
-        let told = |at| obstacle.distance(grid.place(at)).0 as f32;
-        let mut numbers: Vec<f32> = grid.nodes().map(told).collect();
-        spline::coefficients(&grid, &mut numbers);
+        let told = |slot| obstacle.distance(grid.place(grid.node(slot))).0 as f32;
+        let distances: Vec<f32> = (0..grid.len()).map(told).collect();
+        let mut numbers = vec![0.0; grid.len()];
+        spline::coefficients(&grid, &distances, Region::whole(&grid), &mut numbers);
         Self {
             grid,
             band: 0.0,

@@ -46,9 +46,15 @@ impl Foot {
     /// `C = ∇²f/|∇f|` and `s = (p − x)·n`; then along `n` by `a − uᵀCu/2 − a uᵀCn`, so that `f = c` to second order. Beyond the
     /// centre of curvature, where `1 + sC` is not positive and `x` no least distance, it goes downhill instead.
     pub fn toward(&self, p: DVec3, longest: f64) -> DVec3 {
+        self.toward_with_trust(p, longest).0
+    }
+
+    /// The same, and what the least eigenvalue of `1 + sC` is at least, a half of it or more: 0 where the step was cut or went downhill, and says
+    /// little.
+    pub fn toward_with_trust(&self, p: DVec3, longest: f64) -> (DVec3, f64) {
         let n = self.inward;
         if n == DVec3::ZERO {
-            return self.at;
+            return (self.at, 0.0);
         }
         let (t1, t2) = n.any_orthonormal_pair();
         let d = p - self.at;
@@ -59,18 +65,32 @@ impl Foot {
         let (r1, r2) = (t1.dot(d) - a * s * b1, t2.dot(d) - a * s * b2);
         let (m11, m12, m22) = (1.0 + s * c11, s * c12, 1.0 + s * c22);
         let det = m11 * m22 - m12 * m12;
-        let (mut u1, mut u2) = match det > 1e-3 && m11 + m22 > 0.0 {
+        let is_upright = det > 1e-3 && m11 + m22 > 0.0;
+        let (mut u1, mut u2) = match is_upright {
             true => ((m22 * r1 - m12 * r2) / det, (m11 * r2 - m12 * r1) / det),
             false => (r1, r2),
         };
-        let length = (u1 * u1 + u2 * u2).sqrt();
-        if length > longest {
-            (u1, u2) = (u1 * longest / length, u2 * longest / length);
+        let square = u1 * u1 + u2 * u2;
+        let is_whole = is_upright && square < longest * longest && a.abs() < longest;
+        if square > longest * longest {
+            let cut = longest / square.sqrt();
+            (u1, u2) = (u1 * cut, u2 * cut);
         }
-        let length = length.min(longest);
-        let sag = 0.5 * (c11 * u1 * u1 + 2.0 * c12 * u1 * u2 + c22 * u2 * u2) + a * (b1 * u1 + b2 * u2);
-        let sag = sag.clamp(-0.5 * length, 0.5 * length);
-        self.at + u1 * t1 + u2 * t2 + (a.clamp(-longest, longest) - sag) * n
+        let mut sag = 0.5 * (c11 * u1 * u1 + 2.0 * c12 * u1 * u2 + c22 * u2 * u2) + a * (b1 * u1 + b2 * u2);
+        let square = u1 * u1 + u2 * u2;
+        if sag * sag > 0.25 * square {
+            sag = (0.5 * square.sqrt()).copysign(sag);
+        }
+        (
+            self.at + u1 * t1 + u2 * t2 + (a.clamp(-longest, longest) - sag) * n,
+            if is_whole { det / (m11 + m22) } else { 0.0 },
+        )
+    }
+
+    /// How deep a place near this one is inside, to second order.
+    pub fn depth_at(&self, p: DVec3) -> f64 {
+        let d = p - self.at;
+        self.depth + self.inward.dot(d) + 0.5 * d.dot(self.bend * d)
     }
 }
 

@@ -3,6 +3,9 @@
 use bspline::{Aabb, Frame};
 use glam::{DAffine3, DQuat, DVec3};
 
+/// Nodes from one to the next of those that are always looked at. A grid begins and ends with one.
+pub const STEP: usize = 4;
+
 /// A box of nodes `(i, j, k)·spacing`, z fastest. Grids of one spacing share their nodes, to the bit, wherever their boxes lie.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grid {
@@ -15,10 +18,13 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// The least box of nodes round a box of the world.
+    /// The least box of nodes round a box of the world, from a multiple of [`STEP`] to another.
     pub fn round(b: &Aabb, spacing: f64) -> Self {
-        let first = (b.min / spacing).floor().to_array().map(|v| v as i64);
-        let last = (b.max / spacing).ceil().to_array().map(|v| v as i64);
+        let step = STEP as i64;
+        let first = (b.min / spacing).floor().to_array();
+        let first = first.map(|v| (v as i64).div_euclid(step) * step);
+        let last = (b.max / spacing).ceil().to_array();
+        let last = last.map(|v| (v as i64 + step - 1).div_euclid(step) * step);
         Self {
             first,
             count: std::array::from_fn(|a| (last[a] - first[a]) as usize + 1),
@@ -37,6 +43,23 @@ impl Grid {
         Aabb::new(self.place([0; 3]), self.place(last))
     }
 
+    /// Number of a node of the box in the world.
+    pub fn number(&self, at: [usize; 3]) -> [i32; 3] {
+        std::array::from_fn(|a| (self.first[a] + at[a] as i64) as i32)
+    }
+
+    /// The node of the box with a number in the world.
+    pub fn find(&self, number: [i32; 3]) -> Option<[usize; 3]> {
+        let at: [i64; 3] = std::array::from_fn(|a| i64::from(number[a]) - self.first[a]);
+        let is_there = (0..3).all(|a| at[a] >= 0 && at[a] < self.count[a] as i64);
+        is_there.then(|| at.map(|n| n as usize))
+    }
+
+    /// Whether a node lies at a side of the box.
+    pub fn is_rim(&self, at: [usize; 3]) -> bool {
+        (0..3).any(|a| at[a] == 0 || at[a] + 1 == self.count[a])
+    }
+
     /// Where a node of the box lies.
     pub fn place(&self, at: [usize; 3]) -> DVec3 {
         let number = |a: usize| (self.first[a] + at[a] as i64) as f64;
@@ -48,16 +71,20 @@ impl Grid {
         (at[0] * self.count[1] + at[1]) * self.count[2] + at[2]
     }
 
-    /// All nodes in the order of lists.
-    pub fn nodes(&self) -> impl Iterator<Item = [usize; 3]> + use<> {
-        let [nx, ny, nz] = self.count;
-        (0..nx).flat_map(move |x| (0..ny).flat_map(move |y| (0..nz).map(move |z| [x, y, z])))
-    }
-
     /// The node at a place of lists.
     pub fn node(&self, slot: usize) -> [usize; 3] {
         let [_, ny, nz] = self.count;
         [slot / (ny * nz), slot / nz % ny, slot % nz]
+    }
+
+    /// Places in lists of the nodes next to one on each axis.
+    pub fn neighbours(&self, at: [usize; 3], slot: usize) -> impl Iterator<Item = usize> + use<> {
+        let (strides, count) = (self.strides(), self.count);
+        (0..3).flat_map(move |a| {
+            let before = (at[a] > 0).then(|| slot - strides[a]);
+            let behind = (at[a] + 1 < count[a]).then(|| slot + strides[a]);
+            before.into_iter().chain(behind)
+        })
     }
 
     /// Steps in lists to the next node on each axis.

@@ -1,50 +1,64 @@
-//! What of a grid an answer was made from, and whether any of it has changed.
+//! What of a field and of a grid an answer was made from, and whether any of it has changed.
 
+use bspline::Aabb;
 use glam::DVec3;
 
 use super::grid::Grid;
+use super::region::Region;
 
-/// Farther than a grid is wide, also where it has moved.
-const AWAY: i16 = 4000;
+/// Numbers beyond any grid.
+const AWAY: i32 = 1 << 29;
 
-/// A box of cells and nodes, both by the number of their first corner in a grid.
+/// A box of cells and nodes, both by the number of their first corner in the world, both ends included.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Hull {
-    lo: [i16; 3],
-    hi: [i16; 3],
+    lo: [i32; 3],
+    hi: [i32; 3],
 }
 
 impl Hull {
+    /// Of nothing.
+    pub const NONE: Self = Self {
+        lo: [AWAY; 3],
+        hi: [-AWAY; 3],
+    };
+
     /// Of a node alone.
-    pub fn of(node: [usize; 3]) -> Self {
-        let at = node.map(|n| n as i16);
-        Self { lo: at, hi: at }
+    pub fn of(node: [i32; 3]) -> Self {
+        Self { lo: node, hi: node }
+    }
+
+    /// As numbers: those of nothing known are all 0.
+    pub fn pack(&self) -> [i32; 6] {
+        let (a, b) = (self.lo, self.hi);
+        [a[0], a[1], a[2], b[0], b[1], b[2]]
+    }
+
+    /// From numbers.
+    pub fn unpack(n: &[i32; 6]) -> Self {
+        Self {
+            lo: [n[0], n[1], n[2]],
+            hi: [n[3], n[4], n[5]],
+        }
     }
 
     /// With a node.
-    pub fn add(&mut self, node: [usize; 3]) {
-        for a in 0..3 {
-            self.lo[a] = self.lo[a].min(node[a] as i16);
-            self.hi[a] = self.hi[a].max(node[a] as i16);
-        }
+    pub fn add(&mut self, node: [i32; 3]) {
+        *self = self.with(&Self::of(node));
     }
 
     /// With the cell of a place, wherever that is.
-    pub fn add_place(&mut self, grid: &Grid, p: DVec3) {
-        let q = (p / grid.spacing).floor();
-        for a in 0..3 {
-            let cell = (q[a] - grid.first[a] as f64).clamp(f64::from(-AWAY), f64::from(AWAY)) as i16;
-            self.lo[a] = self.lo[a].min(cell);
-            self.hi[a] = self.hi[a].max(cell);
-        }
+    pub fn add_place(&mut self, spacing: f64, p: DVec3) {
+        let most = f64::from(AWAY);
+        let cell = (p / spacing).floor().to_array();
+        self.add(cell.map(|n| n.clamp(-most, most) as i32));
     }
 
-    /// The same where the grid begins `by` nodes earlier.
-    pub fn moved(&self, by: [i64; 3]) -> Self {
-        let corner = |of: [i16; 3]| std::array::from_fn(|a| (i64::from(of[a]) + by[a]) as i16);
+    /// Round both.
+    pub fn with(&self, other: &Self) -> Self {
         Self {
-            lo: corner(self.lo),
-            hi: corner(self.hi),
+            lo: std::array::from_fn(|a| self.lo[a].min(other.lo[a])),
+            hi: std::array::from_fn(|a| self.hi[a].max(other.hi[a])),
         }
     }
 
@@ -53,48 +67,143 @@ impl Hull {
         self.lo = [-AWAY; 3];
     }
 
-    /// The same where the grid begins `by` nodes earlier; none where it is not wholly in the grid.
-    pub fn within(&self, grid: &Grid, by: [i64; 3]) -> Option<[[usize; 3]; 2]> {
-        let moved = self.moved(by);
-        let is_inside = |of: [i16; 3]| (0..3).all(|a| of[a] >= 0 && (of[a] as usize) < grid.count[a]);
-        (is_inside(moved.lo) && is_inside(moved.hi))
-            .then(|| [moved.lo, moved.hi].map(|of| of.map(|n| n as usize)))
+    /// With `by` more on each side.
+    pub fn grown(&self, by: i32) -> Self {
+        Self {
+            lo: self.lo.map(|n| n - by),
+            hi: self.hi.map(|n| n + by),
+        }
+    }
+
+    /// Whether it goes farther than `by` from a node of it.
+    pub fn is_wider(&self, node: [i32; 3], by: i32) -> bool {
+        (0..3).any(|a| node[a] - self.lo[a] > by || self.hi[a] - node[a] > by)
+    }
+
+    /// Whether both have a cell in common.
+    pub fn meets(&self, other: &Self) -> bool {
+        (0..3).all(|a| self.lo[a] <= other.hi[a] && self.hi[a] >= other.lo[a])
+    }
+
+    /// What of it is in a grid.
+    pub fn region(&self, grid: &Grid) -> Region {
+        let end = |n: i32, a: usize| (i64::from(n) - grid.first[a]).clamp(0, grid.count[a] as i64) as usize;
+        Region {
+            lo: std::array::from_fn(|a| end(self.lo[a], a)),
+            end: std::array::from_fn(|a| end(self.hi[a].saturating_add(1), a)),
+        }
+    }
+
+    /// Whether all of it is in a grid.
+    pub fn is_within(&self, grid: &Grid) -> bool {
+        (0..3).all(|a| {
+            i64::from(self.lo[a]) >= grid.first[a]
+                && i64::from(self.hi[a]) < grid.first[a] + grid.count[a] as i64
+        })
     }
 }
 
-/// Marks on a grid, counted so that any box is looked through at once.
-pub struct Marks {
+/// Where a field has changed, and where nodes beside the surface have.
+pub struct Changes {
     grid: Grid,
-    /// Marks before each place on all axes.
+    /// Round cells in which the field has changed, also beyond the grid.
+    cells: Hull,
+    boxes: Vec<Hull>,
+    /// Round all.
+    all: Hull,
+    region: Region,
+    /// Marks before each place of the region on all axes.
     sums: Vec<u32>,
 }
 
-impl Marks {
-    /// Of the places that `is_marked` by their place in lists.
-    pub fn new(grid: &Grid, is_marked: impl Fn(usize) -> bool) -> Self {
-        let [nx, ny, nz] = grid.count;
-        let (sy, sx) = (nz + 1, (ny + 1) * (nz + 1));
-        let mut sums = vec![0u32; (nx + 1) * sx];
-        for x in 0..nx {
-            for y in 0..ny {
-                let mut row = 0;
-                for z in 0..nz {
-                    row += u32::from(is_marked(grid.slot([x, y, z])));
-                    let at = (x + 1) * sx + (y + 1) * sy + z + 1;
-                    sums[at] = row + sums[at - sx] + sums[at - sy] - sums[at - sx - sy];
-                }
-            }
-        }
-        Self { grid: *grid, sums }
+impl Changes {
+    /// Of boxes of the world outside which a field has the bits that it had.
+    pub fn new(grid: &Grid, changed: &[Aabb]) -> Self {
+        let hull = |b: &Aabb| {
+            let mut hull = Hull::NONE;
+            hull.add_place(grid.spacing, b.min - 1e-6 * grid.spacing);
+            hull.add_place(grid.spacing, b.max + 1e-6 * grid.spacing);
+            hull
+        };
+        let boxes: Vec<Hull> = changed.iter().map(hull).collect();
+        let cells = boxes.iter().fold(Hull::NONE, |all, b| all.with(b));
+        Self::of(grid, cells, boxes, &[])
     }
 
-    /// Whether any place of a box is marked.
-    pub fn any(&self, [lo, hi]: [[usize; 3]; 2]) -> bool {
-        let [_, ny, nz] = self.grid.count;
+    /// With nodes, by their places in lists.
+    pub fn with(self, nodes: &[usize]) -> Self {
+        Self::of(&self.grid, self.cells, self.boxes, nodes)
+    }
+
+    /// Of nodes alone.
+    pub fn of_nodes(grid: &Grid, nodes: &[usize]) -> Self {
+        Self::of(grid, Hull::NONE, Vec::new(), nodes)
+    }
+
+    fn of(grid: &Grid, cells: Hull, boxes: Vec<Hull>, nodes: &[usize]) -> Self {
+        let mut all = cells;
+        nodes
+            .iter()
+            .for_each(|slot| all.add(grid.number(grid.node(*slot))));
+        let region = all.region(grid);
+        let [nx, ny, nz] = region.count();
+        let (sy, sx) = (nz + 1, (ny + 1) * (nz + 1));
+        let mut sums = vec![0u32; (nx + 1) * sx];
+        let place = |at: [usize; 3]| {
+            let [x, y, z]: [usize; 3] = std::array::from_fn(|a| at[a] - region.lo[a] + 1);
+            x * sx + y * sy + z
+        };
+        if !region.is_empty() {
+            for b in &boxes {
+                for (at, slots) in b.region(grid).rows(grid) {
+                    let start = place(at);
+                    sums[start..start + slots.len()].fill(1);
+                }
+            }
+            nodes.iter().for_each(|slot| sums[place(grid.node(*slot))] = 1);
+            for at in sx..sums.len() {
+                if at % sx < sy || at % sy == 0 {
+                    continue;
+                }
+                let row = sums[at] + sums[at - 1] + sums[at - sx] - sums[at - sx - 1];
+                sums[at] =
+                    row + sums[at - sy] - sums[at - sy - 1] - sums[at - sx - sy] + sums[at - sx - sy - 1];
+            }
+        }
+        Self {
+            grid: *grid,
+            cells,
+            boxes,
+            all,
+            region,
+            sums,
+        }
+    }
+
+    /// Round all that has changed.
+    pub fn hull(&self) -> &Hull {
+        &self.all
+    }
+
+    /// Whether what a hull stands for has changed, or may have.
+    pub fn touch(&self, hull: &Hull) -> bool {
+        if !hull.meets(&self.all) {
+            return false;
+        }
+        if !hull.is_within(&self.grid) && hull.meets(&self.cells) {
+            return true;
+        }
+        let own = hull.region(&self.grid);
+        let lo: [usize; 3] = std::array::from_fn(|a| own.lo[a].max(self.region.lo[a]));
+        let end: [usize; 3] = std::array::from_fn(|a| own.end[a].min(self.region.end[a]));
+        if (0..3).any(|a| lo[a] >= end[a]) {
+            return false;
+        }
+        let [_, ny, nz] = self.region.count();
         let (sy, sx) = (nz + 1, (ny + 1) * (nz + 1));
         let at = |x: usize, y: usize, z: usize| self.sums[x * sx + y * sy + z];
-        let [x, y, z] = lo;
-        let [u, v, w] = hi.map(|n| n + 1);
+        let [x, y, z]: [usize; 3] = std::array::from_fn(|a| lo[a] - self.region.lo[a]);
+        let [u, v, w]: [usize; 3] = std::array::from_fn(|a| end[a] - self.region.lo[a]);
         let near = at(u, v, w) + at(u, y, z) + at(x, v, z) + at(x, y, w);
         near != at(x, v, w) + at(u, y, w) + at(u, v, z) + at(x, y, z)
     }

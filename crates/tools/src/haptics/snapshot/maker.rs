@@ -8,9 +8,8 @@ use glam::{DAffine3, DVec3};
 
 use super::brick::{BrickOptions, DistanceBrick};
 use super::distances::Distances;
-use super::field_obstacle::FieldObstacle;
 use super::spline::Interpolation;
-use super::state::{Part, Shape, Snapshot};
+use super::state::{Part, Snapshot};
 use super::surface::Surface;
 use super::touch_map::TouchMap;
 use crate::haptics::{PointTool, Touch};
@@ -20,19 +19,19 @@ use crate::paint::{Layers, Substance};
 const BRICK: u32 = 8;
 /// Share of the way to the sides of a box that a tool goes before the box follows.
 const SLACK: f64 = 0.25;
+/// From a point to the sides of its box, mm: it feels what is at itself alone, so its box is small and its nodes are close.
+const POINT_REACH: f64 = 7.5;
 /// From a tool of many points to the sides of its box, mm: as a ball of 2 mm has it.
 const ROOM: f64 = 9.0;
 /// Closest nodes for tools of many points, mm.
 const FINEST: f64 = 0.5;
 /// Nodes on an axis for such a tool, where they are not closer than that: a box that follows is made anew in two steps of a simulation.
 const TOOL_NODES: f64 = 64.0;
-/// Most nodes on an axis.
-const MOST: f64 = 200.0;
 
 /// What a tool asks of snapshots.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Demand {
-    /// Radius of the tool, mm; of a tool of many points that of its largest ball. Points, 0, touch the field itself where they can.
+    /// Radius of the tool, mm; of a tool of many points that of its largest ball; 0 of a point.
     pub radius: f64,
     /// From the tool to the sides of the box, mm: what it can reach until the next snapshot, and the depth of the hand.
     pub reach: f64,
@@ -40,21 +39,25 @@ pub struct Demand {
     pub spacing: Option<f64>,
     /// Shortest knot interval of fields that do not know theirs, mm of the world.
     pub detail: f64,
-    /// Nodes of an object up to which thin parts make them closer.
+    /// Most nodes of an object, whatever its radius, its knots and its thin parts ask for.
     pub most_nodes: usize,
     /// Between nodes.
     pub interpolation: Interpolation,
 }
 
 impl Demand {
-    /// Of a ball, or of a point. As far as a hand goes at 0.2 m/s until the next of 30 snapshots a second, and 6 mm in depth.
+    /// Of a ball, or of a point. As far as a hand goes at 0.2 m/s until the next of 30 snapshots a second, and 6 mm in depth of a ball.
     pub fn of_ball(radius: f64) -> Self {
         Self {
             radius,
-            reach: (2.0 * radius + 13.0).max(15.0),
+            reach: if radius > 0.0 {
+                (2.0 * radius + 13.0).max(15.0)
+            } else {
+                POINT_REACH
+            },
             spacing: None,
             detail: 0.5,
-            most_nodes: 300_000,
+            most_nodes: 380_000,
             interpolation: Interpolation::default(),
         }
     }
@@ -98,8 +101,10 @@ struct Kept {
     default: Touch,
     options: BrickOptions,
     center: DVec3,
-    distances: Option<Distances>,
-    shape: Shape,
+    distances: Distances,
+    shape: Arc<DistanceBrick>,
+    /// Distance of nodes before thin parts made them closer, and where the tool was then.
+    wanted: (f64, DVec3),
     painted: Option<Arc<TouchMap>>,
 }
 
@@ -175,75 +180,74 @@ impl SnapshotMaker {
     }
 
     /// An object as it is now, and the shape that it had if that was another.
-    fn renew(&mut self, at: DVec3, object: &TouchedObject<'_>, old: Option<Kept>) -> (Kept, Option<Shape>) {
+    fn renew(
+        &mut self,
+        at: DVec3,
+        object: &TouchedObject<'_>,
+        old: Option<Kept>,
+    ) -> (Kept, Option<Arc<DistanceBrick>>) {
         let surface = Surface::new(&*object.field, object.iso).placed(object.world_from_object);
         let old =
             old.filter(|old| old.iso == object.iso && old.world_from_object == object.world_from_object);
-        let Some(old) = old else {
+        let Some(mut old) = old else {
             return (self.begin(at, object, &surface), None);
         };
         let stays = (at - old.center).abs().max_element() <= SLACK * self.demand.reach;
         let center = if stays { old.center } else { at };
-        let grid = old.options.grid(center);
-        let look = surface.to_field(&grid.world_box().widened(9.0 * grid.spacing));
+        let look = old
+            .options
+            .grid(center)
+            .world_box()
+            .widened(9.0 * old.options.spacing);
         let changed = match Arc::ptr_eq(&old.field, &object.field) {
             true => Vec::new(),
-            false => object.field.changed_boxes(&*old.field, &look),
+            false => object.field.changed_boxes(&*old.field, &surface.to_field(&look)),
         };
-        if stays && changed.is_empty() {
-            let painted = self.painted(object, &old.options, center, Some(&old));
-            let now = Kept {
-                layers: object.layers.clone(),
-                default: object.default,
-                field: object.field.clone(),
-                painted,
-                ..old
-            };
-            return (now, None);
-        }
         let has_changed = !changed.is_empty();
-        // A box elsewhere may need other nodes.
-        let coarse = self.options(object, center);
-        let options = if stays || coarse.spacing == old.options.spacing {
-            old.options
-        } else {
-            coarse
-        };
-        let (distances, options) = match &old.distances {
-            Some(distances) if options == old.options => {
-                let found = distances.after(&surface, grid, &changed);
-                self.renewed += found.renewed;
-                self.finer(&surface, found, center, options)
+        if !stays || has_changed {
+            // A box elsewhere may need other nodes. Closer ones for a thin part stay until the tool has left it.
+            if !stays {
+                let coarse = self.options(object, center);
+                let (spacing, place) = old.wanted;
+                let is_near = (center - place).abs().max_element() <= self.demand.reach;
+                if coarse.spacing != spacing || old.options.spacing != spacing && !is_near {
+                    let begun = self.begin(at, object, &surface);
+                    return (begun, has_changed.then_some(old.shape));
+                }
             }
-            Some(_) => self.sample(&surface, center, options),
-            None => (None, options),
-        };
-        let shape = self.shape(object, distances.as_ref(), center, &options);
+            old.distances.renew(&surface, old.options.grid(center), &changed);
+            self.renewed += old.distances.renewed;
+            self.finer(&surface, &mut old.distances, center, &mut old.options);
+        }
+        let before = old.shape.clone();
+        if !stays || has_changed {
+            old.shape = Arc::new(DistanceBrick::of(
+                &old.distances,
+                old.options.interpolation,
+                Some(&before),
+            ));
+        }
         let now = Kept {
-            painted: self.painted(object, &options, center, Some(&old)),
-            options,
+            painted: self.painted(object, &old.options, center, Some(&old)),
             center,
-            distances,
-            shape,
             field: object.field.clone(),
             layers: object.layers.clone(),
             default: object.default,
             ..old
         };
         // A box that follows the tool shows the same surface: there is nothing to move.
-        (now, has_changed.then_some(old.shape))
+        (now, has_changed.then_some(before))
     }
 
     fn begin(&mut self, at: DVec3, object: &TouchedObject<'_>, surface: &Surface<'_>) -> Kept {
-        let options = self.options(object, at);
-        let is_point = self.demand.radius == 0.0 && levels(&object.field).is_some();
-        let (distances, options) = match is_point {
-            true => (None, options),
-            false => self.sample(surface, at, options),
-        };
+        let mut options = self.options(object, at);
+        let wanted = (options.spacing, at);
+        let mut distances = Distances::new(surface, options.grid(at), options.band);
+        self.renewed += distances.renewed;
+        self.finer(surface, &mut distances, at, &mut options);
         Kept {
             id: object.id,
-            shape: self.shape(object, distances.as_ref(), at, &options),
+            shape: Arc::new(DistanceBrick::of(&distances, options.interpolation, None)),
             painted: self.painted(object, &options, at, None),
             field: object.field.clone(),
             iso: object.iso,
@@ -253,65 +257,29 @@ impl SnapshotMaker {
             options,
             center: at,
             distances,
+            wanted,
         }
     }
 
-    fn sample(
-        &mut self,
-        surface: &Surface<'_>,
-        center: DVec3,
-        options: BrickOptions,
-    ) -> (Option<Distances>, BrickOptions) {
-        let found = Distances::new(surface, options.grid(center), options.band);
-        self.renewed += found.renewed;
-        self.finer(surface, found, center, options)
-    }
-
-    /// With closer nodes where some part is too thin for those at hand, as long as they are not too many.
+    /// Takes closer nodes where some part is too thin for those at hand, as long as they are not too many.
     fn finer(
         &mut self,
         surface: &Surface<'_>,
-        mut found: Distances,
+        found: &mut Distances,
         center: DVec3,
-        mut options: BrickOptions,
-    ) -> (Option<Distances>, BrickOptions) {
+        options: &mut BrickOptions,
+    ) {
         while found.unresolved.any() {
             let half = BrickOptions {
                 spacing: 0.5 * options.spacing,
-                ..options
+                ..*options
             };
-            let grid = half.grid(center);
-            if grid.len() > self.demand.most_nodes {
+            if half.most_nodes() > self.demand.most_nodes {
                 break;
             }
-            options = half;
-            found = Distances::new(surface, grid, options.band);
+            *options = half;
+            *found = Distances::new(surface, half.grid(center), half.band);
             self.renewed += found.renewed;
-        }
-        (Some(found), options)
-    }
-
-    fn shape(
-        &self,
-        object: &TouchedObject<'_>,
-        distances: Option<&Distances>,
-        center: DVec3,
-        options: &BrickOptions,
-    ) -> Shape {
-        let levels = levels(&object.field);
-        match (distances, levels) {
-            (Some(distances), _) => {
-                Shape::Brick(Arc::new(DistanceBrick::of(distances, options.interpolation)))
-            }
-            (None, Some(levels)) => {
-                let surface = Surface::new(levels, object.iso).placed(object.world_from_object);
-                let around = Aabb::new(center, center).widened(options.reach);
-                let local = Arc::new(levels.local(&surface.to_field(&around)));
-                let detail = self.detail(object, center);
-                let place = object.world_from_object;
-                Shape::Field(Arc::new(FieldObstacle::new(local, object.iso, place, detail)))
-            }
-            (None, None) => unreachable!("fields without levels are sampled"),
         }
     }
 
@@ -327,14 +295,12 @@ impl SnapshotMaker {
             return None;
         }
         let is_same = |old: &Kept| {
-            old.center == center
-                && old.options == *options
+            let map = old.painted.as_ref();
+            map.is_some_and(|map| *map.grid() == options.grid(center))
                 && old.default == object.default
                 && are_same(&old.layers, object.layers)
         };
-        if let Some(old) = old.filter(|old| is_same(old))
-            && old.painted.is_some()
-        {
+        if let Some(old) = old.filter(|old| is_same(old)) {
             return old.painted.clone();
         }
         let back = object.world_from_object.inverse();
@@ -350,13 +316,17 @@ impl SnapshotMaker {
         let wanted = demand
             .spacing
             .unwrap_or_else(|| BrickOptions::of_tool(demand.radius, detail).spacing);
-        let spacing = wanted.max(2.0 * demand.reach / MOST);
-        BrickOptions {
+        let of = |spacing: f64| BrickOptions {
             reach: demand.reach,
             spacing,
             band: demand.radius + 2.0 * spacing,
             interpolation: demand.interpolation,
+        };
+        let mut options = of(wanted);
+        while options.most_nodes() > demand.most_nodes {
+            options = of(1.0625 * options.spacing);
         }
+        options
     }
 
     /// Shortest knot interval in the box, mm of the world.

@@ -49,9 +49,13 @@ impl Seek<'_> {
         }) as f32
     }
 
-    /// Leads all to their closest places.
-    pub fn all(&self, seekers: &mut [Seeker]) {
+    /// Leads all to their closest places. `feet` gets what the field is like there, or as near to it as it was asked.
+    pub fn all(&self, seekers: &mut [Seeker], mut feet: Option<&mut Vec<Foot>>) {
         let h = self.grid.spacing;
+        if let Some(feet) = &mut feet {
+            feet.clear();
+            feet.extend(seekers.iter().map(|s| Foot::flat(s.start)));
+        }
         // No answer may be farther than this: a place of the surface is known that is as near.
         let mut most: Vec<f64> = seekers
             .iter()
@@ -72,7 +76,7 @@ impl Seek<'_> {
                 let most = &mut most[*i as usize];
                 let seeker = &mut seekers[*i as usize];
                 let p = self.grid.place(self.grid.node(seeker.slot as usize));
-                seeker.hull.add_place(self.grid, seeker.at);
+                seeker.hull.add_place(self.grid.spacing, seeker.at);
                 let Some(foot) = Foot::new(seeker.at, jet) else {
                     stuck.push(*i);
                     continue;
@@ -80,6 +84,9 @@ impl Seek<'_> {
                 if round == 0 && seeker.other.is_some() {
                     // The first place was a guess.
                     *most += foot.depth.abs();
+                }
+                if let Some(feet) = &mut feet {
+                    feet[*i as usize] = foot;
                 }
                 let next = foot.toward(p, h);
                 let step = next.distance(seeker.at);
@@ -94,7 +101,13 @@ impl Seek<'_> {
         }
         stuck.extend(&open);
         for i in stuck {
-            self.at_an_edge(&mut seekers[i as usize]);
+            let seeker = &mut seekers[i as usize];
+            self.at_an_edge(seeker);
+            if let Some(feet) = &mut feet {
+                self.surface.jets(&[seeker.at], &mut jets);
+                seeker.hull.add_place(h, seeker.at);
+                feet[i as usize] = Foot::new(seeker.at, &jets[0]).unwrap_or(Foot::flat(seeker.at));
+            }
         }
     }
 
@@ -104,10 +117,10 @@ impl Seek<'_> {
         let mut start = seeker.start;
         if let Some(other) = seeker.other {
             start = self.between(p, other, is_inside);
-            seeker.hull.add_place(self.grid, start);
-            seeker.hull.add_place(self.grid, other);
+            seeker.hull.add_place(self.grid.spacing, start);
+            seeker.hull.add_place(self.grid.spacing, other);
         }
-        let look = |at: DVec3| seeker.hull.add_place(self.grid, at);
+        let look = |at: DVec3| seeker.hull.add_place(self.grid.spacing, at);
         seeker.at = creased(self.surface, p, is_inside, start, self.grid.spacing, look);
     }
 

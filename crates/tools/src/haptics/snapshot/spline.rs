@@ -4,6 +4,7 @@ use bspline::{cubic, vectorized};
 use glam::DVec3;
 
 use super::grid::Grid;
+use super::region::Region;
 
 /// How numbers between nodes are found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -15,81 +16,79 @@ pub enum Interpolation {
     Linear,
 }
 
-/// Pole of the filter that makes coefficients of numbers \[Unser99\].
-const POLE: f32 = -0.267_949_2;
-/// Nodes after which what lies beyond has no more weight than rounding.
-const HORIZON: usize = 14;
+/// Weights of a number and of those one and two nodes away in a coefficient.
+///
+/// The spline through numbers `s` has `c = (1 + δ²/6)⁻¹ s` on each axis \[Unser99\]; this is `(1 − δ²/6 + δ⁴/36) s`, its series up to the
+/// second term. What is left out, `δ⁶s/216`, is of sixth order, as little against the error between nodes, of the fourth, as it is worth: and a
+/// coefficient follows from five numbers a line, so that what is far away changes none.
+const WEIGHTS: [f32; 3] = [1.5, -5.0 / 18.0, 1.0 / 36.0];
+/// Nodes to each side that a coefficient follows from.
+const SIDE: usize = 2;
 
-/// Coefficients of the cubic spline through numbers at the nodes of a grid, in place; beyond the grid it is mirrored.
-pub fn coefficients(grid: &Grid, numbers: &mut [f32]) {
-    let strides = grid.strides();
-    let mut line = vec![0.0f32; grid.count[2]];
-    for row in numbers.chunks_exact_mut(grid.count[2]) {
-        line.copy_from_slice(row);
-        filter_rows(&mut line, grid.count[2], 1);
-        row.copy_from_slice(&line);
+/// Renews the coefficients of the cubic spline through numbers at the nodes of a grid, where numbers of a region have changed; beyond the grid it
+/// is mirrored.
+pub fn coefficients(grid: &Grid, numbers: &[f32], changed: Region, out: &mut [f32]) {
+    let to = changed.grown(SIDE, grid);
+    if to.is_empty() {
+        return;
     }
-    for plane in numbers.chunks_exact_mut(strides[0]) {
-        filter_rows(plane, grid.count[1], strides[1]);
+    let from = to.grown(SIDE, grid);
+    let ([fx, fy, fz], [tx, ty, tz]) = (from.count(), to.count());
+    // Along z, y, x; each axis goes from `from` to `to`.
+    let mut planes = vec![0.0f32; fx * fy * tz];
+    for ((_, slots), row) in from.rows(grid).zip(planes.chunks_exact_mut(tz)) {
+        let line = &numbers[slots.start - from.lo[2]..][..grid.count[2]];
+        for (z, c) in row.iter_mut().enumerate() {
+            *c = weighted(to.lo[2] + z, grid.count[2], |n| line[n]);
+        }
     }
-    filter_rows(numbers, grid.count[0], strides[0]);
+    debug_assert!(fz >= tz);
+    let mut lines = vec![0.0f32; fx * ty * tz];
+    for x in 0..fx {
+        let plane = &planes[x * fy * tz..][..fy * tz];
+        for y in 0..ty {
+            let at = to.lo[1] + y;
+            let rows = |n: usize| &plane[(n - from.lo[1]) * tz..][..tz];
+            weigh(at, grid.count[1], rows, &mut lines[(x * ty + y) * tz..][..tz]);
+        }
+    }
+    let mut row = vec![0.0f32; ty * tz];
+    for x in 0..tx {
+        let at = to.lo[0] + x;
+        let rows = |n: usize| &lines[(n - from.lo[0]) * ty * tz..][..ty * tz];
+        weigh(at, grid.count[0], rows, &mut row);
+        for (y, row) in row.chunks_exact(tz).enumerate() {
+            let start = grid.slot([at, to.lo[1] + y, to.lo[2]]);
+            out[start..start + tz].copy_from_slice(row);
+        }
+    }
 }
 
-/// Filters along `count` rows of `width` numbers.
-fn filter_rows(rows: &mut [f32], count: usize, width: usize) {
-    // 1/6, 4/6, 1/6 is undone by c⁺ₖ = 6s + z c⁺ₖ₋₁ forward and cₖ = z(cₖ₊₁ − c⁺ₖ) backward.
-    let mut first = vec![0.0f32; width];
-    let mut power = 1.0f32;
-    for k in 0..HORIZON {
-        // Mirrored about the first node and, for short lines, about the last.
-        let period = 2 * (count - 1).max(1);
-        let k = k % period;
-        let k = k.min(period - k);
-        let row = &rows[k * width..][..width];
-        for (sum, value) in first.iter_mut().zip(row) {
-            *sum += power * value;
-        }
-        power *= POLE;
-    }
-    let axpy = |to: &mut [f32], from: &[f32]| {
-        vectorized(
-            #[inline(always)]
-            || {
-                for (t, f) in to.iter_mut().zip(from) {
-                    *t += POLE * f;
-                }
-            },
-        );
-    };
-    rows[..width].copy_from_slice(&first);
-    for k in 1..count {
-        let (before, at) = rows.split_at_mut(k * width);
-        axpy(&mut at[..width], &before[(k - 1) * width..]);
-    }
-    let gain = -POLE / (1.0 - POLE * POLE);
-    let last = count - 1;
-    if last > 0 {
-        let (before, at) = rows.split_at_mut(last * width);
-        let before = &before[(last - 1) * width..];
-        for (c, b) in at[..width].iter_mut().zip(before) {
-            *c = gain * (*c + POLE * b);
-        }
-    } else {
-        rows.iter_mut().for_each(|c| *c *= gain);
-    }
-    for k in (0..last).rev() {
-        let (at, after) = rows.split_at_mut((k + 1) * width);
-        let (at, after) = (&mut at[k * width..], &after[..width]);
-        vectorized(
-            #[inline(always)]
-            || {
-                for (c, a) in at.iter_mut().zip(after) {
-                    *c = POLE * (a - *c);
-                }
-            },
-        );
-    }
-    rows.iter_mut().for_each(|c| *c *= 6.0);
+/// Place of a node on an axis of so many, mirrored about the first and the last.
+fn mirrored(n: isize, count: usize) -> usize {
+    let n = n.unsigned_abs();
+    if n < count { n } else { 2 * (count - 1) - n }
+}
+
+fn around(n: usize, count: usize) -> [usize; 5] {
+    std::array::from_fn(|k| mirrored(n as isize + k as isize - SIDE as isize, count))
+}
+
+fn weighted(n: usize, count: usize, value: impl Fn(usize) -> f32) -> f32 {
+    let [a, b, c, d, e] = around(n, count).map(value);
+    WEIGHTS[0] * c + WEIGHTS[1] * (b + d) + WEIGHTS[2] * (a + e)
+}
+
+fn weigh<'a>(n: usize, count: usize, row: impl Fn(usize) -> &'a [f32], out: &mut [f32]) {
+    let [a, b, c, d, e] = around(n, count).map(row);
+    vectorized(
+        #[inline(always)]
+        || {
+            for (i, o) in out.iter_mut().enumerate() {
+                *o = WEIGHTS[0] * c[i] + WEIGHTS[1] * (b[i] + d[i]) + WEIGHTS[2] * (a[i] + e[i]);
+            }
+        },
+    );
 }
 
 /// Value and gradient per node at `t` in the cell behind node `cell` of the spline with these coefficients. The cell has a node before it and

@@ -2,40 +2,12 @@
 
 use std::sync::Arc;
 
-use bspline::hierarchical::LocalField;
 use glam::DVec3;
 
 use super::brick::DistanceBrick;
-use super::field_obstacle::FieldObstacle;
 use super::thin::Unresolved;
 use super::touch_map::TouchMap;
 use crate::haptics::{Obstacle, Touch};
-
-/// The shape of an object round the tool.
-#[derive(Clone)]
-pub enum Shape {
-    /// Sampled: for tools of some radius, and for any field.
-    Brick(Arc<DistanceBrick>),
-    /// The field itself: for points.
-    Field(Arc<FieldObstacle<LocalField<f32>>>),
-}
-
-impl Shape {
-    fn as_obstacle(&self) -> &dyn Obstacle {
-        match self {
-            Self::Brick(brick) => &**brick,
-            Self::Field(field) => &**field,
-        }
-    }
-
-    /// Whether it tells anything of a place.
-    fn knows(&self, p: DVec3) -> bool {
-        match self {
-            Self::Brick(brick) => brick.covers(p, 0.0),
-            Self::Field(_) => true,
-        }
-    }
-}
 
 /// An object as it may be touched.
 #[derive(Clone)]
@@ -43,9 +15,9 @@ pub struct Part {
     /// Which object.
     pub object: u64,
     /// Its shape.
-    pub shape: Shape,
+    pub shape: Arc<DistanceBrick>,
     /// Its shape in the snapshot before, if that was another.
-    pub before: Option<Shape>,
+    pub before: Option<Arc<DistanceBrick>>,
     /// What it feels like where nothing else is painted.
     pub default: Touch,
     /// What is painted.
@@ -97,29 +69,19 @@ impl Snapshot {
 
     /// Whether no surface beyond what was sampled is nearer to a tool of some size, mm, than what is told.
     pub fn covers(&self, p: DVec3, size: f64) -> bool {
-        self.parts.iter().all(|part| match &part.shape {
-            Shape::Brick(brick) => brick.covers(p, size),
-            Shape::Field(_) => true,
-        })
+        self.parts.iter().all(|part| part.shape.covers(p, size))
     }
 
     /// What was sampled too coarsely, of the worst object: to be told to the user.
     pub fn unresolved(&self) -> Option<Unresolved> {
-        let of = |part: &Part| match &part.shape {
-            Shape::Brick(brick) => Some(brick.unresolved()),
-            Shape::Field(_) => None,
-        };
-        let all = self.parts.iter().filter_map(of).filter(Unresolved::any);
+        let all = self.parts.iter().map(|part| part.shape.unresolved());
+        let all = all.filter(Unresolved::any);
         all.max_by_key(|u| (u.missed, u.thin))
     }
 
     /// Bytes of all samples.
     pub fn bytes(&self) -> usize {
-        let of = |part: &Part| match &part.shape {
-            Shape::Brick(brick) => brick.bytes(),
-            Shape::Field(_) => 0,
-        };
-        self.parts.iter().map(of).sum()
+        self.parts.iter().map(|part| part.shape.bytes()).sum()
     }
 }
 
@@ -132,10 +94,10 @@ pub struct Moving<'a> {
 
 impl Moving<'_> {
     fn of(&self, part: &Part, p: DVec3) -> (f64, DVec3) {
-        let (b, gb) = part.shape.as_obstacle().distance(p);
+        let (b, gb) = part.shape.distance(p);
         match &part.before {
-            Some(before) if self.share < 1.0 && before.knows(p) => {
-                let (a, ga) = before.as_obstacle().distance(p);
+            Some(before) if self.share < 1.0 && before.covers(p, 0.0) => {
+                let (a, ga) = before.distance(p);
                 (a + self.share * (b - a), ga + self.share * (gb - ga))
             }
             _ => (b, gb),
@@ -158,11 +120,8 @@ impl Obstacle for Moving<'_> {
 
     fn finest(&self) -> f64 {
         let of = |part: &Part| {
-            let before = part
-                .before
-                .as_ref()
-                .map_or(f64::INFINITY, |b| b.as_obstacle().finest());
-            part.shape.as_obstacle().finest().min(before)
+            let before = part.before.as_ref().map_or(f64::INFINITY, |b| b.finest());
+            part.shape.finest().min(before)
         };
         self.snapshot.parts.iter().map(of).fold(f64::INFINITY, f64::min)
     }

@@ -130,7 +130,7 @@ fn a_ball_has_its_distance() {
             let brick = DistanceBrick::new(&Surface::new(field, iso), at, &options);
             let off = off(&brick, &of_sphere, &|p| of_sphere(p).0 < -6.0);
             println!("h {h}: {off:?}");
-            assert!(off.zero < 1e-3 && off.slope < 2e-3, "{off:?}");
+            assert!(off.zero < 5e-5 && off.slope < 2e-3, "{off:?}");
         }
     }
 }
@@ -148,12 +148,13 @@ fn a_torus_has_its_distance() {
         let fields: [(&dyn Field, f64); 2] = [(&plain, 0.0), (&steep, 300.0)];
         for (field, iso) in fields {
             let brick = DistanceBrick::new(&Surface::new(field, iso), at, &options);
-            // Three nodes from where the distance itself has no gradient.
+            // A spline follows nodes up to four away, of which the farthest hardly count: so far from where the distance itself has no
+            // gradient it is as good as elsewhere.
             let skip =
-                |p: DVec3| of_torus(p).0 < -4.0 + 3.5 * h || DVec3::new(p.x, p.y, 0.0).length() < 3.5 * h;
+                |p: DVec3| of_torus(p).0 < -4.0 + 2.5 * h || DVec3::new(p.x, p.y, 0.0).length() < 2.5 * h;
             let off = off(&brick, &of_torus, &skip);
             println!("h {h}: {off:?}");
-            assert!(off.zero < 1e-2 && off.slope < 1e-2, "{off:?}");
+            assert!(off.zero < 1.5e-3 && off.slope < 1e-2, "{off:?}");
         }
     }
 }
@@ -205,9 +206,17 @@ fn bits(d: &Distances) -> Vec<u32> {
 /// box has moved, and with it.
 #[test]
 fn renewed_distances_have_the_bits_of_fresh_ones() {
-    let before = spline(0.5, 16.0, |p| {
-        12.0 - p.length() + 0.3 * libm::sin(p.x) * libm::cos(1.3 * p.y)
-    });
+    let bumps = |p: DVec3| 12.0 - p.length() + 0.3 * libm::sin(p.x) * libm::cos(1.3 * p.y);
+    // Full of sheets and holes that are too thin for the nodes, where Newton goes astray.
+    let noise = |p: DVec3| {
+        let n = p.dot(DVec3::new(127.1, 311.7, 74.7));
+        4.0 * (43_758.545 * libm::sin(n)).fract()
+    };
+    renewed_as_fresh(&spline(0.5, 16.0, bumps), true);
+    renewed_as_fresh(&spline(1.0, 16.0, |p| bumps(p) + noise(p)), false);
+}
+
+fn renewed_as_fresh(before: &HierarchicalSpline<f32>, is_smooth: bool) {
     let edit = |first: [u32; 3], by: f32| BlockEdit {
         level: 0,
         first,
@@ -215,11 +224,16 @@ fn renewed_distances_have_the_bits_of_fresh_ones() {
         change: Change::Set(vec![by; 27]),
     };
     // On the surface, inside it and away from it.
+    let cells = before.lattice().cells[0];
     let edits = [
         edit([56, 34, 33], 2.0),
         edit([46, 30, 38], -6.0),
         edit([62, 52, 33], -30.0),
     ];
+    let edits = edits.map(|edit| BlockEdit {
+        first: edit.first.map(|n| n * cells / 64),
+        ..edit
+    });
     let map = glam::DAffine3::from_axis_angle(DVec3::new(0.3, 1.0, 0.2).normalize(), 0.4);
     for map in [glam::DAffine3::IDENTITY, map] {
         let options = BrickOptions {
@@ -229,26 +243,27 @@ fn renewed_distances_have_the_bits_of_fresh_ones() {
             ..BrickOptions::default()
         };
         let grid = options.grid(DVec3::new(11.0, 1.0, 0.5));
-        let old = Distances::new(&Surface::new(&before, 0.0).placed(map), grid, options.band);
+        let old = Distances::new(&Surface::new(before, 0.0).placed(map), grid, options.band);
         for (n, edit) in edits.iter().enumerate() {
             let now = before.edited_blocks(std::slice::from_ref(edit)).unwrap();
             let surface = Surface::new(&now, 0.0).placed(map);
-            let changed = now.changed_boxes(&before, &before.lattice().world_box());
-            for shift in [[0; 3], [3, 0, -2], [-9, 5, 1]] {
+            let changed = now.changed_boxes(before, &before.lattice().world_box());
+            for shift in [[0; 3], [4, 0, -4], [-8, 4, 12]] {
                 let there = Grid {
                     first: std::array::from_fn(|a| grid.first[a] + shift[a]),
                     ..grid
                 };
                 let fresh = Distances::new(&surface, there, options.band);
-                let renewed = old.after(&surface, there, &changed);
-                assert_eq!(bits(&fresh), bits(&renewed), "edit {n}, shift {shift:?}");
+                let mut renewed = old.clone();
+                renewed.renew(&surface, there, &changed);
+                assert!(bits(&fresh) == bits(&renewed), "edit {n}, shift {shift:?}");
                 assert_eq!(fresh.unresolved, renewed.unresolved);
-                assert!(bits(&fresh) != bits(&old) || n == 2);
+                assert!(bits(&fresh) != bits(&old) || n == 2 || !is_smooth);
                 println!(
                     "edit {n}, shift {shift:?}: {} of {}",
                     renewed.renewed, fresh.renewed
                 );
-                if shift == [0; 3] {
+                if shift == [0; 3] && is_smooth {
                     assert!(
                         renewed.renewed * 2 < fresh.renewed,
                         "{} of {}",
@@ -257,8 +272,9 @@ fn renewed_distances_have_the_bits_of_fresh_ones() {
                     );
                 }
                 // And once more from there.
-                let back = renewed.after(&Surface::new(&before, 0.0).placed(map), grid, &changed);
-                assert_eq!(bits(&old), bits(&back));
+                let mut back = renewed.clone();
+                back.renew(&Surface::new(before, 0.0).placed(map), grid, &changed);
+                assert!(bits(&old) == bits(&back));
             }
         }
     }
@@ -336,14 +352,15 @@ fn a_ball_rolls_over_a_scan_on_the_exact_offset() {
         let at = DVec3::new(0.0, 17.0, 0.0);
         let reach = DVec3::splat(9.0);
         let exact = BruteForce::new(&field, iso, &Aabb::new(at - 2.0 * reach, at + 2.0 * reach), 0.4);
+        // Where a ball touches two places at once its offset has an edge; nodes round it by a tenth of their distance, and by no less.
         for (radius, h, most) in [
-            (5.0, 1.0, 0.15),
-            (5.0, 0.75, 0.1),
-            (5.0, 2.5, 0.5),
-            (2.0, 1.0, 0.15),
-            (2.0, 0.5, 0.1),
-            (0.5, 0.5, 0.02),
-            (0.0, 0.5, 0.02),
+            (5.0, 1.0, 0.1),
+            (5.0, 0.75, 0.07),
+            (5.0, 2.5, 0.4),
+            (2.0, 1.0, 0.125),
+            (2.0, 0.5, 0.06),
+            (0.5, 0.5, 0.012),
+            (0.0, 0.5, 0.007),
         ] {
             let options = BrickOptions {
                 reach: 15.0,
@@ -443,7 +460,7 @@ fn boolean_solids_have_their_distance() {
                 worst = worst.max(off);
             }
         }
-        let brick = DistanceBrick::of(&distances, Interpolation::Cubic);
+        let brick = DistanceBrick::of(&distances, Interpolation::Cubic, None);
         let (mut two, mut one, mut edge) = (0.0_f64, 0.0_f64, 0.0_f64);
         for p in places(&Aabb::new(DVec3::splat(-5.0), DVec3::splat(9.0)), 20_000) {
             let off = (brick.distance(p).0 - truth(p)).abs();
@@ -459,7 +476,8 @@ fn boolean_solids_have_their_distance() {
             distances.unresolved
         );
         assert!(worst < 1e-3, "{worst}");
-        assert!(two < 0.04 * h && edge < 0.25 * h && !distances.unresolved.any());
+        // Nodes beside the edge are exact; a spline between them rounds it by a share of their distance.
+        assert!(two < 0.03 * h && edge < 0.17 * h && !distances.unresolved.any());
     }
     let ball = |x: f64| -> Arc<dyn Field> { Arc::new(Steep(Sphere::new(DVec3::X * x, 5.0).unwrap())) };
     let rounding = bspline::csg::Rounding::Bounded { range: 1200.0 };

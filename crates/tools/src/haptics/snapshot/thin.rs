@@ -3,20 +3,24 @@
 use bspline::Jet;
 use glam::DVec3;
 
+use super::beside::Beside;
 use super::foot::Foot;
 use super::grid::Grid;
-use super::samples::Samples;
+use super::region::Region;
+use super::samples::{Samples, blocks, nodes_of};
 use super::surface::Surface;
 
 /// Share of the steepest fall to a neighbour within which a node may be near a surface that no neighbour is behind. From a surface that
 /// is seen, nodes with all neighbours on their side are farther away.
-const NEAR: f64 = 0.75;
+const NEAR: f32 = 0.75;
 /// Cosine between the normals of two surfaces that face one another, rather than meet at an edge.
 const FACING: f64 = -0.5;
 /// Share of a cell beyond which a place is not in it.
 const TOUCHES: f64 = 0.1;
 /// Newton steps towards a surface that may be there.
 const STEPS: usize = 4;
+/// Nodes round one that it is judged by: as far as these steps lead.
+const NEIGHBOURS: usize = 6;
 
 /// What the nodes of a grid are too far apart for.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -36,45 +40,93 @@ impl Unresolved {
     }
 }
 
-/// Looks through a grid. `foot` gives the closest place of a node beside the surface.
-pub fn look<'a>(
+/// What is too thin, block by block.
+#[derive(Clone, Debug)]
+pub struct Thin {
+    blocks: Vec<Unresolved>,
+}
+
+impl Thin {
+    /// Nothing looked at.
+    pub fn new(grid: &Grid) -> Self {
+        Self {
+            blocks: vec![Unresolved::default(); blocks(grid).count()],
+        }
+    }
+
+    /// Looks at the blocks of a grid that have a part near a region in which something has changed. `beside` gives what is known of a node beside the
+    /// surface.
+    pub fn update<'a>(
+        &mut self,
+        surface: &Surface<'_>,
+        grid: &Grid,
+        samples: &Samples,
+        changed: Region,
+        beside: impl Fn(usize) -> Option<&'a Beside>,
+    ) -> Unresolved {
+        let near = changed.grown(NEIGHBOURS, grid);
+        for (found, block) in self.blocks.iter_mut().zip(blocks(grid)) {
+            let own = nodes_of(block, grid);
+            if (0..3).all(|a| own.lo[a] < near.end[a] && near.lo[a] < own.end[a]) {
+                *found = look(surface, grid, samples, own, &beside);
+            }
+        }
+        let mut all = Unresolved::default();
+        for found in &self.blocks {
+            if found.thin > 0 {
+                let before = if all.thin > 0 { all.thinnest } else { f64::INFINITY };
+                all.thinnest = before.min(found.thinnest);
+            }
+            all.thin += found.thin;
+            all.missed += found.missed;
+        }
+        all
+    }
+}
+
+/// Looks through a part of a grid.
+fn look<'a>(
     surface: &Surface<'_>,
     grid: &Grid,
     samples: &Samples,
-    foot: impl Fn(usize) -> Option<&'a Foot>,
+    part: Region,
+    beside: impl Fn(usize) -> Option<&'a Beside>,
 ) -> Unresolved {
     let mut found = Unresolved {
         thinnest: f64::INFINITY,
         ..Unresolved::default()
     };
     let strides = grid.strides();
-    let [nx, ny, nz] = grid.count;
     let mut doubtful = Vec::new();
-    for x in 1..nx - 1 {
-        for y in 1..ny - 1 {
-            for z in 1..nz - 1 {
-                let slot = grid.slot([x, y, z]);
-                if foot(slot).is_some() {
-                    let between = strides.iter().filter_map(|stride| {
-                        let both = [slot - stride, slot + stride];
-                        let is_alone = both.iter().all(|s| samples.inside[*s] != samples.inside[slot]);
-                        is_alone.then(|| both.map(&foot)).and_then(thickness)
-                    });
-                    if let Some(thick) = between.reduce(f64::min) {
-                        found.thin += 1;
-                        found.thinnest = found.thinnest.min(thick);
-                    }
-                    continue;
+    let inner = Region {
+        lo: part.lo.map(|n| n.max(1)),
+        end: std::array::from_fn(|a| part.end[a].min(grid.count[a] - 1)),
+    };
+    for (first, slots) in inner.rows(grid) {
+        for (z, slot) in slots.enumerate() {
+            if beside(slot).is_some() {
+                let between = strides.iter().filter_map(|stride| {
+                    let both = [slot - stride, slot + stride];
+                    let is_alone = both.iter().all(|s| samples.inside[*s] != samples.inside[slot]);
+                    is_alone.then(|| both.map(&beside)).and_then(thickness)
+                });
+                if let Some(thick) = between.reduce(f64::min) {
+                    found.thin += 1;
+                    found.thinnest = found.thinnest.min(thick);
                 }
-                let value = samples.values[slot];
-                let steepest = strides
-                    .iter()
-                    .flat_map(|stride| [slot - stride, slot + stride])
-                    .fold(0.0, |m: f64, other| m.max((samples.values[other] - value).abs()));
-                // No number is not near.
-                if value.abs() < NEAR * steepest && is_among_its_like(grid, samples, slot) {
-                    doubtful.push(grid.place([x, y, z]));
-                }
+                continue;
+            }
+            let value = samples.values[slot];
+            // No number is not near.
+            if value.is_nan() {
+                continue;
+            }
+            let steepest = strides
+                .iter()
+                .flat_map(|stride| [slot - stride, slot + stride])
+                .fold(0.0, |m: f32, other| m.max((samples.values[other] - value).abs()));
+            if value.abs() < NEAR * steepest && is_among_its_like(grid, samples, slot) {
+                doubtful.push(grid.place([first[0], first[1], first[2] + z]));
             }
         }
     }
@@ -89,10 +141,10 @@ pub fn look<'a>(
 }
 
 /// Distance of two surfaces that face one another, by their closest places.
-fn thickness(feet: [Option<&Foot>; 2]) -> Option<f64> {
-    let [a, b] = [feet[0]?, feet[1]?];
-    let faces = a.inward.dot(b.inward) < FACING;
-    faces.then(|| (a.at - b.at).dot(a.inward).abs())
+fn thickness(nodes: [Option<&Beside>; 2]) -> Option<f64> {
+    let [a, b] = [nodes[0]?, nodes[1]?];
+    let (m, n) = (a.foot.inward, b.foot.inward);
+    (m.dot(n) < FACING).then(|| (a.at - b.at).dot(m).abs())
 }
 
 /// Whether all 26 neighbours are on the side of a node that is not at the rim.

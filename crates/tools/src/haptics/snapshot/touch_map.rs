@@ -42,6 +42,11 @@ impl TouchMap {
         }
     }
 
+    /// Its nodes.
+    pub(super) fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
     /// Whether some layers say anything that is felt.
     pub fn is_needed(layers: &Layers) -> bool {
         let felt = [Substance::SurfaceStiffness, Substance::Friction];

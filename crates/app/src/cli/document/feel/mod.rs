@@ -6,6 +6,7 @@ mod tally;
 mod tool;
 
 use std::path::PathBuf;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use clap::ValueEnum;
@@ -15,7 +16,7 @@ use tools::haptics::gates::GateOptions;
 use tools::haptics::simulated::SimulatedDevice;
 use tools::haptics::{
     Abilities, Coupling, Demand, Device, Embedding, PointTool, Proxy, ProxyOptions, Servo, ServoOptions,
-    TickRecord, Vcp, VcpOptions, Workspace,
+    TickRecord, Unresolved, Vcp, VcpOptions, Workspace,
 };
 
 use super::{Told, chosen, failure, open};
@@ -23,7 +24,7 @@ use crate::cli::failure::{Failure, Outcome};
 use crate::cli::interrupt;
 use crate::cli::output::Output;
 use crate::cli::progress::Bar;
-use crate::cli::quantity::positive;
+use crate::cli::quantity::{human_count, human_number, positive};
 use crate::cli::simulate;
 use crate::cli::source::Source;
 use crate::devices::{self, Force, Name};
@@ -153,7 +154,15 @@ pub fn run(args: &Args) -> Outcome {
     };
     let servo = servo(args, tool.as_ref(), held.abilities(), workspace)?;
     notes.extend(servo.granted().note());
-    let show = show(args, tool.as_ref(), document.state(), &name, &workspace)?;
+    let unresolved = Arc::default();
+    let show = show(
+        args,
+        tool.as_ref(),
+        document.state(),
+        &name,
+        &workspace,
+        &unresolved,
+    )?;
     let granted = servo.granted();
     let mut sculpting = Sculpting::new(document, name, script.stroke.clone());
     if let Some(rate) = script.rate {
@@ -212,6 +221,7 @@ pub fn run(args: &Args) -> Outcome {
     interrupt::check(&cancel)?;
     let (mut document, strokes, told) = sculpting.close();
     notes.extend(told);
+    notes.extend(unresolved.lock().ok().and_then(|worst| worst.map(too_thin)));
     let felt = Felt::new(
         &args.device,
         granted,
@@ -319,13 +329,14 @@ fn servo(
     servo.map_err(Failure::usage)
 }
 
-/// What may be touched.
+/// What may be touched, and the worst that was too thin for it.
 fn show(
     args: &Args,
     tool: Option<&PointTool>,
     state: &State,
     name: &str,
     workspace: &Workspace,
+    unresolved: &Arc<Mutex<Option<Unresolved>>>,
 ) -> Outcome<Show> {
     let object = object(state, name)?;
     if object.meta.iso.is_none() {
@@ -352,5 +363,30 @@ fn show(
         most_nodes: NODES,
         ..demand
     });
-    Ok(Box::new(move |state, at| toucher.show(state, at)))
+    let unresolved = Arc::clone(unresolved);
+    Ok(Box::new(move |state, at| {
+        let snapshot = toucher.show(state, at);
+        // Nobody else looks before the end.
+        if let (Some(now), Ok(mut worst)) = (snapshot.unresolved(), unresolved.lock()) {
+            let before = worst.filter(|before| (before.missed, before.thin) > (now.missed, now.thin));
+            *worst = before.or(Some(now));
+        }
+        snapshot
+    }))
+}
+
+/// What a hand cannot feel, and what helps.
+fn too_thin(found: Unresolved) -> String {
+    let helps = "a smaller --radius shows finer parts";
+    match found.missed {
+        0 => format!(
+            "at {} places sheets or gaps are only {} thick and feel blurred; {helps}",
+            human_count(found.thin),
+            human_number(found.thinnest)
+        ),
+        missed => format!(
+            "at {} places what is there is too thin to be felt; {helps}",
+            human_count(missed)
+        ),
+    }
 }
