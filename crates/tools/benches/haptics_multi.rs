@@ -13,6 +13,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use bspline::Field;
 use bspline::csg::Csg;
+use bspline::hierarchical::{HierarchicalSpline, Lattice};
 use bspline::primitives::{Cuboid, HalfSpace, Sphere};
 use criterion::measurement::Measurement;
 use glam::{DAffine3, DQuat, DVec3};
@@ -80,6 +81,35 @@ fn brick(tool: &PointTool, touch: Touch) -> Arc<Snapshot> {
         ..usual
     };
     SnapshotMaker::new(demand).make(DVec3::new(0.0, 0.0, 5.0), &[object], 1)
+}
+
+/// Processor time of snapshots of a spline ball with knots of 1 mm, as a tool asks for them.
+fn snapshots(tool: &PointTool) {
+    let lattice = Lattice {
+        world_from_lattice: DAffine3::from_translation(DVec3::splat(-40.0)),
+        cells: [80; 3],
+    };
+    let ball = HierarchicalSpline::<f32>::schoenberg(lattice, 1.0, |p| 30.0 - p.length());
+    let (field, layers) = (Arc::new(ball.expect("a ball")), Layers::default());
+    let demand = Demand::of_points(tool);
+    let mut maker = SnapshotMaker::new(demand);
+    let mut make = |at: DVec3| {
+        let object = TouchedObject {
+            id: 1,
+            field: field.clone(),
+            iso: 0.0,
+            world_from_object: DAffine3::IDENTITY,
+            layers: &layers,
+            default: Touch::default(),
+        };
+        let start = CpuTime.start();
+        let made = maker.make(at, &[object], 1);
+        (1e-6 * CpuTime.end(start), made.bytes())
+    };
+    let top = DVec3::new(0.0, 0.0, 30.0);
+    let (first, bytes) = make(top);
+    let (moved, _) = make(top + DVec3::new(0.26 * demand.reach, 0.0, 0.0));
+    println!("snapshots of {bytes} bytes: first {first:.0} ms, box moved by a quarter {moved:.0} ms");
 }
 
 /// Counts what is asked.
@@ -232,6 +262,7 @@ fn measure() {
             );
         }
         println!("{name}: on a brick");
+        snapshots(&tool);
         let plain = brick(&tool, Touch::default());
         let on_brick = Scene {
             dense: &dense,

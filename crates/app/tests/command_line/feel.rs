@@ -183,6 +183,13 @@ fn a_plate_pressed_beside_its_middle_returns_torque() {
     );
     // That device gives none.
     assert_eq!(last("torque_sent"), 0.0);
+    // Four points as wide, with nothing between them, do not touch a ball with a face: two of them straddle its top.
+    bench.write("tool.xyz", "3 -10 -3\n3 10 -3\n3 -10 9\n3 10 9\n");
+    let (told, last) = felt("--tool points:tool.xyz");
+    assert!(
+        last("force_z") > 0.1 && told["largest_torque_nmm"].as_f64().unwrap() > 0.1,
+        "{told}"
+    );
     let (told, last) = felt("");
     assert!(
         last("force_z") > 0.3 && told["largest_torque_nmm"] == 0.0,

@@ -9,14 +9,14 @@ use bspline::primitives::Cuboid;
 use bspline::{Aabb, Field};
 use fitting::phantoms::SplitMix64;
 use glam::{DAffine3, DQuat, DVec2, DVec3};
-use tools::haptics::simulated::{Bare, Path, Rig, SimulatedDevice, SimulatedHand, Trace, World};
+use tools::haptics::simulated::{Bare, Change, Path, Rig, SimulatedDevice, SimulatedHand, Trace, World};
 use tools::haptics::{
     Contact, Demand, Felt, MultiPoint, MultiPointOptions, Obstacle, PointTool, Pose, Renderer, Sampling,
     Scaled, Snapshot, SnapshotMaker, Touch, TouchedObject,
 };
 use tools::paint::Layers;
 
-use crate::common::{Bumps, omni, spline};
+use crate::common::{Bumps, HalfSpace, Rubbing, omni, spline};
 
 const SEEDS: u64 = 20;
 /// How deep a point may be, mm.
@@ -137,6 +137,15 @@ fn touch(
     seconds: f64,
     renderer: impl Renderer + 'static,
 ) -> Trace {
+    touch_world(World::shared(obstacle.clone()), hand, seconds, renderer)
+}
+
+fn touch_world(
+    world: World<'_>,
+    hand: SimulatedHand,
+    seconds: f64,
+    renderer: impl Renderer + 'static,
+) -> Trace {
     let mechanics = omni();
     let force = mechanics.force;
     let device = SimulatedDevice::new(mechanics, hand);
@@ -144,7 +153,7 @@ fn touch(
         renderer: Box::new(renderer),
         force,
     };
-    Rig::new(device, drive, World::shared(obstacle.clone())).run(seconds)
+    Rig::new(device, drive, world).run(seconds)
 }
 
 fn renderer() -> MultiPoint {
@@ -259,6 +268,71 @@ fn a_plate_rubs_over_waves_without_a_gain() {
     }
     assert!(sticks > 1000, "{sticks}");
     println!("waves: {most:?}, {sticks} ticks stick");
+}
+
+/// Rough ground sinks by 0.1 mm thirty times a second under a plate that is dragged over it, and then 3 mm come over it in one step of the
+/// simulation: both are felt as motions, the second of the plate at 0.1 m/s at most.
+#[test]
+fn ground_that_changes_moves_a_plate_at_bounded_rates() {
+    let height = |time: f64| {
+        if time < 0.7 {
+            -3.0 * (time - 0.2).max(0.0)
+        } else {
+            1.5
+        }
+    };
+    let mut most = [0.0f64; 3];
+    for seed in 0..SEEDS {
+        let mut random = SplitMix64::new(200 + seed);
+        let aside = vector(&mut random) * DVec3::new(8.0, 8.0, 0.0);
+        let lies = DQuat::from_rotation_y(std::f64::consts::FRAC_PI_2);
+        let turn = DQuat::from_scaled_axis(0.3 * vector(&mut random)) * lies;
+        let of = |p: DVec3, z: f64| DVec3::new(p.x, p.y, z);
+        let path = Path::smooth([
+            (0.0, of(aside, 8.0)),
+            (0.2, of(aside, -3.0)),
+            (0.7, of(-aside, -3.0)),
+            (1.3, of(-aside, -3.0)),
+        ]);
+        let hand = SimulatedHand::light(path).turning([(0.0, turn)]);
+        let ground = move |time: f64, _: &Pose| -> Arc<dyn Obstacle> {
+            Arc::new(Rubbing {
+                solid: HalfSpace::floor(height(time)),
+                coefficient: 0.4,
+            })
+        };
+        let world = World::changing(30.0, Change::Blended, &Pose::at(8.0 * DVec3::Z), ground);
+        let trace = touch_world(world, hand, 1.3, renderer());
+        let lowest = |t: &tools::haptics::simulated::Tick| {
+            let places = plate()
+                .points()
+                .iter()
+                .map(|p| (t.proxy.at + t.proxy.turn * *p).z)
+                .collect::<Vec<_>>();
+            places.into_iter().fold(f64::INFINITY, f64::min) - plate().nose()
+        };
+        for w in trace.ticks.windows(2) {
+            let jump = (w[1].force - w[0].force).length();
+            match w[0].time {
+                t if (0.3..0.69).contains(&t) => most[0] = most[0].max(jump),
+                t if t >= 0.7 => most[1] = most[1].max(jump),
+                _ => {}
+            }
+            if w[0].time > 0.7 {
+                most[2] = most[2].max(lowest(&w[1]) - lowest(&w[0]));
+            }
+        }
+        let end = trace.ticks.last().expect("ticks");
+        assert!((lowest(end) - 1.5).abs() < 0.01, "{seed}: {}", lowest(end));
+        assert!(end.force.z > 0.5, "{seed}: {}", end.force);
+    }
+    println!(
+        "changing ground: steps while it sinks {:.4} N, while it comes {:.4} N, way out {:.4} mm a tick",
+        most[0], most[1], most[2]
+    );
+    // 60 mm/s at most of a hand that friction lets slip, and 0.1 mm in 33 ticks.
+    assert!(most[0] < 0.05, "{most:?}");
+    assert!(most[1] <= 0.25 + 1e-9 && most[2] <= 0.101, "{most:?}");
 }
 
 /// A tool that is told in the lengths of the hand feels the same at every zoom.

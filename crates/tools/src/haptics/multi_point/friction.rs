@@ -215,23 +215,21 @@ impl MultiPoint {
         let (mut free, mut way) = (*twist, *wish);
         add(&mut way, -1.0, twist);
         add(&mut free, 1.0, &rows.across(&way));
-        let (mut expected, mut rubs) = (free, [Rubs::default(); 6]);
-        for (rub, p) in rubs.iter_mut().zip(pressings.iter()) {
-            *rub = Rubs {
-                most: p.most(),
-                slips: p.slips,
-                yields: p.slips.map(|slip| rows.across(&slip)),
-            };
-            for (yields, friction) in rub.yields.iter().zip(p.friction) {
-                add(&mut expected, friction, yields);
-            }
+        let mut rubs = [Rubs::default(); 6];
+        let mut count = 0;
+        for p in pressings.iter() {
+            let yields = p.slips.map(|slip| rows.across(&slip));
+            rubs[count] = Rubs::new(p.most(), p.slips, yields, p.friction);
+            count += 1;
         }
-        slide::slide(
-            &free,
-            &expected,
-            &rubs,
-            pressings.iter_mut().map(|p| &mut p.friction),
-        )
+        slide::slide(&free, &mut rubs[..count]);
+        let mut most = 0.0f64;
+        for (p, rub) in pressings.iter_mut().zip(&rubs) {
+            let change = [0, 1].map(|k| (rub.friction[k] - p.friction[k]).abs());
+            most = most.max(change[0].max(change[1]));
+            p.friction = rub.friction;
+        }
+        most
     }
 
     /// Begins the next solution with the points that pressed in the last one.

@@ -6,6 +6,9 @@
 //! joins the polyhedron, and no point near the surface goes further between two looks than the solid is thin ([`march`]). At
 //! rest the springs balance the contacts, so the torque is `Σ rᵢ × fᵢ`.
 //!
+//! Where the surface is rough or soft, each place that presses holds the tool within its own cone and gives its own share of the springs
+//! ([`friction`]).
+//!
 //! The source tells four cases apart (free; plane; edge; hole) and gives each its rule: cross products of the two deepest
 //! normals at edges, averages at convex ones, pushes along normals in holes. A polyhedron of all points has the cases as its
 //! numbers of active rows, 0 to 6, and no rule to choose wrongly.

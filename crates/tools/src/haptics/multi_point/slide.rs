@@ -1,148 +1,165 @@
-//! Where a body slides whose contacts rub with given strengths: Newton's method on a convex function.
+//! Where a body slides whose contacts rub with given strengths.
 //!
-//! `½|w|² + Σ gᵢ ψ(|Tᵢ(u + w)|)` is least, ψ the length, but for slips below a width ε its square over 2ε \[Huber64\]. The width falls
-//! from that of the slips themselves to [`SOFT`], so every step begins near its end; whatever sticks then still slips by less than that.
+//! `½|u − d|² + Σ gᵢ ψ(|Tᵢu|)` is least, ψ the length, but for slips below [`SOFT`] its square over twice that \[Huber64\]. Newton's method for the
+//! slips and the frictions `sᵢ = −gᵢ tᵢ/|tᵢ|` together, as for sums of lengths in \[Andersen00\]: from `|tᵢ| sᵢ + gᵢ tᵢ = 0` linearised, so that a contact
+//! whose friction is not known yet is not taken for one that slides on as it does.
 
 use super::projection::{Twist, add, dot};
 
 /// Slip below which friction is softened, mm.
 pub(super) const SOFT: f64 = 1e-6;
-/// Widths of the softening, from the widest on, over the one before.
-const NARROWER: f64 = 0.03;
-/// Steps at most with a width.
+/// Steps at most.
 const STEPS: usize = 12;
-/// Steps at most from what is expected.
-const TRIES: usize = 4;
-/// Halvings of a step at most.
-const HALVINGS: usize = 20;
-/// Length of a step that ends them, over the width.
-const DONE: f64 = 1e-2;
+/// Widths of the softening for where steps go round in circles: each over the one before, from one mm on.
+const NARROWER: f64 = 0.1;
+/// Length of a step that ends them, mm.
+const DONE: f64 = 0.01 * SOFT;
 
 /// What a contact does against slipping.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Rubs {
     /// Largest friction, mm.
-    pub most: f64,
+    most: f64,
     /// Slip along each tangent for a twist.
-    pub slips: [Twist; 2],
+    slips: [Twist; 2],
     /// The parts of these that the contacts leave free.
-    pub yields: [Twist; 2],
+    yields: [Twist; 2],
+    /// The friction, mm: as it is expected, then as it is.
+    pub friction: [f64; 2],
+    slip: [f64; 2],
+    width: f64,
+    is_soft: bool,
 }
 
 impl Rubs {
-    fn slip(&self, u: &Twist) -> [f64; 2] {
-        [dot(&self.slips[0], u), dot(&self.slips[1], u)]
-    }
-}
-
-/// Frictions of contacts when the body would go to `free` without them. The largest change of one, mm.
-/// `frictions` are what they are expected to be, and then are.
-pub(super) fn slide<'a>(
-    free: &Twist,
-    expected: &Twist,
-    rubs: &[Rubs],
-    frictions: impl Iterator<Item = &'a mut [f64; 2]>,
-) -> f64 {
-    let mut u = *expected;
-    let mut width = SOFT;
-    if !settle(free, &mut u, rubs, SOFT, TRIES) {
-        u = *free;
-        width = rubs.iter().map(|r| length(r.slip(free))).fold(SOFT, f64::max);
-        while width > SOFT {
-            settle(free, &mut u, rubs, width, STEPS);
-            width = (NARROWER * width).max(SOFT);
+    /// Of a largest friction, slips along two tangents, the parts of these that are free, and what the friction is expected to be.
+    pub fn new(most: f64, slips: [Twist; 2], yields: [Twist; 2], friction: [f64; 2]) -> Self {
+        Self {
+            most,
+            slips,
+            yields,
+            friction,
+            ..Self::default()
         }
-        settle(free, &mut u, rubs, width, STEPS);
     }
-    let mut most = 0.0f64;
-    for (friction, rub) in frictions.zip(rubs) {
-        let slip = rub.slip(&u);
-        let share = -rub.most / length(slip).max(width);
-        let new = slip.map(|t| share * t);
-        most = most.max(length([new[0] - friction[0], new[1] - friction[1]]));
-        *friction = new;
+
+    /// Takes a twist, and adds what follows from it to the matrix and to the way down.
+    fn linearise(&mut self, u: &Twist, soft: f64, matrix: &mut [[f64; 6]; 6], down: &mut Twist) {
+        self.slip = self.slips.map(|t| dot(&t, u));
+        let length = length(self.slip);
+        self.width = length.max(soft);
+        self.is_soft = length <= soft;
+        let stiff = self.most / self.width;
+        let [t, s] = [self.direction(), self.friction];
+        // (g + ½(s tᵀ + t sᵀ))/w is not negative, since |s| ≤ g.
+        let across = 0.5 * (s[0] * t[1] + s[1] * t[0]) / self.width;
+        for k in 0..2 {
+            add(down, -stiff * self.slip[k], &self.yields[k]);
+            add_product(
+                matrix,
+                stiff + s[k] * t[k] / self.width,
+                &self.yields[k],
+                &self.yields[k],
+            );
+            add_product(matrix, across, &self.yields[k], &self.yields[1 - k]);
+        }
     }
-    most
+
+    /// Of the slip; none where that is softened.
+    fn direction(&self) -> [f64; 2] {
+        match self.is_soft {
+            true => [0.0; 2],
+            false => self.slip.map(|t| t / self.width),
+        }
+    }
+
+    /// Takes a step.
+    fn follow(&mut self, way: &Twist) {
+        let [t, change] = [self.direction(), self.slips.map(|slip| dot(&slip, way))];
+        let grows = t[0] * change[0] + t[1] * change[1];
+        for k in 0..2 {
+            let moved = self.most * (self.slip[k] + change[k]);
+            self.friction[k] = -(moved + self.friction[k] * grows) / self.width;
+        }
+        self.confine();
+    }
+
+    /// The friction nearest to this one that there may be.
+    fn confine(&mut self) {
+        let size = length(self.friction);
+        if size > self.most {
+            self.friction = self.friction.map(|s| s * (self.most / size));
+        }
+    }
 }
 
-fn length(t: [f64; 2]) -> f64 {
-    (t[0] * t[0] + t[1] * t[1]).sqrt()
+/// Finds the frictions of contacts when the body would go to `free` without them. Whether that is done to [`DONE`].
+pub(super) fn slide(free: &Twist, rubs: &mut [Rubs]) -> bool {
+    if settle(free, rubs, SOFT) {
+        return true;
+    }
+    let mut soft = 1.0;
+    while soft > SOFT {
+        settle(free, rubs, soft);
+        soft = (NARROWER * soft).max(SOFT);
+    }
+    settle(free, rubs, SOFT)
 }
 
-/// Goes where the function is least. Whether it got there.
-fn settle(free: &Twist, u: &mut Twist, rubs: &[Rubs], width: f64, steps: usize) -> bool {
-    let mut now = value(free, u, rubs, width);
-    for _ in 0..steps {
-        if step(free, u, rubs, width, &mut now) {
+/// The same from what the frictions are, softened below a width.
+fn settle(free: &Twist, rubs: &mut [Rubs], soft: f64) -> bool {
+    rubs.iter_mut().for_each(Rubs::confine);
+    let mut u = held(free, rubs);
+    for _ in 0..STEPS {
+        let mut matrix = [[0.0; 6]; 6];
+        for (k, row) in matrix.iter_mut().enumerate() {
+            row[k] = 1.0;
+        }
+        let mut way: Twist = std::array::from_fn(|k| free[k] - u[k]);
+        for rub in rubs.iter_mut() {
+            rub.linearise(&u, soft, &mut matrix, &mut way);
+        }
+        solve(&mut matrix, &mut way);
+        for rub in rubs.iter_mut() {
+            rub.follow(&way);
+        }
+        add(&mut u, 1.0, &way);
+        // What the frictions themselves come to.
+        let mut off = held(free, rubs);
+        add(&mut off, -1.0, &u);
+        if dot(&way, &way) < DONE * DONE && dot(&off, &off) < DONE * DONE {
             return true;
         }
     }
     false
 }
 
-/// The function, with a width.
-fn value(free: &Twist, u: &Twist, rubs: &[Rubs], width: f64) -> f64 {
-    let mut sum = 0.0;
-    for k in 0..6 {
-        sum += 0.5 * (u[k] - free[k]) * (u[k] - free[k]);
+/// Where the body goes with frictions.
+fn held(free: &Twist, rubs: &[Rubs]) -> Twist {
+    let mut u = *free;
+    for rub in rubs {
+        for (yields, friction) in rub.yields.iter().zip(rub.friction) {
+            add(&mut u, friction, yields);
+        }
     }
-    for rub in rubs.iter().filter(|r| r.most > 0.0) {
-        let t = length(rub.slip(u));
-        sum += rub.most
-            * if t > width {
-                t - 0.5 * width
-            } else {
-                0.5 * t * t / width
-            };
-    }
-    sum
+    u
 }
 
-/// A step of Newton's method, shortened until it leads down; whether it is too short to matter. `now` is the function there.
-fn step(free: &Twist, u: &mut Twist, rubs: &[Rubs], width: f64, now: &mut f64) -> bool {
-    let mut matrix = [[0.0; 6]; 6];
-    let mut down: Twist = std::array::from_fn(|k| free[k] - u[k]);
-    for (k, row) in matrix.iter_mut().enumerate() {
-        row[k] = 1.0;
-    }
-    for rub in rubs.iter().filter(|r| r.most > 0.0) {
-        let t = rub.slip(u);
-        let size = length(t);
-        let stiff = rub.most / size.max(width);
-        for k in 0..2 {
-            add(&mut down, -stiff * t[k], &rub.yields[k]);
-            add_square(&mut matrix, stiff, &rub.yields[k]);
-        }
-        if size > width {
-            // Along the slip friction does not grow; a little is left, so that long steps are not too long.
-            let along: Twist =
-                std::array::from_fn(|k| (t[0] * rub.yields[0][k] + t[1] * rub.yields[1][k]) / size);
-            add_square(&mut matrix, -stiff, &along);
-        }
-    }
-    let mut way = solved(&mut matrix, &down);
-    let is_short = dot(&way, &way).sqrt() < DONE * width;
-    for _ in 0..HALVINGS {
-        let there = std::array::from_fn(|k| u[k] + way[k]);
-        let then = value(free, &there, rubs, width);
-        if then <= *now {
-            (*u, *now) = (there, then);
-            break;
-        }
-        way = way.map(|w| 0.5 * w);
-    }
-    is_short
+fn length(t: [f64; 2]) -> f64 {
+    (t[0] * t[0] + t[1] * t[1]).sqrt()
 }
 
-fn add_square(matrix: &mut [[f64; 6]; 6], share: f64, a: &Twist) {
-    for (row, x) in matrix.iter_mut().zip(a) {
-        add(row, share * x, a);
+/// To the lower half of a matrix.
+fn add_product(matrix: &mut [[f64; 6]; 6], share: f64, a: &Twist, b: &Twist) {
+    for i in 0..6 {
+        for j in 0..=i {
+            matrix[i][j] += share * a[i] * b[j];
+        }
     }
 }
 
 /// By the factors of Cholesky; the matrix is the identity and what is not negative.
-fn solved(matrix: &mut [[f64; 6]; 6], right: &Twist) -> Twist {
-    let mut x = *right;
+fn solve(matrix: &mut [[f64; 6]; 6], x: &mut Twist) {
     for j in 0..6 {
         for k in 0..j {
             let part = matrix[j][k];
@@ -150,7 +167,7 @@ fn solved(matrix: &mut [[f64; 6]; 6], right: &Twist) -> Twist {
                 matrix[i][j] -= part * matrix[i][k];
             }
         }
-        let root = matrix[j][j].max(1e-3).sqrt();
+        let root = matrix[j][j].max(0.5).sqrt();
         for i in j..6 {
             matrix[i][j] /= root;
         }
@@ -166,5 +183,83 @@ fn solved(matrix: &mut [[f64; 6]; 6], right: &Twist) -> Twist {
         }
         x[j] /= matrix[j][j];
     }
-    x
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::super::places::row;
+    use super::super::projection::Polyhedron;
+    use super::super::random::Random;
+    use super::*;
+
+    fn vector(random: &mut Random) -> DVec3 {
+        DVec3::from_array(std::array::from_fn(|_| 2.0 * random.share() - 1.0))
+    }
+
+    /// Contacts of a tool that is pressed on a plane or on all sides, and a twist that it would go without friction.
+    fn contacts(random: &mut Random) -> (Twist, Vec<Rubs>) {
+        let count = 1 + (random.share() * 6.0) as usize;
+        let flat = random.share() < 0.6;
+        let mut rows = Polyhedron::with_capacity(6);
+        let lever = 63.0;
+        let high = 16.0 * random.share();
+        let places: Vec<_> = (0..count)
+            .map(|_| {
+                let place = 12.0 * vector(random) * DVec3::new(1.0, 1.0, 0.0) - high * DVec3::Z;
+                let lean = if flat { DVec3::ZERO } else { vector(random) };
+                (place, (lean + DVec3::Z).normalize_or(DVec3::Z))
+            })
+            .collect();
+        for (n, (place, normal)) in places.iter().enumerate() {
+            rows.push(row(*normal, *place, lever), 0.0);
+            rows.expect(n);
+        }
+        let strength = [0.01, 0.3, 1.0, 3.0][(random.share() * 4.0) as usize];
+        let rubs = places.iter().map(|(place, normal)| {
+            let (a, b) = normal.any_orthonormal_pair();
+            let slips = [a, b].map(|t| row(t, *place, lever));
+            let most = strength * random.share().powi(2);
+            Rubs::new(most, slips, slips.map(|t| rows.across(&t)), [0.0; 2])
+        });
+        let rubs: Vec<_> = rubs.collect();
+        let size = [1e-3, 0.05, 1.0, 3.0][(random.share() * 4.0) as usize];
+        let free: Twist = std::array::from_fn(|_| size * (2.0 * random.share() - 1.0));
+        (rows.across(&free), rubs)
+    }
+
+    /// Frictions are within their strengths and balance; what slips is held back with all of it, and what has less does not slip.
+    #[test]
+    fn frictions_meet_their_conditions() {
+        let mut random = Random::new(3);
+        let (mut stick, mut slip, mut open) = (0, 0, 0);
+        for _ in 0..5000 {
+            let (free, mut rubs) = contacts(&mut random);
+            if !slide(&free, &mut rubs) {
+                open += 1;
+                continue;
+            }
+            let u = held(&free, &rubs);
+            for rub in &rubs {
+                let t = rub.slips.map(|t| dot(&t, &u));
+                let size = length(rub.friction);
+                assert!(size <= rub.most * (1.0 + 1e-12));
+                if length(t) < 2.0 * SOFT {
+                    stick += 1;
+                    continue;
+                }
+                slip += 1;
+                let against = -(t[0] * rub.friction[0] + t[1] * rub.friction[1]) / length(t);
+                assert!(
+                    (against - rub.most).abs() < 1e-2 * rub.most,
+                    "{against} {}",
+                    rub.most
+                );
+            }
+        }
+        println!("{stick} stick, {slip} slip, {open} of 5000 open");
+        assert!(stick > 1000 && slip > 1000, "{stick} {slip}");
+        assert_eq!(open, 0);
+    }
 }

@@ -25,8 +25,8 @@ const POINT_REACH: f64 = 7.5;
 const ROOM: f64 = 9.0;
 /// Closest nodes for tools of many points, mm.
 const FINEST: f64 = 0.5;
-/// Nodes on an axis for such a tool, where they are not closer than that.
-const TOOL_NODES: f64 = 100.0;
+/// Nodes on an axis for such a tool, where they are not closer than that: a box that follows is made anew in two steps of a simulation.
+const TOOL_NODES: f64 = 64.0;
 
 /// What a tool asks of snapshots.
 #[derive(Clone, Copy, Debug, PartialEq)]

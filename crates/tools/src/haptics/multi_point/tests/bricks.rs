@@ -15,7 +15,7 @@ use super::super::super::{
 use super::super::{MultiPoint, MultiPointOptions, PointTool, Sampling};
 use super::contacts::{all_tools, cube};
 use super::scenes::*;
-use crate::paint::Layers;
+use crate::paint::{Layer, LayerError, Layers, Substance};
 
 /// Ticks from snapshot to snapshot.
 const STEP: usize = 33;
@@ -378,4 +378,68 @@ fn ticks_on_snapshots_take_no_memory() {
         }
     });
     assert_eq!(counted.count_total, 0, "{counted:?}");
+}
+
+/// What is painted is felt where the tool presses: on the left side soft and smooth, on the right hard and rough.
+#[test]
+fn painted_friction_and_stiffness_are_felt() {
+    let lattice = Lattice {
+        world_from_lattice: DAffine3::from_translation(DVec3::splat(-24.0)),
+        cells: [48; 3],
+    };
+    let spline = HierarchicalSpline::<f32>::schoenberg(lattice, 1.0, |p| -p.z).expect("a floor");
+    let whole = lattice.world_box();
+    let paint = |left: f64, right: f64| {
+        let number = move |p: DVec3| if p.x < 0.0 { left } else { right };
+        let layer = Layer::empty(&lattice, 0).painted(&whole, |p, _| Ok::<_, LayerError>(Some(number(p))));
+        layer.expect("numbers")
+    };
+    let layers = Layers::from([
+        (Substance::SurfaceStiffness, paint(500.0, 1500.0)),
+        (Substance::Friction, paint(0.2, 0.7)),
+    ]);
+    let object = TouchedObject {
+        id: 1,
+        field: Arc::new(spline),
+        iso: 0.0,
+        world_from_object: DAffine3::IDENTITY,
+        layers: &layers,
+        default: Touch::default(),
+    };
+    for tool in [
+        PointTool::sphere(4.0, Sampling::default()),
+        PointTool::block(DVec3::splat(6.0), Sampling::default()),
+    ] {
+        let tool = tool.expect("a tool");
+        let low = tool
+            .extent()
+            .min(if tool.points().len() == 80 { 4.0 } else { 3.0 });
+        let shown =
+            SnapshotMaker::new(Demand::of_points(&tool)).make(DVec3::ZERO, &[object_again(&object)], 0);
+        for (x, stiffness, friction) in [(-8.0, 250.0, 0.2), (8.0, 375.0, 0.7)] {
+            let hand = |t: f64| {
+                let way = 30.0 * (t - 0.2).max(0.0);
+                Pose::at(DVec3::new(x, way - 3.0, low + (1.0 - 20.0 * t).max(-2.0)))
+            };
+            let felt = follow(&mut renderer(&tool), &*shown, 450, hand).last().felt;
+            let expected = 1e-3 * stiffness * 2.0;
+            assert!(
+                (felt.force.z / expected - 1.0).abs() < 0.01,
+                "{x}: {}",
+                felt.force
+            );
+            assert!(
+                (-felt.force.y / felt.force.z / friction - 1.0).abs() < 0.02,
+                "{x}: {}",
+                felt.force
+            );
+        }
+    }
+}
+
+fn object_again<'a>(object: &TouchedObject<'a>) -> TouchedObject<'a> {
+    TouchedObject {
+        field: object.field.clone(),
+        ..*object
+    }
 }
