@@ -6,9 +6,15 @@ mod check;
 mod cli;
 mod devices;
 mod fans;
+#[cfg(feature = "window")]
+mod panels;
 mod picture;
 mod pieces;
 mod threads;
+#[cfg(feature = "window")]
+mod view;
+#[cfg(feature = "window")]
+mod window;
 
 use std::process::ExitCode;
 

@@ -238,12 +238,38 @@ fn directory_of(target: &Path) -> PathBuf {
     }
 }
 
-fn temporary_in(target: &Path, old: Option<Permissions>) -> io::Result<tempfile::NamedTempFile> {
+/// How the names of temporary files of a target begin.
+fn prefix(target: &Path) -> std::ffi::OsString {
     let mut prefix = std::ffi::OsString::from(".");
     prefix.push(target.file_name().unwrap_or_default());
     prefix.push(".");
+    prefix
+}
+
+/// How they end.
+const SUFFIX: &str = ".tmp";
+
+/// Removes temporary files that killed writers of a target have left. Only for who knows that nobody is writing it.
+///
+/// # Errors
+/// Those of the system.
+pub fn clear_left(target: &Path) -> io::Result<()> {
+    let prefix = prefix(target);
+    for entry in fs::read_dir(directory_of(target))? {
+        let entry = entry?;
+        let name = entry.file_name();
+        let bytes = name.as_encoded_bytes();
+        if bytes.starts_with(prefix.as_encoded_bytes()) && bytes.ends_with(SUFFIX.as_bytes()) {
+            fs::remove_file(entry.path())?;
+        }
+    }
+    Ok(())
+}
+
+fn temporary_in(target: &Path, old: Option<Permissions>) -> io::Result<tempfile::NamedTempFile> {
+    let prefix = prefix(target);
     let mut builder = tempfile::Builder::new();
-    builder.prefix(&prefix).suffix(".tmp");
+    builder.prefix(&prefix).suffix(SUFFIX);
     #[cfg(unix)]
     {
         // The system takes the umask off, as for any new file.
@@ -317,6 +343,23 @@ pub(crate) mod tests {
             Ok(())
         });
         assert_eq!(length, 18);
+    }
+
+    #[test]
+    fn what_killed_writers_left_is_cleared() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = |name: &str| directory.path().join(name);
+        for name in [
+            "a.html",
+            ".a.html.x1Y2z3.tmp",
+            ".a.htm.x1Y2z3.tmp",
+            ".b.html.x1Y2z3.tmp",
+        ] {
+            fs::write(path(name), "text").unwrap();
+        }
+        clear_left(&path("a.html")).unwrap();
+        assert!(path("a.html").exists() && !path(".a.html.x1Y2z3.tmp").exists());
+        assert!(path(".a.htm.x1Y2z3.tmp").exists() && path(".b.html.x1Y2z3.tmp").exists());
     }
 
     #[test]

@@ -1,10 +1,10 @@
-use std::io::{self, Write};
 use std::path::PathBuf;
 
 use fitting::{Cancel, FitError};
 
+use super::chart_output::{JsonLines, write_charts};
 use super::cost::cpu_seconds;
-use super::failure::{Failure, OrFail, Outcome};
+use super::failure::{Failure, Outcome};
 use super::progress::Bar;
 use super::staged::{StagedFiles, publish};
 use crate::charts::{Chart, DynamicsError, Extent, Line, Run, cost, sampling, sweep};
@@ -35,15 +35,8 @@ pub fn run(args: &Args, cancel: &Cancel) -> Outcome {
         _ => Extent::Charts,
     };
     let bar = Bar::new();
-    let mut closed = None;
-    let mut show = |line: &Line| {
-        if args.json {
-            let text = serde_json::to_string(line).expect("a struct of plain fields is always JSON");
-            if let Err(e) = writeln!(io::stdout().lock(), "{text}") {
-                closed.get_or_insert(e);
-            }
-        }
-    };
+    let mut json = JsonLines::new(args.json);
+    let mut show = |line: &Line| json.show(line);
     let mut go_on = |fraction: f64| {
         bar.show("measuring", fraction);
         !cancel.is_cancelled()
@@ -57,16 +50,11 @@ pub fn run(args: &Args, cancel: &Cancel) -> Outcome {
     let profiles = sampling(extent, &mut run).map_err(failed)?;
     let costs = cost(extent, &mut run).map_err(failed)?;
     bar.clear();
-    if let Some(e) = closed {
-        return Err(e).or_limit();
-    }
+    json.end()?;
     let mut charts = Chart::of_steps(&lines);
     charts.extend(Chart::of_sampling(&profiles));
     charts.push(("cost".into(), Chart::of_cost(&costs)));
-    for (name, chart) in charts {
-        let svg = chart.svg().map_err(Failure::limit)?;
-        staged.write_text(&format!("dynamics-{name}.svg"), &svg)?;
-    }
+    write_charts(&mut staged, "dynamics", charts)?;
     publish(staged, args.json)
 }
 

@@ -1,9 +1,9 @@
-use std::io::{self, Write};
 use std::path::PathBuf;
 
 use fitting::{Cancel, FitError};
 
-use super::failure::{Failure, OrFail, Outcome};
+use super::chart_output::{JsonLines, write_charts};
+use super::failure::Outcome;
 use super::progress::Bar;
 use super::staged::{StagedFiles, publish};
 use crate::charts::{HapticLine, HapticRun, haptic_costs};
@@ -26,15 +26,8 @@ pub struct Args {
 pub fn run(args: &Args, cancel: &Cancel) -> Outcome {
     let mut staged = StagedFiles::new("-o", &args.output)?;
     let bar = Bar::new();
-    let mut closed = None;
-    let mut show = |line: &HapticLine| {
-        if args.json {
-            let text = serde_json::to_string(line).expect("a struct of plain fields is always JSON");
-            if let Err(e) = writeln!(io::stdout().lock(), "{text}") {
-                closed.get_or_insert(e);
-            }
-        }
-    };
+    let mut json = JsonLines::new(args.json);
+    let mut show = |line: &HapticLine| json.show(line);
     let mut go_on = |fraction: f64| {
         bar.show("touching", fraction);
         !cancel.is_cancelled()
@@ -46,12 +39,7 @@ pub fn run(args: &Args, cancel: &Cancel) -> Outcome {
     });
     bar.clear();
     let costs = costs.map_err(|_| FitError::Cancelled)?;
-    if let Some(e) = closed {
-        return Err(e).or_limit();
-    }
-    for (name, chart) in costs.charts() {
-        let svg = chart.svg().map_err(Failure::limit)?;
-        staged.write_text(&format!("haptics-{name}.svg"), &svg)?;
-    }
+    json.end()?;
+    write_charts(&mut staged, "haptics", costs.charts())?;
     publish(staged, args.json)
 }

@@ -1,10 +1,10 @@
-use std::io::{self, Write};
 use std::path::PathBuf;
 
 use fitting::{Cancel, FitError};
 
+use super::chart_output::{JsonLines, write_charts};
 use super::cost::cpu_seconds;
-use super::failure::{Failure, OrFail, Outcome};
+use super::failure::{Failure, Outcome};
 use super::progress::Bar;
 use super::staged::{StagedFiles, publish};
 use crate::charts::{Chart, mask_costs};
@@ -27,15 +27,10 @@ pub struct Args {
 pub fn run(args: &Args, cancel: &Cancel) -> Outcome {
     let mut staged = StagedFiles::new("-o", &args.output)?;
     let bar = Bar::new();
-    let mut closed = None;
+    let mut json = JsonLines::new(args.json);
     let costs = mask_costs(args.quick, cpu_seconds, |cost, fraction| {
         bar.show("measuring", fraction);
-        if args.json {
-            let text = serde_json::to_string(cost).expect("a struct of plain fields is always JSON");
-            if let Err(e) = writeln!(io::stdout().lock(), "{text}") {
-                closed.get_or_insert(e);
-            }
-        }
+        json.show(cost);
         !cancel.is_cancelled()
     });
     bar.clear();
@@ -43,12 +38,7 @@ pub fn run(args: &Args, cancel: &Cancel) -> Outcome {
         return Err(FitError::Cancelled.into());
     }
     let costs = costs.map_err(Failure::limit)?;
-    if let Some(e) = closed {
-        return Err(e).or_limit();
-    }
-    for (name, chart) in Chart::of_masks(&costs) {
-        let svg = chart.svg().map_err(Failure::limit)?;
-        staged.write_text(&format!("masks-{name}.svg"), &svg)?;
-    }
+    json.end()?;
+    write_charts(&mut staged, "masks", Chart::of_masks(&costs))?;
     publish(staged, args.json)
 }

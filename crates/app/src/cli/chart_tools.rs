@@ -1,11 +1,11 @@
-use std::io::{self, Write};
 use std::path::PathBuf;
 
 use fitting::{Cancel, FitError};
 use formats::field::AnyField;
 
+use super::chart_output::{JsonLines, write_charts};
 use super::cost::cpu_seconds;
-use super::failure::{Failure, OrFail, Outcome};
+use super::failure::{Failure, Outcome};
 use super::field::OpenField;
 use super::progress::Bar;
 use super::source::{FIELDS, Source};
@@ -53,15 +53,8 @@ pub fn run(args: &Args, cancel: &Cancel) -> Outcome {
     };
     let sculptures: Vec<Sculpture> = args.fields.iter().map(open).collect::<Outcome<_>>()?;
     let bar = Bar::new();
-    let mut closed = None;
-    let mut show = |line: &ToolLine| {
-        if args.json {
-            let text = serde_json::to_string(line).expect("a struct of plain fields is always JSON");
-            if let Err(e) = writeln!(io::stdout().lock(), "{text}") {
-                closed.get_or_insert(e);
-            }
-        }
-    };
+    let mut json = JsonLines::new(args.json);
+    let mut show = |line: &ToolLine| json.show(line);
     let mut go_on = |fraction: f64| {
         bar.show("pulling", fraction);
         !cancel.is_cancelled()
@@ -80,12 +73,7 @@ pub fn run(args: &Args, cancel: &Cancel) -> Outcome {
         ToolsError::Cancelled => FitError::Cancelled.into(),
         e => Failure::limit(e),
     })?;
-    if let Some(e) = closed {
-        return Err(e).or_limit();
-    }
-    for (name, chart) in costs.charts() {
-        let svg = chart.svg().map_err(Failure::limit)?;
-        staged.write_text(&format!("tools-{name}.svg"), &svg)?;
-    }
+    json.end()?;
+    write_charts(&mut staged, "tools", costs.charts())?;
     publish(staged, args.json)
 }

@@ -12,11 +12,14 @@ mod chart_haptics;
 mod chart_masks;
 mod chart_mesh;
 mod chart_orient;
+mod chart_output;
 mod chart_tools;
 mod charts;
 mod check;
 mod convert;
 mod cost;
+#[cfg(feature = "window")]
+pub mod desk_files;
 mod devices;
 mod document;
 mod end;
@@ -35,13 +38,15 @@ mod keep;
 mod mesh;
 mod mesh_check;
 mod mesh_output;
+#[cfg(feature = "window")]
+mod open;
 mod output;
 mod overwrite;
 mod own;
 mod phantom;
 mod picture;
 mod progress;
-mod quantity;
+pub mod quantity;
 mod report;
 mod sample;
 mod simulate;
@@ -69,7 +74,7 @@ use quantity::Memory;
 #[command(name = "isoclay", version, max_term_width = 100, after_help = EXIT_CODES)]
 struct Cli {
     #[command(subcommand)]
-    command: Command,
+    command: Option<Command>,
     /// Memory that the process may hold, such as 2GiB
     #[arg(long, global = true, value_name = "SIZE")]
     memory: Option<Memory>,
@@ -122,6 +127,9 @@ enum Command {
     Devices(devices::Args),
     /// Draw speed against accuracy
     Charts(charts::Args),
+    /// Open the window, with files in it, as isoclay alone does
+    #[cfg(feature = "window")]
+    Open(open::Args),
 }
 
 /// The tree of commands. Where a shared option means something else in one of them, its help says so there.
@@ -146,13 +154,22 @@ pub fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(e) => return refuse(&e),
     };
-    let (json, data_on_stdout) = cli.command.stdout();
+    #[cfg(feature = "window")]
+    let asked = cli
+        .command
+        .unwrap_or_else(|| Command::Open(open::Args::default()));
+    #[cfg(not(feature = "window"))]
+    let Some(asked) = cli.command else {
+        let missing = clap::error::ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand;
+        return refuse(&command().error(missing, "say what to do: isoclay --help lists the commands"));
+    };
+    let (json, data_on_stdout) = asked.stdout();
     end::tell_as(json, data_on_stdout);
     if cli.memory.is_none() {
         crate::allocator::take_large_steps();
     }
     let ready = interrupt::listen().and_then(|()| cli.memory.map_or(Ok(()), ceiling::hold));
-    let outcome = ready.and_then(|()| match &cli.command {
+    let outcome = ready.and_then(|()| match &asked {
         Command::Fit(a) => fit::run(a),
         Command::Batch(a) => batch::run(a),
         Command::Mesh(a) => mesh::run(a),
@@ -174,6 +191,8 @@ pub fn main() -> ExitCode {
         Command::Feel(a) => document::feel::run(a),
         Command::Devices(a) => devices::run(a),
         Command::Charts(a) => charts::run(a),
+        #[cfg(feature = "window")]
+        Command::Open(a) => open::run(a),
     });
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
@@ -238,6 +257,8 @@ impl Command {
             Self::Feel(a) => (a.json, a.output.as_deref().is_some_and(is_stdout)),
             Self::Devices(a) => (a.json, false),
             Self::Charts(a) => (a.json(), false),
+            #[cfg(feature = "window")]
+            Self::Open(_) => (false, false),
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::DVec3;
-use tools::haptics::{Moving, Obstacle, Shape, Snapshot, StrokeStep};
+use tools::haptics::{Moving, Obstacle, Snapshot, StrokeStep};
 
 /// Places along each edge of a brick whose distances the checksum takes.
 const LOOKS: u32 = 4;
@@ -77,15 +77,12 @@ impl Shown {
         let pulled = self.pulled.map_or([0; 2], |p| [p.number, p.force.to_bits()]);
         let mut sum = words.into_iter().chain(place).chain(pulled).fold(0, mixed);
         for part in s.parts() {
-            let Shape::Brick(brick) = &part.shape else {
-                continue;
-            };
-            let b = brick.world_box();
+            let b = part.shape.world_box();
             let share = |n: u32| f64::from(n) / f64::from(LOOKS - 1);
             for n in 0..LOOKS.pow(3) {
                 let [i, j, k] = [n % LOOKS, n / LOOKS % LOOKS, n / LOOKS / LOOKS].map(share);
                 let p = b.min + DVec3::new(i, j, k) * (b.max - b.min);
-                sum = mixed(sum, brick.distance(p).0.to_bits());
+                sum = mixed(sum, part.shape.distance(p).0.to_bits());
             }
         }
         sum

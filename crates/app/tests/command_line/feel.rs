@@ -131,3 +131,64 @@ fn a_session_by_a_trajectory_is_an_edit_like_any_other() {
         run.stderr
     );
 }
+
+/// A plate that lies on the top of the ball, held off its middle: the torque is the arm times the force, and a ball has none.
+#[test]
+fn a_plate_pressed_beside_its_middle_returns_torque() {
+    let bench = ball();
+    bench.json("new clay.isoclay ball.iclay");
+    bench.write(
+        "press.toml",
+        "target = [{ time = 0, at = [0.08, 0, 1.3], turn = [0, 90, 0] }, { time = 1, at = [0.08, 0, 1.2] }, \
+         { time = 3, at = [0.08, 0, 0.97] }]",
+    );
+    let felt = |options: &str| {
+        let told = bench.json(&format!(
+            "feel clay.isoclay --device sim:omni --script press.toml -o trace.csv {options}"
+        ));
+        let trace = std::fs::read_to_string(bench.path("trace.csv")).unwrap();
+        let names: Vec<String> = trace
+            .lines()
+            .next()
+            .unwrap()
+            .split(',')
+            .map(String::from)
+            .collect();
+        let last: Vec<String> = trace
+            .lines()
+            .last()
+            .unwrap()
+            .split(',')
+            .map(String::from)
+            .collect();
+        let of = move |name: &str| {
+            let column = names.iter().position(|n| n == name).unwrap();
+            last[column].parse::<f64>().unwrap()
+        };
+        (told, of)
+    };
+    let (told, last) = felt("--tool plate:20x30x1");
+    let arm = last("proxy_x") / told["scale"].as_f64().unwrap();
+    let torque = arm * last("wished");
+    assert!(last("force_z") > 0.3 && torque > 1.0, "{told}");
+    // The plate gives way a little: it then touches beside the top.
+    assert!(
+        (last("torque_y") / torque - 1.0).abs() < 0.08,
+        "{} {torque}",
+        last("torque_y")
+    );
+    assert!(
+        told["largest_torque_nmm"].as_f64().unwrap() >= last("torque_y"),
+        "{told}"
+    );
+    // That device gives none.
+    assert_eq!(last("torque_sent"), 0.0);
+    let (told, last) = felt("");
+    assert!(
+        last("force_z") > 0.3 && told["largest_torque_nmm"] == 0.0,
+        "{told}"
+    );
+    let run = bench
+        .run("feel clay.isoclay --device sim:omni --script press.toml --tool knife:8x20x1 --contact vcp");
+    assert!(run.code == 2 && run.stderr.contains("--tool"), "{}", run.stderr);
+}

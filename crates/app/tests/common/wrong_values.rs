@@ -117,6 +117,8 @@ pub const ROWS: &[Row] = &[
     ("feel", "--stiffness", "clay.isoclay --device sim:omni --script hand.toml --stiffness *0", "above zero"),
     ("feel", "--force", "clay.isoclay --device sim:omni --script hand.toml --force *none", "number"),
     ("feel", "--radius", "clay.isoclay --device sim:omni --script hand.toml --radius *0", "above zero"),
+    ("feel", "--tool", "clay.isoclay --device sim:omni --script hand.toml --tool *plate:20x30", "thickness"),
+    ("feel", "--tool", "clay.isoclay --device sim:omni --script hand.toml --tool *plough", "plate:20x30x1"),
     ("feel", "--scale", "clay.isoclay --device sim:omni --script hand.toml --scale *0", "above zero"),
     ("feel", "--contact", "clay.isoclay --device sim:omni --script hand.toml --contact *glue", "proxy"),
     ("feel", "--seconds", "clay.isoclay --device sim:omni --script hand.toml --seconds *0", "above zero"),

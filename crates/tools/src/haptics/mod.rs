@@ -28,7 +28,9 @@ mod workspace;
 pub use coupling::Coupling;
 pub use device::{Abilities, Device, DeviceError, Reading};
 pub use feel::{Contact, Felt, Pose, Renderer};
-pub use multi_point::{MultiPoint, MultiPointError, MultiPointOptions, PointTool, Sampling, ToolError};
+pub use multi_point::{
+    MultiPoint, MultiPointError, MultiPointOptions, PointTool, Sampling, Scaled, ToolError,
+};
 pub use obstacle::{Blend, Obstacle, Together, Touch};
 pub use probe::{MatterMap, Probe, ProbeOptions, Probed};
 pub use proxy::{Friction, Magnet, Proxy, ProxyOptions};

@@ -2,7 +2,7 @@
 
 use super::gates::Status;
 
-/// What is kept of a tick: 64 bytes, without padding. Lengths are those of the scene, forces those on the hand.
+/// What is kept of a tick: 80 bytes, without padding. Lengths are those of the scene, forces those on the hand.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
 pub struct TickRecord {
@@ -24,6 +24,10 @@ pub struct TickRecord {
     pub energy: f32,
     /// Time since the tick before, s.
     pub dt: f32,
+    /// Torque that was wished, N mm, in the axes of the force: few devices give any.
+    pub torque: [f32; 3],
+    /// Length of the torque that was sent, N mm.
+    pub torque_sent: f32,
 }
 
-const _: () = assert!(size_of::<TickRecord>() == 64);
+const _: () = assert!(size_of::<TickRecord>() == 80);

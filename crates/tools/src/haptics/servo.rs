@@ -81,6 +81,8 @@ pub struct Servo {
     stroke: StrokeForce,
     /// Of the stroke that is at work now.
     pulled: Option<StrokeStep>,
+    /// Whether that stroke was lost hold of.
+    has_slipped: bool,
     gates: Gates,
     granted: Granted,
     last: Felt,
@@ -117,6 +119,7 @@ impl Servo {
                 ..StrokeForceOptions::of_scale(1.0)
             }),
             pulled: None,
+            has_slipped: false,
             renderer: make(granted.stiffness / scale, granted.damping / scale),
             gates: Gates::new(abilities, granted.stiffness, options.gates)?,
             granted,
@@ -137,7 +140,7 @@ impl Servo {
         dt: f64,
     ) -> Tick {
         self.ticks += 1;
-        let (felt, wrench) = match self.gates.admit(told, dt) {
+        let (felt, wished, wrench) = match self.gates.admit(told, dt) {
             None => {
                 self.gates.shut();
                 let nothing = Felt {
@@ -145,7 +148,7 @@ impl Servo {
                     torque: DVec3::ZERO,
                     ..self.last
                 };
-                (nothing, Wrench::ZERO)
+                (nothing, Wrench::ZERO, Wrench::ZERO)
             }
             Some(reading) => {
                 self.buttons = reading.buttons;
@@ -155,7 +158,11 @@ impl Servo {
                     force: felt.force,
                     torque: felt.torque,
                 });
-                (felt, self.gates.pass(wished, felt.contact, heartbeat, dt))
+                let sent = self.gates.pass(wished, felt.contact, heartbeat, dt);
+                if self.gates.is_faded() {
+                    self.lose_hold();
+                }
+                (felt, wished, sent)
             }
         };
         self.last = felt;
@@ -172,6 +179,8 @@ impl Servo {
                 wished: felt.force.length() as f32,
                 energy: self.gates.energy() as f32,
                 dt: dt as f32,
+                torque: wished.torque.as_vec3().to_array(),
+                torque_sent: wrench.torque.length() as f32,
             },
         }
     }
@@ -179,7 +188,16 @@ impl Servo {
     /// Tells what a force tool in the hand did in the last step of the simulation, in newtons and millimetres of the scene; none when
     /// it has let go. While it pulls, that is felt in place of contact: the hand is where it pulls to, in the solid or out of it.
     pub fn pull(&mut self, step: Option<StrokeStep>) {
-        self.pulled = step;
+        self.has_slipped &= step.is_some();
+        self.pulled = step.filter(|_| !self.has_slipped);
+    }
+
+    /// Forgets the contact and the stroke. Where the hand went while it felt nothing cost it no work: a spring from where the contact was
+    /// would give it energy.
+    fn lose_hold(&mut self) {
+        self.has_slipped = self.pulled.take().is_some() || self.has_slipped;
+        self.stroke.reset();
+        self.renderer.reset();
     }
 
     /// What the hand feels: the stroke that pulls, or else contact, which begins anew after one.

@@ -26,7 +26,7 @@ fn a_fault_takes_the_force_away_until_it_is_armed_again() {
         (FaultKind::Jump(DVec3::new(60.0, 0.0, 80.0)), Trip::TooFast, 0.0),
         (FaultKind::Unplugged, Trip::Gone, 0.0),
         (FaultKind::Frozen, Trip::Stale, 10e-3),
-        (FaultKind::WriterStalls, Trip::Writer, 12e-3),
+        (FaultKind::WriterStalls, Trip::Writer, 9e-3),
     ];
     for (kind, why, latest) in faults {
         let path = Path::smooth([

@@ -1,8 +1,8 @@
 //! What the gates of a servo add: nothing that is sent changes faster than the slew limit, whatever the contact does.
 
 use glam::{DVec2, DVec3};
-use tools::haptics::simulated::{Path, SimulatedHand, World};
-use tools::haptics::{Obstacle, ServoOptions, Workspace};
+use tools::haptics::simulated::{Change, Path, SimulatedHand, World};
+use tools::haptics::{Obstacle, Pose, ServoOptions, Workspace};
 
 use crate::common::{Bumps, Check, Edge, HalfSpace, Loop, Sheet, proxy};
 
@@ -158,4 +158,30 @@ fn a_tool_that_is_armed_inside_gets_its_force_slowly() {
             ("P3", check.is_slewed()),
         ],
     );
+}
+
+/// A simulation that is not heard of for half a second and more: the force fades, and what comes back gives the hand no energy.
+#[test]
+fn what_comes_back_after_a_long_stall_gives_no_energy() {
+    for silent in [0.45, 0.52, 0.55, 0.58, 0.62, 0.7, 1.0, 1.7] {
+        let path = Path::smooth([(0.1, of(0.0, 14.0)), (0.3, of(0.0, -4.0))]);
+        let setup = Loop::new(SimulatedHand::light(path), 4.0);
+        let start = Pose::at(of(0.0, 14.0));
+        let floor = || std::sync::Arc::new(HalfSpace::floor(0.0));
+        let world = World::changing(1.0 / silent, Change::Steps, &start, |_, _| floor());
+        let mut rig = setup.rig(world, setup.served(), |k| Box::new(proxy(2.0, k)));
+        let check = setup.check(rig.run(setup.seconds), &Workspace::default());
+        println!(
+            "{silent} s: {} J, {} N",
+            check.measures.returned, check.measures.force
+        );
+        check.assert(
+            &format!("{silent} s without a word"),
+            &[
+                ("pressed", check.measures.force > 1.0),
+                ("P2", check.is_passive()),
+                ("P3", check.is_slewed()),
+            ],
+        );
+    }
 }

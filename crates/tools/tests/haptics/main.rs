@@ -22,6 +22,7 @@ mod groove;
 mod inside;
 mod jitter;
 mod memory;
+mod multi;
 mod same;
 mod saturated;
 mod scans;

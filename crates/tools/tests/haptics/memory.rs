@@ -6,8 +6,8 @@ use bspline::HierarchicalSpline;
 use bspline::hierarchical::Lattice;
 use glam::{DAffine3, DVec3};
 use tools::haptics::{
-    Abilities, Demand, Obstacle, Pose, Proxy, ProxyOptions, Reading, Renderer, Servo, ServoOptions,
-    SnapshotMaker, Touch, TouchedObject, Vcp, VcpOptions,
+    Abilities, Demand, DeviceError, Obstacle, Pose, Proxy, ProxyOptions, Reading, Renderer, Servo,
+    ServoOptions, SnapshotMaker, Touch, TouchedObject, Vcp, VcpOptions,
 };
 use tools::paint::Layers;
 
@@ -82,12 +82,16 @@ fn ticks_take_no_memory() {
         for renderer in renderers {
             let mut servo = Servo::new(&abilities, ServoOptions::default(), |_, _| renderer).unwrap();
             servo.arm();
+            let gone = DeviceError::Gone("test".into());
             let mut pressed = 0;
             let counted = allocation_counter::measure(|| {
                 for n in 0..600 {
                     let tick = servo.tick(Ok(&reading(hand(radius, n))), obstacle, 0.0, 1e-3);
                     pressed += u32::from(tick.felt.force != DVec3::ZERO);
                 }
+                // Late, silent, and gone.
+                servo.tick(Ok(&reading(hand(radius, 600))), obstacle, 1.0, 8e-3);
+                servo.tick(Err(&gone), obstacle, 0.0, 1e-3);
             });
             assert!(pressed > 100, "radius {radius}: {pressed} ticks in contact");
             assert_eq!(counted.count_total, 0, "radius {radius}");

@@ -2,7 +2,7 @@
 //! nothing is done twice.
 
 mod board;
-mod child;
+pub mod child;
 mod choice;
 mod digest;
 mod gather;
@@ -134,6 +134,11 @@ fn fit_all(args: &Args, directory: &Path) -> Outcome {
             .map_or(".work".into(), |s| format!(".work-{}-of-{}", s.index, s.count)),
     );
     let _ = std::fs::remove_dir_all(&work);
+    let whole = ["summary.json", "summary.csv", "report.html"].map(|name| directory.join(name));
+    let own = if args.shard.is_none() { &whole[..] } else { &[] };
+    for target in own.iter().chain([&path]) {
+        formats::atomic::clear_left(target).or_limit()?;
+    }
     let made = formats::atomic::MadeDirectory::new(&work).or_limit()?;
     let scratch = PassingDirectory::new(Some(&work)).or_limit()?;
     let plan = Plan {

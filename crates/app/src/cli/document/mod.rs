@@ -43,7 +43,7 @@ pub fn open(path: &Path, notes: &mut Vec<String>) -> Outcome<Document> {
     Ok(opened.document)
 }
 
-fn options() -> Options {
+pub fn options() -> Options {
     Options {
         limits: limits(None),
         ..Options::default()

@@ -79,6 +79,43 @@ impl From<Material> for tools::material::Material {
     }
 }
 
+/// The object that a field becomes, under the name of its file; by default its surface is where the field says.
+pub fn of_field(source: &Source, iso: Option<f64>, notes: &mut Vec<String>) -> Outcome<(String, Object)> {
+    let open = OpenField::load(source)?;
+    let name = source
+        .path()
+        .file_stem()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned();
+    if matches!(open.levels(), Ok(AnyField::F64(_))) {
+        notes.push(format!(
+            "{name}: documents hold single precision; the field was rounded to it"
+        ));
+    }
+    if let Some(iso) = iso {
+        let range = open.field().bounds(&open.lattice().world_box());
+        if !(range.lo..=range.hi).contains(&iso) {
+            return Err(Failure::usage(format!(
+                "--iso {iso}: densities of {} run from {:.6} to {:.6}; choose another --iso, between them",
+                source.name(),
+                range.lo,
+                range.hi
+            )));
+        }
+    }
+    let meta = FieldMeta {
+        iso: iso.or(open.iso()),
+        ..open.meta().clone()
+    };
+    let object = match open.knots() {
+        Some(knots) => Object::of(knots.clone().into(), meta),
+        None => Object::new(open.levels()?, meta)
+            .map_err(|e| Failure::input(format!("{}: {e}", source.name())))?,
+    };
+    Ok((name, object))
+}
+
 /// Finest knot interval over what a mesh of a block may be off by, as for a fit.
 const TOLERANCE: f64 = 0.02;
 
@@ -88,44 +125,13 @@ pub fn run(args: &Args) -> Outcome {
     let mut notes = Vec::new();
     for path in &args.fields {
         let source = Source::open(path, None, FIELDS, &Cancel::new())?;
-        let open = OpenField::load(&source)?;
-        let name = path
-            .file_stem()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned();
+        let (name, mut object) = of_field(&source, args.iso, &mut notes)?;
         if state.objects().contains_key(&name) {
             return Err(Failure::usage(format!(
                 "{}: another field has the name {name:?} already; rename one of the files",
                 source.name()
             )));
         }
-        let is_double = matches!(open.levels(), Ok(AnyField::F64(_)));
-        if is_double {
-            notes.push(format!(
-                "{name}: documents hold single precision; the field was rounded to it"
-            ));
-        }
-        if let Some(iso) = args.iso {
-            let range = open.field().bounds(&open.lattice().world_box());
-            if !(range.lo..=range.hi).contains(&iso) {
-                return Err(Failure::usage(format!(
-                    "--iso {iso}: densities of {} run from {:.6} to {:.6}; choose another --iso, between them",
-                    source.name(),
-                    range.lo,
-                    range.hi
-                )));
-            }
-        }
-        let meta = FieldMeta {
-            iso: args.iso.or(open.iso()),
-            ..open.meta().clone()
-        };
-        let mut object = match open.knots() {
-            Some(knots) => Object::of(knots.clone().into(), meta),
-            None => Object::new(open.levels()?, meta)
-                .map_err(|e| Failure::input(format!("{}: {e}", source.name())))?,
-        };
         object.properties.material = args.material.into();
         state = state.with(&name, object).map_err(failure)?;
     }

@@ -75,8 +75,9 @@ pub struct Gates {
     motion: Motion,
     passivity: Passivity,
     thermal: Thermal,
-    /// Share of the force that the age of the snapshot leaves.
+    /// Share of the force that the age of the snapshot leaves, and whether that falls.
     fresh: f64,
+    fades: bool,
     sent: Wrench,
     status: Status,
     late_poses: u64,
@@ -102,6 +103,7 @@ impl Gates {
             passivity: Passivity::new(abilities, force, stiffness, options.passive),
             thermal: Thermal::new(force, abilities.continuous_force),
             fresh: 1.0,
+            fades: false,
             sent: Wrench::ZERO,
             status: Status::default(),
             late_poses: 0,
@@ -247,17 +249,21 @@ impl Gates {
         sent
     }
 
-    /// The force fades while the simulation is not heard of, and comes back as slowly.
+    /// The force fades while the simulation is not heard of, and comes back as slowly. A fade goes on to its end: a spring that gets its
+    /// stiffness back while it is pressed gives energy.
     fn freshen(&mut self, heartbeat: f64, dt: f64) {
-        let to = match heartbeat > self.options.snapshot_age {
-            true => 0.0,
-            false => 1.0,
-        };
+        self.fades = heartbeat > self.options.snapshot_age || (self.fades && self.fresh > 0.0);
+        let to = if self.fades { 0.0 } else { 1.0 };
         let most = dt / self.options.fade;
         self.fresh += f64::clamp(to - self.fresh, -most, most);
         if self.fresh < 1.0 {
             self.status |= Status::OLD_SNAPSHOT;
         }
+    }
+
+    /// Whether nothing is left of the force, as the simulation has not been heard of for so long.
+    pub fn is_faded(&self) -> bool {
+        self.fresh == 0.0
     }
 
     /// How far on its way to giving force it is.

@@ -48,7 +48,7 @@ impl MultiPoint {
 
     /// Distance and gradient at the middle of the tool's points.
     fn middle(&self, obstacle: &dyn Obstacle) -> (f64, DVec3) {
-        obstacle.distance(self.pose.at + arm(&self.tool, self.places.turn, self.tool.middle))
+        obstacle.distance(self.pose.at + arm(&self.tool, &self.places.turn, self.tool.middle))
     }
 
     /// Moves the tool if no point of it is then as deep as a limit.
@@ -65,7 +65,7 @@ impl MultiPoint {
                     &self.tool,
                     obstacle,
                     &pose,
-                    self.places.turn,
+                    &self.places.turn,
                     self.places.here[k].on,
                 );
                 deepest = deepest.min(self.places.there[k].clearance);

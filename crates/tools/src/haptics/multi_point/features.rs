@@ -7,7 +7,7 @@
 //! it touches. At rest a guest's gradient is across the tool's surface, so a sharp edge of the solid under a face of
 //! the tool presses along the face's normal.
 
-use glam::{DQuat, DVec3};
+use glam::{DMat3, DVec3};
 
 use super::super::{Obstacle, Pose};
 use super::MultiPoint;
@@ -89,7 +89,7 @@ impl MultiPoint {
             }
             self.places.there[i] = self.places.here[i];
             let (pose, turn) = (self.pose, self.places.turn);
-            self.slide(obstacle, &pose, turn, i);
+            self.slide(obstacle, &pose, &turn, i);
             self.places.here[i] = self.places.there[i];
             let here = self.places.here[i];
             // A point of the tool, or a guest before it, says the same.
@@ -105,7 +105,7 @@ impl MultiPoint {
     }
 
     /// Moves a guest over the tool's surface to where it is deepest, at the pose that is tried.
-    pub(super) fn slide(&mut self, obstacle: &dyn Obstacle, pose: &Pose, turn: DQuat, i: usize) {
+    pub(super) fn slide(&mut self, obstacle: &dyn Obstacle, pose: &Pose, turn: &DMat3, i: usize) {
         let stride = self.features.stride[i - self.places.own];
         let (place, stride) = self.slid(obstacle, pose, turn, self.places.there[i], stride);
         self.places.there[i] = place;
@@ -113,11 +113,11 @@ impl MultiPoint {
     }
 
     /// Part of a gradient along the tool's surface, in its axes.
-    fn slope(&self, turn: DQuat, place: &Place) -> DVec3 {
-        let Some(shape) = self.tool.shape else {
+    fn slope(&self, turn: &DMat3, place: &Place) -> DVec3 {
+        let Some(shape) = &self.tool.shape else {
             return DVec3::ZERO;
         };
-        let (g, n) = (turn.inverse() * place.gradient, shape.distance(place.on).1);
+        let (g, n) = (turn.transpose() * place.gradient, shape.distance(place.on).1);
         g - g.dot(n) * n
     }
 
@@ -126,11 +126,11 @@ impl MultiPoint {
         &self,
         obstacle: &dyn Obstacle,
         pose: &Pose,
-        turn: DQuat,
+        turn: &DMat3,
         from: Place,
         stride: f64,
     ) -> (Place, f64) {
-        let Some(shape) = self.tool.shape else {
+        let Some(shape) = &self.tool.shape else {
             return (from, stride);
         };
         let (least, most) = (1e-3 * self.tool.spacing, 1e3 * self.tool.spacing);
@@ -140,7 +140,11 @@ impl MultiPoint {
             if slope.length() < LEVEL {
                 break;
             }
-            let on = shape.project(place.on - stride * slope);
+            let Some(on) = shape.project(place.on - stride * slope) else {
+                // There the tool ends.
+                stride = (0.5 * stride).max(least);
+                continue;
+            };
             let next = ask(&self.tool, obstacle, pose, turn, on);
             let (way, change) = (on - place.on, self.slope(turn, &next) - slope);
             // Step of Barzilai and Borwein: the way to where the slope is none if it changes on as it did.
@@ -167,7 +171,7 @@ impl MultiPoint {
             let fine = &self.tool.fine[self.tool.first[i]..self.tool.first[i + 1]];
             self.places.here[i].clearance > self.tool.cover[i]
                 || fine.iter().all(|on| {
-                    ask(&self.tool, obstacle, &self.pose, self.places.turn, *on).clearance
+                    ask(&self.tool, obstacle, &self.pose, &self.places.turn, *on).clearance
                         >= -self.options.tolerance
                 })
         })
@@ -179,7 +183,7 @@ impl MultiPoint {
         obstacle: &dyn Obstacle,
         twist: &Twist,
         pose: &Pose,
-        turn: DQuat,
+        turn: &DMat3,
         is_violated: &mut bool,
         is_too_far: &mut bool,
     ) {
@@ -238,7 +242,7 @@ impl MultiPoint {
         found: Place,
         stride: f64,
         twist: &Twist,
-        turn: DQuat,
+        turn: &DMat3,
         is_violated: &mut bool,
         is_too_far: &mut bool,
     ) {
@@ -263,7 +267,7 @@ impl MultiPoint {
         self.places.there[i] = found;
         self.features.stride[i - self.places.own] = stride;
         // If it was in the solid before it was found, it leaves that as if the solid had grown.
-        let here = ask(&self.tool, obstacle, &self.pose, self.places.turn, found.on);
+        let here = ask(&self.tool, obstacle, &self.pose, &self.places.turn, found.on);
         self.places.here[i] = here;
         self.places.level[i] = here.clearance.min(0.0);
         self.judge(i, twist, turn, is_violated, is_too_far);

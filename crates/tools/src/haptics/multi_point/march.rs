@@ -1,10 +1,11 @@
 //! The way of the proxy to the hand in a tick.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 use super::super::{Obstacle, Pose};
 use super::MultiPoint;
-use super::places::{arm, ask, row};
+use super::friction::Meeting;
+use super::places::{Place, arm, ask};
 use super::projection::{Twist, dot};
 use super::turn::{exponential, logarithm};
 
@@ -34,8 +35,10 @@ impl MultiPoint {
     /// Moves the proxy as near to the hand as it gets.
     pub(super) fn march(&mut self, obstacle: &dyn Obstacle, hand: &Pose, dt: f64) {
         self.look_again(obstacle, hand, dt);
+        self.pressings.begin();
         let depth = -self.places.deepest_own().0;
         if self.is_buried {
+            self.pressings.clear();
             self.surface(obstacle, depth);
             return;
         }
@@ -44,7 +47,11 @@ impl MultiPoint {
         self.reach = most.max(SHORTEST);
         for _ in 0..self.options.iterations {
             let wish = self.wish(hand);
-            if dot(&wish, &wish).sqrt() < STILL || !self.step(obstacle, &wish) {
+            if dot(&wish, &wish).sqrt() < STILL {
+                self.pressings.clear();
+                break;
+            }
+            if !self.step(obstacle, &wish) {
                 break;
             }
             self.reach = (2.0 * self.reach).min(most);
@@ -60,7 +67,7 @@ impl MultiPoint {
         if self.options.turn_every > 0 {
             self.hold_turn(hand);
         } else {
-            self.places.turn = self.pose.turn;
+            self.places.turn = DMat3::from_quat(self.pose.turn);
         }
         let mut grown = 0.0f64;
         for i in 0..self.places.len() {
@@ -68,7 +75,7 @@ impl MultiPoint {
                 continue;
             }
             let before = self.places.here[i];
-            let now = ask(&self.tool, obstacle, &self.pose, self.places.turn, before.on);
+            let now = ask(&self.tool, obstacle, &self.pose, &self.places.turn, before.on);
             let change = before.clearance - now.clearance;
             grown = grown.max(if before.is_exact { change.abs() } else { change });
             self.places.here[i] = now;
@@ -94,9 +101,12 @@ impl MultiPoint {
     fn step(&mut self, obstacle: &dyn Obstacle, wish: &Twist) -> bool {
         self.gather(obstacle, wish);
         for _ in 0..CUTS {
-            let Some((whole, push)) = self.goal(wish) else {
+            let Some((mut whole, mut push)) = self.goal(obstacle, wish) else {
                 return false;
             };
+            if let Some(air) = self.in_the_air(wish) {
+                (whole, push) = (air, 0.0);
+            }
             let size = dot(&whole, &whole).sqrt();
             if size < STILL {
                 return false;
@@ -109,6 +119,7 @@ impl MultiPoint {
             self.share = share;
             match self.try_out(obstacle, &twist) {
                 Tried::Clear => {
+                    self.pressings.moved(&twist);
                     self.accept(&twist);
                     self.push_left -= share * push;
                     return true;
@@ -124,14 +135,14 @@ impl MultiPoint {
 
     /// The twist that leads nearest to a wish by the rows, and how much of it pushes the tool out of the solid: no more than is left
     /// for this tick.
-    fn goal(&mut self, wish: &Twist) -> Option<(Twist, f64)> {
-        let whole = self.rows.nearest(wish);
+    fn goal(&mut self, obstacle: &dyn Obstacle, wish: &Twist) -> Option<(Twist, f64)> {
+        let whole = self.nearest(obstacle, wish);
         if whole.is_some() && !self.rows.lacks(self.options.tolerance) {
             return whole.map(|whole| (whole, 0.0));
         }
         // As far as the tool would go if it only had to get no deeper.
         self.rows.relax();
-        let free = self.rows.nearest(wish)?;
+        let free = self.nearest(obstacle, wish)?;
         let out: Twist = whole.map_or([0.0; 6], |whole| std::array::from_fn(|k| whole[k] - free[k]));
         let push = dot(&out, &out).sqrt();
         let share = if whole.is_none() {
@@ -150,11 +161,12 @@ impl MultiPoint {
     fn gather(&mut self, obstacle: &dyn Obstacle, wish: &Twist) {
         let way = dot(wish, wish).sqrt();
         self.rows.clear();
+        self.meetings.clear();
         for i in 0..self.places.len() {
             if !self.places.counts[i] {
                 continue;
             }
-            let arm = arm(&self.tool, self.places.turn, self.places.here[i].on);
+            let arm = arm(&self.tool, &self.places.turn, self.places.here[i].on);
             // No twist of that size moves the point further.
             let most = way * (1.0 + arm.length_squared() / (self.lever * self.lever)).sqrt();
             if self.places.here[i].clearance > most {
@@ -165,23 +177,28 @@ impl MultiPoint {
                     &self.tool,
                     obstacle,
                     &self.pose,
-                    self.places.turn,
+                    &self.places.turn,
                     self.places.here[i].on,
                 );
             }
-            let place = &self.places.here[i];
+            let place = self.places.here[i];
             if place.clearance <= most {
                 let a = self.row_of(place.gradient, arm);
-                self.rows.push(a, self.places.level[i] - place.clearance);
+                let meeting = self.meeting(i, &place, self.pose.at, arm);
+                self.meet(a, self.places.level[i] - place.clearance, meeting);
             }
         }
+        self.expect_the_same();
     }
 
-    fn row_of(&self, gradient: DVec3, arm: DVec3) -> Twist {
-        match self.options.turn_every {
-            0 => row(gradient, arm, self.lever),
-            // The turn is the hand's.
-            _ => [gradient.x, gradient.y, gradient.z, 0.0, 0.0, 0.0],
+    /// Where a point's row comes from.
+    fn meeting(&self, point: usize, place: &Place, handle: DVec3, arm: DVec3) -> Meeting {
+        let down = (place.clearance + self.tool.nose) * place.gradient;
+        Meeting {
+            point,
+            at: handle + arm - down,
+            arm: arm - self.tool.nose * place.gradient,
+            gradient: place.gradient,
         }
     }
 
@@ -210,7 +227,7 @@ impl MultiPoint {
         } else {
             w
         };
-        v.length() + turned.cross(arm(&self.tool, self.places.turn, on)).length()
+        v.length() + turned.cross(arm(&self.tool, &self.places.turn, on)).length()
     }
 
     /// Looks at the pose after a twist.
@@ -220,7 +237,7 @@ impl MultiPoint {
         let turn = if self.options.turn_every > 0 {
             self.places.turn
         } else {
-            pose.turn
+            DMat3::from_quat(pose.turn)
         };
         let (mut is_violated, mut is_too_far) = (false, false);
         for i in 0..self.places.len() {
@@ -230,22 +247,22 @@ impl MultiPoint {
             let here = self.places.here[i];
             let bound = here.clearance - self.way(v, w, here.on);
             if bound > 0.0 || self.features.is_ignored(i) {
-                self.places.there[i] = super::places::Place {
+                self.places.there[i] = Place {
                     clearance: bound,
                     is_exact: false,
                     ..here
                 };
                 continue;
             }
-            let there = ask(&self.tool, obstacle, &pose, turn, here.on);
+            let there = ask(&self.tool, obstacle, &pose, &turn, here.on);
             self.places.there[i] = there;
             if i >= self.places.own {
-                self.slide(obstacle, &pose, turn, i);
+                self.slide(obstacle, &pose, &turn, i);
             }
-            self.judge(i, twist, turn, &mut is_violated, &mut is_too_far);
+            self.judge(i, twist, &turn, &mut is_violated, &mut is_too_far);
         }
         if !is_violated && !is_too_far {
-            self.find_features(obstacle, twist, &pose, turn, &mut is_violated, &mut is_too_far);
+            self.find_features(obstacle, twist, &pose, &turn, &mut is_violated, &mut is_too_far);
         }
         match (is_violated, is_too_far) {
             (_, true) => Tried::TooFar,
@@ -259,7 +276,7 @@ impl MultiPoint {
         &mut self,
         i: usize,
         twist: &Twist,
-        turn: glam::DQuat,
+        turn: &DMat3,
         is_violated: &mut bool,
         is_too_far: &mut bool,
     ) {
@@ -275,11 +292,13 @@ impl MultiPoint {
         if was_late && there.clearance > here - LATE {
             return;
         }
-        let a = self.row_of(there.gradient, arm(&self.tool, turn, there.on));
+        let arm = arm(&self.tool, turn, there.on);
+        let a = self.row_of(there.gradient, arm);
         let b = level - there.clearance + dot(&a, twist);
         // Where the proxy is now must not be in the solid by it, but for what it already is.
         let slack = if i < self.places.own { LATE } else { GUESSED };
-        if b > lack + slack || !self.rows.push(a, b) {
+        let meeting = self.meeting(i, &there, self.pose.at + halves(twist, self.lever).0, arm);
+        if b > lack + slack || !self.meet(a, b, meeting) {
             *is_too_far |= !was_late;
         } else {
             *is_violated = true;
@@ -299,7 +318,7 @@ impl MultiPoint {
         let (v, w) = halves(twist, self.lever);
         self.pose = self.after(v, w);
         if self.options.turn_every == 0 {
-            self.places.turn = self.pose.turn;
+            self.places.turn = DMat3::from_quat(self.pose.turn);
         }
         std::mem::swap(&mut self.places.here, &mut self.places.there);
         self.features.changed(0.0, w.length());
@@ -311,7 +330,7 @@ impl MultiPoint {
         self.held_for += 1;
         if self.held_for >= self.options.turn_every {
             self.held_for = 0;
-            self.places.turn = hand.turn;
+            self.places.turn = DMat3::from_quat(hand.turn);
         }
     }
 }

@@ -10,27 +10,33 @@
 //! normals at edges, averages at convex ones, pushes along normals in holes. A polyhedron of all points has the cases as its
 //! numbers of active rows, 0 to 6, and no rule to choose wrongly.
 
+mod carved;
 mod extraction;
 mod features;
+mod friction;
 mod march;
 mod options;
 mod places;
 mod projection;
 mod random;
+mod scaled;
 mod shape;
+mod slide;
 #[cfg(test)]
 mod tests;
 mod tool;
 mod turn;
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 pub use options::{MultiPointError, MultiPointOptions};
+pub use scaled::Scaled;
 pub use tool::{PointTool, Sampling, ToolError};
 
 use super::coupling::{Coupling, Stretching, pressing};
 use super::{Contact, Felt, Obstacle, Pose, Renderer};
 use features::Features;
+use friction::{Meeting, Pressings};
 use places::Places;
 use projection::Polyhedron;
 use random::Random;
@@ -56,6 +62,9 @@ pub struct MultiPoint {
     places: Places,
     features: Features,
     rows: Polyhedron,
+    /// Where each row comes from.
+    meetings: Vec<Meeting>,
+    pressings: Pressings,
     /// Step that this tick can take near the surface, mm.
     reach: f64,
     /// Way by which the tool may still be pushed out in this tick, mm.
@@ -80,12 +89,15 @@ impl MultiPoint {
     pub fn new(tool: PointTool, options: MultiPointOptions) -> Result<Self, MultiPointError> {
         options.check()?;
         let places = Places::new(&tool);
+        let most_rows = places.len() * (2 + march::CUTS);
         Ok(Self {
             lever: (options.angular_stiffness / (1e-3 * options.coupling.stiffness)).sqrt(),
             pose: Pose::at(DVec3::ZERO),
             is_clear: false,
             is_buried: false,
-            rows: Polyhedron::with_capacity(places.len() * (2 + march::CUTS)),
+            rows: Polyhedron::with_capacity(most_rows),
+            meetings: Vec::with_capacity(most_rows),
+            pressings: Pressings::default(),
             features: Features::new(&tool),
             places,
             reach: options.step,
@@ -116,7 +128,7 @@ impl MultiPoint {
     /// Whether a hand at a pose has the tool clear of the solid; sets the tool there if so.
     fn begin(&mut self, obstacle: &dyn Obstacle, hand: &Pose) -> bool {
         self.pose = *hand;
-        self.places.turn = hand.turn;
+        self.places.turn = DMat3::from_quat(hand.turn);
         self.held_for = 0;
         self.places.look(&self.tool, obstacle, hand);
         self.is_clear = self.places.deepest().0 >= -self.options.tolerance && self.is_clear_between(obstacle);
@@ -132,10 +144,9 @@ impl MultiPoint {
         let force = pressing(stretch, 1e-3 * stiffness, damping, speed);
         // `pressing` takes N s/m.
         let damping = 1e3 * self.options.angular_damping;
-        (
-            force,
-            pressing(turn, self.options.angular_stiffness, damping, spin),
-        )
+        let torque = pressing(turn, self.options.angular_stiffness, damping, spin);
+        let (soft, slack) = self.pressings.softness(1e-3 * stiffness);
+        (force - soft, torque - slack)
     }
 }
 
@@ -177,10 +188,10 @@ impl Renderer for MultiPoint {
             force: self.force,
             torque: self.torque,
             proxy: self.pose,
-            contact: if is_touching {
-                Contact::Slides
-            } else {
-                Contact::Free
+            contact: match is_touching {
+                true if self.pressings.sticks() => Contact::Sticks,
+                true => Contact::Slides,
+                false => Contact::Free,
             },
         }
     }
@@ -190,6 +201,7 @@ impl Renderer for MultiPoint {
         self.is_buried = false;
         self.reach = self.options.step;
         self.places.forget();
+        self.pressings.clear();
         self.features.forget();
         self.stretching.end();
         self.turning.end();

@@ -1,6 +1,6 @@
 //! Where the points of a tool are, and how clear of the solid.
 
-use glam::{DQuat, DVec3};
+use glam::{DMat3, DVec3};
 
 use super::super::{Obstacle, Pose};
 use super::projection::Twist;
@@ -42,7 +42,7 @@ pub(super) struct Places {
     /// The tool's own; guests follow.
     pub own: usize,
     /// Turn of the points.
-    pub turn: DQuat,
+    pub turn: DMat3,
 }
 
 impl Places {
@@ -59,7 +59,7 @@ impl Places {
             counts: (0..own + guests).map(|i| i < own).collect(),
             here,
             own,
-            turn: DQuat::IDENTITY,
+            turn: DMat3::IDENTITY,
         }
     }
 
@@ -76,7 +76,7 @@ impl Places {
     pub fn look(&mut self, tool: &PointTool, obstacle: &dyn Obstacle, pose: &Pose) {
         for i in 0..self.here.len() {
             if self.counts[i] {
-                self.here[i] = ask(tool, obstacle, pose, self.turn, self.here[i].on);
+                self.here[i] = ask(tool, obstacle, pose, &self.turn, self.here[i].on);
             }
         }
     }
@@ -99,12 +99,12 @@ impl Places {
 }
 
 /// Way from the handle point to a point of the tool, in the world's axes.
-pub(super) fn arm(tool: &PointTool, turn: DQuat, on: DVec3) -> DVec3 {
-    turn * (on - tool.handle)
+pub(super) fn arm(tool: &PointTool, turn: &DMat3, on: DVec3) -> DVec3 {
+    *turn * (on - tool.handle)
 }
 
 /// Asks for a point of the tool.
-pub(super) fn ask(tool: &PointTool, obstacle: &dyn Obstacle, pose: &Pose, turn: DQuat, on: DVec3) -> Place {
+pub(super) fn ask(tool: &PointTool, obstacle: &dyn Obstacle, pose: &Pose, turn: &DMat3, on: DVec3) -> Place {
     let (distance, gradient) = obstacle.distance(pose.at + arm(tool, turn, on));
     Place {
         on,

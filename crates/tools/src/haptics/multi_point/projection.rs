@@ -14,7 +14,7 @@ pub(super) fn dot(a: &Twist, b: &Twist) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5]
 }
 
-fn add(a: &mut Twist, share: f64, b: &Twist) {
+pub(super) fn add(a: &mut Twist, share: f64, b: &Twist) {
     for (a, b) in a.iter_mut().zip(b) {
         *a += share * b;
     }
@@ -73,9 +73,60 @@ impl Polyhedron {
     }
 
     /// The point nearest to `d`; nothing if the polyhedron is empty.
+    #[cfg(test)]
     pub fn nearest(&mut self, d: &Twist) -> Option<Twist> {
-        let mut u = *d;
         self.count = 0;
+        self.go_on(*d)
+    }
+
+    /// The point nearest to `d`; nothing if the polyhedron is empty. It is looked for from the rows that were active last, or are expected to
+    /// be: it is the same from any, but where many sets of rows say the same, those stay.
+    pub fn nearest_again(&mut self, d: &Twist) -> Option<Twist> {
+        let mut u = *d;
+        while self.count > 0 {
+            self.multipliers = self.multipliers_of(d);
+            let pulling =
+                (0..self.count).min_by(|a, b| self.multipliers[*a].total_cmp(&self.multipliers[*b]));
+            match pulling.filter(|j| self.multipliers[*j] < 0.0) {
+                Some(j) => self.leave(j),
+                None => break,
+            }
+        }
+        for (row, multiplier) in self.active() {
+            add(&mut u, multiplier, &self.rows[row].0);
+        }
+        self.go_on(u)
+    }
+
+    /// Begins with a row that is likely to be active; it is left out if the others say as much.
+    pub fn expect(&mut self, row: usize) {
+        if self.count == 6 || self.active[..self.count].contains(&row) {
+            return;
+        }
+        self.enter(row, 0.0);
+        let (j, a) = (self.count - 1, &self.rows[row].0);
+        if self.r[j][j] * self.r[j][j] <= DEPENDENT * dot(a, a) {
+            self.count = j;
+        }
+    }
+
+    /// Multipliers by which all active rows hold exactly.
+    fn multipliers_of(&self, d: &Twist) -> [f64; 6] {
+        let mut y = [0.0; 6];
+        for j in 0..self.count {
+            let (a, b) = &self.rows[self.active[j]];
+            let known: f64 = (0..j).map(|k| self.r[k][j] * y[k]).sum();
+            y[j] = (b - dot(a, d) - known) / self.r[j][j];
+        }
+        for j in (0..self.count).rev() {
+            let known: f64 = (j + 1..self.count).map(|k| self.r[j][k] * y[k]).sum();
+            y[j] = (y[j] - known) / self.r[j][j];
+        }
+        y
+    }
+
+    /// From the point nearest to `d` by the active rows alone to that by all.
+    fn go_on(&mut self, mut u: Twist) -> Option<Twist> {
         for _ in 0..EXCHANGES {
             let Some(entering) = self.most_violated(&u) else {
                 return Some(u);
@@ -101,6 +152,7 @@ impl Polyhedron {
                 }
                 let step = full.min(most);
                 if step == f64::INFINITY {
+                    self.count = 0;
                     return None;
                 }
                 if !dependent {
@@ -132,6 +184,29 @@ impl Polyhedron {
             }
         }
         worst.1
+    }
+
+    /// The rows that press, and their multipliers, by which `u = d + Σ λa`.
+    pub fn active(&self) -> impl Iterator<Item = (usize, f64)> {
+        let rows = self.active[..self.count].iter().copied();
+        rows.zip(self.multipliers[..self.count].iter().copied())
+    }
+
+    /// Part of a vector across all active rows.
+    pub fn across(&self, a: &Twist) -> Twist {
+        let mut across = *a;
+        for q in &self.q[..self.count] {
+            let part = dot(q, &across);
+            add(&mut across, -part, q);
+        }
+        across
+    }
+
+    /// Share of a vector up to where it first violates a row; 1 if it violates none.
+    pub fn meets(&self, u: &Twist) -> f64 {
+        let violated = self.rows.iter().map(|(a, b)| (dot(a, u), *b));
+        let violated = violated.filter(|(along, b)| along < b && *along < 0.0);
+        violated.fold(1.0, |share, (along, b)| share.min((b / along).max(0.0)))
     }
 
     /// Part of a row across all active ones, and the shares of these in it.
@@ -232,6 +307,31 @@ mod tests {
             busy += usize::from(p.count >= 3);
         }
         assert!(busy > 1000, "{busy}");
+    }
+
+    /// The solution does not depend on where it was begun, and goes on from one that is near.
+    #[test]
+    fn nearest_points_are_the_same_from_other_active_rows() {
+        let mut random = Random::new(11);
+        for _ in 0..500 {
+            let mut p = Polyhedron::with_capacity(40);
+            for _ in 0..40 {
+                let a = twist(&mut random);
+                p.push(a, -0.2 * random.share());
+            }
+            let mut d = twist(&mut random).map(|x| 3.0 * x);
+            p.nearest(&d).expect("the origin is inside");
+            for _ in 0..5 {
+                let other = twist(&mut random);
+                add(&mut d, 0.7, &other);
+                let again = p.nearest_again(&d).expect("the origin is inside");
+                let fresh = p.clone().nearest(&d).expect("the origin is inside");
+                assert!(
+                    (0..6).all(|k| (again[k] - fresh[k]).abs() < 1e-7),
+                    "{again:?} {fresh:?}"
+                );
+            }
+        }
     }
 
     #[test]

@@ -1,9 +1,13 @@
 //! What a tool's surface is: its distance, and points on it.
 
+use std::sync::Arc;
+
 use glam::{DVec2, DVec3};
 
-/// A convex shape in the tool's own axes, about their origin.
-#[derive(Clone, Copy, Debug, PartialEq)]
+use super::carved::Carved;
+
+/// A shape in the tool's own axes, about their origin; all but those that are carved are convex.
+#[derive(Clone, Debug, PartialEq)]
 pub(super) enum Shape {
     /// A sphere.
     Ball(f64),
@@ -11,6 +15,8 @@ pub(super) enum Shape {
     Drawn(Outline, f64),
     /// The same with the outline in y and z, drawn out along x.
     Flat(Outline, f64),
+    /// A part of an object.
+    Carved(Arc<Carved>),
 }
 
 /// A convex polygon of 1 to 4 corners, counter-clockwise, widened by a radius.
@@ -117,6 +123,7 @@ impl Shape {
     /// Signed distance to the surface, positive outside, and its gradient of length 1.
     pub fn distance(&self, p: DVec3) -> (f64, DVec3) {
         match *self {
+            Self::Carved(ref carved) => carved.distance(p),
             Self::Ball(radius) => {
                 let length = p.length();
                 let n = if length > 0.0 { p / length } else { DVec3::Z };
@@ -141,15 +148,19 @@ impl Shape {
         }
     }
 
-    /// The nearest place of the surface.
-    pub fn project(&self, p: DVec3) -> DVec3 {
+    /// The nearest place of the surface; of a part of an object one that is near, and none where the part ends.
+    pub fn project(&self, p: DVec3) -> Option<DVec3> {
+        if let Self::Carved(carved) = self {
+            return carved.project(p);
+        }
         let (d, n) = self.distance(p);
-        p - d * n
+        Some(p - d * n)
     }
 
-    /// Points on the surface, edges and corners among them, about `spacing` apart.
+    /// Points on the surface, edges and corners among them, about `spacing` apart. Parts of objects have theirs from these.
     pub fn points(&self, spacing: f64) -> Vec<DVec3> {
         match *self {
+            Self::Carved(_) => Vec::new(),
             Self::Ball(radius) => {
                 // Golden spiral; each point has a hexagon of √3/2 spacing² to itself.
                 let area = 4.0 * std::f64::consts::PI * radius * radius;
@@ -208,7 +219,8 @@ mod tests {
             // Whatever place of the surface: a point is near. Squares of side 1 have half diagonals of 0.71.
             for k in 0..20_000 {
                 let f = |n: f64| 20.0 * ((f64::from(k) * n).fract() - 0.5);
-                let p = shape.project(DVec3::new(f(0.754_877_67), f(0.569_840_29), f(0.438_579_21)));
+                let p = DVec3::new(f(0.754_877_67), f(0.569_840_29), f(0.438_579_21));
+                let p = shape.project(p).expect("a whole shape");
                 let near = points.iter().map(|q| q.distance(p)).fold(f64::INFINITY, f64::min);
                 assert!(near < 1.0, "{shape:?} {p} {near}");
             }

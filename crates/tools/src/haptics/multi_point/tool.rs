@@ -1,8 +1,11 @@
 //! Tools as many points: what shape they have, and where on it they touch.
 
+use std::sync::Arc;
+
 use glam::{DVec2, DVec3};
 
 use super::super::Obstacle;
+use super::carved::Carved;
 use super::shape::{Outline, Shape};
 
 /// Points of a tool at most: a tick looks at each of them.
@@ -30,6 +33,19 @@ impl Default for Sampling {
             refinement: 4,
             nose: 0.05,
         }
+    }
+}
+
+impl Sampling {
+    /// Some points, finer ones between them, and the spacing of these.
+    fn of(&self, points: &[DVec3]) -> (Vec<DVec3>, Vec<DVec3>, f64) {
+        let (coarse, _) = spread(points, self.points);
+        let finer = self.points.saturating_mul(self.refinement * self.refinement);
+        let (fine, spacing) = match self.refinement > 1 {
+            true => spread(points, finer),
+            false => (Vec::new(), 0.0),
+        };
+        (coarse, fine, spacing)
     }
 }
 
@@ -181,7 +197,20 @@ impl PointTool {
         Self::new(None, radius, points, Vec::new(), 0.0)
     }
 
-    /// The part of an object's surface in a box: its points become the tool, the middle of the box its origin. The solid side is the
+    /// Some of any points, the farthest from all others first, so that corners are among them; more of them between these.
+    ///
+    /// # Errors
+    /// As [`Self::from_points`].
+    pub fn scattered(points: &[DVec3], sampling: Sampling) -> Result<Self, ToolError> {
+        above("the nose", sampling.nose, -1e-300)?;
+        if let Some(index) = points.iter().position(|p| !p.is_finite()) {
+            return Err(ToolError::Point { index });
+        }
+        let (coarse, fine, spacing) = sampling.of(points);
+        Self::new(None, sampling.nose, coarse, fine, spacing)
+    }
+
+    /// The part of an object's surface in a box, with the object's distance there: its points become the tool, the middle of the box its origin. The solid side is the
     /// tool's inside. `sampling.points` of them, the farthest from all others first, so that corners are among them.
     ///
     /// # Errors
@@ -217,19 +246,13 @@ impl PointTool {
                 }
             }
         }
-        let (coarse, _) = spread(&found, sampling.points);
+        let (coarse, fine, spacing) = sampling.of(&found);
         if coarse.is_empty() {
             return Err(ToolError::NoSurface { centre, half });
         }
-        let finer = sampling
-            .points
-            .saturating_mul(sampling.refinement * sampling.refinement);
-        let (fine, spacing) = if sampling.refinement > 1 {
-            spread(&found, finer)
-        } else {
-            (Vec::new(), 0.0)
-        };
-        Self::new(None, sampling.nose, coarse, fine, spacing)
+        let carved = Carved::new(object, centre, half, sampling.nose, step);
+        let shape = Shape::Carved(Arc::new(carved));
+        Self::new(Some(shape), sampling.nose, coarse, fine, spacing)
     }
 
     /// Moves the handle point: where the hand holds the tool, and about which torques are told.
@@ -249,9 +272,21 @@ impl PointTool {
         self.nose
     }
 
+    /// From the handle point to the farthest place of the tool, mm.
+    pub fn extent(&self) -> f64 {
+        let far = |most: f64, p: &DVec3| most.max(p.distance(self.handle));
+        // Of the finer points, since those of a ball alone leave some of it out.
+        self.points.iter().chain(&self.fine).fold(0.0, far) + self.nose
+    }
+
+    /// From a place of the tool's surface to the nearest of its points, mm, at most.
+    pub fn gap(&self) -> f64 {
+        self.cover.iter().copied().fold(0.0, f64::max)
+    }
+
     /// Signed distance to the tool's surface, mm, positive outside it; nothing for tools that are points alone.
     pub fn distance(&self, p: DVec3) -> Option<f64> {
-        self.shape.map(|shape| shape.distance(p).0 - self.nose)
+        self.shape.as_ref().map(|shape| shape.distance(p).0 - self.nose)
     }
 
     fn shaped(shape: Shape, sampling: Sampling) -> Result<Self, ToolError> {
@@ -276,7 +311,8 @@ impl PointTool {
         } else {
             Vec::new()
         };
-        Self::new(Some(shape), sampling.nose, shape.points(most), fine, spacing)
+        let points = shape.points(most);
+        Self::new(Some(shape), sampling.nose, points, fine, spacing)
     }
 
     fn new(

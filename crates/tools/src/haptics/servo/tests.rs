@@ -249,6 +249,33 @@ fn unplugged_in_contact_the_force_is_gone_and_stays_so() {
     }
 }
 
+/// A stroke that pulls while the simulation is silent is lost hold of: nothing pulls any more until it was let go.
+#[test]
+fn a_stroke_that_faded_is_felt_again_only_after_it_was_let_go() {
+    let mut servo = servo(ServoOptions::default());
+    pressed(&mut servo, DVec3::Z, 3.0 * DVec3::Z);
+    let step = StrokeStep {
+        number: 1,
+        reference: DVec3::ZERO,
+        cursor: 3.0 * DVec3::Z,
+        force: 1.0,
+        rigidity: 0.1,
+    };
+    let told = told(3.0 * DVec3::Z);
+    let mut ticks = |step: Option<StrokeStep>, heartbeat: f64, count: usize| {
+        let tick = |_| {
+            servo.pull(step);
+            servo.tick(Ok(&told), &Ground, heartbeat, DT).wrench.force.z
+        };
+        (0..count).map(tick).last().expect("some ticks")
+    };
+    assert!((ticks(Some(step), 0.0, 100) + 1.0).abs() < 1e-9);
+    assert_eq!(ticks(Some(step), 0.6, 101), 0.0);
+    assert_eq!(ticks(Some(StrokeStep { number: 2, ..step }), 0.0, 500), 0.0);
+    assert_eq!(ticks(None, 0.0, 10), 0.0);
+    assert!((ticks(Some(StrokeStep { number: 3, ..step }), 0.0, 100) + 1.0).abs() < 1e-9);
+}
+
 #[test]
 fn a_record_tells_what_happened() {
     let mut servo = servo(ServoOptions::default());

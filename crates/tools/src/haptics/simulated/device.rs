@@ -15,8 +15,8 @@ const SUB_STEP: f64 = 10e-6;
 /// Forces under way at most: 10 ms at 10 kHz.
 const UNDER_WAY: usize = 128;
 
-/// Time for which a writer may owe an answer before sending fails, s.
-const HEARTBEAT: f64 = 10e-3;
+/// Time for which a writer may owe an answer before sending fails, s: with a tick before and after, no force is older than 10 ms.
+const HEARTBEAT: f64 = 8e-3;
 
 /// A mass with damping, dry friction, an encoder that counts and an amplifier that is late and saturates, in a hand.
 #[derive(Clone, Debug)]

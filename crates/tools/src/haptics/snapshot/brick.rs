@@ -76,7 +76,7 @@ impl BrickOptions {
 }
 
 /// Signed distance to the surface of an object, mm, positive in the air, sampled in a box. An immutable value.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct DistanceBrick {
     grid: Grid,
     band: f64,
@@ -119,6 +119,23 @@ impl DistanceBrick {
             numbers,
             inner: grid.world_box().widened(-grid.spacing),
             unresolved: distances.unresolved,
+        }
+    }
+
+    /// Of any obstacle, as it tells its distance, in a box.
+    pub(in crate::haptics) fn sampled(obstacle: &dyn Obstacle, within: &Aabb, spacing: f64) -> Self {
+        let grid = Grid::round(&within.widened(2.0 * spacing), spacing);
+        let told = |slot| obstacle.distance(grid.place(grid.node(slot))).0 as f32;
+        let distances: Vec<f32> = (0..grid.len()).map(told).collect();
+        let mut numbers = vec![0.0; grid.len()];
+        spline::coefficients(&grid, &distances, Region::whole(&grid), &mut numbers);
+        Self {
+            grid,
+            band: 0.0,
+            interpolation: Interpolation::Cubic,
+            numbers,
+            inner: grid.world_box().widened(-spacing),
+            unresolved: Unresolved::default(),
         }
     }
 

@@ -12,7 +12,7 @@ use super::spline::Interpolation;
 use super::state::{Part, Snapshot};
 use super::surface::Surface;
 use super::touch_map::TouchMap;
-use crate::haptics::Touch;
+use crate::haptics::{PointTool, Touch};
 use crate::paint::{Layers, Substance};
 
 /// Cells of a brick of coefficients on an axis.
@@ -21,6 +21,12 @@ const BRICK: u32 = 8;
 const SLACK: f64 = 0.25;
 /// From a point to the sides of its box, mm: it feels what is at itself alone, so its box is small and its nodes are close.
 const POINT_REACH: f64 = 7.5;
+/// From a tool of many points to the sides of its box, mm: as a ball of 2 mm has it.
+const ROOM: f64 = 9.0;
+/// Closest nodes for tools of many points, mm.
+const FINEST: f64 = 0.5;
+/// Nodes on an axis for such a tool, where they are not closer than that.
+const TOOL_NODES: f64 = 100.0;
 
 /// What a tool asks of snapshots.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,6 +59,18 @@ impl Demand {
             detail: 0.5,
             most_nodes: 380_000,
             interpolation: Interpolation::default(),
+        }
+    }
+
+    /// Of a tool of many points. The box still holds all of it, with the same room as for a ball, when the tool has gone so far that the box is to
+    /// follow; distances are exact as far as the tool looks between its points.
+    pub fn of_points(tool: &PointTool) -> Self {
+        let reach = (tool.extent() + ROOM) / (1.0 - SLACK);
+        Self {
+            radius: tool.gap() + tool.nose(),
+            reach,
+            spacing: Some((2.0 * reach / TOOL_NODES).max(FINEST)),
+            ..Self::of_ball(0.0)
         }
     }
 }

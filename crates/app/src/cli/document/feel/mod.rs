@@ -3,8 +3,10 @@
 mod report;
 mod script;
 mod tally;
+mod tool;
 
 use std::path::PathBuf;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use clap::ValueEnum;
@@ -13,8 +15,8 @@ use glam::DVec3;
 use tools::haptics::gates::GateOptions;
 use tools::haptics::simulated::SimulatedDevice;
 use tools::haptics::{
-    Abilities, Coupling, Demand, Device, Embedding, Proxy, ProxyOptions, Servo, ServoOptions, TickRecord,
-    Vcp, VcpOptions, Workspace,
+    Abilities, Coupling, Demand, Device, Embedding, PointTool, Proxy, ProxyOptions, Servo, ServoOptions,
+    TickRecord, Unresolved, Vcp, VcpOptions, Workspace,
 };
 
 use super::{Told, chosen, failure, open};
@@ -22,7 +24,7 @@ use crate::cli::failure::{Failure, Outcome};
 use crate::cli::interrupt;
 use crate::cli::output::Output;
 use crate::cli::progress::Bar;
-use crate::cli::quantity::positive;
+use crate::cli::quantity::{human_count, human_number, positive};
 use crate::cli::simulate;
 use crate::cli::source::Source;
 use crate::devices::{self, Force, Name};
@@ -33,6 +35,7 @@ use crate::threads::{Session, Show};
 use report::Felt;
 use script::Script;
 use tally::{Tally, write_trace};
+use tool::Tool;
 
 /// Time from step to step of the simulation, s.
 const STEP: f64 = 1.0 / 30.0;
@@ -73,6 +76,9 @@ pub struct Args {
     /// Radius of the ball that touches, mm of the device
     #[arg(long, value_name = "MM", default_value = "2", value_parser = positive)]
     radius: f64,
+    /// What touches: ball, or with its sizes in mm of the device a tool of many points that turns and feels torque: sphere:5, cylinder:4x12, box:10x10x10, plate:20x30x1, spatula:10x30x1, knife:12x30x2, or points:FILE, the vertices of a mesh or cloud
+    #[arg(long, value_name = "TOOL", default_value = "ball")]
+    tool: Tool,
     /// Lengths of the document for one mm of the device [default: as many as let the object fit the device's room]
     #[arg(long, value_parser = positive)]
     scale: Option<f64>,
@@ -112,6 +118,11 @@ pub fn run(args: &Args) -> Outcome {
         let why = "there is no target; write one [[target]] with time and at, or more";
         return Err(about(why.into()));
     }
+    let tool = args.tool.points(&cancel)?;
+    if tool.is_some() && args.contact == ContactMode::Vcp {
+        let why = "--contact vcp: is for the ball; leave it out, or --tool";
+        return Err(Failure::usage(why));
+    }
     let output = args.output.as_ref();
     let output = output.map(|path| Output::check("-o", path, &["csv"], None, &[&source]));
     let output = output.transpose()?;
@@ -141,9 +152,17 @@ pub fn run(args: &Args) -> Outcome {
             (Held::Real(Box::new(device)), workspace)
         }
     };
-    let servo = servo(args, held.abilities(), workspace)?;
+    let servo = servo(args, tool.as_ref(), held.abilities(), workspace)?;
     notes.extend(servo.granted().note());
-    let show = show(args, document.state(), &name, &workspace)?;
+    let unresolved = Arc::default();
+    let show = show(
+        args,
+        tool.as_ref(),
+        document.state(),
+        &name,
+        &workspace,
+        &unresolved,
+    )?;
     let granted = servo.granted();
     let mut sculpting = Sculpting::new(document, name, script.stroke.clone());
     if let Some(rate) = script.rate {
@@ -202,6 +221,7 @@ pub fn run(args: &Args) -> Outcome {
     interrupt::check(&cancel)?;
     let (mut document, strokes, told) = sculpting.close();
     notes.extend(told);
+    notes.extend(unresolved.lock().ok().and_then(|worst| worst.map(too_thin)));
     let felt = Felt::new(
         &args.device,
         granted,
@@ -261,7 +281,12 @@ fn object<'a>(state: &'a State, name: &str) -> Outcome<&'a Object> {
 }
 
 /// Coupling and gates as they are wished.
-fn servo(args: &Args, abilities: &Abilities, workspace: Workspace) -> Outcome<Servo> {
+fn servo(
+    args: &Args,
+    tool: Option<&PointTool>,
+    abilities: &Abilities,
+    workspace: Workspace,
+) -> Outcome<Servo> {
     let scale = workspace.scale;
     let options = ServoOptions {
         stiffness: args.stiffness,
@@ -275,6 +300,9 @@ fn servo(args: &Args, abilities: &Abilities, workspace: Workspace) -> Outcome<Se
     };
     let radius = args.radius * scale;
     let servo = Servo::new(abilities, options, |stiffness, damping| {
+        if let Some(tool) = tool {
+            return tool::renderer(tool, stiffness * scale, damping * scale, scale);
+        }
         let coupling = Coupling { stiffness, damping };
         match args.contact {
             ContactMode::Proxy => {
@@ -301,8 +329,15 @@ fn servo(args: &Args, abilities: &Abilities, workspace: Workspace) -> Outcome<Se
     servo.map_err(Failure::usage)
 }
 
-/// What may be touched.
-fn show(args: &Args, state: &State, name: &str, workspace: &Workspace) -> Outcome<Show> {
+/// What may be touched, and the worst that was too thin for it.
+fn show(
+    args: &Args,
+    tool: Option<&PointTool>,
+    state: &State,
+    name: &str,
+    workspace: &Workspace,
+    unresolved: &Arc<Mutex<Option<Unresolved>>>,
+) -> Outcome<Show> {
     let object = object(state, name)?;
     if object.meta.iso.is_none() {
         let why = format!("object {name:?} names no surface; fit it with an iso-value");
@@ -312,12 +347,46 @@ fn show(args: &Args, state: &State, name: &str, workspace: &Workspace) -> Outcom
     let lattice = object.field.lattice();
     let cell = (placed * lattice.world_from_lattice).matrix3;
     let knots = cell.x_axis.length() / f64::from(1_u32 << object.detail().min(31));
-    let usual = Demand::of_ball(args.radius * workspace.scale);
+    let scale = workspace.scale;
+    let demand = match tool {
+        Some(tool) => tool::demand(tool, scale),
+        None => {
+            let usual = Demand::of_ball(args.radius * scale);
+            Demand {
+                reach: (REACH * scale).max(4.0 * usual.radius),
+                ..usual
+            }
+        }
+    };
     let mut toucher = Toucher::new(Demand {
-        reach: (REACH * workspace.scale).max(4.0 * usual.radius),
         detail: knots,
         most_nodes: NODES,
-        ..usual
+        ..demand
     });
-    Ok(Box::new(move |state, at| toucher.show(state, at)))
+    let unresolved = Arc::clone(unresolved);
+    Ok(Box::new(move |state, at| {
+        let snapshot = toucher.show(state, at);
+        // Nobody else looks before the end.
+        if let (Some(now), Ok(mut worst)) = (snapshot.unresolved(), unresolved.lock()) {
+            let before = worst.filter(|before| (before.missed, before.thin) > (now.missed, now.thin));
+            *worst = before.or(Some(now));
+        }
+        snapshot
+    }))
+}
+
+/// What a hand cannot feel, and what helps.
+fn too_thin(found: Unresolved) -> String {
+    let helps = "a smaller --radius shows finer parts";
+    match found.missed {
+        0 => format!(
+            "at {} places sheets or gaps are only {} thick and feel blurred; {helps}",
+            human_count(found.thin),
+            human_number(found.thinnest)
+        ),
+        missed => format!(
+            "at {} places what is there is too thin to be felt; {helps}",
+            human_count(missed)
+        ),
+    }
 }

@@ -165,6 +165,10 @@ impl Felt {
             ("largest force", newton(t.largest_force_n)),
             ("largest step", newton(t.largest_step_n)),
             (
+                "largest torque",
+                format!("{} N mm", human_number(t.largest_torque_nmm)),
+            ),
+            (
                 "work of the hand",
                 format!(
                     "{} J, at most {} J came back that was not put in",

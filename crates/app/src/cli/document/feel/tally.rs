@@ -16,6 +16,8 @@ pub struct Tally {
     pub seconds: f64,
     /// Largest force sent.
     pub largest_force_n: f64,
+    /// Largest torque that the tool felt, whether the device gives any or not.
+    pub largest_torque_nmm: f64,
     /// Largest step of the force, from what the hand still felt of the last one.
     pub largest_step_n: f64,
     /// Share of ticks in contact.
@@ -54,6 +56,7 @@ impl Tally {
         self.seconds += f64::from(record.dt);
         let force = vector(record.force);
         self.largest_force_n = self.largest_force_n.max(force.length());
+        self.largest_torque_nmm = self.largest_torque_nmm.max(vector(record.torque).length());
         if let Some(last) = &self.last {
             let (was, share) = (vector(last.force), held(f64::from(record.dt)));
             self.largest_step_n = self.largest_step_n.max((force - was * share).length());
@@ -90,7 +93,7 @@ fn vector(v: [f32; 3]) -> DVec3 {
 
 /// Columns of a trace.
 const COLUMNS: &str = "seconds,contact,live,damped,clamped,slewed,warm,old_snapshot,stalled,tripped,buttons,hand_x,hand_y,hand_z,\
-                       proxy_x,proxy_y,proxy_z,force_x,force_y,force_z,wished,energy";
+                       proxy_x,proxy_y,proxy_z,force_x,force_y,force_z,wished,energy,torque_x,torque_y,torque_z,torque_sent";
 
 /// Writes records as a table of comma-separated values, one line a tick.
 ///
@@ -124,7 +127,8 @@ pub fn write_trace(records: &[TickRecord], out: &mut dyn Write) -> io::Result<()
         for number in r.hand.iter().chain(&r.proxy).chain(&r.force) {
             write!(out, ",{number}")?;
         }
-        writeln!(out, ",{},{}", r.wished, r.energy)?;
+        let [x, y, z] = r.torque;
+        writeln!(out, ",{},{},{x},{y},{z},{}", r.wished, r.energy, r.torque_sent)?;
     }
     Ok(())
 }
@@ -162,6 +166,6 @@ mod tests {
         write_trace(&[TickRecord::default(); 3], &mut out).unwrap();
         let text = String::from_utf8(out).unwrap();
         let columns: Vec<usize> = text.lines().map(|line| line.split(',').count()).collect();
-        assert_eq!(columns, [22; 4]);
+        assert_eq!(columns, [26; 4]);
     }
 }

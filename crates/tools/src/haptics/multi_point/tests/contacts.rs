@@ -6,7 +6,7 @@ use super::super::super::{Contact, Pose};
 use super::super::{MultiPoint, MultiPointOptions, PointTool, Sampling, ToolError};
 use super::scenes::*;
 
-fn cube() -> PointTool {
+pub fn cube() -> PointTool {
     PointTool::block(DVec3::splat(10.0), Sampling::default()).expect("a cube")
 }
 
@@ -14,7 +14,7 @@ fn renderer(tool: PointTool) -> MultiPoint {
     MultiPoint::new(tool, MultiPointOptions::default()).expect("options")
 }
 
-fn all_tools() -> Vec<(&'static str, PointTool)> {
+pub fn all_tools() -> Vec<(&'static str, PointTool)> {
     let s = Sampling::default();
     vec![
         ("sphere", PointTool::sphere(5.0, s).expect("a sphere")),
@@ -35,7 +35,7 @@ fn steady_force_on_a_plane_is_stiffness_times_depth() {
     for (name, tool) in all_tools() {
         let solid = Solid::new(1e3, |p| plane(p, DVec3::ZERO, DVec3::Z));
         // Height at which the lowest place of the surface touches, not turned.
-        let shape = tool.shape.expect("a shape");
+        let shape = tool.shape.as_ref().expect("a shape");
         let touch = tool.nose
             - shape
                 .points(0.02 * tool.spacing.max(1.0))

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::super::super::Pose;
+use super::super::super::{Obstacle, Pose};
 use super::super::{MultiPoint, MultiPointOptions, PointTool, Sampling};
 use super::scenes::*;
 
@@ -127,4 +127,66 @@ fn edge_of_the_solid_slides_under_a_face() {
     }
     assert!(trace.least_work() > -1e-4);
     assert!(trace.step() < 0.1, "{}", trace.step());
+}
+
+/// A tool that is a part of an object finds what is between its points by the object's own distance: a rod that stands on a floor
+/// under its round foot.
+#[test]
+fn feature_between_the_points_of_a_carved_tool_is_found() {
+    let object = Solid::new(10.0, |p| {
+        or(ball(p, DVec3::ZERO, 9.0), ball(p, DVec3::new(6.0, 0.0, 0.0), 8.0))
+    });
+    let carve = |refinement: usize| {
+        let sampling = Sampling {
+            refinement,
+            ..Sampling::default()
+        };
+        PointTool::carved(
+            &object,
+            DVec3::new(3.0, 0.0, -6.0),
+            DVec3::new(9.0, 7.0, 5.0),
+            sampling,
+        )
+        .expect("a foot")
+    };
+    let (tool, blind) = (carve(4), carve(1));
+    let carved = |tool: &PointTool| match &tool.shape {
+        Some(super::super::shape::Shape::Carved(carved)) => carved.points(0.3),
+        _ => panic!("it is carved"),
+    };
+    let all = carved(&tool);
+    assert!(all.len() > 2000, "{}", all.len());
+    assert!(
+        all.iter()
+            .all(|p| tool.distance(*p).expect("a field").abs() - tool.nose < 1e-3)
+    );
+    let (mut worst, mut missed) = (0.0f64, 0);
+    for k in 0..12 {
+        let f = |n: f64| (f64::from(k) * n).fract() - 0.5;
+        let foot = DVec3::new(3.0 + 9.0 * f(0.754_877_67), 6.0 * f(0.569_840_29), -9.0);
+        let solid = Solid::new(0.6, move |p| {
+            let floor = plane(p, DVec3::new(0.0, 0.0, -9.0), DVec3::Z);
+            or(floor, rod(p, foot, foot + DVec3::new(0.0, 0.0, 4.7), 0.3))
+        });
+        let hand = |t: f64| Pose::at(DVec3::new(3.0, 0.0, (2.0 - 40.0 * t).max(-3.0)));
+        let depth = |pose: &Pose| {
+            let depths = all
+                .iter()
+                .map(|p| tool.nose - solid.distance(place(&tool, pose, *p)).0);
+            depths.fold(f64::NEG_INFINITY, f64::max)
+        };
+        let trace = follow(&mut renderer(&tool), &solid, 300, hand);
+        let deepest = trace.0.iter().step_by(3).map(|t| depth(&t.felt.proxy));
+        worst = worst.max(deepest.fold(f64::NEG_INFINITY, f64::max));
+        assert!(
+            trace.last().felt.force.z > 0.1,
+            "{foot}: {}",
+            trace.last().felt.force
+        );
+        let trace = follow(&mut renderer(&blind), &solid, 300, hand);
+        missed += usize::from(depth(&trace.last().felt.proxy) > 0.15);
+    }
+    println!("carved: {worst:.4} mm deep, {missed} of 12 missed without finer points");
+    assert!(worst < 0.03, "{worst}");
+    assert!(missed >= 6, "{missed}");
 }

@@ -154,19 +154,27 @@ impl Trace {
         all.fold((f64::NEG_INFINITY, 0), |a, b| if b.0 > a.0 { b } else { a })
     }
 
+    /// Work that the hand has put in, J.
+    pub fn work(&self) -> f64 {
+        self.works().last().unwrap_or(0.0)
+    }
+
     /// Work that the hand has put in, least over all times, J: below 0 the tool gave more than it got.
     pub fn least_work(&self) -> f64 {
-        let (mut sum, mut least) = (0.0f64, 0.0f64);
-        for w in self.0.windows(2) {
+        self.works().fold(0.0, f64::min)
+    }
+
+    fn works(&self) -> impl Iterator<Item = f64> {
+        let mut sum = 0.0;
+        self.0.windows(2).map(move |w| {
             let way = w[1].hand.at - w[0].hand.at;
             let turn = logarithm(w[1].hand.turn * w[0].hand.turn.inverse());
             // Means over the tick: a force that is held for it gives K(vT)²/2 more, whatever renders it.
             let force = 0.5 * (w[0].felt.force + w[1].felt.force);
             let torque = 0.5 * (w[0].felt.torque + w[1].felt.torque);
             sum -= 1e-3 * (force.dot(way) + torque.dot(turn));
-            least = least.min(sum);
-        }
-        least
+            sum
+        })
     }
 }
 
@@ -177,7 +185,7 @@ pub fn place(tool: &PointTool, pose: &Pose, q: DVec3) -> DVec3 {
 
 /// Deepest place of a dense set on the tool's surface.
 pub fn dense_depth(tool: &PointTool, solid: &dyn Obstacle, pose: &Pose, spacing: f64) -> f64 {
-    let shape = tool.shape.expect("a shape");
+    let shape = tool.shape.as_ref().expect("a shape");
     let depth = |q: &DVec3| tool.nose() - solid.distance(place(tool, pose, *q)).0;
     shape
         .points(spacing)

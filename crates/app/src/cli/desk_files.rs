@@ -1,0 +1,157 @@
+//! What the window opens and writes: each by the command that does it, in a process of its own.
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+use document::{Document, Object, State};
+use etcetera::BaseStrategy;
+use fitting::{Cancel, Control, FitReport};
+use formats::field::{FieldMeta, SourceKind};
+use glam::DVec3;
+use tools::force::Solid;
+use tools::geometric::block;
+
+use super::batch::child::{Bounds, Stop, ask};
+use super::document::{self as on_documents, new};
+use super::failure::{Failure, Outcome};
+use super::report::with_report;
+use super::source::{FIELDS, Source, scratch};
+
+/// Told the stage and the share done.
+pub type Show<'a> = &'a dyn Fn(&str, f64);
+
+/// Whether a path is a document.
+pub fn is_document(path: &Path) -> bool {
+    formats_as(path, "isoclay")
+}
+
+fn formats_as(path: &Path, extension: &str) -> bool {
+    path.extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case(extension))
+}
+
+/// Opens a document for the window alone; what was lost goes to the notes.
+pub fn open(path: &Path, notes: &mut Vec<String>) -> Result<Document, String> {
+    on_documents::open(path, notes).map_err(|e| e.to_string())
+}
+
+/// A new document at a path that no file has.
+pub fn create(path: &Path, state: State) -> Result<Document, String> {
+    Document::create(path, state, on_documents::options()).map_err(|e| e.to_string())
+}
+
+/// The object that a field or a scan becomes, and its name. A scan is fitted first.
+pub fn import(path: &Path, cancel: &Cancel, show: Show<'_>) -> Result<(String, Object), String> {
+    let told = |outcome: Outcome<(String, Object)>| outcome.map_err(|e| e.to_string());
+    if formats_as(path, "iclay") {
+        return told(of_field(path, None));
+    }
+    told(scratch("the fit").and_then(|scratch| {
+        let field = scratch.path().join("field.iclay");
+        let arguments = [path.as_os_str().to_owned(), "-o".into(), field.clone().into()];
+        command("fit", &arguments, cancel, scratch.path(), show)?;
+        of_field(&field, Some(path))
+    }))
+}
+
+fn of_field(field: &Path, scan: Option<&Path>) -> Outcome<(String, Object)> {
+    let source = Source::open(field, None, FIELDS, &Cancel::new())?;
+    let (name, mut object) = new::of_field(&source, None, &mut Vec::new())?;
+    if object.meta.iso.is_none() {
+        let why = "names no surface; fit it with --iso DENSITY on the command line first";
+        return Err(Failure::input(format!("{}: {why}", field.display())));
+    }
+    object.properties.material = clay();
+    let scan = scan.and_then(Path::file_name).map(|n| n.to_string_lossy());
+    let stem = scan.map(|n| n.split('.').next().unwrap_or("scan").to_string());
+    Ok((stem.filter(|s| !s.is_empty()).unwrap_or(name), object))
+}
+
+fn clay() -> tools::material::Material {
+    tools::material::Material { solid: Solid::Clay }
+}
+
+/// A block of clay to begin with.
+pub fn clay_block() -> Result<(String, Object), String> {
+    const SIZE: f64 = 40.0;
+    const SPACING: f64 = 0.8;
+    let field = block(DVec3::splat(SIZE), SPACING, &mut Control::default()).map_err(|e| e.to_string())?;
+    let report = FitReport {
+        tolerance: 0.02 * SPACING,
+        ..FitReport::default()
+    };
+    let meta = FieldMeta {
+        source: SourceKind::Other,
+        unit: formats::Unit::Millimetre,
+        iso: Some(0.0),
+        ..FieldMeta::default()
+    };
+    let mut object = Object::of(field.into(), with_report(meta, &report));
+    object.properties.material = clay();
+    Ok(("clay".into(), object))
+}
+
+/// Writes an object of a document that nobody has open: its mesh, its field, or, over a scan, that scan with its edits.
+pub fn export(
+    document: &Path,
+    object: &str,
+    out: &Path,
+    scan: Option<&Path>,
+    cancel: &Cancel,
+    show: Show<'_>,
+) -> Result<(), String> {
+    let mut arguments: Vec<OsString> = vec![
+        document.into(),
+        "--object".into(),
+        object.into(),
+        "-o".into(),
+        out.into(),
+    ];
+    let name = match (scan, formats_as(out, "iclay")) {
+        (Some(scan), _) => {
+            arguments.extend(["--like".into(), scan.as_os_str().to_owned()]);
+            "export"
+        }
+        (None, true) => "export",
+        (None, false) => "mesh",
+    };
+    let done = scratch("the export").and_then(|s| command(name, &arguments, cancel, s.path(), show));
+    done.map_err(|e| e.to_string())
+}
+
+fn command(name: &str, arguments: &[OsString], cancel: &Cancel, scratch: &Path, show: Show<'_>) -> Outcome {
+    let bounds = Bounds {
+        cancel,
+        deadline: None,
+        scratch,
+    };
+    match ask(name, arguments, &bounds, show).said {
+        Ok(_) => Ok(()),
+        Err(Stop::Cancelled) => Err(Failure::input("cancelled")),
+        Err(Stop::Failed(reason)) => Err(Failure::input(reason.message)),
+    }
+}
+
+/// Where documents are kept that have no name yet: beside what other programs keep for the user.
+pub fn home() -> PathBuf {
+    let usual = etcetera::choose_base_strategy().map(|kept| kept.data_dir());
+    usual.unwrap_or_else(|_| std::env::temp_dir()).join("isoclay")
+}
+
+/// The file in a directory of a document that has no name yet.
+pub fn untitled(directory: &Path, name: &str) -> Result<PathBuf, String> {
+    std::fs::create_dir_all(directory).map_err(|e| {
+        format!(
+            "{}: cannot be made ({e}); check who may write there",
+            directory.display()
+        )
+    })?;
+    let free = (1..).map(|n| match n {
+        1 => directory.join(format!("{name}.isoclay")),
+        n => directory.join(format!("{name}-{n}.isoclay")),
+    });
+    Ok(free
+        .into_iter()
+        .find(|p| !p.exists())
+        .expect("numbers do not end"))
+}

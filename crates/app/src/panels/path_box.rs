@@ -1,0 +1,165 @@
+//! Asks for a file: by the system's own dialog, or by its path where there is none.
+
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, channel};
+
+use crate::window::Bench;
+use crate::window::orders::{Order, Sheet};
+
+/// What the file is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Purpose {
+    Open,
+    Save,
+    Export,
+}
+
+/// A question for a file.
+pub struct PathBox {
+    purpose: Purpose,
+    text: String,
+    /// Of an export: the scan to write with its edits.
+    scan: String,
+    chosen: Option<Receiver<Option<PathBuf>>>,
+    is_new: bool,
+}
+
+impl PathBox {
+    /// For one to open.
+    pub fn open() -> Self {
+        Self::new(Purpose::Open, String::new())
+    }
+
+    /// For the name of a document.
+    pub fn save(sheet: &Sheet) -> Self {
+        let name = match sheet.is_untitled {
+            true => sheet.path.file_name().map(PathBuf::from).unwrap_or_default(),
+            false => sheet.path.clone(),
+        };
+        Self::new(Purpose::Save, name.display().to_string())
+    }
+
+    /// For what the chosen object is written to.
+    pub fn export(sheet: &Sheet) -> Self {
+        let name = sheet.objects.get(sheet.chosen).map_or("object", |t| &t.name);
+        Self::new(Purpose::Export, format!("{name}.stl"))
+    }
+
+    fn new(purpose: Purpose, text: String) -> Self {
+        Self {
+            purpose,
+            text,
+            scan: String::new(),
+            chosen: None,
+            is_new: true,
+        }
+    }
+
+    fn title(&self) -> &'static str {
+        match self.purpose {
+            Purpose::Open => "Open",
+            Purpose::Save => "Save as",
+            Purpose::Export => "Export",
+        }
+    }
+
+    fn hint(&self) -> &'static str {
+        match self.purpose {
+            Purpose::Open => {
+                "A document .isoclay, a field .iclay, a cloud or mesh .ply .obj .pcd .las .xyz …, a volume .nii .nrrd .mha …"
+            }
+            Purpose::Save => "A document .isoclay. From then on every edit goes there",
+            Purpose::Export => {
+                "A mesh .stl .ply .obj .3mf .glb, a field .iclay; or, with the scan named below, the scan with its edits"
+            }
+        }
+    }
+
+    /// The system's dialog, on a thread of its own: some wait for it.
+    fn browse(&mut self, context: &egui::Context) {
+        let (tell, chosen) = channel();
+        let (purpose, context) = (self.purpose, context.clone());
+        let name = self.text.clone();
+        std::thread::spawn(move || {
+            let dialog = rfd::FileDialog::new();
+            let path = match purpose {
+                Purpose::Open => dialog.pick_file(),
+                Purpose::Save | Purpose::Export => dialog.set_file_name(name).save_file(),
+            };
+            let _ = tell.send(path);
+            context.request_repaint();
+        });
+        self.chosen = Some(chosen);
+    }
+}
+
+/// Shows the question that is asked, if one is.
+pub fn path_box(context: &egui::Context, bench: &mut Bench) {
+    let Some(mut asks) = bench.asks.take() else { return };
+    if let Some(chosen) = &asks.chosen
+        && let Ok(path) = chosen.try_recv()
+    {
+        asks.chosen = None;
+        if let Some(path) = path {
+            asks.text = path.display().to_string();
+        }
+    }
+    let (mut goes_on, mut is_given) = (true, false);
+    let modal = egui::Modal::new(egui::Id::unique("path")).show(context, |ui| {
+        ui.set_width(460.0);
+        ui.heading(asks.title());
+        ui.label(asks.hint());
+        ui.add_space(6.0);
+        ui.horizontal(|ui| {
+            let label = ui.label("File");
+            let field = ui.add(egui::TextEdit::singleline(&mut asks.text).desired_width(320.0));
+            let field = field.labelled_by(label.id);
+            if std::mem::take(&mut asks.is_new) {
+                field.request_focus();
+            }
+            is_given |= field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
+            if ui.button("Browse…").clicked() {
+                asks.browse(context);
+            }
+        });
+        if asks.purpose == Purpose::Export {
+            ui.horizontal(|ui| {
+                let label = ui.label("Scan");
+                let edit = egui::TextEdit::singleline(&mut asks.scan)
+                    .desired_width(320.0)
+                    .hint_text("none: write a mesh or a field");
+                ui.add(edit).labelled_by(label.id);
+            });
+        }
+        ui.add_space(6.0);
+        ui.horizontal(|ui| {
+            is_given |= ui
+                .add_enabled(!asks.text.trim().is_empty(), egui::Button::new(asks.title()))
+                .clicked();
+            goes_on &= !ui.button("Not now").clicked();
+        });
+    });
+    goes_on &= !modal.should_close();
+    if is_given && !asks.text.trim().is_empty() {
+        bench.order(order(&asks));
+    } else if goes_on {
+        bench.asks = Some(asks);
+    }
+}
+
+fn order(asks: &PathBox) -> Order {
+    let path = PathBuf::from(asks.text.trim());
+    match asks.purpose {
+        Purpose::Open => Order::Open(path),
+        Purpose::Save => Order::Save(match path.extension() {
+            Some(_) => path,
+            None => path.with_extension("isoclay"),
+        }),
+        Purpose::Export => Order::Export {
+            out: path,
+            scan: Some(asks.scan.trim())
+                .filter(|s| !s.is_empty())
+                .map(PathBuf::from),
+        },
+    }
+}

@@ -1,0 +1,219 @@
+//! Where the eye is.
+
+// Clip space as wgpu has it: y up, z from 0 to 1.
+use glam::dcamera::rh::proj::directx as project;
+use glam::{DMat3, DMat4, DQuat, DVec2, DVec3};
+
+/// Angle of the picture's height, rad.
+const ANGLE: f64 = 0.52;
+/// Half turns for a way across the whole height of the picture.
+const TURN: f64 = 1.0;
+
+/// A half line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ray {
+    /// Where it begins.
+    pub from: DVec3,
+    /// Of length 1.
+    pub along: DVec3,
+}
+
+/// An eye that goes round a point. Places of a picture are in heights of it, from its middle to the right and up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// What it goes round.
+    pub center: DVec3,
+    /// Length at that point which fills the height of the picture.
+    pub height: f64,
+    /// Whether what is farther away looks smaller.
+    pub perspective: bool,
+    /// Up in the world, of length 1.
+    pub up: DVec3,
+    /// Angles about `up` and above the horizon, rad.
+    pub turn: [f64; 2],
+}
+
+impl Camera {
+    /// Looks at a ball from the front and a little above.
+    pub fn onto(center: DVec3, radius: f64, up: DVec3) -> Self {
+        Self {
+            center,
+            height: 2.3 * radius,
+            perspective: true,
+            up,
+            turn: [0.35, 0.25],
+        }
+    }
+
+    /// To the right, up and to the eye, of length 1.
+    pub fn axes(&self) -> [DVec3; 3] {
+        // Whatever is up: towards the viewer is -y where that is z, else z.
+        let front = if self.up.z.abs() > 0.9 {
+            -DVec3::Y
+        } else {
+            DVec3::Z
+        };
+        let right = self.up.cross(front).normalize();
+        let front = right.cross(self.up);
+        let around = DQuat::from_axis_angle(self.up, self.turn[0]);
+        let right = around * right;
+        let above = DQuat::from_axis_angle(right, -self.turn[1]);
+        [right, above * self.up, above * (around * front)]
+    }
+
+    /// From the eye to what it goes round.
+    pub fn distance(&self) -> f64 {
+        0.5 * self.height / (0.5 * ANGLE).tan()
+    }
+
+    /// The line under a place of the picture, from the eye.
+    pub fn ray(&self, at: DVec2) -> Ray {
+        let [right, up, back] = self.axes();
+        let on_plane = self.center + self.height * (at.x * right + at.y * up);
+        let eye = self.center + self.distance() * back;
+        match self.perspective {
+            true => Ray {
+                from: eye,
+                along: (on_plane - eye).normalize(),
+            },
+            // From so far away that all that is seen lies before it.
+            false => Ray {
+                from: on_plane + 1e3 * self.height * back,
+                along: -back,
+            },
+        }
+    }
+
+    /// Where a point is in the picture.
+    pub fn place(&self, p: DVec3) -> DVec2 {
+        let [right, up, back] = self.axes();
+        let way = p - self.center;
+        let size = match self.perspective {
+            true => self.height * (1.0 - way.dot(back) / self.distance()),
+            false => self.height,
+        };
+        DVec2::new(way.dot(right), way.dot(up)) / size
+    }
+
+    /// Clip space from a world whose origin is at `origin`, for things within `radius` of the centre.
+    pub fn clip_from_world(&self, origin: DVec3, radius: f64, aspect: f64) -> DMat4 {
+        let [right, up, back] = self.axes();
+        let turn = DMat3::from_cols(right, up, back).transpose();
+        let distance = self.distance();
+        let center = turn * (origin - self.center) - DVec3::new(0.0, 0.0, distance);
+        let view = DMat4::from_cols(
+            turn.x_axis.extend(0.0),
+            turn.y_axis.extend(0.0),
+            turn.z_axis.extend(0.0),
+            center.extend(1.0),
+        );
+        let (near, far) = ((distance - radius).max(1e-3 * distance), distance + radius);
+        let seen = match self.perspective {
+            true => project::perspective(ANGLE, aspect, near, far),
+            false => {
+                let (h, w) = (0.5 * self.height, 0.5 * self.height * aspect);
+                project::orthographic(-w, w, -h, h, distance - radius, far)
+            }
+        };
+        seen * view
+    }
+
+    /// Turns round the centre by a way over the picture.
+    pub fn orbit(&mut self, way: DVec2) {
+        use std::f64::consts::{FRAC_PI_2, PI};
+        self.turn[0] -= TURN * PI * way.x;
+        self.turn[1] = (self.turn[1] - TURN * PI * way.y).clamp(-FRAC_PI_2, FRAC_PI_2);
+    }
+
+    /// Goes along, so that what lies at the centre's depth follows a way over the picture.
+    pub fn pan(&mut self, way: DVec2) {
+        let [right, up, _] = self.axes();
+        self.center -= self.height * (way.x * right + way.y * up);
+    }
+
+    /// Comes nearer, by a factor below 1, with the place under `at` staying there.
+    pub fn zoom(&mut self, factor: f64, at: DVec2) {
+        self.pan(-at);
+        self.height *= factor;
+        self.pan(at);
+    }
+
+    /// Looks along an axis of the world, from its positive end.
+    pub fn look_from(&mut self, axis: DVec3) {
+        let mut level = *self;
+        level.turn = [0.0, 0.0];
+        let [right, up, front] = level.axes();
+        let sideways = DVec2::new(axis.dot(right), axis.dot(front));
+        self.turn = match sideways.length() > 0.5 {
+            true => [sideways.x.atan2(sideways.y), 0.0],
+            false => [0.0, axis.dot(up).signum() * std::f64::consts::FRAC_PI_2],
+        };
+    }
+}
+
+/// Whether a point of clip space is in front of the eye.
+#[cfg(test)]
+fn seen(clip: DMat4, p: DVec3) -> DVec3 {
+    let q: glam::DVec4 = clip * p.extend(1.0);
+    q.truncate() / q.w
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cameras() -> impl Iterator<Item = Camera> {
+        [DVec3::Y, DVec3::Z].into_iter().flat_map(|up| {
+            [true, false].map(|perspective| Camera {
+                perspective,
+                ..Camera::onto(DVec3::new(3.0, -2.0, 5.0), 4.0, up)
+            })
+        })
+    }
+
+    /// The line under a place goes through all points that are drawn there, and the graphics card draws them there.
+    #[test]
+    fn lines_places_and_pictures_agree() {
+        for camera in cameras() {
+            for at in [DVec2::ZERO, DVec2::new(0.3, -0.4), DVec2::new(-0.7, 0.1)] {
+                let ray = camera.ray(at);
+                for beyond in [-1.5, 0.0, 2.0] {
+                    let far = (camera.center - ray.from).dot(ray.along) + beyond;
+                    let p = ray.from + far * ray.along;
+                    assert!((camera.place(p) - at).length() < 1e-9);
+                    let origin = DVec3::new(1.0, 1.0, 1.0);
+                    let clip = camera.clip_from_world(origin, 8.0, 1.5);
+                    let q = seen(clip, p - origin);
+                    let drawn = DVec2::new(0.5 * 1.5 * q.x, 0.5 * q.y);
+                    assert!((drawn - at).length() < 1e-6, "{drawn} for {at}");
+                    assert!((0.0..=1.0).contains(&q.z));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn zoom_keeps_what_is_under_the_mouse() {
+        for mut camera in cameras() {
+            let at = DVec2::new(0.3, 0.2);
+            let [right, up, _] = camera.axes();
+            let p = camera.center + camera.height * (at.x * right + at.y * up);
+            camera.zoom(0.5, at);
+            assert!((camera.place(p) - at).length() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn standard_views_look_along_the_axes() {
+        for mut camera in cameras() {
+            for axis in DVec3::AXES.into_iter().flat_map(|a| [a, -a]) {
+                camera.look_from(axis);
+                assert!(
+                    (camera.axes()[2] - axis).length() < 1e-9,
+                    "{axis} with {} up",
+                    camera.up
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! Where a line meets the surface.
+
+use bspline::{Aabb, Field};
+use glam::DVec3;
+
+use super::Ray;
+
+/// Halvings of the line's way through the box after which a piece has one crossing at most.
+const SHORTEST: u32 = 12;
+/// Bisections of a crossing.
+const BISECTIONS: usize = 40;
+
+/// Where a line first goes into the solid, and the outward normal there, of length 1. None where it passes by, or is inside from
+/// the start to the end.
+pub fn pick(field: &dyn Field, iso: f64, within: &Aabb, ray: &Ray) -> Option<(DVec3, DVec3)> {
+    let [from, to] = through(within, ray)?;
+    let at = |t: f64| ray.from + t * ray.along;
+    let enters = enter(field, iso, [at(from), at(to)], 0)?;
+    let gradient = field.value_gradient(enters).1;
+    let normal = -gradient.try_normalize()?;
+    Some((enters, normal))
+}
+
+/// Ways along the line to where it goes into a box and out of it.
+fn through(b: &Aabb, ray: &Ray) -> Option<[f64; 2]> {
+    let (mut from, mut to) = (0.0_f64, f64::INFINITY);
+    for a in 0..3 {
+        let (start, step) = (ray.from[a], ray.along[a]);
+        if step == 0.0 {
+            if !(b.min[a]..=b.max[a]).contains(&start) {
+                return None;
+            }
+            continue;
+        }
+        let ends = [(b.min[a] - start) / step, (b.max[a] - start) / step];
+        from = from.max(ends[0].min(ends[1]));
+        to = to.min(ends[0].max(ends[1]));
+    }
+    (from < to).then_some([from, to])
+}
+
+/// The first way in on a piece of the line, halved so often: pieces that the bounds of the field exclude are left out.
+fn enter(field: &dyn Field, iso: f64, [a, b]: [DVec3; 2], halvings: u32) -> Option<DVec3> {
+    let range = field.bounds_along(a, b);
+    if range.hi <= iso || range.lo > iso {
+        return None;
+    }
+    let is_inside = |p: DVec3| field.value(p) > iso;
+    if halvings < SHORTEST {
+        let middle = 0.5 * (a + b);
+        let first = enter(field, iso, [a, middle], halvings + 1);
+        return first.or_else(|| enter(field, iso, [middle, b], halvings + 1));
+    }
+    if is_inside(a) || !is_inside(b) {
+        return None;
+    }
+    let (mut out, mut inside) = (a, b);
+    for _ in 0..BISECTIONS {
+        let middle = 0.5 * (out + inside);
+        *(if is_inside(middle) { &mut inside } else { &mut out }) = middle;
+    }
+    Some(inside)
+}
+
+#[cfg(test)]
+mod tests {
+    use bspline::HierarchicalSpline;
+    use bspline::hierarchical::Lattice;
+    use glam::DAffine3;
+
+    use super::*;
+
+    fn two_balls() -> HierarchicalSpline<f32> {
+        let lattice = Lattice {
+            world_from_lattice: DAffine3::from_translation(DVec3::splat(-12.0)),
+            cells: [24; 3],
+        };
+        let ball = |p: DVec3, x: f64| 3.0 - p.distance(DVec3::new(x, 0.0, 0.0));
+        HierarchicalSpline::schoenberg(lattice, 1.0, |p| ball(p, -5.0).max(ball(p, 5.0))).unwrap()
+    }
+
+    #[test]
+    fn lines_stop_at_the_first_of_two_balls() {
+        let field = two_balls();
+        let b = field.lattice().world_box();
+        for n in 0..200 {
+            let (sine, cosine) = (0.031 * f64::from(n)).sin_cos();
+            let aim = DVec3::new(-5.0, 1.8 * cosine, 1.8 * sine);
+            let from = DVec3::new(-40.0, 3.0 * sine, 5.0 * cosine);
+            let ray = Ray {
+                from,
+                along: (aim - from).normalize(),
+            };
+            let (p, normal) = pick(&field, 0.0, &b, &ray).expect("it hits");
+            assert!(field.value(p).abs() < 1e-6 && p.x < -3.0, "{p}");
+            assert!(normal.dot(ray.along) < 0.0);
+            // By many small steps.
+            let first = (0..80_000).map(|n| from + 1e-3 * f64::from(n) * ray.along);
+            let first = first.into_iter().find(|q| field.value(*q) > 0.0).unwrap();
+            assert!(first.distance(p) < 2e-3, "{first} and {p}");
+        }
+    }
+
+    #[test]
+    fn lines_that_pass_by_meet_nothing() {
+        let field = two_balls();
+        let b = field.lattice().world_box();
+        for (from, along) in [
+            (DVec3::new(0.0, -40.0, 0.0), DVec3::Y),
+            (DVec3::new(-40.0, 0.0, 9.0), DVec3::X),
+            (DVec3::new(-40.0, 0.0, 90.0), DVec3::X),
+            (DVec3::new(-40.0, 0.0, 0.0), -DVec3::X),
+        ] {
+            assert_eq!(pick(&field, 0.0, &b, &Ray { from, along }), None);
+        }
+    }
+}

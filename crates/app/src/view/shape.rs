@@ -1,0 +1,220 @@
+//! The triangles of an object, kept as it changes.
+
+use std::collections::BTreeMap;
+
+use bspline::polygonize::{AdaptiveBlock, AdaptiveBlockMesh, AdaptiveOptions, Mesh, PolygonizeError};
+use bspline::{Aabb, Field, Frame, Jet};
+use document::Object;
+use glam::{DAffine3, DVec3};
+use tools::paint::{Substance, values};
+
+/// Cells along the longest side of the box that triangles begin with.
+const CELLS: f64 = 32.0;
+/// Halvings of these, at most.
+const DEPTH: usize = 6;
+/// Chord error over the diagonal of the box.
+const ERROR: f64 = 4e-4;
+/// Radius of curvature, over the diagonal of the box, at which a hollow is half as dark as it can be.
+const HOLLOW: f64 = 0.02;
+
+/// A corner of triangles, in the world from the origin of the picture.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct Vertex {
+    /// Place.
+    pub at: [f32; 3],
+    /// Outward normal, of length 1.
+    pub normal: [f32; 3],
+    /// -1 in hollows, 1 on ridges.
+    pub ridge: f32,
+    /// Logarithm to base 2 of the painted stiffness.
+    pub paint: f32,
+}
+
+/// Triangles of a part of an object; none where there are none any more.
+#[derive(Clone, Debug)]
+pub struct Patch {
+    /// Whose.
+    pub object: String,
+    /// Which part.
+    pub part: [i32; 3],
+    /// Corners.
+    pub vertices: Vec<Vertex>,
+    /// Three for each triangle.
+    pub indices: Vec<u32>,
+}
+
+/// A field that was not asked yet.
+const NOTHING: Jet = Jet {
+    value: 0.0,
+    gradient: DVec3::ZERO,
+    hessian: glam::DMat3::ZERO,
+};
+
+/// The triangles of an object.
+pub struct Shape {
+    mesh: AdaptiveBlockMesh,
+    object: Object,
+    world_box: Aabb,
+    world_from_object: DAffine3,
+    /// Blocks with triangles.
+    blocks: BTreeMap<[i32; 3], Vec<AdaptiveBlock>>,
+}
+
+impl Shape {
+    /// Of an object with an iso-value that stands at a place. `origin` is that of the picture.
+    ///
+    /// # Errors
+    /// That the surface cannot be followed, such as for its size.
+    pub fn new(object: &Object, iso: f64, world_from_object: DAffine3) -> Result<Self, PolygonizeError> {
+        let world_box = object.field.world_box();
+        let size = world_box.size();
+        let edge = size.max_element() / CELLS;
+        let cells = (size / edge).ceil().max(DVec3::ONE).to_array().map(|n| n as u32);
+        let options = AdaptiveOptions {
+            iso,
+            depth: DEPTH,
+            detection: DEPTH - 1,
+            ..AdaptiveOptions::default()
+        };
+        let frame = Frame::over(&world_box, cells);
+        let field = object.field.as_field();
+        Ok(Self {
+            mesh: AdaptiveBlockMesh::new(field, &frame, &options, ERROR * size.length(), false)?,
+            object: object.clone(),
+            world_box,
+            world_from_object,
+            blocks: BTreeMap::new(),
+        })
+    }
+
+    /// Whether it can follow to another state of its object.
+    pub fn follows(&self, object: &Object, world_from_object: DAffine3) -> bool {
+        self.world_box == object.field.world_box()
+            && self.object.meta.iso == object.meta.iso
+            && self.world_from_object == world_from_object
+    }
+
+    /// All that is to be drawn of it.
+    pub fn all(&mut self, name: &str, origin: DVec3) -> Vec<Patch> {
+        self.group();
+        let parts: Vec<[i32; 3]> = self.blocks.keys().copied().collect();
+        parts
+            .into_iter()
+            .map(|part| self.patch(name, part, origin))
+            .collect()
+    }
+
+    /// Follows its object; what is to be drawn anew.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn follow(
+        &mut self,
+        name: &str,
+        object: &Object,
+        origin: DVec3,
+    ) -> Result<Vec<Patch>, PolygonizeError> {
+        let mut boxes = object.field.changed_boxes(&self.object.field);
+        let update = self.mesh.update(object.field.as_field(), &boxes)?;
+        boxes.extend(painted(&self.object, object));
+        self.object = object.clone();
+        let mut parts: Vec<[i32; 3]> = update.changed.iter().map(part).collect();
+        parts.extend(self.blocks.keys().copied().filter(|part| {
+            let b = self.part_box(*part);
+            boxes
+                .iter()
+                .any(|c| b.min.cmple(c.max).all() && c.min.cmple(b.max).all())
+        }));
+        parts.sort_unstable();
+        parts.dedup();
+        self.group();
+        Ok(parts
+            .into_iter()
+            .map(|part| self.patch(name, part, origin))
+            .collect())
+    }
+
+    /// A box round its surface, in the world.
+    pub fn bounding_box(&self) -> Option<Aabb> {
+        let pieces = self
+            .mesh
+            .blocks()
+            .into_iter()
+            .filter_map(|block| self.mesh.piece(block));
+        let boxes = pieces.filter_map(|piece| piece.bounding_box());
+        let whole = boxes.reduce(Aabb::hull)?;
+        Some(whole.transformed(&self.world_from_object))
+    }
+
+    fn group(&mut self) {
+        self.blocks.clear();
+        for block in self.mesh.blocks() {
+            self.blocks.entry(part(&block)).or_default().push(block);
+        }
+    }
+
+    fn part_box(&self, part: [i32; 3]) -> Aabb {
+        let edge = 8.0 * self.world_box.size().max_element() / CELLS;
+        let min = self.world_box.min + edge * DVec3::from_array(part.map(f64::from));
+        Aabb::new(min, min + edge).widened(1e-9 * edge)
+    }
+
+    fn patch(&self, name: &str, part: [i32; 3], origin: DVec3) -> Patch {
+        let (mut places, mut indices) = (Vec::new(), Vec::new());
+        for block in self.blocks.get(&part).into_iter().flatten() {
+            let Some(Mesh {
+                positions, triangles, ..
+            }) = self.mesh.piece(*block)
+            else {
+                continue;
+            };
+            let first = places.len() as u32;
+            indices.extend(triangles.iter().flatten().map(|n| first + n));
+            places.extend(positions);
+        }
+        let mut jets = vec![NOTHING; places.len()];
+        self.object.field.as_field().jets(&places, &mut jets);
+        let hollow = HOLLOW * self.world_box.size().length();
+        let stiffness = values(&self.object.layers, Substance::Stiffness, &places);
+        let placed = self.world_from_object;
+        let normals = placed.matrix3.inverse().transpose();
+        let vertices = places.iter().zip(&jets).enumerate().map(|(n, (p, jet))| {
+            let steep = jet.gradient.length();
+            let normal = -jet.gradient / steep.max(f64::MIN_POSITIVE);
+            // Twice the mean curvature: div n.
+            let h = &jet.hessian;
+            let trace = h.x_axis.x + h.y_axis.y + h.z_axis.z;
+            let bent = -(trace - normal.dot(*h * normal)) / steep.max(f64::MIN_POSITIVE);
+            let factor = stiffness.as_ref().map_or(1.0, |stiffness| stiffness[n]);
+            Vertex {
+                at: (placed.transform_point3(*p) - origin).as_vec3().to_array(),
+                normal: normals.mul_vec3(normal).normalize_or_zero().as_vec3().to_array(),
+                ridge: libm::tanh(0.5 * hollow * bent) as f32,
+                paint: libm::log2(f64::max(factor, 1e-6)) as f32,
+            }
+        });
+        Patch {
+            object: name.into(),
+            part,
+            vertices: vertices.collect(),
+            indices,
+        }
+    }
+}
+
+/// The part of an object in which a block lies.
+fn part(block: &AdaptiveBlock) -> [i32; 3] {
+    block.block.map(|n| n >> block.level)
+}
+
+/// Boxes that hold all places whose stiffness was painted anew.
+fn painted(before: &Object, now: &Object) -> Vec<Aabb> {
+    let whole = now.field.world_box();
+    let [before, now] = [before, now].map(|object| object.layers.get(&Substance::Stiffness));
+    match (before, now) {
+        (None, None) => Vec::new(),
+        (Some(before), Some(now)) => Field::changed_boxes(now.tree(), before.tree(), &whole),
+        _ => vec![whole],
+    }
+}

@@ -1,0 +1,475 @@
+//! The window.
+
+use std::collections::VecDeque;
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use egui::{Key, Modifiers, PointerButton, Pos2, Rect, Sense};
+use fitting::Cancel;
+use glam::{DVec2, DVec3};
+
+use super::desk::Desk;
+use super::gesture::{Gesture, Way};
+use super::orders::{News, Order, Sheet};
+use super::tool::{Kind, Tool};
+use crate::cli::desk_files;
+use crate::panels;
+use crate::view::{Camera, Canvas, Look, Ray, pick};
+
+/// Time after which a picture in which nothing moves is drawn whole.
+const STILL: Duration = Duration::from_millis(200);
+/// Share of the pixels of a side that are drawn while something moves.
+const ROUGH: f32 = 0.5;
+/// Time for which a message stays.
+const READ: Duration = Duration::from_secs(8);
+/// Sides of the ring that shows the tool.
+const RING: usize = 48;
+
+/// What panels show and change.
+pub struct Bench {
+    /// The document, if there is one.
+    pub sheet: Option<Arc<Sheet>>,
+    /// The tool as it is set; its radius in shares of the scene's.
+    pub tool: Tool,
+    /// How the scene is looked at.
+    pub look: Look,
+    /// Middle and radius of the scene.
+    pub scene: (DVec3, f64),
+    /// What takes a while, and the share done.
+    pub busy: Option<(String, f64)>,
+    /// What was told, the newest last, and whether it is that something failed.
+    pub messages: VecDeque<(Instant, String, bool)>,
+    /// Triangles that are shown.
+    pub triangles: usize,
+    /// The path that is being asked for.
+    pub asks: Option<panels::PathBox>,
+    /// Where sample scans are written.
+    pub scratch: Option<tempfile::TempDir>,
+    orders: Sender<Order>,
+    cancel: Arc<Mutex<Cancel>>,
+}
+
+impl Bench {
+    /// Gives the desk an order.
+    pub fn order(&self, order: Order) {
+        // A desk that has fallen is told of when the window closes.
+        let _ = self.orders.send(order);
+    }
+
+    /// Ends what takes a while.
+    pub fn cancel(&self) {
+        self.cancel
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .cancel();
+    }
+
+    /// Tells the user something.
+    pub fn tell(&mut self, text: String, is_failure: bool) {
+        self.messages.push_back((Instant::now(), text, is_failure));
+        if self.messages.len() > 100 {
+            self.messages.pop_front();
+        }
+    }
+
+    /// What was told so lately that it is still to be read.
+    pub fn message(&self) -> Option<(&str, bool)> {
+        let (when, text, is_failure) = self.messages.back()?;
+        (when.elapsed() < READ).then_some((text, *is_failure))
+    }
+
+    /// The tool with its radius in lengths, doing what the keys held make of it.
+    fn tool_in_hand(&self, keys: Modifiers) -> Tool {
+        let kind = if keys.shift { Kind::Smooth } else { self.tool.kind };
+        Tool {
+            kind,
+            radius: self.tool.radius * self.scene.1,
+            inverted: keys.command || keys.ctrl,
+            ..self.tool
+        }
+    }
+
+    /// Looks at the whole scene.
+    pub fn frame_all(&mut self) {
+        let (center, radius) = self.scene;
+        self.look.camera = Camera {
+            perspective: self.look.camera.perspective,
+            turn: self.look.camera.turn,
+            ..Camera::onto(center, radius, self.look.camera.up)
+        };
+    }
+}
+
+/// The window.
+pub struct Modeler {
+    bench: Bench,
+    news: Receiver<News>,
+    canvas: Option<Canvas>,
+    gesture: Option<Gesture>,
+    /// When something moved last.
+    moved: Instant,
+    desk: Option<JoinHandle<()>>,
+}
+
+impl Modeler {
+    /// Begins the desk, with files to open.
+    pub fn new(context: &eframe::CreationContext<'_>, files: Vec<PathBuf>) -> Self {
+        let canvas = context.wgpu_render_state.clone().map(Canvas::new);
+        let modeler = Self::on(&context.egui_ctx, canvas, desk_files::home());
+        for file in files {
+            modeler.bench.order(Order::Open(file));
+        }
+        modeler
+    }
+
+    /// With nothing open.
+    pub(super) fn on(context: &egui::Context, canvas: Option<Canvas>, home: PathBuf) -> Self {
+        let (orders, received) = channel();
+        let (told, news) = channel();
+        let cancel = Arc::new(Mutex::new(Cancel::new()));
+        let desk = Desk::new(told, wake(context), cancel.clone(), home);
+        let desk = std::thread::Builder::new()
+            .name("desk".into())
+            .spawn(move || desk.work(&received))
+            .expect("the system has threads enough");
+        Self {
+            bench: Bench {
+                sheet: None,
+                tool: Tool {
+                    kind: Kind::Carve,
+                    radius: 0.08,
+                    strength: 0.5,
+                    inverted: false,
+                },
+                look: Look {
+                    camera: Camera::onto(DVec3::ZERO, 1.0, DVec3::Y),
+                    cut: None,
+                    paint: true,
+                },
+                scene: (DVec3::ZERO, 1.0),
+                busy: None,
+                messages: VecDeque::new(),
+                triangles: 0,
+                asks: None,
+                scratch: None,
+                orders,
+                cancel,
+            },
+            news,
+            canvas,
+            gesture: None,
+            moved: Instant::now(),
+            desk: Some(desk),
+        }
+    }
+
+    /// Takes what the desk told.
+    fn hear(&mut self) {
+        while let Ok(news) = self.news.try_recv() {
+            match news {
+                News::Sheet(sheet) => self.bench.sheet = Some(sheet),
+                News::Scene {
+                    origin,
+                    center,
+                    radius,
+                    up,
+                } => {
+                    self.bench.scene = (center, radius);
+                    self.bench.look.cut = None;
+                    self.bench.look.camera.up = up;
+                    self.bench.frame_all();
+                    if let Some(canvas) = &mut self.canvas {
+                        canvas.begin(origin, center.distance(origin) + radius);
+                    }
+                }
+                News::Patches(patches) => {
+                    self.moved = Instant::now();
+                    if let Some(canvas) = &mut self.canvas {
+                        patches.iter().for_each(|patch| canvas.put(patch));
+                    }
+                }
+                News::Gone(object) => {
+                    if let Some(canvas) = &mut self.canvas {
+                        canvas.forget(&object);
+                    }
+                }
+                News::Busy(busy) => self.bench.busy = busy,
+                News::Note(text) => self.bench.tell(text, false),
+                News::Failed(text) => self.bench.tell(text, true),
+            }
+        }
+        self.bench.triangles = self.canvas.as_ref().map_or(0, Canvas::triangles);
+    }
+
+    /// The scene, and what the mouse does in it.
+    fn viewport(&mut self, ui: &mut egui::Ui) {
+        let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
+        let is_still = self.moved.elapsed() > STILL && self.gesture.is_none();
+        if let Some(canvas) = &mut self.canvas {
+            let share = if is_still { 1.0 } else { ROUGH };
+            let pixels = (rect.size() * ui.ctx().pixels_per_point() * share).round();
+            let size = [pixels.x as u32, pixels.y as u32];
+            let picture = canvas.draw(&self.bench.look, size, !is_still);
+            let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
+            ui.painter().image(picture, rect, whole, egui::Color32::WHITE);
+        }
+        if !is_still {
+            ui.ctx().request_repaint_after(STILL);
+        }
+        let over = response.hover_pos().or(response.interact_pointer_pos());
+        if let Some(over) = over {
+            self.pointer(ui, rect, &response, over);
+        }
+        if response.drag_stopped() || !ui.input(|i| i.pointer.any_down()) {
+            self.end_gesture();
+        }
+    }
+
+    fn end_gesture(&mut self) {
+        if let Some(Gesture::Stroke(_)) = self.gesture.take() {
+            self.bench.order(Order::End);
+        }
+    }
+
+    fn pointer(&mut self, ui: &egui::Ui, rect: Rect, response: &egui::Response, over: Pos2) {
+        let (keys, scroll, pressed) = ui.input(|i| {
+            let pressed = [
+                PointerButton::Primary,
+                PointerButton::Secondary,
+                PointerButton::Middle,
+            ]
+            .into_iter()
+            .find(|b| i.pointer.button_pressed(*b));
+            (i.modifiers, i.smooth_scroll_delta().y, pressed)
+        });
+        if response.hovered() && scroll != 0.0 {
+            let factor = (-0.003 * f64::from(scroll)).exp();
+            self.bench.look.camera.zoom(factor, at(rect, over));
+            self.moved = Instant::now();
+        }
+        let tool = self.bench.tool_in_hand(keys);
+        let under = self.under(rect, over);
+        if let Some(button) = pressed.filter(|_| response.hovered() && self.gesture.is_none()) {
+            self.gesture = Some(match (button, keys.shift, keys.alt) {
+                (PointerButton::Primary, _, false) if under.is_some() => {
+                    let reach = self.pixels_of(rect, tool.radius);
+                    self.bench.order(Order::Begin {
+                        tool,
+                        ray: self.ray(rect, over),
+                    });
+                    Gesture::Stroke(Way::new(over, (0.2 * reach).clamp(2.0, 24.0)))
+                }
+                (PointerButton::Middle, true, _) | (PointerButton::Secondary, ..) => Gesture::Pan,
+                _ => Gesture::Orbit,
+            });
+            return;
+        }
+        let moves: Vec<Pos2> = ui.input(|i| {
+            let moves = i.events.iter().filter_map(|event| match event {
+                egui::Event::PointerMoved(to) => Some(*to),
+                _ => None,
+            });
+            moves.collect()
+        });
+        let way = ui.input(|i| i.pointer.delta());
+        let way = DVec2::new(f64::from(way.x), -f64::from(way.y)) / f64::from(rect.height());
+        match &mut self.gesture {
+            Some(Gesture::Stroke(path)) => {
+                let steps: Vec<Pos2> = moves.into_iter().flat_map(|to| path.to(to)).collect();
+                for step in steps {
+                    self.bench.order(Order::Along(self.ray(rect, step)));
+                }
+            }
+            Some(Gesture::Orbit) if way != DVec2::ZERO => {
+                self.bench.look.camera.orbit(way);
+                self.moved = Instant::now();
+            }
+            Some(Gesture::Pan) if way != DVec2::ZERO => {
+                self.bench.look.camera.pan(way);
+                self.moved = Instant::now();
+            }
+            _ => {}
+        }
+        if let (Some((p, normal)), None) = (under, self.gesture) {
+            self.ring(ui, rect, p, normal, &tool);
+        }
+    }
+
+    /// A circle on the surface as large as the tool.
+    fn ring(&self, ui: &egui::Ui, rect: Rect, p: DVec3, normal: DVec3, tool: &Tool) {
+        let right = normal.any_orthonormal_vector();
+        let up = normal.cross(right);
+        let corner = |n: usize| {
+            let (sine, cosine) = (std::f64::consts::TAU * n as f64 / RING as f64).sin_cos();
+            self.on_screen(rect, p + tool.radius * (cosine * right + sine * up))
+        };
+        let color = match (tool.kind, tool.inverted) {
+            (Kind::Smooth, _) => egui::Color32::from_rgb(150, 200, 255),
+            (_, true) => egui::Color32::from_rgb(120, 220, 160),
+            (_, false) => egui::Color32::from_rgb(255, 210, 150),
+        };
+        let ring: Vec<Pos2> = (0..=RING).map(corner).collect();
+        let painter = ui.painter().with_clip_rect(rect);
+        painter.add(egui::Shape::line(
+            ring.clone(),
+            egui::Stroke::new(3.0, egui::Color32::from_black_alpha(90)),
+        ));
+        painter.add(egui::Shape::line(ring, egui::Stroke::new(1.5, color)));
+        painter.circle_filled(self.on_screen(rect, p), 2.0, color);
+    }
+
+    fn ray(&self, rect: Rect, over: Pos2) -> Ray {
+        self.bench.look.camera.ray(at(rect, over))
+    }
+
+    fn on_screen(&self, rect: Rect, p: DVec3) -> Pos2 {
+        let place = self.bench.look.camera.place(p) * f64::from(rect.height());
+        rect.center() + egui::vec2(place.x as f32, -place.y as f32)
+    }
+
+    fn pixels_of(&self, rect: Rect, length: f64) -> f32 {
+        (length / self.bench.look.camera.height) as f32 * rect.height()
+    }
+
+    /// Where the mouse is over the chosen object, and the normal there, in the world.
+    fn under(&self, rect: Rect, over: Pos2) -> Option<(DVec3, DVec3)> {
+        let sheet = self.bench.sheet.as_ref()?;
+        let thing = sheet.objects.get(sheet.chosen)?;
+        let ray = self.ray(rect, over);
+        let own = thing.world_from_object.inverse();
+        let ray = Ray {
+            from: own.transform_point3(ray.from),
+            along: own.transform_vector3(ray.along).try_normalize()?,
+        };
+        let (p, normal) = pick(&*thing.field, thing.iso, &thing.own_box, &ray)?;
+        let turned = own.matrix3.transpose() * normal;
+        Some((
+            thing.world_from_object.transform_point3(p),
+            turned.normalize_or_zero(),
+        ))
+    }
+
+    fn keys(&mut self, ui: &egui::Ui) {
+        if ui.ctx().egui_wants_keyboard_input() {
+            return;
+        }
+        let pressed = |keys: Modifiers, key| ui.input_mut(|i| i.consume_key(keys, key));
+        let redo = Modifiers::COMMAND | Modifiers::SHIFT;
+        if pressed(redo, Key::Z) || pressed(Modifiers::COMMAND, Key::Y) {
+            self.bench.order(Order::Redo(1));
+        } else if pressed(Modifiers::COMMAND, Key::Z) {
+            self.bench.order(Order::Undo(1));
+        }
+        if pressed(Modifiers::COMMAND, Key::O) {
+            self.bench.asks = Some(panels::PathBox::open());
+        }
+        if pressed(Modifiers::COMMAND, Key::S) {
+            self.bench.asks = self
+                .bench
+                .sheet
+                .as_ref()
+                .map(|sheet| panels::PathBox::save(sheet));
+        }
+        if pressed(Modifiers::NONE, Key::Escape) {
+            self.gesture = None;
+            self.bench.order(Order::Drop);
+        }
+        if pressed(Modifiers::NONE, Key::OpenBracket) {
+            self.bench.tool.radius = (self.bench.tool.radius / 1.15).max(panels::RADII[0]);
+        }
+        if pressed(Modifiers::NONE, Key::CloseBracket) {
+            self.bench.tool.radius = (self.bench.tool.radius * 1.15).min(panels::RADII[1]);
+        }
+        for kind in Kind::ALL {
+            if pressed(Modifiers::NONE, kind.key()) {
+                self.bench.tool.kind = kind;
+            }
+        }
+        let up = self.bench.look.camera.up;
+        let front = if up == DVec3::Z { -DVec3::Y } else { DVec3::Z };
+        for (key, axis) in [(Key::Num1, front), (Key::Num3, DVec3::X), (Key::Num7, up)] {
+            if pressed(Modifiers::NONE, key) {
+                self.bench.look.camera.look_from(axis);
+                self.moved = Instant::now();
+            }
+        }
+        if pressed(Modifiers::NONE, Key::Home) {
+            self.bench.frame_all();
+            self.moved = Instant::now();
+        }
+        if pressed(Modifiers::NONE, Key::Num5) {
+            self.bench.look.camera.perspective ^= true;
+            self.moved = Instant::now();
+        }
+    }
+}
+
+/// Where a point of the screen is in the picture, in heights of it.
+fn at(rect: Rect, p: Pos2) -> DVec2 {
+    let way = p - rect.center();
+    DVec2::new(f64::from(way.x), -f64::from(way.y)) / f64::from(rect.height())
+}
+
+fn wake(context: &egui::Context) -> Box<dyn Fn() + Send> {
+    let context = context.clone();
+    Box::new(move || context.request_repaint())
+}
+
+impl Modeler {
+    /// What panels show.
+    #[cfg(test)]
+    pub fn bench(&self) -> &Bench {
+        &self.bench
+    }
+
+    /// All of the window.
+    pub fn show(&mut self, ui: &mut egui::Ui) {
+        self.hear();
+        self.keys(ui);
+        let dropped: Vec<PathBuf> = ui.input(|i| {
+            let files = i.raw.dropped_files.iter();
+            files.map(|file| file.path().to_path_buf()).collect()
+        });
+        for path in dropped {
+            self.bench.order(Order::Open(path));
+        }
+        egui::Panel::top("menu").show(ui, |ui| panels::menu(ui, &mut self.bench));
+        egui::Panel::bottom("status").show(ui, |ui| panels::status(ui, &self.bench));
+        if self.bench.sheet.is_some() {
+            egui::Panel::left("tools")
+                .exact_size(196.0)
+                .show(ui, |ui| panels::tools(ui, &mut self.bench));
+            egui::Panel::right("document")
+                .default_size(210.0)
+                .show(ui, |ui| panels::document(ui, &self.bench));
+        }
+        egui::CentralPanel::no_frame().show(ui, |ui| match &self.bench.sheet {
+            Some(_) => self.viewport(ui),
+            None => panels::start(ui, &mut self.bench),
+        });
+        panels::path_box(ui.ctx(), &mut self.bench);
+        if self.bench.message().is_some() {
+            ui.ctx().request_repaint_after(Duration::from_secs(1));
+        }
+    }
+}
+
+impl eframe::App for Modeler {
+    fn ui(&mut self, ui: &mut egui::Ui, _: &mut eframe::Frame) {
+        self.show(ui);
+    }
+
+    /// A stroke that is under way becomes an edit.
+    fn on_exit(&mut self) {
+        self.bench.cancel();
+        let (nobody, _) = channel();
+        // Its orders end, and with them the desk.
+        self.bench.orders = nobody;
+        if let Some(desk) = self.desk.take() {
+            let _ = desk.join();
+        }
+    }
+}

@@ -1,0 +1,262 @@
+use std::path::Path;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use document::{Command, Document, Options, State};
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable;
+use fitting::{Cancel, Control};
+use glam::DVec3;
+
+use super::desk::Desk;
+use super::modeler::Modeler;
+use super::orders::{News, Order, Sheet};
+use super::tool::{Kind, Tool};
+use crate::view::Ray;
+
+/// A desk on its thread, without a window.
+struct Bare {
+    orders: Sender<Order>,
+    news: Receiver<News>,
+    desk: JoinHandle<()>,
+    told: Vec<News>,
+}
+
+impl Bare {
+    fn new(home: &Path) -> Self {
+        let (orders, received) = channel();
+        let (told, news) = channel();
+        let cancel = Arc::new(Mutex::new(Cancel::new()));
+        let desk = Desk::new(told, Box::new(|| ()), cancel, home.into());
+        Self {
+            orders,
+            news,
+            desk: std::thread::spawn(move || desk.work(&received)),
+            told: Vec::new(),
+        }
+    }
+
+    fn order(&self, order: Order) {
+        self.orders.send(order).unwrap();
+    }
+
+    /// The sheet of so many edits, so many of them done.
+    fn sheet(&mut self, all: usize, done: usize) -> Arc<Sheet> {
+        loop {
+            let news = self
+                .news
+                .recv_timeout(Duration::from_secs(60))
+                .expect("it is told");
+            self.told.push(news.clone());
+            match news {
+                News::Sheet(sheet) if (sheet.history.len(), sheet.done) == (all, done) => return sheet,
+                News::Failed(why) => panic!("{why}"),
+                _ => {}
+            }
+        }
+    }
+
+    /// What is still told, and the end.
+    fn end(self) -> Vec<News> {
+        drop(self.orders);
+        self.desk.join().unwrap();
+        self.told.into_iter().chain(self.news.iter()).collect()
+    }
+}
+
+/// A stroke over the front of the block, seen from +z: so many lines of sight.
+fn stroke(tool: Tool, count: usize) -> Vec<Order> {
+    let ray = |n: usize| Ray {
+        from: DVec3::new(-8.0 + 0.8 * n as f64, 2.0, 200.0),
+        along: -DVec3::Z,
+    };
+    let begin = Order::Begin { tool, ray: ray(0) };
+    let along = (1..count).map(|n| Order::Along(ray(n)));
+    std::iter::once(begin).chain(along).chain([Order::End]).collect()
+}
+
+fn tool(kind: Kind) -> Tool {
+    Tool {
+        kind,
+        radius: 4.0,
+        strength: 0.5,
+        inverted: false,
+    }
+}
+
+fn opened(path: &Path) -> Document {
+    Document::open(path, Options::default()).unwrap().document
+}
+
+/// What the journal leaves when all of it is done again by the commands in it.
+fn again(document: &mut Document) -> State {
+    let first = document.first_state().unwrap();
+    (0..document.counts().unwrap().done).fold(first, |state, n| {
+        let command: Command = serde_json::from_value(document.command(n).unwrap()).unwrap();
+        command.apply(&state, &mut Control::default()).unwrap().0
+    })
+}
+
+#[test]
+fn every_tool_leaves_an_edit_that_a_script_repeats_to_the_bit() {
+    let home = tempfile::tempdir().unwrap();
+    let mut desk = Bare::new(home.path());
+    desk.order(Order::Clay);
+    let sheet = desk.sheet(0, 0);
+    let mut kinds = 0;
+    for kind in Kind::ALL {
+        stroke(tool(kind), 4)
+            .into_iter()
+            .for_each(|order| desk.order(order));
+        kinds += 1;
+        desk.sheet(kinds, kinds);
+    }
+    // One that is dropped leaves nothing, and one that was not ended becomes an edit when the window closes.
+    let mut dropped = stroke(tool(Kind::Carve), 3);
+    *dropped.last_mut().unwrap() = Order::Drop;
+    dropped.into_iter().for_each(|order| desk.order(order));
+    let mut open = stroke(tool(Kind::Inflate), 3);
+    open.pop();
+    open.into_iter().for_each(|order| desk.order(order));
+    let told = desk.end();
+    assert!(
+        !told.iter().any(|news| matches!(news, News::Failed(_))),
+        "{told:?}"
+    );
+    let mut document = opened(&sheet.path);
+    assert_eq!(document.counts().unwrap().done, kinds + 1);
+    assert_eq!(again(&mut document).sha256(), document.state().sha256());
+}
+
+/// The triangles that are told add up to those of the shape as it is, and lie on it.
+#[test]
+fn patches_follow_the_surface() {
+    let home = tempfile::tempdir().unwrap();
+    let mut desk = Bare::new(home.path());
+    desk.order(Order::Clay);
+    desk.sheet(0, 0);
+    stroke(tool(Kind::Carve), 6)
+        .into_iter()
+        .for_each(|order| desk.order(order));
+    desk.sheet(1, 1);
+    desk.order(Order::Undo(1));
+    desk.sheet(1, 0);
+    desk.order(Order::Redo(1));
+    let sheet = desk.sheet(1, 1);
+    let told = desk.end();
+    let (mut held, mut origin) = (std::collections::BTreeMap::new(), DVec3::ZERO);
+    for news in &told {
+        match news {
+            News::Scene { origin: at, .. } => origin = *at,
+            News::Patches(patches) => {
+                held.extend(patches.iter().map(|p| (p.part, p)));
+            }
+            _ => {}
+        }
+    }
+    let field = &sheet.objects[0].field;
+    let (mut corners, mut worst) = (0, 0.0_f64);
+    let mut edges = std::collections::BTreeMap::new();
+    for patch in held.values() {
+        let place = |n: u32| patch.vertices[n as usize].at.map(f32::to_bits);
+        for triangle in patch.indices.chunks_exact(3) {
+            for (a, b) in [(0, 1), (1, 2), (2, 0)] {
+                let [a, b] = [place(triangle[a]), place(triangle[b])];
+                *edges.entry((a.min(b), a.max(b))).or_insert(0) += if a < b { 1 } else { -1 };
+            }
+        }
+        for vertex in &patch.vertices {
+            let p = origin + glam::Vec3::from(vertex.at).as_dvec3();
+            worst = worst.max(field.value(p).abs());
+            corners += 1;
+        }
+    }
+    assert!(corners > 5000, "{corners}");
+    // The block's density falls by 1 a millimetre.
+    assert!(worst < 0.05, "{worst} mm");
+    // Closed across patches: every edge is gone along both ways.
+    let open = edges.values().filter(|n| **n != 0).count();
+    assert_eq!(open, 0, "of {} edges", edges.len());
+}
+
+fn window(home: &Path) -> Harness<'static, Modeler> {
+    let home = home.to_path_buf();
+    let made = |ui: &mut egui::Ui, modeler: &mut Modeler| modeler.show(ui);
+    let context = egui::Context::default();
+    Harness::builder()
+        .with_size([1280.0, 800.0])
+        .build_ui_state(made, Modeler::on(&context, None, home))
+}
+
+/// Steps until something is there.
+fn wait_for(window: &mut Harness<'_, Modeler>, what: &str) {
+    let start = Instant::now();
+    while window.query_by_label(what).is_none() {
+        assert!(start.elapsed() < Duration::from_secs(60), "no {what:?}");
+        std::thread::sleep(Duration::from_millis(10));
+        window.step();
+    }
+}
+
+#[test]
+fn the_first_minute_needs_no_file() {
+    let home = tempfile::tempdir().unwrap();
+    let mut window = window(home.path());
+    window.step();
+    assert!(window.query_by_label_contains("Bunny").is_some());
+    window.get_by_label("A block of clay").click();
+    wait_for(&mut window, "History");
+    assert!(window.query_by_label("clay").is_some());
+    // Keys choose tools, unless a path is being written.
+    window.key_press(egui::Key::S);
+    window.step();
+    assert_eq!(window.state().bench().tool.kind, Kind::Smooth);
+    window.key_press_modifiers(egui::Modifiers::COMMAND, egui::Key::O);
+    window.step();
+    window.step();
+    assert!(window.query_by_label("Browse…").is_some());
+    window.key_press(egui::Key::C);
+    window.step();
+    assert_eq!(window.state().bench().tool.kind, Kind::Smooth);
+}
+
+/// A drag over the block is a stroke; the history undoes it.
+#[test]
+fn a_drag_is_a_stroke_and_the_history_undoes_it() {
+    let home = tempfile::tempdir().unwrap();
+    let mut window = window(home.path());
+    window.step();
+    window.get_by_label("A block of clay").click();
+    wait_for(&mut window, "History");
+    window.hover_at(egui::pos2(620.0, 400.0));
+    window.step();
+    window.drag_at(egui::pos2(620.0, 400.0));
+    window.step();
+    for x in 0..12 {
+        window.hover_at(egui::pos2(620.0 + 6.0 * x as f32, 400.0));
+        window.step();
+    }
+    window.drop_at(egui::pos2(690.0, 400.0));
+    window.step();
+    let start = Instant::now();
+    while window.query_by_label_contains("carve on clay").is_none() {
+        let bench = window.state().bench();
+        assert!(
+            start.elapsed() < Duration::from_secs(10),
+            "{:?} {:?}",
+            bench.sheet,
+            bench.messages
+        );
+        std::thread::sleep(Duration::from_millis(10));
+        window.step();
+    }
+    window.get_by_label("as it was").click();
+    let start = Instant::now();
+    while window.state().bench().sheet.as_ref().is_some_and(|s| s.done > 0) {
+        assert!(start.elapsed() < Duration::from_secs(60));
+        std::thread::sleep(Duration::from_millis(10));
+        window.step();
+    }
+}
