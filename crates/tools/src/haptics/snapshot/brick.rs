@@ -44,13 +44,10 @@ impl Default for BrickOptions {
 impl BrickOptions {
     /// For a tool of a radius, 0 for a point, on a field whose knots are so far apart, both mm.
     pub fn of_tool(radius: f64, detail: f64) -> Self {
-        // Where a ball touches two places at once its offset has an edge, which nodes round by a tenth of their distance. A point is
-        // on the surface itself, which is as smooth as its knots are far apart.
-        let spacing = if radius > 0.0 {
-            (0.5 * radius).min(COARSEST).max(detail)
-        } else {
-            POINT * detail
-        };
+        // Where a ball touches two places at once its offset has an edge, which nodes round by a tenth of their distance. A tool
+        // that is smaller than knots is on the surface itself, which is as smooth as these are far apart.
+        let least = radius.clamp(POINT * detail, detail);
+        let spacing = (0.5 * radius).min(COARSEST).max(least);
         Self {
             reach: 15.0,
             spacing,

@@ -4,16 +4,17 @@ use bspline::Aabb;
 use glam::DVec3;
 
 use super::beside::BesideNodes;
+use super::changes::Changes;
 use super::far::Far;
 use super::grid::Grid;
-use super::hull::{Changes, Hull};
+use super::hull::Hull;
 use super::nearest::{self, Way};
 use super::region::{Flags, Region};
 use super::samples::Samples;
 use super::seek::{Seek, Seeker};
 use super::surface::Surface;
 use super::thin::{Thin, Unresolved};
-use super::walk::{First, walk};
+use super::walk::{Firsts, walk};
 
 /// Node distances beyond the band in which distances are as exact as in it.
 const MARGIN: f64 = 2.0;
@@ -265,7 +266,13 @@ impl Distances {
             }
             let p = grid.place(at);
             let mut hull = Hull::of(grid.number(at));
-            let walked = walk(&grid, &all.nodes, p, all.first(at, slot).list(), &mut hull);
+            let walked = walk(
+                &grid,
+                &all.nodes,
+                p,
+                Firsts::of(&grid, &all.ways, at, slot).list(),
+                &mut hull,
+            );
             let Some(walked) = walked else { return };
             let far = walked.far(p);
             let phi = if walked.beside.node == grid.number(at) {
@@ -317,30 +324,6 @@ impl Distances {
         self.strays.dedup();
     }
 
-    /// The nodes beside the surface that a node and those next to it are nearest to.
-    fn first(&self, at: [usize; 3], slot: usize) -> Firsts {
-        let (grid, strides) = (&self.grid, self.grid.strides());
-        let number = grid.number(at);
-        let mut found = Firsts::default();
-        let mut add = |from: usize, a: usize, by: i32| {
-            let way = self.ways[from];
-            if let (Some(there), Some(mut step)) = (way.from(from, strides), way.step()) {
-                step[a] += by;
-                found.add(there, std::array::from_fn(|a| number[a] + step[a]));
-            }
-        };
-        add(slot, 0, 0);
-        for a in 0..3 {
-            if at[a] > 0 {
-                add(slot - strides[a], a, -1);
-            }
-            if at[a] + 1 < grid.count[a] {
-                add(slot + strides[a], a, 1);
-            }
-        }
-        found
-    }
-
     /// Notes an exact distance, what it was made from and whether the field was asked.
     fn found(&mut self, slot: usize, phi: f32, (hull, asked): (Hull, bool), changed: &mut Region) {
         let at = self.grid.node(slot);
@@ -373,26 +356,6 @@ impl Distances {
         // What comes after this begins anew.
         self.ways.fill(Way::UNKNOWN);
         self.far = Far::default();
-    }
-}
-
-/// Different nodes, at most one of a node and of each next to it.
-#[derive(Default)]
-struct Firsts {
-    all: [First; 7],
-    count: usize,
-}
-
-impl Firsts {
-    fn add(&mut self, slot: usize, number: [i32; 3]) {
-        if self.list().iter().all(|first| first.0 != slot) {
-            self.all[self.count] = (slot, number);
-            self.count += 1;
-        }
-    }
-
-    fn list(&self) -> &[First] {
-        &self.all[..self.count]
     }
 }
 

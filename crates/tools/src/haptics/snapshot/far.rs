@@ -1,8 +1,9 @@
 //! Distances far from the surface, where only the way matters: looked for at every [`STEP`]th node, linear between these.
 
 use super::beside::BesideNodes;
+use super::changes::Changes;
 use super::grid::{Grid, STEP};
-use super::hull::{Changes, Hull};
+use super::hull::Hull;
 use super::nearest;
 use super::region::{Flags, Region};
 use super::samples::Samples;

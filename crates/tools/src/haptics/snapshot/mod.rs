@@ -5,6 +5,8 @@
 
 mod beside;
 mod brick;
+mod changes;
+mod crossing;
 mod distances;
 mod far;
 mod field_obstacle;

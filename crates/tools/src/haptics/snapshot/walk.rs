@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::beside::{Beside, BesideNodes};
 use super::grid::Grid;
 use super::hull::Hull;
+use super::nearest::Way;
 
 /// Closest places of neighbours that are tried, one after the other, each nearer than the one before.
 const WALK: usize = 6;
@@ -39,6 +40,51 @@ impl Walked<'_> {
 
 /// A node beside the surface: its place in lists, and its number in the world.
 pub type First = (usize, [i32; 3]);
+
+/// Different nodes, at most one of a node and of each next to it.
+#[derive(Default)]
+pub struct Firsts {
+    all: [First; 7],
+    count: usize,
+}
+
+impl Firsts {
+    /// The nodes beside the surface that a node and those next to it are nearest to.
+    pub fn of(grid: &Grid, ways: &[Way], at: [usize; 3], slot: usize) -> Self {
+        let strides = grid.strides();
+        let number = grid.number(at);
+        let mut found = Self::default();
+        let mut add = |from: usize, a: usize, by: i32| {
+            let way = ways[from];
+            if let (Some(there), Some(mut step)) = (way.from(from, strides), way.step()) {
+                step[a] += by;
+                found.add(there, std::array::from_fn(|a| number[a] + step[a]));
+            }
+        };
+        add(slot, 0, 0);
+        for a in 0..3 {
+            if at[a] > 0 {
+                add(slot - strides[a], a, -1);
+            }
+            if at[a] + 1 < grid.count[a] {
+                add(slot + strides[a], a, 1);
+            }
+        }
+        found
+    }
+
+    fn add(&mut self, slot: usize, number: [i32; 3]) {
+        if self.list().iter().all(|first| first.0 != slot) {
+            self.all[self.count] = (slot, number);
+            self.count += 1;
+        }
+    }
+
+    /// All of them.
+    pub fn list(&self) -> &[First] {
+        &self.all[..self.count]
+    }
+}
 
 /// From the nodes `first` to those at the corners of the cell that the nearest points to, while they are nearer. `hull` gets what was
 /// looked at; none if there are no first ones.
