@@ -60,7 +60,7 @@ fn shade(in: Seen, @builtin(front_facing) is_front: bool) -> @location(0) vec4<f
   var color = CLAY;
   if (scene.shows.x > 0.5) {
     let share = clamp(in.paint / 4.0, -1.0, 1.0);
-    color = mix(color, select(SOFT, STIFF, share > 0.0), abs(share) * 0.85);
+    color = mix(color, select(SOFT, STIFF, share > 0.0), sqrt(abs(share)) * 0.85);
   }
   let sun = max(dot(v, normalize(SUN)), 0.0);
   let sky = 0.5 + 0.5 * v.y;

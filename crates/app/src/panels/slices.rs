@@ -21,6 +21,8 @@ pub struct Slices {
     drawn: Vec<Drawn>,
     /// Of which field that is.
     of: Option<(usize, String)>,
+    /// Whether something was set since.
+    is_old: bool,
 }
 
 struct Drawn {
@@ -38,6 +40,7 @@ impl Slices {
             is_radiological: true,
             drawn: Vec::new(),
             of: None,
+            is_old: true,
         }
     }
 
@@ -48,9 +51,10 @@ impl Slices {
             std::sync::Arc::as_ptr(&thing.field).cast::<()>() as usize,
             thing.name.clone(),
         );
-        if self.of.as_ref() == Some(&of) && self.drawn.len() == PLANES.len() {
+        if self.of.as_ref() == Some(&of) && !self.is_old {
             return;
         }
+        self.is_old = false;
         let is_new = self.of.as_ref().is_none_or(|(_, name)| *name != of.1);
         self.of = Some(of);
         let turned = |axis: usize| is_patient && self.is_radiological && axis != 0;
@@ -82,11 +86,6 @@ impl Slices {
         });
         self.drawn = drawn.collect();
     }
-
-    /// Has all be drawn anew.
-    fn changed(&mut self) {
-        self.drawn.clear();
-    }
 }
 
 /// A window over the scene, if it is wished.
@@ -100,6 +99,7 @@ pub fn slices(context: &egui::Context, bench: &mut Bench) {
     slices.draw(context, thing, thing.is_volume);
     let mut is_open = true;
     egui::Window::new("Slices")
+        .default_pos([210.0, 40.0])
         .open(&mut is_open)
         .resizable(false)
         .show(context, |ui| {
@@ -120,7 +120,7 @@ pub fn slices(context: &egui::Context, bench: &mut Bench) {
                 ui.add(egui::Slider::new(white, range[0]..=range[1]).max_decimals(2))
                     .labelled_by(label.id);
                 if slices.window != before {
-                    slices.changed();
+                    slices.is_old = true;
                 }
                 if thing.is_volume {
                     let hint =
@@ -130,7 +130,7 @@ pub fn slices(context: &egui::Context, bench: &mut Bench) {
                         .on_hover_text(hint)
                         .changed()
                     {
-                        slices.changed();
+                        slices.is_old = true;
                     }
                 }
             });
@@ -140,6 +140,9 @@ pub fn slices(context: &egui::Context, bench: &mut Bench) {
                 &told
             });
         });
+    if slices.is_old {
+        context.request_repaint();
+    }
     if is_open {
         bench.slices = Some(slices);
     }
@@ -179,7 +182,7 @@ fn plane(ui: &mut egui::Ui, slices: &mut Slices, n: usize, axis: usize, name: &s
         let [x, y, z, value] = [p.x, p.y, p.z, value].map(human_number);
         format!("{value} at {x}, {y}, {z} {}", thing.unit)
     });
-    let mut share = slices.shares[axis];
+    let share = slices.shares[axis];
     let (low, high) = (thing.own_box.min[axis], thing.own_box.max[axis]);
     let mut place = low + share * (high - low);
     ui.spacing_mut().slider_width = WIDE - 80.0;
@@ -189,9 +192,8 @@ fn plane(ui: &mut egui::Ui, slices: &mut Slices, n: usize, axis: usize, name: &s
         .on_hover_text(format!("Where the {} plane lies", name.to_lowercase()))
         .changed()
     {
-        share = (place - low) / (high - low);
-        slices.shares[axis] = share;
-        slices.changed();
+        slices.shares[axis] = (place - low) / (high - low);
+        slices.is_old = true;
     }
     told.unwrap_or_default()
 }

@@ -47,7 +47,9 @@ pub fn tools(ui: &mut egui::Ui, bench: &mut Bench) {
         let (center, radius) = bench.scene;
         let mut height = (at - center).dot(normal);
         let label = ui.label("Clipping plane");
-        let slider = egui::Slider::new(&mut height, -radius..=radius).max_decimals(2);
+        let slider = egui::Slider::new(&mut height, -radius..=radius)
+            .max_decimals(2)
+            .suffix(format!(" {unit}"));
         if ui.add(slider).labelled_by(label.id).changed() {
             bench.look.cut = Some((center + height * normal, normal));
         }

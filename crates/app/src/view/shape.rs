@@ -5,15 +5,18 @@ use std::collections::BTreeMap;
 use bspline::polygonize::{AdaptiveBlock, AdaptiveBlockMesh, AdaptiveOptions, Mesh, PolygonizeError};
 use bspline::{Aabb, Field, Frame, Jet};
 use document::Object;
+use formats::field::SourceKind;
 use glam::{DAffine3, DVec3};
 use tools::paint::{Substance, values};
 
 /// Cells along the longest side of the box that triangles begin with.
 const CELLS: f64 = 32.0;
-/// Halvings of these, at most.
+/// Halvings of these, at most, and how many more than knots have: of a volume no cell is much finer than its voxels, tools add a level
+/// or two to others.
 const DEPTH: usize = 6;
-/// Chord error over the diagonal of the box.
-const ERROR: f64 = 4e-4;
+const FINER: [usize; 2] = [1, 2];
+/// Chord error over the diagonal of the box: half a pixel where the box fills a screen.
+const ERROR: f64 = 8e-4;
 /// Radius of curvature, over the diagonal of the box, at which a hollow is half as dark as it can be.
 const HOLLOW: f64 = 0.02;
 
@@ -71,10 +74,11 @@ impl Shape {
         let size = world_box.size();
         let edge = size.max_element() / CELLS;
         let cells = (size / edge).ceil().max(DVec3::ONE).to_array().map(|n| n as u32);
+        let depth = depth(object);
         let options = AdaptiveOptions {
             iso,
-            depth: DEPTH,
-            detection: DEPTH - 1,
+            depth,
+            detection: depth - 1,
             ..AdaptiveOptions::default()
         };
         let frame = Frame::over(&world_box, cells);
@@ -201,6 +205,15 @@ impl Shape {
             indices,
         }
     }
+}
+
+/// Halvings of the first cells that show what an object is shaped to.
+fn depth(object: &Object) -> usize {
+    let knots = object.field.lattice().cells_at(object.detail());
+    let finest = knots.into_iter().max().unwrap_or(1);
+    let level = (f64::from(finest) / CELLS).log2().ceil().max(0.0) as usize;
+    let is_volume = object.meta.source == SourceKind::Volume;
+    (level + FINER[usize::from(!is_volume)]).clamp(1, DEPTH)
 }
 
 /// The part of an object in which a block lies.

@@ -377,7 +377,8 @@ impl Modeler {
                 .as_ref()
                 .map(|sheet| panels::PathBox::save(sheet));
         }
-        if pressed(Modifiers::NONE, Key::Escape) {
+        // Menus have it else.
+        if matches!(self.gesture, Some(Gesture::Stroke(_))) && pressed(Modifiers::NONE, Key::Escape) {
             self.gesture = None;
             self.bench.order(Order::Drop);
         }

@@ -18,7 +18,7 @@ pub const SAMPLES: [Sample; 2] = [
         bytes: include_bytes!("../../../../data/bunny.obj.gz"),
     },
     Sample {
-        name: "Head, a CT volume",
+        name: "Head, an MR volume",
         file: "head.nii.gz",
         bytes: include_bytes!("../../../../data/head.nii.gz"),
     },

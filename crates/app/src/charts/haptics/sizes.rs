@@ -71,7 +71,6 @@ pub fn all(run: &mut HapticRun, add: &mut Add) -> Result<(), Stopped> {
             let name = format!("ball in a box of {voxels} voxels, proxy");
             let mut line = line(name, &trace, &limits, bytes, 0, Place::Size { radius });
             line.passed &= line.force_jump_max_n <= limits.slew;
-            line.default = true;
             add(line, run);
         }
     }
