@@ -41,8 +41,6 @@ use tool::Tool;
 const STEP: f64 = 1.0 / 30.0;
 /// What may be touched is known so far about the hand, mm of the device.
 const REACH: f64 = 15.0;
-/// Nodes of what may be touched of an object, where thin parts want them close: as many as are made anew in a step of the simulation.
-const NODES: usize = 60_000;
 /// Longest time from tick to tick, s.
 const TICK: f64 = 1e-3;
 /// Time of a session with a device that is not simulated, s.
@@ -360,7 +358,6 @@ fn show(
     };
     let mut toucher = Toucher::new(Demand {
         detail: knots,
-        most_nodes: NODES,
         ..demand
     });
     let unresolved = Arc::clone(unresolved);
