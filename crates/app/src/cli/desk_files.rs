@@ -138,6 +138,19 @@ pub fn home() -> PathBuf {
     usual.unwrap_or_else(|_| std::env::temp_dir()).join("isoclay")
 }
 
+/// Documents in a directory, the newest first.
+pub fn kept(directory: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(directory).into_iter().flatten().flatten();
+    let dated = entries.filter_map(|entry| {
+        let path = entry.path();
+        let changed = entry.metadata().and_then(|m| m.modified()).ok()?;
+        is_document(&path).then_some((changed, path))
+    });
+    let mut dated: Vec<_> = dated.collect();
+    dated.sort_by(|a, b| b.cmp(a));
+    dated.into_iter().map(|(_, path)| path).collect()
+}
+
 /// The file in a directory of a document that has no name yet.
 pub fn untitled(directory: &Path, name: &str) -> Result<PathBuf, String> {
     std::fs::create_dir_all(directory).map_err(|e| {

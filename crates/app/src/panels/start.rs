@@ -5,6 +5,9 @@ use crate::window::Bench;
 use crate::window::orders::Order;
 use crate::window::samples::SAMPLES;
 
+/// Documents without a name that are offered, at most.
+const MOST: usize = 4;
+
 /// In the middle, before anything is open.
 pub fn start(ui: &mut egui::Ui, bench: &mut Bench) {
     let room = ui.available_height();
@@ -33,6 +36,17 @@ pub fn start(ui: &mut egui::Ui, bench: &mut Bench) {
             .clicked()
         {
             bench.order(Order::Clay);
+        }
+        if !bench.kept.is_empty() {
+            ui.add_space(24.0);
+            ui.label("Or go on with what was not saved under a name:");
+        }
+        for path in bench.kept.iter().take(MOST) {
+            let name = path.file_stem().unwrap_or_default().to_string_lossy();
+            let button = egui::Button::new(name).min_size(wide);
+            if ui.add(button).on_hover_text(path.display().to_string()).clicked() {
+                bench.order(Order::Open(path.clone()));
+            }
         }
     });
 }

@@ -75,6 +75,19 @@ impl Desk {
         }
         // A stroke in the hand becomes an edit: closing loses nothing.
         self.end();
+        self.put_away();
+    }
+
+    /// Closes the document. One without a name in which nothing was done leaves no file.
+    fn put_away(&mut self) {
+        let Some(mut open) = self.open.take() else { return };
+        let is_idle = open.document.counts().is_ok_and(|c| c.done + c.undone == 0);
+        let (path, is_untitled) = (open.path.clone(), open.is_untitled);
+        drop(open);
+        if is_untitled && is_idle {
+            // What cannot be removed is only in the way.
+            let _ = std::fs::remove_file(path);
+        }
     }
 
     fn tell(&self, news: News) {
@@ -118,7 +131,8 @@ impl Desk {
         if desk_files::is_document(path) {
             let mut notes = Vec::new();
             let document = desk_files::open(path, &mut notes)?;
-            self.lay(document, path.to_path_buf(), false)?;
+            let is_untitled = path.parent() == Some(&self.home);
+            self.lay(document, path.to_path_buf(), is_untitled)?;
             notes.into_iter().for_each(|note| self.tell(News::Note(note)));
             return Ok(());
         }
@@ -154,6 +168,7 @@ impl Desk {
             Some(object.field.world_box().transformed(&placed))
         });
         let all = boxes.reduce(bspline::Aabb::hull).ok_or("the document is empty")?;
+        self.put_away();
         self.open = Some(Open {
             document,
             path,
@@ -217,7 +232,7 @@ impl Desk {
         };
         // Every edit is in its file already.
         let (from, chosen) = (open.path.clone(), open.chosen.clone());
-        let is_untitled = open.is_untitled;
+        let open_untitled = open.is_untitled;
         drop(open);
         let copied = match from == path {
             true => Ok(()),
@@ -227,9 +242,14 @@ impl Desk {
         };
         let (path, is_untitled) = match &copied {
             Ok(()) => (path.to_path_buf(), false),
-            Err(_) => (from.clone(), is_untitled),
+            Err(_) => (from.clone(), open_untitled),
         };
+        let was_untitled = open_untitled && copied.is_ok();
         self.reopen(path.clone(), is_untitled, chosen)?;
+        if was_untitled && from != path {
+            // It has a name now. What cannot be removed is only in the way.
+            let _ = std::fs::remove_file(&from);
+        }
         copied.map_err(|e| format!("{}: {e}", path.display()))
     }
 

@@ -35,6 +35,12 @@ pub fn run(files: Vec<PathBuf>) -> Result<(), String> {
         Box::new(move |context| Ok(Box::new(Modeler::new(context, files)))),
     );
     begun.map_err(|why| {
+        let why = match why {
+            eframe::Error::Winit(_) | eframe::Error::WinitEventLoop(_) => {
+                "neither DISPLAY nor WAYLAND_DISPLAY leads to one".to_string()
+            }
+            why => why.to_string(),
+        };
         format!(
             "no window can be opened ({why}); isoclay needs a display, and a graphics driver for Vulkan or OpenGL: on Debian without a \
              graphics card install mesa-vulkan-drivers, or set WGPU_BACKEND=gl"

@@ -48,6 +48,8 @@ pub struct Bench {
     pub slices: Option<panels::Slices>,
     /// The path that is being asked for.
     pub asks: Option<panels::PathBox>,
+    /// Documents without a name that were left, the newest first.
+    pub kept: Vec<PathBuf>,
     /// Where sample scans are written.
     pub scratch: Option<tempfile::TempDir>,
     orders: Sender<Order>,
@@ -133,7 +135,7 @@ impl Modeler {
         let (orders, received) = channel();
         let (told, news) = channel();
         let cancel = Arc::new(Mutex::new(Cancel::new()));
-        let desk = Desk::new(told, wake(context), cancel.clone(), home);
+        let desk = Desk::new(told, wake(context), cancel.clone(), home.clone());
         let desk = std::thread::Builder::new()
             .name("desk".into())
             .spawn(move || desk.work(&received))
@@ -158,6 +160,7 @@ impl Modeler {
                 triangles: 0,
                 slices: None,
                 asks: None,
+                kept: desk_files::kept(&home),
                 scratch: None,
                 orders,
                 cancel,

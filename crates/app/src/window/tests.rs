@@ -130,6 +130,37 @@ fn every_tool_leaves_an_edit_that_a_script_repeats_to_the_bit() {
     assert_eq!(again(&mut document).sha256(), document.state().sha256());
 }
 
+/// A document without a name goes when nothing was done in it, or when it gets one; what it was exported to is there.
+#[test]
+fn documents_without_a_name_leave_nothing_behind() {
+    let home = tempfile::tempdir().unwrap();
+    let elsewhere = tempfile::tempdir().unwrap();
+    let mut desk = Bare::new(home.path());
+    desk.order(Order::Clay);
+    let first = desk.sheet(0, 0);
+    assert!(first.is_untitled && first.path.exists());
+    desk.order(Order::Clay);
+    let second = desk.sheet(0, 0);
+    assert!(!first.path.exists() || first.path == second.path);
+    stroke(tool(Kind::Carve), 3)
+        .into_iter()
+        .for_each(|order| desk.order(order));
+    desk.sheet(1, 1);
+    let named = elsewhere.path().join("named.isoclay");
+    desk.order(Order::Save(named.clone()));
+    let saved = desk.sheet(1, 1);
+    assert!(!saved.is_untitled && saved.path == named);
+    desk.order(Order::Undo(1));
+    desk.sheet(1, 0);
+    let told = desk.end();
+    assert!(
+        !told.iter().any(|news| matches!(news, News::Failed(_))),
+        "{told:?}"
+    );
+    assert_eq!(std::fs::read_dir(home.path()).unwrap().count(), 0);
+    assert_eq!(opened(&named).counts().unwrap().undone, 1);
+}
+
 /// The triangles that are told add up to those of the shape as it is, and lie on it.
 #[test]
 fn patches_follow_the_surface() {
