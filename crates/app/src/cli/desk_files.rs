@@ -8,6 +8,7 @@ use etcetera::BaseStrategy;
 use fitting::{Cancel, Control, FitReport};
 use formats::field::{FieldMeta, SourceKind};
 use glam::DVec3;
+use serde_json::{Map, Value};
 use tools::force::Solid;
 use tools::geometric::block;
 
@@ -48,7 +49,18 @@ pub fn import(path: &Path, cancel: &Cancel, show: Show<'_>) -> Result<(String, O
     }
     told(scratch("the fit").and_then(|scratch| {
         let field = scratch.path().join("field.iclay");
-        let arguments = [path.as_os_str().to_owned(), "-o".into(), field.clone().into()];
+        let about = command(
+            "info",
+            &[path.as_os_str().to_owned()],
+            cancel,
+            scratch.path(),
+            show,
+        )?;
+        let mut arguments = vec![path.as_os_str().to_owned(), "-o".into(), field.clone().into()];
+        // Nobody can be asked here which side of the points is inside.
+        if about.get("normals").is_some_and(|normals| normals == "none") {
+            arguments.push("--unoriented".into());
+        }
         command("fit", &arguments, cancel, scratch.path(), show)?;
         of_field(&field, Some(path))
     }))
@@ -116,20 +128,28 @@ pub fn export(
         (None, false) => "mesh",
     };
     let done = scratch("the export").and_then(|s| command(name, &arguments, cancel, s.path(), show));
-    done.map_err(|e| e.to_string())
+    done.map(drop).map_err(|e| e.to_string())
 }
 
-fn command(name: &str, arguments: &[OsString], cancel: &Cancel, scratch: &Path, show: Show<'_>) -> Outcome {
+/// What a command prints as JSON.
+fn command(
+    name: &str,
+    arguments: &[OsString],
+    cancel: &Cancel,
+    scratch: &Path,
+    show: Show<'_>,
+) -> Outcome<Map<String, Value>> {
     let bounds = Bounds {
         cancel,
         deadline: None,
         scratch,
     };
-    match ask(name, arguments, &bounds, show).said {
-        Ok(_) => Ok(()),
-        Err(Stop::Cancelled) => Err(Failure::input("cancelled")),
-        Err(Stop::Failed(reason)) => Err(Failure::input(reason.message)),
-    }
+    ask(name, arguments, &bounds, show)
+        .said
+        .map_err(|stop| match stop {
+            Stop::Cancelled => Failure::input("cancelled"),
+            Stop::Failed(reason) => Failure::input(reason.message),
+        })
 }
 
 /// Where documents are kept that have no name yet: beside what other programs keep for the user.

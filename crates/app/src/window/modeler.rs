@@ -258,7 +258,8 @@ impl Modeler {
             self.moved = Instant::now();
         }
         let tool = self.bench.tool_in_hand(keys);
-        let under = self.under(rect, over);
+        // While a scan is read or a file is written strokes would have to wait.
+        let under = self.under(rect, over).filter(|_| self.bench.busy.is_none());
         if let Some(button) = pressed.filter(|_| response.hovered() && self.gesture.is_none()) {
             self.gesture = Some(match (button, keys.shift, keys.alt) {
                 (PointerButton::Primary, _, false) if under.is_some() => {
