@@ -210,6 +210,8 @@ pub const ROWS: &[Row] = &[
     ("devices", "--test", "--test pid:*force=0", "up to 100"),
     ("devices", "--seconds", "--test spacemouse --seconds *0", "1 to 600"),
     ("devices", "--memory", "--memory *lots", "2GiB"),
+    ("open", "files", "*nowhere.ply", "check the path"),
+    ("open", "--memory", "--memory *lots", "2GiB"),
     // Phantoms, scenes, charts.
     ("phantom", "--count", "@cloud --count *0", "1 to 100000000"),
     ("phantom", "--size", "@volume --size *3", "4 to 1024"),
