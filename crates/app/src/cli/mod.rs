@@ -154,13 +154,8 @@ pub fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(e) => return refuse(&e),
     };
-    #[cfg(feature = "window")]
-    let asked = cli
-        .command
-        .unwrap_or_else(|| Command::Open(open::Args::default()));
-    #[cfg(not(feature = "window"))]
-    let Some(asked) = cli.command else {
-        let missing = clap::error::ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand;
+    let Some(asked) = cli.command.or_else(window) else {
+        let missing = clap::error::ErrorKind::MissingSubcommand;
         return refuse(&command().error(missing, "say what to do: isoclay --help lists the commands"));
     };
     let (json, data_on_stdout) = asked.stdout();
@@ -202,6 +197,18 @@ pub fn main() -> ExitCode {
             ExitCode::from(f.code())
         }
     }
+}
+
+/// What isoclay alone does where there is a screen.
+fn window() -> Option<Command> {
+    #[cfg(feature = "window")]
+    if ["DISPLAY", "WAYLAND_DISPLAY"]
+        .iter()
+        .any(|name| std::env::var_os(name).is_some())
+    {
+        return Some(Command::Open(open::Args::default()));
+    }
+    None
 }
 
 /// Prints what is wrong with the command line itself, or the help that was asked for.
