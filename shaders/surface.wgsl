@@ -7,7 +7,7 @@ struct Scene {
   // A point of the clipping plane and, in the last number of the next one, whether there is one.
   cut_at: vec4<f32>,
   cut_normal: vec4<f32>,
-  // Whether paint is shown; whether edges of triangles are.
+  // Whether paint is shown; three numbers without meaning.
   shows: vec4<f32>,
 };
 

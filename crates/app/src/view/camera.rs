@@ -6,8 +6,6 @@ use glam::{DMat3, DMat4, DQuat, DVec2, DVec3};
 
 /// Angle of the picture's height, rad.
 const ANGLE: f64 = 0.52;
-/// Half turns for a way across the whole height of the picture.
-const TURN: f64 = 1.0;
 
 /// A half line.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -118,11 +116,11 @@ impl Camera {
         seen * view
     }
 
-    /// Turns round the centre by a way over the picture.
+    /// Turns round the centre by a way over the picture, half a turn for its whole height.
     pub fn orbit(&mut self, way: DVec2) {
         use std::f64::consts::{FRAC_PI_2, PI};
-        self.turn[0] -= TURN * PI * way.x;
-        self.turn[1] = (self.turn[1] - TURN * PI * way.y).clamp(-FRAC_PI_2, FRAC_PI_2);
+        self.turn[0] -= PI * way.x;
+        self.turn[1] = (self.turn[1] - PI * way.y).clamp(-FRAC_PI_2, FRAC_PI_2);
     }
 
     /// Goes along, so that what lies at the centre's depth follows a way over the picture.
@@ -151,16 +149,15 @@ impl Camera {
     }
 }
 
-/// Whether a point of clip space is in front of the eye.
-#[cfg(test)]
-fn seen(clip: DMat4, p: DVec3) -> DVec3 {
-    let q: glam::DVec4 = clip * p.extend(1.0);
-    q.truncate() / q.w
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Where a point is in clip space, after the division.
+    fn seen(clip: DMat4, p: DVec3) -> DVec3 {
+        let q = clip * p.extend(1.0);
+        q.truncate() / q.w
+    }
 
     fn cameras() -> impl Iterator<Item = Camera> {
         [DVec3::Y, DVec3::Z].into_iter().flat_map(|up| {

@@ -65,7 +65,7 @@ pub struct Shape {
 }
 
 impl Shape {
-    /// Of an object with an iso-value that stands at a place. `origin` is that of the picture.
+    /// Of an object with an iso-value that stands at a place.
     ///
     /// # Errors
     /// That the surface cannot be followed, such as for its size.
