@@ -10,7 +10,7 @@ use crate::{CommandError, Object, State};
 /// An object as a tool sees it, with all others beside it.
 pub fn canvas(state: &State, name: &str) -> Result<Canvas<Body>, CommandError> {
     let object = state.object(name)?;
-    let iso = object.meta.iso;
+    let iso = object.iso();
     Ok(Canvas {
         detail: object.detail(),
         field: object.field.clone(),
@@ -39,6 +39,7 @@ pub fn left(state: &State, name: &str, canvas: Canvas<Body>) -> Result<State, Co
     shaped.properties.set_placement(canvas.placement.map);
     shaped.properties.parent = canvas.placement.parent;
     shaped.properties.material = canvas.material;
+    shaped.properties.iso = Some(canvas.iso).filter(|iso| shaped.meta.iso != Some(*iso));
     Ok(next.with(name, shaped)?)
 }
 
@@ -60,7 +61,7 @@ fn others(state: &State, name: &str) -> Result<Others, CommandError> {
     let own = state.placement(name)?;
     let mut others = Others::default();
     for (other, object) in state.objects() {
-        if let Some(iso) = object.meta.iso {
+        if let Some(iso) = object.iso() {
             // Of what lies alike no rounding.
             let placement = state.placement(other)?;
             let map = match placement == own {

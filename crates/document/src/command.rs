@@ -153,7 +153,7 @@ impl Command {
             Self::Scene { script, .. } => {
                 let mut object = state.object(name)?.clone();
                 let scene: Scene = parsed(script)?;
-                let iso = scene.iso.map(|i| i.0).or(object.meta.iso);
+                let iso = scene.iso.map(|i| i.0).or(object.iso());
                 let (field, told) = object.in_levels(name, control)?;
                 let (field, notes) = played(&scene, field, iso, &object.layers, control)?;
                 object.field = Body::Levels(field);

@@ -47,6 +47,9 @@ pub struct Properties {
     /// What it is by itself.
     #[serde(default, skip_serializing_if = "is_usual")]
     pub material: Material,
+    /// Density of its surface, in place of the one that came with its field.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub iso: Option<f64>,
 }
 
 fn is_usual(material: &Material) -> bool {
@@ -69,6 +72,7 @@ impl Properties {
             detail: None,
             holds: Vec::new(),
             material: Material::default(),
+            iso: None,
         };
         placed.set_placement(map);
         placed
@@ -153,14 +157,16 @@ impl Object {
         match &self.field {
             Body::Levels(field) => Ok((field.clone(), None)),
             Body::Knots(field) => {
-                let iso = self
-                    .meta
-                    .iso
-                    .ok_or_else(|| CommandError::NoSurface(name.into()))?;
+                let iso = self.iso().ok_or_else(|| CommandError::NoSurface(name.into()))?;
                 let (field, told) = knots::in_levels(field, iso, control).map_err(ToolError::from)?;
                 Ok((field, Some(told)))
             }
         }
+    }
+
+    /// Density of its surface, if it has one.
+    pub fn iso(&self) -> Option<f64> {
+        self.properties.iso.or(self.meta.iso)
     }
 
     /// Level of the field that tools work at.
@@ -182,6 +188,10 @@ impl Object {
         if !is_usual(&self.properties.material) {
             let text = serde_json::to_vec(&self.properties.material).expect("names have a JSON form");
             hash.update(text);
+        }
+        if let Some(iso) = self.properties.iso {
+            hash.update("surface");
+            hash.update(iso.to_le_bytes());
         }
         for held in &self.properties.holds {
             let text = serde_json::to_vec(held).expect("names and numbers have a JSON form");

@@ -119,6 +119,9 @@ impl State {
                 MAX_LEVELS - 1
             ));
         }
+        if let Some(iso) = properties.iso.filter(|iso| !iso.is_finite()) {
+            return wrong(format!("its iso-value is {iso}; a number is needed"));
+        }
         let map = properties.parent_from_object();
         if !properties.placement.as_flattened().iter().all(|v| v.is_finite()) {
             return wrong(format!(

@@ -29,6 +29,7 @@ pub mod session;
 mod slope;
 #[cfg(feature = "study")]
 pub mod study;
+pub mod surface;
 pub mod symmetry;
 pub mod tool;
 pub mod warp;

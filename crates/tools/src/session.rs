@@ -16,6 +16,7 @@ use crate::number::Positive;
 use crate::paint::Paint;
 use crate::place::Place;
 use crate::room::MOST_GROWTHS;
+use crate::surface::Surface;
 use crate::symmetry::Symmetry;
 use crate::tool::{Tool, ToolError};
 
@@ -138,6 +139,9 @@ pub struct Stroke {
     /// Says what the object is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub material: Option<Material>,
+    /// Says which density is the surface.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub surface: Option<Surface>,
 }
 
 impl Stroke {
@@ -177,6 +181,7 @@ impl Stroke {
             self.free.as_ref().map(Tool::Free),
             self.place.as_ref().map(Tool::Place),
             self.material.as_ref().map(Tool::Material),
+            self.surface.as_ref().map(Tool::Surface),
         ];
         let given: Vec<_> = all.into_iter().flatten().collect();
         match given[..] {
@@ -291,7 +296,13 @@ impl Stroke {
         let Some(symmetry) = &self.symmetry else {
             return once(canvas);
         };
-        if let Tool::Copy(_) | Tool::Hold(_) | Tool::Free(_) | Tool::Place(_) | Tool::Material(_) = tool {
+        if let Tool::Copy(_)
+        | Tool::Hold(_)
+        | Tool::Free(_)
+        | Tool::Place(_)
+        | Tool::Material(_)
+        | Tool::Surface(_) = tool
+        {
             let why = format!("{} knows no symmetry; write a stroke for each side", tool.name());
             return Err(ToolError::Stroke(why));
         }

@@ -16,6 +16,7 @@ use crate::limits::Limits;
 use crate::material::Material;
 use crate::paint::{Layers, Paint, PaintError};
 use crate::place::Place;
+use crate::surface::Surface;
 
 /// A tool with all that it is told.
 #[derive(Clone, Copy, Debug)]
@@ -60,6 +61,8 @@ pub enum Tool<'a> {
     Place(&'a Place),
     /// Says what the object is.
     Material(&'a Material),
+    /// Says which density is the surface.
+    Surface(&'a Surface),
 }
 
 /// Why a tool cannot be used.
@@ -92,12 +95,12 @@ impl ToolError {
 
 impl Tool<'_> {
     /// Names of all tools, as sessions write them.
-    pub const NAMES: [&'static str; 24] = {
+    pub const NAMES: [&'static str; 25] = {
         let [pull, chisel, squirt, drill, join] = ForceTool::NAMES;
         [
             "carve", "add", "sweep", pull, chisel, squirt, drill, join, "extrude", "bend", "move", "smooth",
             "inflate", "push", "copy", "cut", "paste", "refine", "simplify", "paint", "hold", "free",
-            "place", "material",
+            "place", "material", "surface",
         ]
     };
 
@@ -124,6 +127,7 @@ impl Tool<'_> {
             Self::Free(_) => "free",
             Self::Place(_) => "place",
             Self::Material(_) => "material",
+            Self::Surface(_) => "surface",
         }
     }
 
@@ -192,6 +196,10 @@ impl Tool<'_> {
             Self::Material(material) => {
                 let material = **material;
                 return Ok((Canvas { material, ..canvas }, Vec::new()));
+            }
+            Self::Surface(surface) => {
+                let iso = surface.apply(&canvas).map_err(ToolError::Stroke)?;
+                return Ok((Canvas { iso, ..canvas }, Vec::new()));
             }
             Self::Copy(copy) => {
                 copies.push(copy.to.clone());

@@ -11,6 +11,7 @@ mod hid;
 mod lag;
 mod link;
 mod mailbox;
+#[cfg(feature = "window")]
 mod mouse;
 mod name;
 mod open;
@@ -26,6 +27,8 @@ mod fake;
 
 pub use find::{Everything, Found, Kind, find};
 pub use link::leave_all;
+#[cfg(feature = "window")]
+pub use mouse::{Mouse, mouse};
 pub use name::{FORMS, Name};
 pub use open::{Force, OpenError, open};
 

@@ -5,8 +5,8 @@ use crate::window::Bench;
 use crate::window::orders::Order;
 
 /// On the right.
-pub fn document(ui: &mut egui::Ui, bench: &Bench) {
-    let Some(sheet) = &bench.sheet else { return };
+pub fn document(ui: &mut egui::Ui, bench: &mut Bench) {
+    let Some(sheet) = bench.sheet.clone() else { return };
     ui.add_space(6.0);
     ui.heading("Objects");
     for (n, thing) in sheet.objects.iter().enumerate() {
@@ -27,6 +27,8 @@ pub fn document(ui: &mut egui::Ui, bench: &Bench) {
         }
     }
     ui.add_space(10.0);
+    super::surface(ui, bench);
+    super::constraints(ui, bench);
     ui.heading("History");
     egui::ScrollArea::vertical()
         .auto_shrink(false)

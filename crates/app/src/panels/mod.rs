@@ -1,17 +1,23 @@
 //! Panels round the scene: one file each.
 
+mod constraints;
 mod document;
 mod menu;
 mod path_box;
 mod slices;
 mod start;
 mod status;
+mod surface;
 mod tools;
+mod touch;
 
+pub use constraints::{constraints, next_pin};
 pub use document::document;
 pub use menu::menu;
 pub use path_box::{PathBox, path_box};
 pub use slices::{Slices, slices};
 pub use start::start;
 pub use status::status;
+pub use surface::{Densities, surface};
 pub use tools::{RADII, tools};
+pub use touch::{TouchWish, touch};

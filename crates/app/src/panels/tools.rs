@@ -29,8 +29,8 @@ pub fn tools(ui: &mut egui::Ui, bench: &mut Bench) {
     let size = bench.scene.1;
     let mut radius = bench.tool.radius * size;
     let label = ui
-        .label("Radius  [  ]")
-        .on_hover_text("The keys [ and ] make it smaller and larger");
+        .label("Radius  F")
+        .on_hover_text("The keys [ and ] make it smaller and larger; F sets it by the mouse");
     let slider = egui::Slider::new(&mut radius, RADII[0] * size..=RADII[1] * size)
         .logarithmic(true)
         .suffix(format!(" {unit}"))
@@ -39,7 +39,7 @@ pub fn tools(ui: &mut egui::Ui, bench: &mut Bench) {
     if ui.add(slider).labelled_by(label.id).changed() {
         bench.tool.radius = radius / size;
     }
-    let label = ui.label("Strength");
+    let label = ui.label("Strength").on_hover_text("Shift-F sets it by the mouse");
     ui.add(egui::Slider::new(&mut bench.tool.strength, 0.0..=1.0).max_decimals(2))
         .labelled_by(label.id);
     ui.add_space(10.0);

@@ -6,6 +6,7 @@
 
 pub mod clock;
 mod graphics;
+pub mod grip;
 pub mod hand;
 mod haptic;
 pub mod histogram;

@@ -1,10 +1,14 @@
 //! A document in a hand: strokes begin and end with a button, and each step of the simulation tells one pose.
 
+use std::sync::{Arc, Mutex, PoisonError};
+
 use document::{CommandError, Document, DocumentError, Live, State};
 use fitting::Control;
 use glam::{DQuat, DVec3};
+use tools::curve::Along;
 use tools::haptics::{Embedding, Pose, StrokeStep, newtons_per_unit};
 use tools::live;
+use tools::number::Point;
 use tools::session::Stroke;
 
 use super::hand::Hand;
@@ -17,9 +21,15 @@ const DRAG: f64 = 1.0;
 pub struct Sculpting {
     document: Document,
     object: String,
-    /// What the button begins; without one the hand only touches.
-    tool: Option<Stroke>,
+    /// What the button begins; without one the hand only touches. Another may be put there between strokes.
+    tool: Arc<Mutex<Option<Stroke>>>,
     live: Option<Live>,
+    /// Radius of the ball that touches, if tools work where it does: without it they work where the hand is.
+    touching: Option<f64>,
+    /// Where a tool took hold that goes with the hand: the place of the surface, then the hand's.
+    hold: Option<[DVec3; 2]>,
+    /// Whether it carves or adds a solid.
+    is_solid: bool,
     /// How a solid that carves or adds goes in, and the time of a step, s; without it is where the hand is.
     embedding: Option<(Embedding, f64)>,
     /// What the hand pulls at, and newtons for each unit of that stroke's force.
@@ -29,6 +39,8 @@ pub struct Sculpting {
     presses: u32,
     shown: State,
     strokes: usize,
+    /// Titles of the edits that nobody has taken yet.
+    titles: Arc<Mutex<Vec<String>>>,
     notes: Vec<String>,
 }
 
@@ -39,14 +51,18 @@ impl Sculpting {
             shown: document.state().clone(),
             document,
             object,
-            tool,
+            tool: Arc::new(Mutex::new(tool)),
             live: None,
+            touching: None,
+            hold: None,
+            is_solid: false,
             embedding: None,
             pulled: None,
             newtons: None,
             steps: 0,
             presses: 0,
             strokes: 0,
+            titles: Arc::default(),
             notes: Vec::new(),
         }
     }
@@ -55,6 +71,23 @@ impl Sculpting {
     pub fn embedding(mut self, embedding: Embedding, step: f64) -> Self {
         self.embedding = Some((embedding, step));
         self
+    }
+
+    /// With tools that work where a ball of some radius touches the surface, and not where the hand is in it. What takes hold does so there,
+    /// and goes with the hand.
+    pub fn touching(mut self, radius: f64) -> Self {
+        self.touching = Some(radius);
+        self
+    }
+
+    /// What the button begins, to be exchanged between strokes.
+    pub fn tool(&self) -> Arc<Mutex<Option<Stroke>>> {
+        self.tool.clone()
+    }
+
+    /// Titles of the edits as they are made, for whoever takes them.
+    pub fn titles(&self) -> Arc<Mutex<Vec<String>>> {
+        self.titles.clone()
     }
 
     /// What the hand pulled at in the last step, if it pulls.
@@ -69,7 +102,7 @@ impl Sculpting {
     /// # Errors
     /// That an edit cannot be written.
     pub fn step(&mut self, hand: &Hand, control: &mut Control) -> Result<bool, DocumentError> {
-        let (Some(pose), Some(tool)) = (hand.pose, &self.tool) else {
+        let Some(pose) = hand.pose else {
             return Ok(false);
         };
         let is_pressed_anew = hand.presses != self.presses;
@@ -77,18 +110,16 @@ impl Sculpting {
         let mut is_changed = false;
         if is_pressed_anew {
             // It came up and went down again since the last step.
-            let tool = tool.clone();
             is_changed = self.end(control)?;
-            match Live::begin(self.document.state(), &self.object, tool) {
-                Ok(live) => self.live = Some(live),
-                Err(why) => self.note(&why),
+            if let Err(why) = self.begin(&pose, hand) {
+                self.note(&why);
             }
         }
         if self.live.is_none() {
             return Ok(is_changed);
         }
         if hand.is_pressing() || is_pressed_anew {
-            let pose = self.embedded(pose, hand);
+            let pose = self.worked(pose, hand);
             is_changed = self.tell(&pose, control) || is_changed;
         }
         if !hand.is_pressing() {
@@ -109,6 +140,12 @@ impl Sculpting {
         match live.end(&mut self.document, control) {
             Ok((is_changed, notes)) => {
                 self.strokes += usize::from(is_changed);
+                if is_changed && let Some(edit) = self.document.history()?.pop() {
+                    self.titles
+                        .lock()
+                        .unwrap_or_else(PoisonError::into_inner)
+                        .push(edit.title);
+                }
                 self.notes.extend(notes);
             }
             Err(CommandError::Document(why)) => return Err(why),
@@ -137,19 +174,41 @@ impl Sculpting {
         }
     }
 
-    /// Where a tool in a hand works.
-    fn embedded(&self, pose: Pose, hand: &Hand) -> Pose {
-        let is_solid = self
-            .tool
-            .as_ref()
-            .is_some_and(|t| t.carve.is_some() || t.add.is_some());
-        match &self.embedding {
-            Some((embedding, step)) if is_solid => Pose {
-                at: embedding.beyond(hand.proxy.at, pose.at, *step),
-                ..pose
-            },
-            _ => pose,
+    /// Begins what the button does now, if it does anything.
+    fn begin(&mut self, pose: &Pose, hand: &Hand) -> Result<(), CommandError> {
+        let tool = self.tool.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let Some(mut tool) = tool else { return Ok(()) };
+        let place = self.touched(pose.at, hand);
+        self.is_solid = tool.carve.is_some() || tool.add.is_some();
+        self.hold = (tool.pull.is_some() || tool.motion.is_some()).then_some([place, pose.at]);
+        if let Some(pull) = &mut tool.pull
+            && pull.along.is_empty()
+            && pull.area.is_none()
+        {
+            let own = self.own_pose(&Pose { at: place, ..*pose })?;
+            pull.along = Along::Points(vec![Point(own.at)]);
         }
+        self.live = Some(Live::begin(self.document.state(), &self.object, tool)?);
+        Ok(())
+    }
+
+    /// Where the ball touches the surface; where the hand is, if tools work there or nothing is touched.
+    fn touched(&self, at: DVec3, hand: &Hand) -> DVec3 {
+        let inward = (at - hand.proxy.at).try_normalize();
+        match self.touching.zip(inward) {
+            Some((radius, inward)) => hand.proxy.at + radius * inward,
+            None => at,
+        }
+    }
+
+    /// Where a tool in a hand works.
+    fn worked(&self, pose: Pose, hand: &Hand) -> Pose {
+        let at = match (&self.embedding, self.hold) {
+            (Some((embedding, step)), _) if self.is_solid => embedding.beyond(hand.proxy.at, pose.at, *step),
+            (_, Some([place, from])) if self.touching.is_some() => place + (pose.at - from),
+            _ => self.touched(pose.at, hand),
+        };
+        Pose { at, ..pose }
     }
 
     /// What a hand that pulls has hold of, in newtons and millimetres of the scene.

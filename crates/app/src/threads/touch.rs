@@ -28,7 +28,7 @@ impl Toucher {
             Some(TouchedObject {
                 id: number(name),
                 field: object.field.shared(),
-                iso: object.meta.iso?,
+                iso: object.iso()?,
                 world_from_object: state.placement(name).ok()?,
                 layers: &object.layers,
                 default: Touch::default(),

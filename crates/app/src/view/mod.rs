@@ -2,12 +2,14 @@
 
 mod camera;
 mod canvas;
+mod histogram;
 mod pick;
 mod shape;
 mod slice;
 
 pub use camera::{Camera, Ray};
 pub use canvas::{Canvas, Look};
+pub use histogram::Histogram;
 pub use pick::pick;
 pub use shape::{Patch, Shape};
 pub use slice::{Slice, sides};

@@ -95,7 +95,7 @@ impl Shape {
     /// Whether it can follow to another state of its object.
     pub fn follows(&self, object: &Object, world_from_object: DAffine3) -> bool {
         self.world_box == object.field.world_box()
-            && self.object.meta.iso == object.meta.iso
+            && self.object.iso() == object.iso()
             && self.world_from_object == world_from_object
     }
 

@@ -6,29 +6,34 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use document::{CommandError, Document, Live, Object, State};
+use document::{Command, CommandError, Document, Live, Object, State};
 use fitting::{Cancel, Control};
 use glam::DVec3;
 use tools::live::Pose;
+use tools::session::Stroke;
 
 use super::orders::{News, Order, Sheet, Thing};
 use super::tool::Tool;
+use super::touch::Wanted;
 use crate::cli::desk_files;
 use crate::view::{Ray, Shape, pick};
 
 /// What lies on the desk.
 pub struct Desk {
     news: Sender<News>,
-    wake: Box<dyn Fn() + Send>,
+    wake: Arc<dyn Fn() + Send + Sync>,
     cancel: Arc<Mutex<Cancel>>,
     /// Where documents are kept that have no name yet.
     home: PathBuf,
     open: Option<Open>,
+    /// What is to be in the hand.
+    wanted: Option<Wanted>,
 }
 
 /// An open document.
 struct Open {
-    document: Document,
+    /// Missing while a device has it.
+    document: Option<Document>,
     path: PathBuf,
     is_untitled: bool,
     chosen: String,
@@ -36,6 +41,8 @@ struct Open {
     shown: State,
     shapes: BTreeMap<String, Shape>,
     origin: DVec3,
+    /// Titles of the edits, those undone too, and how many are done.
+    history: (Vec<String>, usize),
 }
 
 /// A stroke.
@@ -50,7 +57,7 @@ impl Desk {
     /// A desk with nothing on it. `wake` has the window look at the news; `cancel` ends what takes a while.
     pub fn new(
         news: Sender<News>,
-        wake: Box<dyn Fn() + Send>,
+        wake: Arc<dyn Fn() + Send + Sync>,
         cancel: Arc<Mutex<Cancel>>,
         home: PathBuf,
     ) -> Self {
@@ -60,13 +67,20 @@ impl Desk {
             cancel,
             home,
             open: None,
+            wanted: None,
         }
     }
 
     /// Does orders until nobody gives any more. What is seen follows when no more orders wait.
     pub fn work(mut self, orders: &Receiver<Order>) {
-        while let Ok(order) = orders.recv() {
-            let mut next = Some(order);
+        loop {
+            let mut next = match self.wanted.clone() {
+                Some(wanted) => self.touch(&wanted, orders),
+                None => orders.recv().ok(),
+            };
+            if next.is_none() {
+                break;
+            }
             while let Some(order) = next {
                 self.obey(order);
                 next = orders.try_recv().ok();
@@ -81,7 +95,8 @@ impl Desk {
     /// Closes the document. One without a name in which nothing was done leaves no file.
     fn put_away(&mut self) {
         let Some(mut open) = self.open.take() else { return };
-        let is_idle = open.document.counts().is_ok_and(|c| c.done + c.undone == 0);
+        let counts = open.document.as_mut().map(Document::counts);
+        let is_idle = counts.is_some_and(|counts| counts.is_ok_and(|c| c.done + c.undone == 0));
         let (path, is_untitled) = (open.path.clone(), open.is_untitled);
         drop(open);
         if is_untitled && is_idle {
@@ -90,7 +105,7 @@ impl Desk {
         }
     }
 
-    fn tell(&self, news: News) {
+    pub(super) fn tell(&self, news: News) {
         // Without a window nobody is left to be told.
         let _ = self.news.send(news);
         (self.wake)();
@@ -112,6 +127,21 @@ impl Desk {
             Order::Drop => self.drop_stroke(),
             Order::Undo(count) => self.turn_back(|d| d.undo(count).map(drop)),
             Order::Redo(count) => self.turn_back(|d| d.redo(count).map(drop)),
+            Order::Do(stroke) => self.apply(*stroke),
+            Order::Take(wanted) => {
+                self.wanted = Some(wanted);
+                Ok(())
+            }
+            Order::Tool(tool) => {
+                if let Some(wanted) = &mut self.wanted {
+                    wanted.tool = tool;
+                }
+                Ok(())
+            }
+            Order::LetGo => {
+                self.let_go();
+                Ok(())
+            }
         };
         if let Err(why) = done {
             self.tell(News::Failed(why));
@@ -170,7 +200,7 @@ impl Desk {
         let all = boxes.reduce(bspline::Aabb::hull).ok_or("the document is empty")?;
         self.put_away();
         self.open = Some(Open {
-            document,
+            document: Some(document),
             path,
             is_untitled,
             chosen,
@@ -178,6 +208,7 @@ impl Desk {
             shown: state,
             shapes: BTreeMap::new(),
             origin: all.center(),
+            history: (Vec::new(), 0),
         });
         // The eye goes to the surface before panels tell of it.
         self.show();
@@ -192,7 +223,7 @@ impl Desk {
             Some(Thing {
                 name: name.clone(),
                 field: object.field.shared(),
-                iso: object.meta.iso?,
+                iso: object.iso()?,
                 own_box: object.field.world_box(),
                 world_from_object: open.shown.placement(name).ok()?,
                 is_volume: object.meta.source == formats::field::SourceKind::Volume,
@@ -201,25 +232,27 @@ impl Desk {
                     unit => unit.symbol(),
                 },
                 coefficients: object.field.coefficient_count(),
+                holds: object.properties.holds.clone(),
             })
         });
         let objects: Vec<Thing> = things.collect();
-        let counts = open.document.counts();
-        let history = open.document.history();
-        let (counts, history) = match (counts, history) {
-            (Ok(counts), Ok(history)) => (counts, history),
-            (Err(e), _) | (_, Err(e)) => {
-                let why = e.to_string();
-                return self.tell(News::Failed(why));
-            }
-        };
+        if let Some(document) = &mut open.document {
+            open.history = match (document.counts(), document.history()) {
+                (Ok(counts), Ok(all)) => (all.into_iter().map(|edit| edit.title).collect(), counts.done),
+                (Err(e), _) | (_, Err(e)) => {
+                    let why = e.to_string();
+                    return self.tell(News::Failed(why));
+                }
+            };
+        }
+        let (history, done) = open.history.clone();
         let sheet = Sheet {
             path: open.path.clone(),
             is_untitled: open.is_untitled,
             chosen: objects.iter().position(|t| t.name == open.chosen).unwrap_or(0),
             objects,
-            history: history.into_iter().map(|edit| edit.title).collect(),
-            done: counts.done,
+            history,
+            done,
         };
         self.tell(News::Sheet(Arc::new(sheet)));
     }
@@ -294,7 +327,7 @@ impl Desk {
             return Ok(());
         };
         let stroke = tool.stroke(at);
-        let live = Live::begin(open.document.state(), &open.chosen, stroke).map_err(|e| e.to_string())?;
+        let live = Live::begin(open.state(), &open.chosen, stroke).map_err(|e| e.to_string())?;
         let hold = tool.takes_hold().then_some([at, -own.along]);
         open.live = Some(InHand { live, tool, hold });
         self.step(tool.middle(at, normal))
@@ -329,17 +362,19 @@ impl Desk {
             }
             Err(why) => {
                 open.live = None;
-                open.shown = open.document.state().clone();
+                open.shown = open.state().clone();
                 Err(format!("the stroke was left out: {why}"))
             }
         }
     }
 
-    fn end(&mut self) {
+    pub(super) fn end(&mut self) {
         let Some(open) = &mut self.open else { return };
-        let Some(hand) = open.live.take() else { return };
-        let ended = hand.live.end(&mut open.document, &mut Control::default());
-        open.shown = open.document.state().clone();
+        let (Some(hand), Some(document)) = (open.live.take(), &mut open.document) else {
+            return;
+        };
+        let ended = hand.live.end(document, &mut Control::default());
+        open.shown = document.state().clone();
         match ended {
             Ok((_, notes)) => notes.into_iter().for_each(|note| self.tell(News::Note(note))),
             Err(CommandError::Document(why)) => {
@@ -353,9 +388,86 @@ impl Desk {
     fn drop_stroke(&mut self) -> Result<(), String> {
         if let Some(open) = &mut self.open {
             open.live = None;
-            open.shown = open.document.state().clone();
+            open.shown = open.state().clone();
         }
         Ok(())
+    }
+
+    /// Does a stroke that needs no hand.
+    fn apply(&mut self, stroke: Stroke) -> Result<(), String> {
+        self.end();
+        let Some(open) = &self.open else { return Ok(()) };
+        let (state, object) = (open.state().clone(), open.chosen.clone());
+        let command = Command::Stroke {
+            object,
+            stroke: Box::new(stroke),
+        };
+        let title = command.title();
+        let (what, news, wake) = (title.clone(), self.news.clone(), self.wake.clone());
+        let mut control = Control {
+            cancel: self.begin_long(),
+            on_progress: Box::new(move |at| {
+                let _ = news.send(News::Busy(Some((format!("{what}: {}", at.stage), at.fraction))));
+                wake();
+            }),
+            ..Control::default()
+        };
+        let done = command.apply(&state, &mut control);
+        self.tell(News::Busy(None));
+        let (next, notes) = done.map_err(|e| e.to_string())?;
+        self.turn_back(|document| document.commit(&title, command.to_value(), next).map(drop))?;
+        notes.into_iter().for_each(|note| self.tell(News::Note(note)));
+        Ok(())
+    }
+
+    /// What is open, and the name of the chosen object.
+    pub(super) fn chosen(&self) -> Option<(&State, &str)> {
+        let open = self.open.as_ref()?;
+        Some((open.state(), &open.chosen))
+    }
+
+    /// Lends the document to a device.
+    pub(super) fn lend(&mut self) -> Option<Document> {
+        self.open.as_mut()?.document.take()
+    }
+
+    /// Takes the document back, or opens it anew where it was lost.
+    pub(super) fn take_back(&mut self, document: Option<Document>) -> Result<(), String> {
+        let Some(open) = &mut self.open else { return Ok(()) };
+        let Some(document) = document else {
+            let (path, is_untitled, chosen) = (open.path.clone(), open.is_untitled, open.chosen.clone());
+            return self.reopen(path, is_untitled, chosen);
+        };
+        open.shown = document.state().clone();
+        open.document = Some(document);
+        self.lay_sheet();
+        Ok(())
+    }
+
+    /// A device has done edits.
+    pub(super) fn hear_edits(&mut self, titles: Vec<String>) {
+        if let Some(Open {
+            history: (all, done), ..
+        }) = &mut self.open
+        {
+            all.truncate(*done);
+            all.extend(titles);
+            *done = all.len();
+        }
+        self.lay_sheet();
+    }
+
+    /// Nothing is to be in the hand any more.
+    pub(super) fn let_go(&mut self) {
+        self.wanted = None;
+    }
+
+    /// Shows what a device made of the document.
+    pub(super) fn look_at(&mut self, state: State) {
+        if let Some(open) = &mut self.open {
+            open.shown = state;
+        }
+        self.show();
     }
 
     fn turn_back(
@@ -364,8 +476,11 @@ impl Desk {
     ) -> Result<(), String> {
         self.end();
         let Some(open) = &mut self.open else { return Ok(()) };
-        let turned = turn(&mut open.document).map_err(|e| e.to_string());
-        open.shown = open.document.state().clone();
+        let Some(document) = &mut open.document else {
+            return Ok(());
+        };
+        let turned = turn(document).map_err(|e| e.to_string());
+        open.shown = document.state().clone();
         self.lay_sheet();
         turned
     }
@@ -381,7 +496,7 @@ impl Desk {
             told.push(News::Gone(name.clone()));
         }
         for (name, object) in open.shown.objects() {
-            let (Some(iso), Ok(placed)) = (object.meta.iso, open.shown.placement(name)) else {
+            let (Some(iso), Ok(placed)) = (object.iso(), open.shown.placement(name)) else {
                 continue;
             };
             let followed = match open.shapes.get_mut(name) {
@@ -405,6 +520,11 @@ impl Desk {
 }
 
 impl Open {
+    /// The state of the document, or what a device shows of it.
+    fn state(&self) -> &State {
+        self.document.as_ref().map_or(&self.shown, Document::state)
+    }
+
     /// Where all surfaces lie, and what is up.
     fn scene(&self) -> News {
         let boxes = self.shapes.values().filter_map(Shape::bounding_box);
@@ -432,10 +552,10 @@ impl Open {
     /// Where a line meets the chosen object as the stroke found it, the outward normal there, and the line, all in the object's world. So a
     /// tool that carves does not follow what it carved, deeper and deeper.
     fn under(&self, ray: &Ray) -> Option<(DVec3, DVec3, Ray)> {
-        let object = self.document.state().object(&self.chosen).ok()?;
+        let object = self.state().object(&self.chosen).ok()?;
         let own = self.own_ray(ray)?;
         let field = object.field.as_field();
-        let (at, normal) = pick(field, object.meta.iso?, &object.field.world_box(), &own)?;
+        let (at, normal) = pick(field, object.iso()?, &object.field.world_box(), &own)?;
         Some((at, normal, own))
     }
 }

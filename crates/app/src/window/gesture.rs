@@ -7,6 +7,8 @@ use egui::{Pos2, Vec2};
 pub enum Gesture {
     /// Works on the solid.
     Stroke(Way),
+    /// Holds the button of what is in the hand.
+    Hand,
     /// Turns the view.
     Orbit,
     /// Moves it along.

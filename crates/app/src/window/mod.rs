@@ -1,11 +1,15 @@
 //! The program that people open: what is seen in the middle, panels round it, and a desk that does the work on a thread of its own.
 
+mod adjust;
 mod desk;
 mod gesture;
+mod hand;
+mod marks;
 mod modeler;
 pub mod orders;
 pub mod samples;
 pub mod tool;
+pub mod touch;
 
 #[cfg(test)]
 mod tests;

@@ -11,10 +11,12 @@ use egui::{Key, Modifiers, PointerButton, Pos2, Rect, Sense};
 use fitting::Cancel;
 use glam::{DVec2, DVec3};
 
+use super::adjust::Adjust;
 use super::desk::Desk;
 use super::gesture::{Gesture, Way};
 use super::orders::{News, Order, Sheet};
 use super::tool::{Kind, Tool};
+use super::touch::{Held, Seen};
 use crate::cli::{desk_files, interrupt};
 use crate::panels;
 use crate::view::{Camera, Canvas, Look, Ray, pick};
@@ -25,8 +27,6 @@ const STILL: Duration = Duration::from_millis(200);
 const ROUGH: f32 = 0.5;
 /// Time for which a message stays.
 const READ: Duration = Duration::from_secs(8);
-/// Sides of the ring that shows the tool.
-const RING: usize = 48;
 
 /// What panels show and change.
 pub struct Bench {
@@ -52,6 +52,18 @@ pub struct Bench {
     pub kept: Vec<PathBuf>,
     /// Where sample scans are written.
     pub scratch: Option<tempfile::TempDir>,
+    /// How often which density is in the chosen object.
+    pub densities: Option<panels::Densities>,
+    /// Whether clicks pin the surface.
+    pub pins: bool,
+    /// How a device is to be held, if that panel is shown.
+    pub touch: Option<panels::TouchWish>,
+    /// What is in the hand.
+    pub held: Option<Held>,
+    /// What it does and feels.
+    pub seen: Option<Seen>,
+    /// The tool that it was told of.
+    told_tool: Option<Tool>,
     orders: Sender<Order>,
     cancel: Arc<Mutex<Cancel>>,
 }
@@ -86,7 +98,7 @@ impl Bench {
     }
 
     /// The tool with its radius in lengths, doing what the keys held make of it.
-    fn tool_in_hand(&self, keys: Modifiers) -> Tool {
+    pub fn tool_in_hand(&self, keys: Modifiers) -> Tool {
         let kind = if keys.shift { Kind::Smooth } else { self.tool.kind };
         Tool {
             kind,
@@ -94,6 +106,27 @@ impl Bench {
             inverted: keys.command || keys.ctrl,
             ..self.tool
         }
+    }
+
+    /// Pins the surface of the chosen object at a place of the world.
+    fn pin(&self, p: DVec3) {
+        let sheet = self.sheet.as_ref();
+        let Some(thing) = sheet.and_then(|sheet| sheet.objects.get(sheet.chosen)) else {
+            return;
+        };
+        let own = thing.world_from_object.inverse().transform_point3(p);
+        let hold = serde_json::json!({ "name": panels::next_pin(thing), "points": [own.to_array()] });
+        let stroke = serde_json::from_value(serde_json::json!({ "hold": hold }));
+        self.order(Order::Do(Box::new(stroke.expect("a finite place can be held"))));
+    }
+
+    /// Tells what holds the tool when another one is chosen, or it is set otherwise.
+    fn tell_tool(&mut self) {
+        let tool = self.tool_in_hand(Modifiers::NONE);
+        if self.held.is_some() && self.told_tool != Some(tool) {
+            self.order(Order::Tool(tool));
+        }
+        self.told_tool = self.held.is_some().then_some(tool);
     }
 
     /// Looks at the whole scene.
@@ -109,10 +142,12 @@ impl Bench {
 
 /// The window.
 pub struct Modeler {
-    bench: Bench,
+    pub(super) bench: Bench,
     news: Receiver<News>,
     canvas: Option<Canvas>,
     gesture: Option<Gesture>,
+    /// What the mouse sets.
+    pub(super) adjust: Option<Adjust>,
     /// When something moved last.
     moved: Instant,
     desk: Option<JoinHandle<()>>,
@@ -162,12 +197,19 @@ impl Modeler {
                 asks: None,
                 kept: desk_files::kept(&home),
                 scratch: None,
+                densities: None,
+                pins: false,
+                touch: None,
+                held: None,
+                seen: None,
+                told_tool: None,
                 orders,
                 cancel,
             },
             news,
             canvas,
             gesture: None,
+            adjust: None,
             moved: Instant::now(),
             desk: Some(desk),
         }
@@ -204,6 +246,11 @@ impl Modeler {
                     }
                 }
                 News::Busy(busy) => self.bench.busy = busy,
+                News::Held(held) => {
+                    self.bench.held = held;
+                    self.bench.seen = None;
+                }
+                News::Seen(seen) => self.bench.seen = Some(seen),
                 News::Note(text) => self.bench.tell(text, false),
                 News::Failed(text) => self.bench.tell(text, true),
             }
@@ -230,6 +277,8 @@ impl Modeler {
         if let Some(over) = over {
             self.pointer(ui, rect, &response, over);
         }
+        self.draw_holds(ui, rect);
+        self.draw_hand(ui, rect);
         if response.drag_stopped() || !ui.input(|i| i.pointer.any_down()) {
             self.end_gesture();
         }
@@ -242,6 +291,9 @@ impl Modeler {
     }
 
     fn pointer(&mut self, ui: &egui::Ui, rect: Rect, response: &egui::Response, over: Pos2) {
+        if self.adjust(ui, rect, over) {
+            return;
+        }
         let (keys, scroll, pressed) = ui.input(|i| {
             let pressed = [
                 PointerButton::Primary,
@@ -261,8 +313,15 @@ impl Modeler {
         // While a scan is read or a file is written strokes would have to wait.
         let under = self.under(rect, over).filter(|_| self.bench.busy.is_none());
         if let Some(button) = pressed.filter(|_| response.hovered() && self.gesture.is_none()) {
+            if let (PointerButton::Primary, true, Some((p, _))) = (button, self.bench.pins, under) {
+                self.bench.pin(p);
+                return;
+            }
             self.gesture = Some(match (button, keys.shift, keys.alt) {
-                (PointerButton::Primary, _, false) if under.is_some() => {
+                (PointerButton::Primary, _, false) if self.leads_by_mouse() && under.is_some() => {
+                    Gesture::Hand
+                }
+                (PointerButton::Primary, _, false) if under.is_some() && self.bench.held.is_none() => {
                     let reach = self.pixels_of(rect, tool.radius);
                     self.bench.order(Order::Begin {
                         tool,
@@ -301,49 +360,36 @@ impl Modeler {
             }
             _ => {}
         }
-        if let (Some((p, normal)), None) = (under, self.gesture) {
+        self.lead(rect, over);
+        if let (Some((p, normal)), None, None) = (under, self.gesture, &self.bench.held) {
             self.ring(ui, rect, p, normal, &tool);
         }
     }
 
-    /// A circle on the surface as large as the tool.
-    fn ring(&self, ui: &egui::Ui, rect: Rect, p: DVec3, normal: DVec3, tool: &Tool) {
-        let right = normal.any_orthonormal_vector();
-        let up = normal.cross(right);
-        let corner = |n: usize| {
-            let (sine, cosine) = (std::f64::consts::TAU * n as f64 / RING as f64).sin_cos();
-            self.on_screen(rect, p + tool.radius * (cosine * right + sine * up))
-        };
-        let color = match (tool.kind, tool.inverted) {
-            (Kind::Smooth, _) => egui::Color32::from_rgb(150, 200, 255),
-            (_, true) => egui::Color32::from_rgb(120, 220, 160),
-            (_, false) => egui::Color32::from_rgb(255, 210, 150),
-        };
-        let ring: Vec<Pos2> = (0..=RING).map(corner).collect();
-        let painter = ui.painter().with_clip_rect(rect);
-        painter.add(egui::Shape::line(
-            ring.clone(),
-            egui::Stroke::new(3.0, egui::Color32::from_black_alpha(90)),
-        ));
-        painter.add(egui::Shape::line(ring, egui::Stroke::new(1.5, color)));
-        painter.circle_filled(self.on_screen(rect, p), 2.0, color);
+    fn leads_by_mouse(&self) -> bool {
+        self.bench.held.as_ref().is_some_and(|held| held.mouse.is_some())
     }
 
-    fn ray(&self, rect: Rect, over: Pos2) -> Ray {
+    /// What a button that is down does.
+    pub(super) fn gesture(&self) -> Option<Gesture> {
+        self.gesture
+    }
+
+    pub(super) fn ray(&self, rect: Rect, over: Pos2) -> Ray {
         self.bench.look.camera.ray(at(rect, over))
     }
 
-    fn on_screen(&self, rect: Rect, p: DVec3) -> Pos2 {
+    pub(super) fn on_screen(&self, rect: Rect, p: DVec3) -> Pos2 {
         let place = self.bench.look.camera.place(p) * f64::from(rect.height());
         rect.center() + egui::vec2(place.x as f32, -place.y as f32)
     }
 
-    fn pixels_of(&self, rect: Rect, length: f64) -> f32 {
+    pub(super) fn pixels_of(&self, rect: Rect, length: f64) -> f32 {
         (length / self.bench.look.camera.height) as f32 * rect.height()
     }
 
     /// Where the mouse is over the chosen object, and the normal there, in the world.
-    fn under(&self, rect: Rect, over: Pos2) -> Option<(DVec3, DVec3)> {
+    pub(super) fn under(&self, rect: Rect, over: Pos2) -> Option<(DVec3, DVec3)> {
         let sheet = self.bench.sheet.as_ref()?;
         let thing = sheet.objects.get(sheet.chosen)?;
         let ray = self.ray(rect, over);
@@ -392,6 +438,10 @@ impl Modeler {
         if pressed(Modifiers::NONE, Key::CloseBracket) {
             self.bench.tool.radius = (self.bench.tool.radius * 1.15).min(panels::RADII[1]);
         }
+        self.adjust_by_keys(ui);
+        if pressed(Modifiers::NONE, Key::N) {
+            self.bench.pins ^= true;
+        }
         for kind in Kind::ALL {
             if pressed(Modifiers::NONE, kind.key()) {
                 self.bench.tool.kind = kind;
@@ -434,9 +484,9 @@ fn close_when_asked(context: &egui::Context) {
     });
 }
 
-fn wake(context: &egui::Context) -> Box<dyn Fn() + Send> {
+fn wake(context: &egui::Context) -> Arc<dyn Fn() + Send + Sync> {
     let context = context.clone();
-    Box::new(move || context.request_repaint())
+    Arc::new(move || context.request_repaint())
 }
 
 impl Modeler {
@@ -465,7 +515,7 @@ impl Modeler {
                 .show(ui, |ui| panels::tools(ui, &mut self.bench));
             egui::Panel::right("document")
                 .default_size(210.0)
-                .show(ui, |ui| panels::document(ui, &self.bench));
+                .show(ui, |ui| panels::document(ui, &mut self.bench));
         }
         egui::CentralPanel::no_frame().show(ui, |ui| match &self.bench.sheet {
             Some(_) => self.viewport(ui),
@@ -473,6 +523,8 @@ impl Modeler {
         });
         panels::slices(ui.ctx(), &mut self.bench);
         panels::path_box(ui.ctx(), &mut self.bench);
+        panels::touch(ui.ctx(), &mut self.bench);
+        self.bench.tell_tool();
         if self.bench.message().is_some() {
             ui.ctx().request_repaint_after(Duration::from_secs(1));
         }

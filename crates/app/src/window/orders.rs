@@ -5,8 +5,11 @@ use std::sync::Arc;
 
 use bspline::{Aabb, Field};
 use glam::{DAffine3, DVec3};
+use tools::hold::Held;
+use tools::session::Stroke;
 
 use super::tool::Tool;
+use super::touch::{self, Seen, Wanted};
 use crate::view::{Patch, Ray};
 
 /// What the window asks. Lines are those under the mouse, in the world.
@@ -44,6 +47,14 @@ pub enum Order {
     Undo(usize),
     /// Does edits again.
     Redo(usize),
+    /// One stroke that needs no hand.
+    Do(Box<Stroke>),
+    /// Takes a device in the hand, or another one.
+    Take(Wanted),
+    /// Does another thing with what is in the hand.
+    Tool(Tool),
+    /// Puts it down.
+    LetGo,
 }
 
 /// What the desk tells.
@@ -68,6 +79,10 @@ pub enum News {
     Gone(String),
     /// What takes a while, and the share done; none when it is done.
     Busy(Option<(String, f64)>),
+    /// What is in the hand now.
+    Held(Option<touch::Held>),
+    /// What it does and feels.
+    Seen(Seen),
     /// Something to tell.
     Note(String),
     /// Something that could not be done.
@@ -110,6 +125,8 @@ pub struct Thing {
     pub unit: &'static str,
     /// Coefficients of its field.
     pub coefficients: usize,
+    /// Its constraints, in its own world.
+    pub holds: Vec<Held>,
 }
 
 impl std::fmt::Debug for Sheet {

@@ -14,7 +14,10 @@ use super::desk::Desk;
 use super::modeler::Modeler;
 use super::orders::{News, Order, Sheet};
 use super::tool::{Kind, Tool};
-use crate::view::Ray;
+use super::touch::{Held, Seen, Wanted};
+use tools::haptics::Contact;
+
+use crate::view::{Ray, pick};
 
 /// A desk on its thread, without a window.
 struct Bare {
@@ -29,7 +32,7 @@ impl Bare {
         let (orders, received) = channel();
         let (told, news) = channel();
         let cancel = Arc::new(Mutex::new(Cancel::new()));
-        let desk = Desk::new(told, Box::new(|| ()), cancel, home.into());
+        let desk = Desk::new(told, Arc::new(|| ()), cancel, home.into());
         Self {
             orders,
             news,
@@ -42,20 +45,46 @@ impl Bare {
         self.orders.send(order).unwrap();
     }
 
-    /// The sheet of so many edits, so many of them done.
-    fn sheet(&mut self, all: usize, done: usize) -> Arc<Sheet> {
+    /// The first news from now on that are looked for.
+    fn wait<T>(&mut self, what: impl Fn(&News) -> Option<T>) -> T {
         loop {
             let news = self
                 .news
                 .recv_timeout(Duration::from_secs(60))
                 .expect("it is told");
-            self.told.push(news.clone());
-            match news {
-                News::Sheet(sheet) if (sheet.history.len(), sheet.done) == (all, done) => return sheet,
-                News::Failed(why) => panic!("{why}"),
-                _ => {}
+            let found = what(&news);
+            if let News::Failed(why) = &news {
+                panic!("{why}");
+            }
+            self.told.push(news);
+            if let Some(found) = found {
+                return found;
             }
         }
+    }
+
+    /// The sheet of so many edits, so many of them done.
+    fn sheet(&mut self, all: usize, done: usize) -> Arc<Sheet> {
+        self.wait(|news| match news {
+            News::Sheet(sheet) if (sheet.history.len(), sheet.done) == (all, done) => Some(sheet.clone()),
+            _ => None,
+        })
+    }
+
+    /// What is in the hand, when it is there.
+    fn held(&mut self) -> Held {
+        self.wait(|news| match news {
+            News::Held(held) => held.clone(),
+            _ => None,
+        })
+    }
+
+    /// What the hand does when it is as it should be.
+    fn seen(&mut self, is: impl Fn(&Seen) -> bool) -> Seen {
+        self.wait(|news| match news {
+            News::Seen(seen) if is(seen) => Some(*seen),
+            _ => None,
+        })
     }
 
     /// What is still told, and the end.
@@ -212,6 +241,133 @@ fn patches_follow_the_surface() {
     assert_eq!(open, 0, "of {} edges", edges.len());
 }
 
+/// The mouse as a device: what it presses is felt, its button is a stroke, undo takes the document back for a moment, and closing in the
+/// middle of a stroke loses nothing.
+#[test]
+fn a_hand_feels_works_and_loses_nothing() {
+    let home = tempfile::tempdir().unwrap();
+    let mut desk = Bare::new(home.path());
+    desk.order(Order::Clay);
+    let sheet = desk.sheet(0, 0);
+    let tool = tool(Kind::Carve);
+    let pick = pick(
+        &*sheet.objects[0].field,
+        0.0,
+        &sheet.objects[0].own_box,
+        &Ray {
+            from: DVec3::new(1.0, 2.0, 200.0),
+            along: -DVec3::Z,
+        },
+    );
+    let (top, _) = pick.unwrap();
+    let put = |held: &Held, over: DVec3, is_down: bool| {
+        let at = (top + over - held.workspace.shift) / held.workspace.scale;
+        held.mouse.as_ref().unwrap().lock().unwrap().put(at, is_down);
+    };
+    desk.order(Order::Take(Wanted {
+        device: None,
+        stiffness: 500.0,
+        force: None,
+        tool,
+    }));
+    let held = desk.held();
+    put(&held, 8.0 * DVec3::Z, false);
+    desk.seen(|seen| seen.contact == Contact::Free);
+    // A millimetre deeper than where the ball rests.
+    put(&held, 3.0 * DVec3::Z, false);
+    let force = 0.5 / held.workspace.scale;
+    let seen = desk.seen(|seen| seen.force > 0.98 * force);
+    assert!(seen.force < 1.02 * force, "{seen:?}, {force}");
+    assert!((seen.proxy.z - top.z - 4.0).abs() < 0.02, "{seen:?}");
+    for step in 0..10 {
+        put(&held, DVec3::new(0.2 * f64::from(step), 0.0, 3.0), true);
+        std::thread::sleep(Duration::from_millis(30));
+    }
+    put(&held, DVec3::new(2.0, 0.0, 8.0), false);
+    let sheet = desk.sheet(1, 1);
+    assert!(
+        sheet.history[0].starts_with("carve on clay by hand"),
+        "{:?}",
+        sheet.history
+    );
+    desk.order(Order::Undo(1));
+    desk.sheet(1, 0);
+    let held = desk.held();
+    put(&held, 3.0 * DVec3::Z, false);
+    desk.seen(|seen| seen.force > 0.98 * force);
+    put(&held, 3.0 * DVec3::Z, true);
+    std::thread::sleep(Duration::from_millis(300));
+    let told = desk.end();
+    assert!(
+        !told.iter().any(|news| matches!(news, News::Failed(_))),
+        "{told:?}"
+    );
+    let mut document = opened(&sheet.path);
+    assert_eq!(document.counts().unwrap().done, 1);
+    assert_ne!(
+        document.state().sha256(),
+        document.first_state().unwrap().sha256()
+    );
+    assert_eq!(again(&mut document).sha256(), document.state().sha256());
+}
+
+/// What is not there is told, and the document is as it was.
+#[test]
+fn a_device_that_is_not_there_is_refused_and_the_desk_goes_on() {
+    let home = tempfile::tempdir().unwrap();
+    let mut desk = Bare::new(home.path());
+    let wanted = |device: &str| {
+        Order::Take(Wanted {
+            device: Some(device.into()),
+            stiffness: 500.0,
+            force: None,
+            tool: tool(Kind::Carve),
+        })
+    };
+    let failed = |desk: &mut Bare| loop {
+        if let Ok(News::Failed(why)) = desk.news.recv_timeout(Duration::from_secs(60)) {
+            break why;
+        }
+    };
+    desk.order(wanted("sim:omni"));
+    assert!(failed(&mut desk).contains("open something"));
+    desk.order(Order::Clay);
+    desk.sheet(0, 0);
+    desk.order(wanted("plough"));
+    assert!(failed(&mut desk).contains("plough"));
+    stroke(tool(Kind::Carve), 3)
+        .into_iter()
+        .for_each(|order| desk.order(order));
+    desk.sheet(1, 1);
+    desk.order(wanted("sim:omni"));
+    assert!(desk.held().mouse.is_none());
+    desk.order(Order::LetGo);
+    desk.wait(|news| matches!(news, News::Held(None)).then_some(()));
+    desk.order(Order::Undo(1));
+    desk.sheet(1, 0);
+    desk.end();
+}
+
+/// Strokes without a hand are edits too, and another density is another surface.
+#[test]
+fn another_density_is_shown_and_undone() {
+    let home = tempfile::tempdir().unwrap();
+    let mut desk = Bare::new(home.path());
+    desk.order(Order::Clay);
+    desk.sheet(0, 0);
+    let surface = serde_json::from_value(serde_json::json!({ "surface": { "iso": 2.0 } })).unwrap();
+    desk.order(Order::Do(Box::new(surface)));
+    let sheet = desk.sheet(1, 1);
+    assert_eq!(sheet.objects[0].iso, 2.0);
+    // All is shown anew: the surface is elsewhere everywhere.
+    let is_anew = |news: &News| matches!(news, News::Gone(_)).then_some(());
+    desk.wait(is_anew);
+    desk.order(Order::Undo(1));
+    assert_eq!(desk.sheet(1, 0).objects[0].iso, 0.0);
+    desk.wait(is_anew);
+    desk.end();
+}
+
 fn window(home: &Path) -> Harness<'static, Modeler> {
     let home = home.to_path_buf();
     let made = |ui: &mut egui::Ui, modeler: &mut Modeler| modeler.show(ui);
@@ -290,4 +446,89 @@ fn a_drag_is_a_stroke_and_the_history_undoes_it() {
         std::thread::sleep(Duration::from_millis(10));
         window.step();
     }
+}
+
+fn edits(window: &mut Harness<'_, Modeler>, count: usize) -> Arc<Sheet> {
+    let start = Instant::now();
+    loop {
+        if let Some(sheet) = &window.state().bench().sheet
+            && sheet.history.len() == count
+        {
+            return sheet.clone();
+        }
+        assert!(
+            start.elapsed() < Duration::from_secs(60),
+            "{:?}",
+            window.state().bench().messages
+        );
+        std::thread::sleep(Duration::from_millis(10));
+        window.step();
+    }
+}
+
+fn click(window: &mut Harness<'_, Modeler>, at: egui::Pos2) {
+    window.hover_at(at);
+    window.step();
+    window.drag_at(at);
+    window.step();
+    window.drop_at(at);
+    window.step();
+}
+
+/// A click pins the surface as the command would, and the panel frees it.
+#[test]
+fn clicks_pin_and_the_panel_frees() {
+    let home = tempfile::tempdir().unwrap();
+    let mut window = window(home.path());
+    window.step();
+    window.get_by_label("A block of clay").click();
+    wait_for(&mut window, "History");
+    window.key_press(egui::Key::N);
+    window.step();
+    click(&mut window, egui::pos2(620.0, 400.0));
+    let sheet = edits(&mut window, 1);
+    assert_eq!(sheet.history[0], "hold on clay");
+    let thing = &sheet.objects[0];
+    let at = thing.holds[0].lines[0][0].0;
+    assert_eq!(thing.holds[0].name, "pin 1");
+    assert!(thing.field.value(at).abs() < 1e-6, "{at}");
+    click(&mut window, egui::pos2(660.0, 400.0));
+    assert_eq!(edits(&mut window, 2).objects[0].holds.len(), 2);
+    window.step();
+    window.get_by_label("Free all").click();
+    assert!(edits(&mut window, 3).objects[0].holds.is_empty());
+}
+
+/// F and a way to the side set the radius, Escape leaves it as it was.
+#[test]
+fn radius_and_strength_are_set_by_the_mouse() {
+    let home = tempfile::tempdir().unwrap();
+    let mut window = window(home.path());
+    window.step();
+    window.get_by_label("A block of clay").click();
+    wait_for(&mut window, "History");
+    let at = egui::pos2(620.0, 400.0);
+    let set = |window: &mut Harness<'_, Modeler>, keys, key, way: f32| {
+        window.hover_at(at);
+        window.step();
+        window.key_press_modifiers(keys, key);
+        window.step();
+        window.hover_at(at + egui::vec2(way, 0.0));
+        window.step();
+    };
+    let before = window.state().bench().tool;
+    set(&mut window, egui::Modifiers::NONE, egui::Key::F, 80.0);
+    window.key_press(egui::Key::Escape);
+    window.step();
+    assert_eq!(window.state().bench().tool.radius, before.radius);
+    set(&mut window, egui::Modifiers::NONE, egui::Key::F, 80.0);
+    click(&mut window, at + egui::vec2(80.0, 0.0));
+    let larger = window.state().bench().tool.radius;
+    assert!((larger / before.radius - 0.5f64.exp()).abs() < 1e-6, "{larger}");
+    set(&mut window, egui::Modifiers::SHIFT, egui::Key::F, 60.0);
+    click(&mut window, at + egui::vec2(60.0, 0.0));
+    let bench = window.state().bench();
+    assert!((bench.tool.strength - before.strength - 0.25).abs() < 1e-6);
+    // The clicks that ended it did nothing to the clay.
+    assert_eq!(bench.sheet.as_ref().unwrap().history.len(), 0);
 }

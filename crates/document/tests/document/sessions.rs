@@ -61,9 +61,11 @@ carve = { shape = { sphere = { radius = 1 } }, along = [[17, 17, 12]] }
 place = { turn = [0, 0, 30], by = [1, 2, 3] }
 [[stroke]]
 material = { solid = "elastic" }
+[[stroke]]
+surface = { iso = 290 }
 "#;
     let commands = commands(script).unwrap();
-    assert_eq!(commands.len(), 17);
+    assert_eq!(commands.len(), 18);
     let mut hashes = vec![document.state().sha256()];
     for command in &commands {
         let (next, _) = command
@@ -113,6 +115,25 @@ fn painted_rest_lengths_move_what_a_stroke_moves() {
     println!("{less} {none} {more}");
     assert!(none.abs() < 1e-3, "{none}");
     assert!(less < -0.02 && more > 0.02, "{less} {more}");
+}
+
+/// The density falls by 40 a length, so that of 340 is one below the top: there tools work from then on.
+#[test]
+fn another_density_becomes_the_surface_and_stays_one() {
+    let block = block();
+    let lower = done(&block, "[[stroke]]\nsurface = { iso = 340 }").unwrap();
+    assert_eq!(lower.object("clay").unwrap().iso(), Some(340.0));
+    assert_ne!(lower.sha256(), block.sha256());
+    let pulled = "[[stroke]]\npull = { along = [[12, 12, 11]], lift = 0.6, radius = 1.2 }";
+    let left = done(&lower, pulled).unwrap();
+    let at = |state: &State, z: f64| {
+        let field = state.object("clay").unwrap().field.as_field();
+        field.value(glam::DVec3::new(12.0, 12.0, z))
+    };
+    assert!((at(&lower, 11.0) - 340.0).abs() < 1e-3);
+    assert!((at(&left, 11.6) - 340.0).abs() < 0.5, "{}", at(&left, 11.6));
+    let back = done(&lower, "[[stroke]]\nsurface = { iso = 300 }").unwrap();
+    assert_eq!(back.sha256(), block.sha256());
 }
 
 /// Paint of a step is felt from that step on, is kept with the object, and is done again with the stroke.
@@ -190,6 +211,11 @@ const REFUSED: &[(&str, &[&str])] = &[
         &["symmetry"],
     ),
     ("material = { solid = 'jelly' }", &["line 2", "clay"]),
+    ("surface = { iso = nan }", &["line 2", "finite"]),
+    (
+        "surface = { iso = 1e6 }",
+        &["iso is 1000000", "run from", "between"],
+    ),
     // Vectors and boxes without length.
     (
         "pull = { along = [[12, 12, 12]], by = [0, 0, 0], radius = 1 }",

@@ -59,6 +59,7 @@ impl Tool<'_> {
         match self {
             Self::Place(place) => left.placement = place.apply(&left).map_err(ToolError::Stroke)?,
             Self::Material(material) => left.material = **material,
+            Self::Surface(surface) => left.iso = surface.apply(&left).map_err(ToolError::Stroke)?,
             Self::Copy(copy) => left.copies.push(copy.to.clone()),
             Self::Free(free) => left.holds = free.left(&left.holds).map_err(ToolError::Stroke)?,
             Self::Hold(hold) => {

@@ -57,7 +57,7 @@ pub fn run(source: &Source, json: bool) -> Outcome {
             "knots": field.knots().map(|knots| knots.shape()),
             "box": [b.min.to_array(), b.max.to_array()],
             "unit": object.meta.unit.symbol(),
-            "iso": object.meta.iso,
+            "iso": object.iso(),
             "painted": painted,
             "placement": object.properties.placement,
             "parent": object.properties.parent,

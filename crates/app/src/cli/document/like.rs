@@ -80,7 +80,7 @@ impl Like<'_> {
                 human_count(left_out)
             )));
         }
-        let iso = now.meta.iso.unwrap_or(0.0);
+        let iso = now.iso().unwrap_or(0.0);
         let changes = revise_cloud(scan_of(fitted)?, scan_of(now)?, &cloud.positions, iso, journey)
             .map_err(|e| Failure::input(format!("{e}; was the object replaced?")))?;
         formats::points::save_revised(self.source.path(), &changes, output, &limits(None)).map_err(|e| {

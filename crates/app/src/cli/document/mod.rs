@@ -53,6 +53,7 @@ pub fn options() -> Options {
 /// What stands beside an object's field when it leaves the document.
 pub fn edited_meta(object: &Object) -> FieldMeta {
     let mut meta = (*object.meta).clone();
+    meta.iso = object.iso();
     meta.notes
         .push("from a document; errors and leaves are those of the fit, before any edit".into());
     meta

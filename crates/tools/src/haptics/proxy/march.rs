@@ -9,6 +9,9 @@ use crate::haptics::Obstacle;
 const ROUNDS: usize = 12;
 /// Steps of one way; beyond, the proxy goes on in the next tick.
 const STEPS: usize = 64;
+/// Way towards the goal, in tolerances, twice over, that is not worth another look when a first one has failed: sampled distances of single
+/// precision are off by as much.
+const HAIR: f64 = 0.04;
 /// Newton steps onto the surface.
 const ONTO: usize = 6;
 /// Share of a distance that a step takes: sampled distances are off by up to a hundredth.
@@ -83,7 +86,8 @@ impl March<'_> {
                 reach *= 0.5;
                 continue;
             }
-            let next = here.at + way * (reach / length).min(1.0);
+            let share = (reach / length).min(1.0);
+            let next = here.at + share * way;
             let mut is_near = true;
             let there = match self.walk(here, next) {
                 Way::Long(there) => return (there, true),
@@ -108,17 +112,25 @@ impl March<'_> {
                     self.onto(by)
                 }
             };
-            let nearer = |s: &Place| s.at.distance_squared(goal) < here.at.distance_squared(goal);
-            match there.filter(nearer) {
-                Some(there) => {
+            let gap = |s: &Place| self.on_surface(s).distance_squared(goal);
+            match there {
+                Some(there) if gap(&there) < gap(&here) => {
                     here = there;
                     planes.add_all(self.plane(&here), here.at);
                     has_failed = false;
+                    if share < 1.0 {
+                        reach *= 2.0;
+                    }
                 }
-                None => {
+                there => {
+                    let gain = gap(&here) - next.distance_squared(goal);
+                    if gain < HAIR * self.tolerance * goal.distance(here.at) {
+                        break;
+                    }
                     planes.add_all(self.plane(&here), here.at);
-                    if has_failed || !is_near {
-                        reach = 0.5 * length.min(reach);
+                    let turns = there.and_then(|there| self.turns(&here, &there, goal));
+                    if turns.is_some() || has_failed || !is_near {
+                        reach = turns.unwrap_or(0.5) * share * length;
                     }
                     has_failed = true;
                 }
@@ -162,6 +174,30 @@ impl March<'_> {
 
     fn rests(&self, place: &Place) -> bool {
         place.distance - self.clearance <= self.tolerance
+    }
+
+    /// Where the surface is at a place that rests on it: such places may be a tolerance off. Others are where they are.
+    fn on_surface(&self, place: &Place) -> DVec3 {
+        match self.rests(place) {
+            true => {
+                place.at
+                    + (self.clearance - place.distance) / place.gradient.length_squared().max(1e-12)
+                        * place.gradient
+            }
+            false => place.at,
+        }
+    }
+
+    /// Share of the way between two places of the surface at which it no longer leads nearer to `goal`, by the secant of how far it does at its
+    /// ends; nothing if it still does at the end. In a hollow the plane of a place leads past there, the farther the deeper the goal.
+    fn turns(&self, from: &Place, to: &Place, goal: DVec3) -> Option<f64> {
+        let along = to.at - from.at;
+        let pull = |place: &Place| {
+            let (lag, normal) = (goal - place.at, place.normal()?);
+            Some((lag - lag.dot(normal) * normal).dot(along))
+        };
+        let (a, b) = (pull(from)?, pull(to)?);
+        (a > 0.0 && b < 0.0).then(|| (a / (a - b)).clamp(0.05, 0.9))
     }
 
     /// The plane that holds a place which rests on the surface.

@@ -6,18 +6,11 @@ mod tally;
 mod tool;
 
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use std::time::Duration;
 
-use clap::ValueEnum;
-use document::{Object, State};
-use glam::DVec3;
-use tools::haptics::gates::GateOptions;
 use tools::haptics::simulated::SimulatedDevice;
-use tools::haptics::{
-    Abilities, Coupling, Demand, Device, Embedding, PointTool, Proxy, ProxyOptions, Servo, ServoOptions,
-    TickRecord, Unresolved, Vcp, VcpOptions, Workspace,
-};
+use tools::haptics::{Abilities, Device, Embedding, TickRecord, Unresolved};
 
 use super::{Told, chosen, failure, open};
 use crate::cli::failure::{Failure, Outcome};
@@ -28,24 +21,15 @@ use crate::cli::quantity::{human_count, human_number, positive};
 use crate::cli::simulate;
 use crate::cli::source::Source;
 use crate::devices::{self, Force, Name};
+use crate::threads::Session;
+use crate::threads::grip::{ContactMode, Grip, STEP, TICK, workspace};
 use crate::threads::rehearsal::Rehearsal;
 use crate::threads::sculpting::Sculpting;
-use crate::threads::touch::Toucher;
-use crate::threads::{Session, Show};
 use report::Felt;
 use script::Script;
 use tally::{Tally, write_trace};
 use tool::Tool;
 
-/// Time from step to step of the simulation, s.
-const STEP: f64 = 1.0 / 30.0;
-/// What may be touched is known so far about the hand, mm of the device.
-const REACH: f64 = 15.0;
-/// Nodes of what may be touched of an object: as many as are made anew in a step of the simulation. With all that snapshots allow, carving a scan of thin
-/// parts took steps of 160 ms where these take 19.
-const NODES: usize = 60_000;
-/// Longest time from tick to tick, s.
-const TICK: f64 = 1e-3;
 /// Time of a session with a device that is not simulated, s.
 const REAL: f64 = 60.0;
 /// Time after the last target, s.
@@ -97,13 +81,6 @@ pub struct Args {
     pub json: bool,
 }
 
-/// How contact is found.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum ContactMode {
-    Proxy,
-    Vcp,
-}
-
 /// Lets a hand follow a script on a document. Strokes that its button begins and ends are edits as any other.
 pub fn run(args: &Args) -> Outcome {
     let cancel = interrupt::cancel();
@@ -119,8 +96,14 @@ pub fn run(args: &Args) -> Outcome {
         let why = "there is no target; write one [[target]] with time and at, or more";
         return Err(about(why.into()));
     }
-    let tool = args.tool.points(&cancel)?;
-    if tool.is_some() && args.contact == ContactMode::Vcp {
+    let grip = Grip {
+        stiffness: args.stiffness,
+        force: args.force.unwrap_or(f64::INFINITY),
+        radius: args.radius,
+        tool: args.tool.points(&cancel)?,
+        contact: args.contact,
+    };
+    if grip.tool.is_some() && args.contact == ContactMode::Vcp {
         let why = "--contact vcp: is for the ball; leave it out, or --tool";
         return Err(Failure::usage(why));
     }
@@ -135,7 +118,8 @@ pub fn run(args: &Args) -> Outcome {
     let (held, workspace) = match &named {
         Name::Simulated(preset) => {
             let mechanics = preset.mechanics();
-            let workspace = workspace(document.state(), &name, mechanics.reach, args.scale)?;
+            let workspace =
+                workspace(document.state(), &name, mechanics.reach, args.scale).map_err(failure)?;
             let hand = script.hand(&workspace, seconds);
             let device = SimulatedDevice::new(mechanics, hand);
             (Held::Simulated(Box::new(device)), workspace)
@@ -149,21 +133,14 @@ pub fn run(args: &Args) -> Outcome {
             let device = devices::open(named, force)
                 .map_err(|why| Failure::input(format!("--device {}: {why}", args.device)))?;
             let reach = device.abilities().reach;
-            let workspace = workspace(document.state(), &name, reach, args.scale)?;
+            let workspace = workspace(document.state(), &name, reach, args.scale).map_err(failure)?;
             (Held::Real(Box::new(device)), workspace)
         }
     };
-    let servo = servo(args, tool.as_ref(), held.abilities(), workspace)?;
+    let servo = grip.servo(held.abilities(), workspace).map_err(Failure::usage)?;
     notes.extend(servo.granted().note());
     let unresolved = Arc::default();
-    let show = show(
-        args,
-        tool.as_ref(),
-        document.state(),
-        &name,
-        &workspace,
-        &unresolved,
-    )?;
+    let show = grip.show(document.state(), &name, &workspace, &unresolved)?;
     let granted = servo.granted();
     let mut sculpting = Sculpting::new(document, name, script.stroke.clone());
     if let Some(rate) = script.rate {
@@ -255,125 +232,6 @@ impl Held {
             Self::Real(device) => device.abilities(),
         }
     }
-}
-
-/// The object in the middle of the device's room.
-fn workspace(state: &State, name: &str, reach: f64, scale: Option<f64>) -> Outcome<Workspace> {
-    let b = object(state, name)?.field.world_box();
-    let placed = state.placement(name).map_err(failure)?;
-    let corner = |i: u32| {
-        let pick = |axis: u32| f64::from(i >> axis & 1);
-        placed.transform_point3(b.min + DVec3::new(pick(0), pick(1), pick(2)) * (b.max - b.min))
-    };
-    let (mut low, mut high) = (corner(0), corner(0));
-    for p in (1..8).map(corner) {
-        (low, high) = (low.min(p), high.max(p));
-    }
-    let fitting = 0.5 * (high - low).max_element() / reach;
-    Ok(Workspace {
-        scale: scale.unwrap_or(fitting),
-        shift: 0.5 * (low + high),
-        ..Workspace::default()
-    })
-}
-
-fn object<'a>(state: &'a State, name: &str) -> Outcome<&'a Object> {
-    state.object(name).map_err(failure)
-}
-
-/// Coupling and gates as they are wished.
-fn servo(
-    args: &Args,
-    tool: Option<&PointTool>,
-    abilities: &Abilities,
-    workspace: Workspace,
-) -> Outcome<Servo> {
-    let scale = workspace.scale;
-    let options = ServoOptions {
-        stiffness: args.stiffness,
-        period: abilities.period.min(TICK),
-        workspace,
-        gates: GateOptions {
-            force: args.force.unwrap_or(f64::INFINITY),
-            ..GateOptions::default()
-        },
-        ..ServoOptions::default()
-    };
-    let radius = args.radius * scale;
-    let servo = Servo::new(abilities, options, |stiffness, damping| {
-        if let Some(tool) = tool {
-            return tool::renderer(tool, stiffness * scale, damping * scale, scale);
-        }
-        let coupling = Coupling { stiffness, damping };
-        match args.contact {
-            ContactMode::Proxy => {
-                let usual = ProxyOptions::default();
-                Box::new(Proxy::new(ProxyOptions {
-                    radius,
-                    coupling,
-                    push_out: usual.push_out * scale,
-                    tolerance: usual.tolerance * scale,
-                    ..usual
-                }))
-            }
-            ContactMode::Vcp => {
-                let usual = VcpOptions::default();
-                Box::new(Vcp::new(VcpOptions {
-                    radius,
-                    coupling,
-                    step: usual.step * scale,
-                    ..usual
-                }))
-            }
-        }
-    });
-    servo.map_err(Failure::usage)
-}
-
-/// What may be touched, and the worst that was too thin for it.
-fn show(
-    args: &Args,
-    tool: Option<&PointTool>,
-    state: &State,
-    name: &str,
-    workspace: &Workspace,
-    unresolved: &Arc<Mutex<Option<Unresolved>>>,
-) -> Outcome<Show> {
-    let object = object(state, name)?;
-    if object.meta.iso.is_none() {
-        let why = format!("object {name:?} names no surface; fit it with an iso-value");
-        return Err(Failure::input(why));
-    }
-    let placed = state.placement(name).map_err(failure)?;
-    let lattice = object.field.lattice();
-    let cell = (placed * lattice.world_from_lattice).matrix3;
-    let knots = cell.x_axis.length() / f64::from(1_u32 << object.detail().min(31));
-    let scale = workspace.scale;
-    let demand = match tool {
-        Some(tool) => tool::demand(tool, scale),
-        None => {
-            let usual = Demand::of_ball(args.radius * scale);
-            Demand {
-                reach: (REACH * scale).max(4.0 * usual.radius),
-                ..usual
-            }
-        }
-    };
-    let mut toucher = Toucher::new(Demand {
-        detail: knots,
-        most_nodes: NODES,
-        ..demand
-    });
-    let unresolved = Arc::clone(unresolved);
-    Ok(Box::new(move |state, at| {
-        let snapshot = toucher.show(state, at);
-        // Nobody else looks before the end.
-        if let (Some(now), Ok(mut worst)) = (snapshot.unresolved(), unresolved.lock()) {
-            let before = worst.filter(|before| (before.missed, before.thin) > (now.missed, now.thin));
-            *worst = before.or(Some(now));
-        }
-        snapshot
-    }))
 }
 
 /// What a hand cannot feel, and what helps.

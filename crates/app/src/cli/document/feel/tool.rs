@@ -5,16 +5,11 @@ use std::str::FromStr;
 
 use fitting::Cancel;
 use glam::DVec3;
-use tools::haptics::{
-    Coupling, Demand, MultiPoint, MultiPointOptions, PointTool, Renderer, Sampling, Scaled,
-};
+use tools::haptics::{PointTool, Sampling};
 
 use crate::cli::failure::{Failure, Outcome};
 use crate::cli::input::limits;
 use crate::cli::source::{POINTS, Source};
-
-/// Stiffness of a turn, N mm/rad, for each N/m of the coupling: a lever of 63 mm.
-const TURN: f64 = 4.0;
 
 /// What the hand touches with, as it is written. Lengths are mm of the device.
 #[derive(Clone, Debug, PartialEq)]
@@ -99,28 +94,6 @@ impl Tool {
         };
         made.map(Some)
             .map_err(|why| Failure::usage(format!("--tool: {why}")))
-    }
-}
-
-/// Its renderer, for a stiffness at the hand, N/m, and a damping, N s/m, in a scene of which a mm of the device is `scale`.
-pub fn renderer(tool: &PointTool, stiffness: f64, damping: f64, scale: f64) -> Box<dyn Renderer> {
-    let options = MultiPointOptions {
-        coupling: Coupling { stiffness, damping },
-        angular_stiffness: TURN * stiffness,
-        ..MultiPointOptions::default()
-    };
-    let renderer = MultiPoint::new(tool.clone(), options).expect("a servo grants stiffness above zero");
-    Box::new(Scaled { renderer, scale })
-}
-
-/// What it asks of snapshots.
-pub fn demand(tool: &PointTool, scale: f64) -> Demand {
-    let usual = Demand::of_points(tool);
-    Demand {
-        radius: scale * usual.radius,
-        reach: scale * usual.reach,
-        spacing: usual.spacing.map(|h| scale * h),
-        ..usual
     }
 }
 

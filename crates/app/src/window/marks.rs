@@ -1,0 +1,86 @@
+//! What is drawn over the scene: the ring of the tool, what is held, and a tool in the hand.
+
+use egui::{Color32, Pos2, Rect, Shape, Stroke};
+use glam::DVec3;
+use tools::number::Point;
+
+use super::modeler::Modeler;
+use super::tool::{Kind, Tool};
+
+/// Sides of the ring that shows the tool.
+const RING: usize = 48;
+/// Length of the arrow of a newton, in radii of the scene.
+const ARROW: f64 = 0.12;
+
+impl Modeler {
+    /// Draws what is held on the chosen object.
+    pub(super) fn draw_holds(&self, ui: &egui::Ui, rect: Rect) {
+        let sheet = self.bench.sheet.as_ref();
+        let Some(thing) = sheet.and_then(|sheet| sheet.objects.get(sheet.chosen)) else {
+            return;
+        };
+        let painter = ui.painter().with_clip_rect(rect);
+        let color = Color32::from_rgb(120, 220, 255);
+        for line in thing.holds.iter().flat_map(|held| &held.lines) {
+            let place = |p: &Point| self.on_screen(rect, thing.world_from_object.transform_point3(p.0));
+            let places: Vec<Pos2> = line.iter().map(place).collect();
+            if let [only] = places[..] {
+                painter.circle(only, 4.0, color, Stroke::new(1.5, Color32::BLACK));
+            } else {
+                painter.line(places, Stroke::new(2.0, color));
+            }
+        }
+    }
+
+    /// A circle on the surface as large as the tool.
+    pub(super) fn ring(&self, ui: &egui::Ui, rect: Rect, p: DVec3, normal: DVec3, tool: &Tool) {
+        let right = normal.any_orthonormal_vector();
+        let up = normal.cross(right);
+        let corner = |n: usize| {
+            let (sine, cosine) = (std::f64::consts::TAU * n as f64 / RING as f64).sin_cos();
+            self.on_screen(rect, p + tool.radius * (cosine * right + sine * up))
+        };
+        let color = match (tool.kind, tool.inverted) {
+            (Kind::Smooth, _) => Color32::from_rgb(150, 200, 255),
+            (_, true) => Color32::from_rgb(120, 220, 160),
+            (_, false) => Color32::from_rgb(255, 210, 150),
+        };
+        let ring: Vec<Pos2> = (0..=RING).map(corner).collect();
+        let painter = ui.painter().with_clip_rect(rect);
+        painter.add(Shape::line(
+            ring.clone(),
+            Stroke::new(3.0, Color32::from_black_alpha(90)),
+        ));
+        painter.add(Shape::line(ring, Stroke::new(1.5, color)));
+        painter.circle_filled(self.on_screen(rect, p), 2.0, color);
+    }
+
+    /// Draws the tool, the hand that draws at it, and the force.
+    pub(super) fn draw_hand(&self, ui: &egui::Ui, rect: Rect) {
+        let (Some(held), Some(seen)) = (&self.bench.held, &self.bench.seen) else {
+            return;
+        };
+        let painter = ui.painter().with_clip_rect(rect);
+        let (tool, hand) = (self.on_screen(rect, seen.proxy), self.on_screen(rect, seen.hand));
+        let color = Color32::from_rgb(255, 210, 150);
+        let radius = self.pixels_of(rect, held.radius);
+        painter.circle_stroke(tool, radius, Stroke::new(3.0, Color32::from_black_alpha(90)));
+        painter.circle_stroke(tool, radius, Stroke::new(1.5, color));
+        painter.line_segment([tool, hand], Stroke::new(1.0, Color32::from_white_alpha(120)));
+        painter.circle_filled(hand, 3.0, Color32::from_white_alpha(160));
+        let way = (seen.proxy - seen.hand).normalize_or_zero();
+        if seen.force > 0.01 && way != DVec3::ZERO {
+            let force = Color32::from_rgb(230, 90, 80);
+            let tip = seen.proxy + ARROW * self.bench.scene.1 * seen.force * way;
+            let tip = self.on_screen(rect, tip);
+            painter.arrow(tool, tip - tool, Stroke::new(2.5, force));
+            painter.text(
+                tip + egui::vec2(8.0, 0.0),
+                egui::Align2::LEFT_CENTER,
+                format!("{:.2} N", seen.force),
+                egui::FontId::proportional(13.0),
+                force,
+            );
+        }
+    }
+}
