@@ -77,15 +77,21 @@ fn views(ui: &mut egui::Ui, bench: &mut Bench) {
     if ui.checkbox(&mut has_slices, "Slices").changed() {
         bench.slices = has_slices.then(super::Slices::new);
     }
-    let mut has_touch = bench.touch.is_some();
-    if ui.checkbox(&mut has_touch, "Touch").changed() {
-        bench.touch = has_touch.then(super::TouchWish::new);
-    }
     let mut is_cut = bench.look.cut.is_some();
     if ui.checkbox(&mut is_cut, "Clipping plane").changed() {
         let toward_eye = bench.look.camera.axes()[2];
         bench.look.cut = is_cut.then_some((bench.scene.0, toward_eye));
     }
+    let mut has_touch = bench.touch.is_some();
+    if ui.checkbox(&mut has_touch, "Touch").changed() {
+        bench.touch = has_touch.then(super::TouchWish::new);
+        if bench.held.is_some() {
+            bench.order(Order::LetGo);
+        }
+    }
+    ui.checkbox(&mut bench.shows_log, "Log");
+    ui.separator();
+    egui::widgets::global_theme_preference_buttons(ui);
 }
 
 fn item<'a>(text: &'a str, keys: &'a str) -> egui::Button<'a> {

@@ -2,6 +2,7 @@
 
 mod constraints;
 mod document;
+mod log;
 mod menu;
 mod path_box;
 mod slices;
@@ -13,6 +14,7 @@ mod touch;
 
 pub use constraints::{constraints, next_pin};
 pub use document::document;
+pub use log::log;
 pub use menu::menu;
 pub use path_box::{PathBox, path_box};
 pub use slices::{Slices, slices};

@@ -54,6 +54,8 @@ pub struct Bench {
     pub scratch: Option<tempfile::TempDir>,
     /// How often which density is in the chosen object.
     pub densities: Option<panels::Densities>,
+    /// Whether all that was told is shown.
+    pub shows_log: bool,
     /// Whether clicks pin the surface.
     pub pins: bool,
     /// How a device is to be held, if that panel is shown.
@@ -198,6 +200,7 @@ impl Modeler {
                 kept: desk_files::kept(&home),
                 scratch: None,
                 densities: None,
+                shows_log: false,
                 pins: false,
                 touch: None,
                 held: None,
@@ -524,6 +527,7 @@ impl Modeler {
         panels::slices(ui.ctx(), &mut self.bench);
         panels::path_box(ui.ctx(), &mut self.bench);
         panels::touch(ui.ctx(), &mut self.bench);
+        panels::log(ui.ctx(), &mut self.bench);
         self.bench.tell_tool();
         if self.bench.message().is_some() {
             ui.ctx().request_repaint_after(Duration::from_secs(1));
