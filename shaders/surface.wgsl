@@ -1,4 +1,5 @@
-// Surfaces of solids: a bright sun from the upper left behind the viewer, a sky that is brighter above, darker hollows, paint.
+// Surfaces of solids in the light of a sun from the upper left behind the viewer and of a sky that is brighter above, as
+// `isoclay picture` draws them; a cut and its inside; paint; and the paper behind all.
 
 struct Scene {
   clip_from_world: mat4x4<f32>,
@@ -7,11 +8,26 @@ struct Scene {
   // A point of the clipping plane and, in the last number of the next one, whether there is one.
   cut_at: vec4<f32>,
   cut_normal: vec4<f32>,
-  // Whether paint is shown; three numbers without meaning.
+  // Whether paint is shown; how many lights the sky has; the radius that their maps show; nothing.
   shows: vec4<f32>,
+  // Linear light of the paper, above and below.
+  paper: array<vec4<f32>, 2>,
+};
+
+// The sun comes after the most lights that the sky can have.
+const SUN: u32 = 64u;
+
+// Of each light the clip space of its map, and the way to it.
+struct Lights {
+  map_from_world: array<mat4x4<f32>, 65>,
+  way: array<vec4<f32>, 65>,
 };
 
 @group(0) @binding(0) var<uniform> scene: Scene;
+@group(0) @binding(1) var<uniform> lights: Lights;
+// Depths of what each light sees.
+@group(1) @binding(0) var sky: texture_depth_2d_array;
+@group(1) @binding(1) var sun: texture_depth_2d;
 
 struct Corner {
   @location(0) at: vec3<f32>,
@@ -39,37 +55,93 @@ fn corner(in: Corner) -> Seen {
   return out;
 }
 
+// As a light sees it.
+@vertex
+fn lit(in: Corner, @builtin(instance_index) light: u32) -> @builtin(position) vec4<f32> {
+  return lights.map_from_world[light] * vec4(in.at, 1.0);
+}
+
 // Linear light of clay, of the inside that a cut shows, and of stiff and of soft paint: blue and orange tell apart to all eyes.
-const CLAY = vec3(0.60, 0.275, 0.148);
+const CLAY = vec3(0.612, 0.279, 0.148);
 const INSIDE = vec3(0.30, 0.10, 0.07);
 const STIFF = vec3(0.05, 0.20, 0.55);
 const SOFT = vec3(0.80, 0.42, 0.05);
-const SUN = vec3(-0.45, 0.65, 0.62);
 
-@fragment
-fn shade(in: Seen, @builtin(front_facing) is_front: bool) -> @location(0) vec4<f32> {
-  if (scene.cut_normal.w > 0.5 && dot(in.at - scene.cut_at.xyz, scene.cut_normal.xyz) > 0.0) {
-    discard;
+// Where a place some pixels off the surface is in a map of so many pixels a side: column, row, depth.
+fn in_map(light: u32, at: vec3<f32>, n: vec3<f32>, pixels: f32, side: u32) -> vec3<f32> {
+  let pixel = 2.0 * scene.shows.z / f32(side);
+  let q = lights.map_from_world[light] * vec4(at + n * (pixels * pixel), 1.0);
+  return vec3((vec2(q.x, -q.y) * 0.5 + 0.5) * f32(side), q.z);
+}
+
+// Share of the sky's light that reaches a place.
+fn from_sky(at: vec3<f32>, n: vec3<f32>) -> f32 {
+  let count = u32(scene.shows.y);
+  let side = textureDimensions(sky).x;
+  var light = 0.0;
+  var all = 1e-6;
+  for (var i = 0u; i < count; i += 1u) {
+    let weight = dot(n, lights.way[i].xyz);
+    if (weight > 0.0) {
+      all += weight;
+      let q = in_map(i, at, n, 2.5, side);
+      if (q.z <= textureLoad(sky, vec2<i32>(q.xy), i32(i), 0)) {
+        light += weight * (0.55 + 0.45 * dot(lights.way[i].xyz, scene.axes[1].xyz));
+      }
+    }
   }
-  let n = normalize(in.normal);
-  // In the axes of the eye.
-  let v = vec3(dot(n, scene.axes[0].xyz), dot(n, scene.axes[1].xyz), dot(n, scene.axes[2].xyz));
+  return light / all;
+}
+
+// Share of the sun that reaches a place: soft at the rim of its shadows.
+fn from_sun(at: vec3<f32>, n: vec3<f32>) -> f32 {
+  let q = in_map(SUN, at, n, 5.0, textureDimensions(sun).x);
+  var seen = 0.0;
+  for (var i = -2; i <= 2; i += 1) {
+    for (var j = -2; j <= 2; j += 1) {
+      seen += select(0.0, 1.0, q.z <= textureLoad(sun, vec2<i32>(q.xy) + vec2(i, j), 0));
+    }
+  }
+  return seen / 25.0;
+}
+
+// Colour of a place in a light, as the cut and the paint have it.
+fn colored(in: Seen, is_front: bool, light: f32) -> vec4<f32> {
   if (!is_front) {
-    return vec4(INSIDE * (0.55 + 0.3 * abs(v.z)), 1.0);
+    return vec4(INSIDE * (0.55 + 0.3 * abs(dot(normalize(in.normal), scene.axes[2].xyz))), 1.0);
   }
   var color = CLAY;
   if (scene.shows.x > 0.5) {
     let share = clamp(in.paint / 4.0, -1.0, 1.0);
     color = mix(color, select(SOFT, STIFF, share > 0.0), sqrt(abs(share)) * 0.85);
   }
-  let sun = max(dot(v, normalize(SUN)), 0.0);
-  let sky = 0.5 + 0.5 * v.y;
-  let hollow = 1.0 + 0.45 * clamp(in.ridge, -1.0, 1.0);
-  let halfway = normalize(normalize(SUN) + vec3(0.0, 0.0, 1.0));
-  let shine = pow(max(dot(v, halfway), 0.0), 40.0) * 0.10;
-  let rim = pow(1.0 - clamp(v.z, 0.0, 1.0), 3.0) * 0.12;
-  let light = 0.95 * sun + 0.36 * sky + 0.10;
-  return vec4(color * light * hollow + shine + rim * vec3(0.7, 0.8, 1.0), 1.0);
+  return vec4(color * light, 1.0);
+}
+
+fn is_cut(at: vec3<f32>) -> bool {
+  return scene.cut_normal.w > 0.5 && dot(at - scene.cut_at.xyz, scene.cut_normal.xyz) > 0.0;
+}
+
+// In the light that reaches a place. Of its own, not a branch: processors that stand in for graphics cards take both sides of those.
+@fragment
+fn shade_lit(in: Seen, @builtin(front_facing) is_front: bool) -> @location(0) vec4<f32> {
+  let n = normalize(in.normal);
+  let facing = max(dot(n, lights.way[SUN].xyz), 0.0);
+  let light = 0.05 + from_sky(in.at, n) + 0.95 * facing * from_sun(in.at, n);
+  return colored(in, is_front, light);
+}
+
+// In all of the light, darker in hollows.
+@fragment
+fn shade(in: Seen, @builtin(front_facing) is_front: bool) -> @location(0) vec4<f32> {
+  if (is_cut(in.at)) {
+    discard;
+  }
+  let n = normalize(in.normal);
+  let facing = max(dot(n, lights.way[SUN].xyz), 0.0);
+  let hollow = 1.0 + 0.45 * clamp(in.ridge, -1.0, 0.0);
+  let light = 0.05 + (0.55 + 0.30 * dot(n, scene.axes[1].xyz)) * hollow + 0.95 * facing;
+  return colored(in, is_front, light);
 }
 
 struct Paper {
@@ -89,5 +161,5 @@ fn paper(@builtin(vertex_index) n: u32) -> Paper {
 
 @fragment
 fn paper_color(in: Paper) -> @location(0) vec4<f32> {
-  return vec4(mix(vec3(0.035, 0.038, 0.045), vec3(0.10, 0.11, 0.125), in.height), 1.0);
+  return vec4(mix(scene.paper[1].rgb, scene.paper[0].rgb, in.height), 1.0);
 }

@@ -76,6 +76,12 @@ impl Ball {
         on_ball(DVec3::new(r * libm::cos(turn), r * libm::sin(turn), z))
     }
 
+    /// Diagonal of the box round it.
+    #[cfg(feature = "window")]
+    pub fn diagonal() -> f64 {
+        2.0 * RADIUS * f64::from(CELLS) * 3f64.sqrt()
+    }
+
     /// Width of a cell of the finest level.
     pub fn cell(&self) -> f64 {
         1.0 / f64::from(1u32 << self.level)

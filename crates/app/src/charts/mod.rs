@@ -14,6 +14,8 @@ mod orient;
 mod outliers;
 mod plot;
 mod tools;
+#[cfg(feature = "window")]
+mod window;
 
 pub use dynamics::{DynamicsError, Extent, Line, Run, cost, sampling, sweep};
 pub use edits::edit_costs;
@@ -28,3 +30,5 @@ pub use orient::Oriented;
 pub use outliers::outliers;
 pub use plot::{Chart, Series};
 pub use tools::{Sculpture, ToolLine, ToolRun, ToolsError, tool_costs};
+#[cfg(feature = "window")]
+pub use window::window_costs;

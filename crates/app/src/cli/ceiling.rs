@@ -101,6 +101,24 @@ pub fn limit() -> Option<Memory> {
     CEILING.get().copied()
 }
 
+/// What a process beside this one may hold: what is left of the user's ceiling, and no more than three quarters of what the system can
+/// spare, if either is known.
+#[cfg(feature = "window")]
+pub fn of_another() -> Option<Memory> {
+    let left = limit().map(|Memory(most)| most.saturating_sub(rss_bytes().unwrap_or(0)).max(LEAST));
+    let spare = spare_bytes().map(|spare| (spare / 4 * 3).max(LEAST));
+    left.into_iter().chain(spare).min().map(Memory)
+}
+
+/// Bytes that the system can give without swapping.
+#[cfg(feature = "window")]
+fn spare_bytes() -> Option<u64> {
+    let told = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let line = told.lines().find_map(|l| l.strip_prefix("MemAvailable:"))?;
+    let kib: u64 = line.trim().strip_suffix("kB")?.trim_end().parse().ok()?;
+    Some(kib << 10)
+}
+
 /// Whether the process holds more than it may: for work that looks up now and then and can say what it was.
 pub fn is_exceeded() -> bool {
     match (limit(), rss_bytes()) {

@@ -10,6 +10,8 @@ use fitting::phantoms::Solid;
 use formats::Kind;
 use serde_json::{Map, Value};
 
+#[cfg(feature = "window")]
+use super::chart_window;
 use super::failure::{Failure, OrFail, Outcome};
 use super::interrupt;
 use super::own;
@@ -51,6 +53,9 @@ enum Subject {
     Tools(chart_tools::Args),
     /// Touch: accuracy of contact against the cost of a tick, over snapshots, searches and methods; scenes; sizes of fields
     Haptics(chart_haptics::Args),
+    /// The window: time to show a dab of a tool, and to draw, against the size of the field
+    #[cfg(feature = "window")]
+    Window(chart_window::Args),
     /// Noise against the resolution chosen and the error, and outliers against the error with and without --robust
     Hard(HardArgs),
 }
@@ -103,6 +108,8 @@ impl Args {
             Subject::Fields(a) => a.json,
             Subject::Tools(a) => a.json,
             Subject::Haptics(a) => a.json,
+            #[cfg(feature = "window")]
+            Subject::Window(a) => a.json,
             Subject::Orient(_) | Subject::Mesh(_) | Subject::Hard(_) => false,
         }
     }
@@ -121,6 +128,8 @@ pub fn run(args: &Args) -> Outcome {
         Subject::Fields(args) => chart_fields::run(args, &cancel),
         Subject::Tools(args) => chart_tools::run(args, &cancel),
         Subject::Haptics(args) => chart_haptics::run(args, &cancel),
+        #[cfg(feature = "window")]
+        Subject::Window(args) => chart_window::run(args, &cancel),
         Subject::Hard(args) => hard(args, &cancel),
     }
 }

@@ -13,13 +13,22 @@ use tools::force::Solid;
 use tools::geometric::block;
 
 use super::batch::child::{Bounds, Stop, ask};
+use super::ceiling::of_another;
 use super::document::{self as on_documents, new};
 use super::failure::{Failure, Outcome};
+use super::quantity::{Memory, human_bytes};
 use super::report::with_report;
 use super::source::{FIELDS, Source, scratch};
 
 /// Told the stage and the share done.
 pub type Show<'a> = &'a dyn Fn(&str, f64);
+
+/// What a fit may hold, and what it is told.
+pub fn memory() -> (Option<Memory>, String) {
+    let most = of_another();
+    let told = most.map_or(String::new(), |m| format!(", with {} at most", human_bytes(m.0)));
+    (most, told)
+}
 
 /// Whether a path is a document.
 pub fn is_document(path: &Path) -> bool {
@@ -41,29 +50,37 @@ pub fn create(path: &Path, state: State) -> Result<Document, String> {
     Document::create(path, state, on_documents::options()).map_err(|e| e.to_string())
 }
 
-/// The object that a field or a scan becomes, and its name. A scan is fitted first.
-pub fn import(path: &Path, cancel: &Cancel, show: Show<'_>) -> Result<(String, Object), String> {
-    let told = |outcome: Outcome<(String, Object)>| outcome.map_err(|e| e.to_string());
-    if formats_as(path, "iclay") {
-        return told(of_field(path, None));
-    }
-    told(scratch("the fit").and_then(|scratch| {
+/// The object that a field is, and its name; none if the path is a scan.
+pub fn field(path: &Path) -> Option<Result<(String, Object), String>> {
+    formats_as(path, "iclay").then(|| of_field(path, None).map_err(|e| e.to_string()))
+}
+
+/// What a fit needs besides that failed for this reason: points without normals are given some, as nobody can be asked here which
+/// side is inside.
+pub fn remedy(why: &str) -> Option<OsString> {
+    const UNORIENTED: &str = "--unoriented";
+    why.contains(UNORIENTED).then(|| UNORIENTED.into())
+}
+
+/// The object that a scan is fitted to by a process that holds no more than `memory`, and its name.
+pub fn fit(
+    scan: &Path,
+    options: &[OsString],
+    memory: Option<Memory>,
+    cancel: &Cancel,
+    show: Show<'_>,
+) -> Result<(String, Object), String> {
+    let fitted = scratch("the fit").and_then(|scratch| {
         let field = scratch.path().join("field.iclay");
-        let about = command(
-            "info",
-            &[path.as_os_str().to_owned()],
-            cancel,
-            scratch.path(),
-            show,
-        )?;
-        let mut arguments = vec![path.as_os_str().to_owned(), "-o".into(), field.clone().into()];
-        // Nobody can be asked here which side of the points is inside.
-        if about.get("normals").is_some_and(|normals| normals == "none") {
-            arguments.push("--unoriented".into());
+        let mut arguments = vec![scan.as_os_str().to_owned(), "-o".into(), field.clone().into()];
+        arguments.extend_from_slice(options);
+        if let Some(Memory(most)) = memory {
+            arguments.extend(["--memory".into(), most.to_string().into()]);
         }
         command("fit", &arguments, cancel, scratch.path(), show)?;
-        of_field(&field, Some(path))
-    }))
+        of_field(&field, Some(scan))
+    });
+    fitted.map_err(|e| e.to_string())
 }
 
 fn of_field(field: &Path, scan: Option<&Path>) -> Outcome<(String, Object)> {

@@ -16,7 +16,7 @@ use super::quantity::{Memory, threads};
 use super::source::{SAMPLES, Source, input_formats};
 use super::summary::Summary;
 use super::volume_choice::VolumeChoice;
-use super::{belongs, ceiling, interrupt, set_threads};
+use super::{belongs, ceiling, coarse, interrupt, set_threads};
 
 /// Arguments of `isoclay fit`.
 #[derive(clap::Args)]
@@ -36,6 +36,10 @@ pub struct Args {
     format: Option<String>,
     #[command(flatten)]
     choice: Choice,
+    /// A solid for a first look, as soon as it can be had: of volumes every so many voxels are read, of which 128 or more are left along
+    /// each axis; of clouds no more than 30 000 points are fitted; cells are no finer than 1/64 of the box
+    #[arg(long)]
+    coarse: bool,
     /// Memory that the process may hold, such as 2GiB
     #[arg(long, value_name = "SIZE")]
     memory: Option<Memory>,
@@ -58,7 +62,14 @@ pub fn run(args: &Args) -> Outcome {
     set_threads(args.threads)?;
     let bar = Bar::new();
     bar.show("reading", 0.0);
-    let input = input::read(&source, args.shape, &args.volume, args.choice.unit, args.memory)?;
+    let (mut volume, mut choice) = (args.volume.clone(), args.choice);
+    if args.coarse {
+        coarse::volume(&source, &mut volume, choice.unit)?;
+    }
+    let mut input = input::read(&source, args.shape, &volume, choice.unit, args.memory)?;
+    if args.coarse {
+        coarse::input(&mut input, &mut choice);
+    }
     interrupt::check(&cancel)?;
     let mut control = Control {
         memory_limit: args
@@ -67,7 +78,7 @@ pub fn run(args: &Args) -> Outcome {
             .map(|m| m.0.saturating_sub(ceiling::PROGRAM + input.bytes())),
         ..bar.control(&cancel)
     };
-    let fitted = fit(&input, &args.choice, &mut control)
+    let fitted = fit(&input, &choice, &mut control)
         .map_err(|f| if f.code() == 3 { f.about(source.name()) } else { f })?;
     interrupt::check(&control.cancel)?;
     bar.show("writing", 0.99);

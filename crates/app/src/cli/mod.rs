@@ -14,8 +14,11 @@ mod chart_mesh;
 mod chart_orient;
 mod chart_output;
 mod chart_tools;
+#[cfg(feature = "window")]
+mod chart_window;
 mod charts;
 mod check;
+mod coarse;
 mod convert;
 mod cost;
 #[cfg(feature = "window")]
@@ -47,6 +50,8 @@ mod phantom;
 mod picture;
 mod progress;
 pub mod quantity;
+#[cfg(feature = "window")]
+mod render;
 mod report;
 mod sample;
 mod simulate;
@@ -105,6 +110,9 @@ enum Command {
     Phantom(phantom::Args),
     /// Draw the solid into a PNG picture
     Picture(picture::Args),
+    /// Draw the same picture on the graphics card, faster; without one the processor draws it
+    #[cfg(feature = "window")]
+    Render(picture::Args),
     /// Move a region of a field by a scripted scene: forces, matter and constraints over time
     Simulate(simulate::Args),
     /// Make a document of fields, to be edited with a history
@@ -175,6 +183,8 @@ pub fn main() -> ExitCode {
         Command::Convert(a) => convert::run(a),
         Command::Phantom(a) => phantom::run(a),
         Command::Picture(a) => picture::run(a),
+        #[cfg(feature = "window")]
+        Command::Render(a) => render::run(a),
         Command::Simulate(a) => simulate::run(a),
         Command::New(a) => document::new::run(a),
         Command::Sculpt(a) => document::sculpt::run(a),
@@ -254,6 +264,8 @@ impl Command {
             Self::Convert(a) => (a.json, is_stdout(&a.output)),
             Self::Phantom(a) => (a.json, is_stdout(&a.output)),
             Self::Picture(a) => (a.json, is_stdout(&a.output)),
+            #[cfg(feature = "window")]
+            Self::Render(a) => (a.json, is_stdout(&a.output)),
             Self::Simulate(a) => (a.json, is_stdout(&a.output)),
             Self::New(a) => (a.json, false),
             Self::Sculpt(a) => (a.json, a.preview.as_deref().is_some_and(is_stdout)),

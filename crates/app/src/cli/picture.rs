@@ -1,3 +1,4 @@
+use std::cell::LazyCell;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
@@ -98,8 +99,16 @@ fn point(s: &str) -> Result<DVec3, String> {
     }
 }
 
+/// Draws a scene another way, in RGB bytes; none where it cannot.
+pub type Draw<'a> = &'a dyn Fn(&Scene, &View) -> Option<Vec<u8>>;
+
 /// Draws a field file.
 pub fn run(args: &Args) -> Outcome {
+    draw(args, &|_, _| None)
+}
+
+/// Draws a field file another way, and as ever where that cannot.
+pub fn draw(args: &Args, another: Draw) -> Outcome {
     let cost = Cost::start();
     let cancel = interrupt::cancel();
     let source = args.field.source(&cancel)?;
@@ -160,8 +169,8 @@ pub fn run(args: &Args) -> Outcome {
         seen: surface_of(&mesh),
         shading: surface_of(&whole),
     };
-    let drawing = Drawing::new(&scene, &view);
-    let pixels = drawing.pixels(&clay);
+    let drawing = LazyCell::new(|| Drawing::new(&scene, &view));
+    let pixels = another(&scene, &view).unwrap_or_else(|| drawing.pixels(&clay));
     let of_errors = errors.map(|output| (output, drawing.pixels(&error_color(&open))));
     interrupt::check(&cancel)?;
     if let Some((output, pixels)) = &of_errors {

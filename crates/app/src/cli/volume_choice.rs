@@ -95,6 +95,11 @@ impl VolumeChoice {
         }
     }
 
+    /// Reads every so many voxels, unless the user has chosen how many.
+    pub fn stride_by_default(&mut self, stride: [usize; 3]) {
+        self.stride.get_or_insert(OneOrThree(stride.map(Step)));
+    }
+
     /// Takes away `--spacing` where it is not that of a file without a header.
     pub fn take_spacing_of_other(&mut self) -> Option<[f64; 3]> {
         if self.dims.is_some() {

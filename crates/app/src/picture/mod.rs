@@ -144,6 +144,20 @@ impl<'a> Drawing<'a> {
     }
 }
 
+/// How far towards the eye, from the middle of the view, a surface is in each pixel; none where there is none.
+#[cfg(all(test, feature = "window"))]
+pub fn depths(surface: &Surface, view: &View) -> Vec<Option<f64>> {
+    let map = DepthMap::draw(surface, view.axes, view.size, view.center, view.pixels_per_length);
+    let [w, h] = view.size;
+    let back = view.axes.row(2);
+    let pixels = (0..h).flat_map(|y| (0..w).map(move |x| (x, y)));
+    let depth = |(x, y): (usize, usize)| {
+        let is_seen = map.triangle[y * w + x] != u32::MAX;
+        is_seen.then(|| (map.point(x, y) - view.center).dot(back))
+    };
+    pixels.map(depth).collect()
+}
+
 struct Lights<'a> {
     sky: &'a [DepthMap],
     sun: &'a DepthMap,

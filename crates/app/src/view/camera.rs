@@ -43,6 +43,25 @@ impl Camera {
         }
     }
 
+    /// Looks at a place from far away along a line to the eye, with up as near to upright as that allows.
+    pub fn along(center: DVec3, height: f64, toward_eye: DVec3, up: DVec3) -> Self {
+        let up = up.normalize();
+        let mut camera = Self {
+            center,
+            height,
+            perspective: false,
+            up,
+            turn: [0.0; 2],
+        };
+        let [right, _, front] = camera.axes();
+        let toward_eye = toward_eye.normalize();
+        camera.turn = [
+            toward_eye.dot(right).atan2(toward_eye.dot(front)),
+            toward_eye.dot(up).clamp(-1.0, 1.0).asin(),
+        ];
+        camera
+    }
+
     /// To the right, up and to the eye, of length 1.
     pub fn axes(&self) -> [DVec3; 3] {
         // Whatever is up: towards the viewer is -y where that is z, else z.
@@ -197,6 +216,24 @@ mod tests {
             let p = camera.center + camera.height * (at.x * right + at.y * up);
             camera.zoom(0.5, at);
             assert!((camera.place(p) - at).length() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn views_along_a_line_look_along_it() {
+        for up in [
+            DVec3::X,
+            DVec3::Y,
+            DVec3::Z,
+            DVec3::new(0.3, 0.8, -0.2).normalize(),
+        ] {
+            for aside in [DVec3::new(0.2, -0.5, 0.9), DVec3::new(-0.7, 0.4, -0.1)] {
+                let back = aside.reject_from(up).normalize();
+                let camera = Camera::along(DVec3::ONE, 2.0, back, up);
+                let [right, above, toward] = camera.axes();
+                assert!((toward - back).length() < 1e-9 && (above - up).length() < 1e-9);
+                assert!((right - up.cross(back)).length() < 1e-9);
+            }
         }
     }
 

@@ -3,18 +3,21 @@
 use std::collections::BTreeMap;
 
 use bytemuck::{Pod, Zeroable};
-use eframe::egui_wgpu::RenderState;
 use eframe::egui_wgpu::wgpu::{self, util::DeviceExt};
 use glam::{DMat4, DVec3};
 
 use super::Camera;
-use super::shape::{Patch, Vertex};
+use super::brush::{Brush, shadow};
+use super::lights::{self, Axes, Lights};
+use super::read;
+use super::shape::Patch;
 
 /// Samples of a pixel in a picture that stays.
 const SAMPLES: u32 = 4;
-const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+/// Of all depths.
+pub const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 /// Pictures are kept in linear light, and shown as the screen wants them.
-const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
+pub const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
 
 /// How the scene is looked at.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,6 +28,27 @@ pub struct Look {
     pub cut: Option<(DVec3, DVec3)>,
     /// Whether painted stiffness shows.
     pub paint: bool,
+    /// What is behind all.
+    pub paper: Paper,
+}
+
+/// What is behind all.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Paper {
+    /// Of the window.
+    Dark,
+    /// Of pictures.
+    Light,
+}
+
+impl Paper {
+    /// Linear light, above and below.
+    fn light(self) -> [[f32; 4]; 2] {
+        match self {
+            Self::Dark => [[0.10, 0.11, 0.125, 1.0], [0.035, 0.038, 0.045, 1.0]],
+            Self::Light => [[0.852, 0.873, 0.893, 1.0], [0.453, 0.463, 0.475, 1.0]],
+        }
+    }
 }
 
 /// See `shaders/surface.wgsl`.
@@ -36,6 +60,7 @@ struct Scene {
     cut_at: [f32; 4],
     cut_normal: [f32; 4],
     shows: [f32; 4],
+    paper: [[f32; 4]; 2],
 }
 
 /// Triangles on the card.
@@ -48,111 +73,138 @@ struct Held {
 /// Where a picture is drawn to.
 struct Target {
     size: [u32; 2],
-    samples: u32,
     /// Of several samples; without it the picture itself is drawn to.
     rough: Option<wgpu::TextureView>,
-    depth: wgpu::TextureView,
+    depth: wgpu::Texture,
     picture: wgpu::Texture,
-    shown: egui::TextureId,
-}
-
-/// How pictures of a number of samples are drawn.
-struct Brush {
-    surface: wgpu::RenderPipeline,
-    paper: wgpu::RenderPipeline,
+    /// What it shows.
+    drawn: Option<Look>,
 }
 
 /// The graphics card with what it holds of a scene.
 pub struct Canvas {
-    state: RenderState,
+    device: wgpu::Device,
+    queue: wgpu::Queue,
     scene: wgpu::Buffer,
+    /// Maps of all lights.
+    maps: wgpu::Buffer,
     bindings: wgpu::BindGroup,
+    lights: Lights,
+    /// Round which eye the maps of the sky were drawn, unless the triangles are others since.
+    sky: Option<Axes>,
+    shadow: wgpu::RenderPipeline,
     /// For one sample, and for [`SAMPLES`].
     brushes: [Brush; 2],
     held: BTreeMap<(String, [i32; 3]), Held>,
-    target: Option<Target>,
-    drawn: Option<(Look, [u32; 2], u32)>,
+    /// What throws shadows in place of these.
+    shades: Option<Held>,
+    /// The same.
+    targets: [Option<Target>; 2],
     /// The origin of the triangles in the world, and the size of all of them.
     origin: DVec3,
     radius: f64,
 }
 
 impl Canvas {
-    /// On a card that egui uses.
-    pub fn new(state: RenderState) -> Self {
-        let device = &state.device;
+    /// On a card. Whole pictures have so many lights in the sky.
+    pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, sky: usize) -> Self {
         let shader = device.create_shader_module(wgpu::include_wgsl!("../../../../shaders/surface.wgsl"));
-        let scene = device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("scene"),
-            size: size_of::<Scene>() as u64,
-            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
+        let buffer = |label, size| {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size: size as u64,
+                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
+        };
+        let scene = buffer("scene", size_of::<Scene>());
+        let maps = buffer("lights", 5 * (lights::MOST + 1) * size_of::<[f32; 4]>());
+        let entry = |binding| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::VERTEX_FRAGMENT,
+            ty: wgpu::BindingType::Buffer {
+                ty: wgpu::BufferBindingType::Uniform,
+                has_dynamic_offset: false,
+                min_binding_size: None,
+            },
+            count: None,
+        };
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("scene"),
-            entries: &[wgpu::BindGroupLayoutEntry {
-                binding: 0,
-                visibility: wgpu::ShaderStages::VERTEX_FRAGMENT,
-                ty: wgpu::BindingType::Buffer {
-                    ty: wgpu::BufferBindingType::Uniform,
-                    has_dynamic_offset: false,
-                    min_binding_size: None,
-                },
-                count: None,
-            }],
+            entries: &[entry(0), entry(1)],
         });
         let bindings = device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("scene"),
             layout: &layout,
-            entries: &[wgpu::BindGroupEntry {
-                binding: 0,
-                resource: scene.as_entire_binding(),
-            }],
+            entries: &[(0, &scene), (1, &maps)].map(|(binding, buffer)| wgpu::BindGroupEntry {
+                binding,
+                resource: buffer.as_entire_binding(),
+            }),
         });
-        let brushes = [1, SAMPLES].map(|samples| Brush::new(device, &shader, &layout, samples));
+        let looked_up = Lights::layout(device);
         Self {
+            brushes: [1, SAMPLES].map(|n| Brush::new(device, &shader, [&layout, &looked_up], n)),
+            shadow: shadow(device, &shader, &layout),
+            lights: Lights::new(device, &looked_up, sky),
+            sky: None,
             scene,
+            maps,
             bindings,
-            brushes,
             held: BTreeMap::new(),
-            target: None,
-            drawn: None,
+            shades: None,
+            targets: [None, None],
             origin: DVec3::ZERO,
             radius: 1.0,
-            state,
+            device: device.clone(),
+            queue: queue.clone(),
         }
+    }
+
+    /// What was drawn is old.
+    fn renew(&mut self) {
+        self.sky = None;
+        self.targets.iter_mut().flatten().for_each(|t| t.drawn = None);
     }
 
     /// Forgets all triangles: those that come next lie about another origin.
     pub fn begin(&mut self, origin: DVec3, radius: f64) {
         (self.origin, self.radius) = (origin, radius);
         self.held.clear();
-        self.drawn = None;
+        self.renew();
     }
 
     /// Forgets those of an object.
     pub fn forget(&mut self, object: &str) {
         self.held.retain(|(name, _), _| name != object);
-        self.drawn = None;
+        self.renew();
     }
 
     /// Puts triangles in place of those that there were.
     pub fn put(&mut self, patch: &Patch) {
         let key = (patch.object.clone(), patch.part);
-        self.drawn = None;
-        if patch.indices.is_empty() {
-            self.held.remove(&key);
-            return;
-        }
+        self.renew();
+        match patch.indices.is_empty() {
+            true => self.held.remove(&key),
+            false => self.held.insert(key, self.hold(patch)),
+        };
+    }
+
+    /// Has other triangles throw the shadows.
+    pub fn shade_by(&mut self, patch: &Patch) {
+        self.shades = Some(self.hold(patch));
+        self.renew();
+    }
+
+    fn hold(&self, patch: &Patch) -> Held {
         let buffer = |label, contents: &[u8], usage| {
             let contents = wgpu::util::BufferInitDescriptor {
                 label: Some(label),
                 contents,
                 usage,
             };
-            self.state.device.create_buffer_init(&contents)
+            self.device.create_buffer_init(&contents)
         };
-        let held = Held {
+        Held {
             vertices: buffer(
                 "vertices",
                 bytemuck::cast_slice(&patch.vertices),
@@ -164,8 +216,7 @@ impl Canvas {
                 wgpu::BufferUsages::INDEX,
             ),
             count: patch.indices.len() as u32,
-        };
-        self.held.insert(key, held);
+        }
     }
 
     /// Triangles that it holds.
@@ -174,32 +225,53 @@ impl Canvas {
     }
 
     /// A picture of so many pixels: rough while something moves. It is drawn anew only if it would be another.
-    pub fn draw(&mut self, look: &Look, size: [u32; 2], is_rough: bool) -> egui::TextureId {
-        let most = self.state.device.limits().max_texture_dimension_2d;
+    pub fn draw(&mut self, look: &Look, size: [u32; 2], is_rough: bool) -> &wgpu::Texture {
+        let most = self.device.limits().max_texture_dimension_2d;
         let size = size.map(|n| n.clamp(1, most));
-        let samples = if is_rough { 1 } else { SAMPLES };
-        if self
-            .target
-            .as_ref()
-            .is_none_or(|t| (t.size, t.samples) != (size, samples))
-        {
-            self.target = Some(self.new_target(size, samples));
-            self.drawn = None;
+        let which = usize::from(!is_rough);
+        let target = match self.targets[which].take() {
+            Some(target) if target.size == size => target,
+            _ => self.new_target(size, if is_rough { 1 } else { SAMPLES }),
+        };
+        if target.drawn != Some(*look) {
+            self.paint(&target, look, which);
         }
-        let target = self.target.as_ref().expect("it was made");
-        let now = (*look, size, samples);
-        if self.drawn == Some(now) {
-            return target.shown;
-        }
+        let target = Target {
+            drawn: Some(*look),
+            ..target
+        };
+        &self.targets[which].insert(target).picture
+    }
+
+    fn paint(&mut self, target: &Target, look: &Look, which: usize) {
+        let brush = &self.brushes[which];
+        let size = target.size;
         let aspect = f64::from(size[0]) / f64::from(size[1]);
+        // What is cut off would still throw its shadow.
+        let is_lit = target.rough.is_some() && look.cut.is_none();
         let scene = self.scene_of(look, aspect);
-        self.state
-            .queue
+        self.queue
             .write_buffer(&self.scene, 0, bytemuck::bytes_of(&scene));
+        let axes = look.camera.axes();
+        // It takes as long as all else, and nobody sees it turn.
+        let is_sky_old = self.sky.is_none();
+        let of_sky = self.sky.unwrap_or(axes);
+        let maps = lights::maps(self.lights.count, [of_sky, axes], self.radius);
+        self.queue
+            .write_buffer(&self.maps, 0, bytemuck::cast_slice(&maps));
         let mut encoder = self
-            .state
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        if is_lit {
+            self.lights.draw(&mut encoder, is_sky_old, |pass, light| {
+                pass.set_pipeline(&self.shadow);
+                pass.set_bind_group(0, &self.bindings, &[]);
+                match &self.shades {
+                    Some(shades) => draw([shades], pass, light),
+                    None => draw(self.held.values(), pass, light),
+                }
+            });
+        }
         let picture = target
             .picture
             .create_view(&wgpu::TextureViewDescriptor::default());
@@ -220,29 +292,30 @@ impl Canvas {
                     },
                 })],
                 depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                    view: &target.depth,
+                    view: &target.depth.create_view(&wgpu::TextureViewDescriptor::default()),
                     depth_ops: Some(wgpu::Operations {
                         load: wgpu::LoadOp::Clear(1.0),
-                        store: wgpu::StoreOp::Discard,
+                        store: wgpu::StoreOp::Store,
                     }),
                     stencil_ops: None,
                 }),
                 ..wgpu::RenderPassDescriptor::default()
             });
-            let brush = &self.brushes[usize::from(!is_rough)];
             pass.set_bind_group(0, &self.bindings, &[]);
             pass.set_pipeline(&brush.paper);
             pass.draw(0..3, 0..1);
-            pass.set_pipeline(&brush.surface);
-            for held in self.held.values() {
-                pass.set_vertex_buffer(0, held.vertices.slice(..));
-                pass.set_index_buffer(held.indices.slice(..), wgpu::IndexFormat::Uint32);
-                pass.draw_indexed(0..held.count, 0, 0..1);
+            if is_lit {
+                pass.set_pipeline(&brush.lit);
+                pass.set_bind_group(1, &self.lights.bindings, &[]);
+            } else {
+                pass.set_pipeline(&brush.surface);
             }
+            draw(self.held.values(), &mut pass, 0);
         }
-        self.state.queue.submit([encoder.finish()]);
-        self.drawn = Some(now);
-        target.shown
+        self.queue.submit([encoder.finish()]);
+        if is_lit {
+            self.sky = Some(of_sky);
+        }
     }
 
     fn scene_of(&self, look: &Look, aspect: f64) -> Scene {
@@ -257,13 +330,19 @@ impl Canvas {
             axes: columns(DMat4::from_cols(right, up, back, glam::DVec4::W)),
             cut_at: (cut_at - self.origin).extend(0.0).as_vec4().to_array(),
             cut_normal: cut_normal.extend(has_cut).as_vec4().to_array(),
-            shows: [f32::from(u8::from(look.paint)), 0.0, 0.0, 0.0],
+            shows: [
+                f32::from(u8::from(look.paint)),
+                self.lights.count as f32,
+                self.radius as f32,
+                0.0,
+            ],
+            paper: look.paper.light(),
         }
     }
 
     fn new_target(&self, size: [u32; 2], samples: u32) -> Target {
         let texture = |format, samples, usage| {
-            self.state.device.create_texture(&wgpu::TextureDescriptor {
+            self.device.create_texture(&wgpu::TextureDescriptor {
                 label: Some("picture"),
                 size: wgpu::Extent3d {
                     width: size[0],
@@ -286,89 +365,54 @@ impl Canvas {
         );
         let whole = wgpu::TextureViewDescriptor::default();
         let rough = (samples > 1).then(|| texture(COLOR, samples, attachment).create_view(&whole));
-        let depth = self.state.device.create_texture(&wgpu::TextureDescriptor {
+        let depth = self.device.create_texture(&wgpu::TextureDescriptor {
             label: Some("depth"),
             size: picture.size(),
             mip_level_count: 1,
             sample_count: samples,
             dimension: wgpu::TextureDimension::D2,
             format: DEPTH,
-            usage: attachment,
+            usage: attachment | wgpu::TextureUsages::COPY_SRC,
             view_formats: &[],
         });
-        // egui takes pictures as the screen wants them.
-        let shown = picture.create_view(&wgpu::TextureViewDescriptor {
-            format: Some(wgpu::TextureFormat::Rgba8Unorm),
-            ..wgpu::TextureViewDescriptor::default()
-        });
-        let mut renderer = self.state.renderer.write();
-        if let Some(old) = &self.target {
-            renderer.free_texture(&old.shown);
-        }
-        let shown = renderer.register_native_texture(&self.state.device, &shown, wgpu::FilterMode::Linear);
         Target {
             size,
-            samples,
             rough,
-            depth: depth.create_view(&whole),
+            depth,
             picture,
-            shown,
+            drawn: None,
         }
+    }
+
+    /// A picture as [`draw`](Self::draw) draws it: red, green, blue, rows from the top.
+    ///
+    /// # Errors
+    /// That the card is lost or has no memory left.
+    pub fn pixels(&mut self, look: &Look, size: [u32; 2], is_rough: bool) -> Result<Vec<u8>, String> {
+        let picture = self.draw(look, size, is_rough).clone();
+        let bytes = read::bytes(&self.device, &self.queue, &picture)?;
+        Ok(bytes.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect())
+    }
+
+    /// How far towards the eye, from its centre, a view without perspective shows the surface in each pixel; none where there is none.
+    ///
+    /// # Errors
+    /// As [`pixels`](Self::pixels).
+    #[cfg(test)]
+    pub fn depths(&mut self, look: &Look, size: [u32; 2]) -> Result<Vec<Option<f64>>, String> {
+        self.draw(look, size, true);
+        let depth = &self.targets[0].as_ref().expect("it was drawn").depth;
+        let bytes = read::bytes(&self.device, &self.queue, depth)?;
+        let reach = self.radius + look.camera.center.distance(self.origin);
+        let toward_eye = |depth: &f32| (*depth < 1.0).then(|| reach * (1.0 - 2.0 * f64::from(*depth)));
+        Ok(bytemuck::cast_slice(&bytes).iter().map(toward_eye).collect())
     }
 }
 
-impl Brush {
-    fn new(
-        device: &wgpu::Device,
-        shader: &wgpu::ShaderModule,
-        layout: &wgpu::BindGroupLayout,
-        samples: u32,
-    ) -> Self {
-        let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("scene"),
-            bind_group_layouts: &[Some(layout)],
-            immediate_size: 0,
-        });
-        let vertices = wgpu::VertexBufferLayout {
-            array_stride: size_of::<Vertex>() as u64,
-            step_mode: wgpu::VertexStepMode::Vertex,
-            attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32, 3 => Float32],
-        };
-        let pipeline = |corner: &str, color: &str, buffers: &[Option<wgpu::VertexBufferLayout<'_>>]| {
-            device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-                label: Some(color),
-                layout: Some(&layout),
-                vertex: wgpu::VertexState {
-                    module: shader,
-                    entry_point: Some(corner),
-                    compilation_options: wgpu::PipelineCompilationOptions::default(),
-                    buffers,
-                },
-                primitive: wgpu::PrimitiveState::default(),
-                depth_stencil: Some(wgpu::DepthStencilState {
-                    format: DEPTH,
-                    depth_write_enabled: Some(true),
-                    depth_compare: Some(wgpu::CompareFunction::LessEqual),
-                    stencil: wgpu::StencilState::default(),
-                    bias: wgpu::DepthBiasState::default(),
-                }),
-                multisample: wgpu::MultisampleState {
-                    count: samples,
-                    ..wgpu::MultisampleState::default()
-                },
-                fragment: Some(wgpu::FragmentState {
-                    module: shader,
-                    entry_point: Some(color),
-                    compilation_options: wgpu::PipelineCompilationOptions::default(),
-                    targets: &[Some(COLOR.into())],
-                }),
-                multiview_mask: None,
-                cache: None,
-            })
-        };
-        Self {
-            surface: pipeline("corner", "shade", &[Some(vertices)]),
-            paper: pipeline("paper", "paper_color", &[]),
-        }
+fn draw<'a>(all: impl IntoIterator<Item = &'a Held>, pass: &mut wgpu::RenderPass<'_>, instance: u32) {
+    for held in all {
+        pass.set_vertex_buffer(0, held.vertices.slice(..));
+        pass.set_index_buffer(held.indices.slice(..), wgpu::IndexFormat::Uint32);
+        pass.draw_indexed(0..held.count, 0, instance..instance + 1);
     }
 }

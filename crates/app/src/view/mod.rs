@@ -1,15 +1,28 @@
 //! What is seen: where the eye is, the triangles on the graphics card, and what lies under the mouse.
 
+mod brush;
 mod camera;
 mod canvas;
+mod card;
 mod histogram;
+mod lights;
 mod pick;
+mod read;
+mod scale_bar;
+mod screen;
 mod shape;
 mod slice;
+mod still;
+#[cfg(test)]
+mod tests;
 
 pub use camera::{Camera, Ray};
-pub use canvas::{Canvas, Look};
+pub use canvas::{Canvas, Look, Paper};
+pub use card::Card;
 pub use histogram::Histogram;
 pub use pick::pick;
+pub use scale_bar::scale_bar;
+pub use screen::{SKY, Screen};
 pub use shape::{Patch, Shape};
 pub use slice::{Slice, sides};
+pub use still::still;

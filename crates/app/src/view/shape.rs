@@ -7,6 +7,7 @@ use bspline::{Aabb, Field, Frame, Jet};
 use document::Object;
 use formats::field::SourceKind;
 use glam::{DAffine3, DVec3};
+use rayon::prelude::*;
 use tools::paint::{Substance, values};
 
 /// Cells along the longest side of the box that triangles begin with.
@@ -48,7 +49,7 @@ pub struct Patch {
 }
 
 /// A field that was not asked yet.
-const NOTHING: Jet = Jet {
+pub const NOTHING: Jet = Jet {
     value: 0.0,
     gradient: DVec3::ZERO,
     hessian: glam::DMat3::ZERO,
@@ -60,9 +61,12 @@ pub struct Shape {
     object: Object,
     world_box: Aabb,
     world_from_object: DAffine3,
-    /// Blocks with triangles.
-    blocks: BTreeMap<[i32; 3], Vec<AdaptiveBlock>>,
+    /// Of each part the blocks with triangles.
+    parts: BTreeMap<[i32; 3], BTreeMap<AdaptiveBlock, Made>>,
 }
+
+/// Corners and triangles of a block.
+type Made = (Vec<Vertex>, Vec<u32>);
 
 impl Shape {
     /// Of an object with an iso-value that stands at a place.
@@ -88,7 +92,7 @@ impl Shape {
             object: object.clone(),
             world_box,
             world_from_object,
-            blocks: BTreeMap::new(),
+            parts: BTreeMap::new(),
         })
     }
 
@@ -101,12 +105,10 @@ impl Shape {
 
     /// All that is to be drawn of it.
     pub fn all(&mut self, name: &str, origin: DVec3) -> Vec<Patch> {
-        self.group();
-        let parts: Vec<[i32; 3]> = self.blocks.keys().copied().collect();
-        parts
-            .into_iter()
-            .map(|part| self.patch(name, part, origin))
-            .collect()
+        self.parts.clear();
+        let blocks = self.mesh.blocks();
+        self.renew(&blocks, origin);
+        self.parts.keys().map(|part| self.patch(name, *part)).collect()
     }
 
     /// Follows its object; what is to be drawn anew.
@@ -123,20 +125,23 @@ impl Shape {
         let update = self.mesh.update(object.field.as_field(), &boxes)?;
         boxes.extend(painted(&self.object, object));
         self.object = object.clone();
-        let mut parts: Vec<[i32; 3]> = update.changed.iter().map(part).collect();
-        parts.extend(self.blocks.keys().copied().filter(|part| {
-            let b = self.part_box(*part);
+        let boxes: Vec<Aabb> = boxes.into_iter().filter(|b| b.min.cmple(b.max).all()).collect();
+        let mut stale = update.changed;
+        // Normals and paint are new there, even where triangles are not.
+        let kept = self.parts.values().flat_map(BTreeMap::keys);
+        stale.extend(kept.filter(|block| {
+            let b = self.block_box(block);
             boxes
                 .iter()
                 .any(|c| b.min.cmple(c.max).all() && c.min.cmple(b.max).all())
         }));
+        stale.sort_unstable();
+        stale.dedup();
+        self.renew(&stale, origin);
+        let mut parts: Vec<[i32; 3]> = stale.iter().map(part).collect();
         parts.sort_unstable();
         parts.dedup();
-        self.group();
-        Ok(parts
-            .into_iter()
-            .map(|part| self.patch(name, part, origin))
-            .collect())
+        Ok(parts.into_iter().map(|part| self.patch(name, part)).collect())
     }
 
     /// A box round its surface, in the world.
@@ -151,32 +156,49 @@ impl Shape {
         Some(whole.transformed(&self.world_from_object))
     }
 
-    fn group(&mut self) {
-        self.blocks.clear();
-        for block in self.mesh.blocks() {
-            self.blocks.entry(part(&block)).or_default().push(block);
-        }
+    /// A box round the triangles of a block, in the object's world.
+    fn block_box(&self, block: &AdaptiveBlock) -> Aabb {
+        let cell = self.world_box.size().max_element() / CELLS / f64::from(1_u32 << block.level);
+        let min = self.world_box.min + 8.0 * cell * DVec3::from_array(block.block.map(f64::from));
+        Aabb::new(min, min + 8.0 * cell).widened(cell)
     }
 
-    fn part_box(&self, part: [i32; 3]) -> Aabb {
-        let edge = 8.0 * self.world_box.size().max_element() / CELLS;
-        let min = self.world_box.min + edge * DVec3::from_array(part.map(f64::from));
-        Aabb::new(min, min + edge).widened(1e-9 * edge)
-    }
-
-    fn patch(&self, name: &str, part: [i32; 3], origin: DVec3) -> Patch {
-        let (mut places, mut indices) = (Vec::new(), Vec::new());
-        for block in self.blocks.get(&part).into_iter().flatten() {
-            let Some(Mesh {
-                positions, triangles, ..
-            }) = self.mesh.piece(*block)
-            else {
-                continue;
+    /// Makes the corners and triangles of blocks anew.
+    fn renew(&mut self, blocks: &[AdaptiveBlock], origin: DVec3) {
+        let made: Vec<Made> = blocks.par_iter().map(|b| self.made(*b, origin)).collect();
+        for (block, made) in blocks.iter().zip(made) {
+            let of_part = self.parts.entry(part(block)).or_default();
+            match made.1.is_empty() {
+                true => of_part.remove(block),
+                false => of_part.insert(*block, made),
             };
-            let first = places.len() as u32;
-            indices.extend(triangles.iter().flatten().map(|n| first + n));
-            places.extend(positions);
         }
+    }
+
+    fn patch(&self, name: &str, part: [i32; 3]) -> Patch {
+        let (mut vertices, mut indices) = (Vec::new(), Vec::new());
+        for (corners, triangles) in self.parts.get(&part).into_iter().flat_map(BTreeMap::values) {
+            let first = vertices.len() as u32;
+            indices.extend(triangles.iter().map(|n| first + n));
+            vertices.extend_from_slice(corners);
+        }
+        Patch {
+            object: name.into(),
+            part,
+            vertices,
+            indices,
+        }
+    }
+
+    fn made(&self, block: AdaptiveBlock, origin: DVec3) -> Made {
+        let Some(Mesh {
+            positions: places,
+            triangles,
+            ..
+        }) = self.mesh.piece(block)
+        else {
+            return Made::default();
+        };
         let mut jets = vec![NOTHING; places.len()];
         self.object.field.as_field().jets(&places, &mut jets);
         let hollow = HOLLOW * self.world_box.size().length();
@@ -198,12 +220,8 @@ impl Shape {
                 paint: libm::log2(f64::max(factor, 1e-6)) as f32,
             }
         });
-        Patch {
-            object: name.into(),
-            part,
-            vertices: vertices.collect(),
-            indices,
-        }
+        let indices = triangles.into_iter().flatten().collect();
+        (vertices.collect(), indices)
     }
 }
 

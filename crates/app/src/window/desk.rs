@@ -2,6 +2,7 @@
 //! and the window never waits for it.
 
 use std::collections::BTreeMap;
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -13,6 +14,7 @@ use tools::live::Pose;
 use tools::session::Stroke;
 
 use super::orders::{News, Order, Sheet, Thing};
+use super::preview;
 use super::tool::Tool;
 use super::touch::Wanted;
 use crate::cli::desk_files;
@@ -43,6 +45,8 @@ struct Open {
     origin: DVec3,
     /// Titles of the edits, those undone too, and how many are done.
     history: (Vec<String>, usize),
+    /// Whether the eye is on it.
+    is_seen: bool,
 }
 
 /// A stroke.
@@ -114,7 +118,13 @@ impl Desk {
     fn obey(&mut self, order: Order) {
         let done = match order {
             Order::Open(path) => self.open(&path),
-            Order::Clay => desk_files::clay_block().and_then(|(name, object)| self.start(&name, object)),
+            Order::Clay => {
+                desk_files::clay_block().and_then(|(name, object)| self.start(&name, object, false))
+            }
+            Order::Show => {
+                self.show_again();
+                Ok(())
+            }
             Order::Save(path) => self.save(&path),
             Order::Export { out, scan } => self.export(&out, scan.as_deref()),
             Order::Choose(name) => self.choose(name),
@@ -162,33 +172,83 @@ impl Desk {
             let mut notes = Vec::new();
             let document = desk_files::open(path, &mut notes)?;
             let is_untitled = path.parent() == Some(&self.home);
-            self.lay(document, path.to_path_buf(), is_untitled)?;
+            self.lay(document, path.to_path_buf(), is_untitled, false)?;
             notes.into_iter().for_each(|note| self.tell(News::Note(note)));
             return Ok(());
         }
-        let file = path
-            .file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned();
-        let show = |stage: &str, share: f64| self.tell(News::Busy(Some((format!("{file}: {stage}"), share))));
-        show("reading", 0.0);
-        let imported = desk_files::import(path, &self.begin_long(), &show);
-        self.tell(News::Busy(None));
-        let (name, object) = imported?;
-        self.start(&name, object)
+        let ((name, object), is_seen) = match desk_files::field(path) {
+            Some(object) => (object?, false),
+            None => {
+                let fitted = self.fit(path);
+                self.tell(News::Busy(None));
+                fitted?
+            }
+        };
+        self.start(&name, object, is_seen)
     }
 
-    /// A new document with one object.
-    fn start(&mut self, name: &str, object: Object) -> Result<(), String> {
+    /// The object that a scan becomes, and whether a coarse one is seen meanwhile.
+    fn fit(&mut self, scan: &Path) -> Result<((String, Object), bool), String> {
+        let file = scan.file_name().unwrap_or_default().to_string_lossy();
+        let (memory, most) = desk_files::memory();
+        let show = |stage: &str, share: f64| {
+            self.tell(News::Busy(Some((format!("{file}: {stage}{most}"), share))));
+        };
+        show("reading", 0.0);
+        let cancel = self.begin_long();
+        let fit = |options: &[OsString]| desk_files::fit(scan, options, memory, &cancel, &show);
+        let mut options: Vec<OsString> = vec!["--coarse".into()];
+        let mut coarse = fit(&options);
+        if let Err(why) = &coarse
+            && let Some(remedy) = desk_files::remedy(why)
+        {
+            options.push(remedy);
+            coarse = fit(&options);
+        }
+        options.remove(0);
+        // Whatever a few samples do not show may still be in all of them.
+        let seen = coarse.and_then(|(name, object)| preview::news(scan, &name, object));
+        let is_seen = seen.is_ok();
+        seen.into_iter().flatten().for_each(|news| self.tell(news));
+        let whole = match cancel.is_cancelled() {
+            true => Err("cancelled".into()),
+            false => fit(&options),
+        };
+        if whole.is_err() && is_seen {
+            self.show_again();
+        }
+        whole.map(|whole| (whole, is_seen))
+    }
+
+    /// What was shown before something else was looked at.
+    fn show_again(&mut self) {
+        match &mut self.open {
+            None => self.tell(News::Empty),
+            Some(open) => {
+                open.shapes.clear();
+                self.show();
+                self.lay_sheet();
+            }
+        }
+    }
+
+    /// A new document with one object, which may be seen already.
+    fn start(&mut self, name: &str, object: Object, is_seen: bool) -> Result<(), String> {
         self.end();
         let state = State::new().with(name, object).map_err(|e| e.to_string())?;
         let path = desk_files::untitled(&self.home, name)?;
         let document = desk_files::create(&path, state)?;
-        self.lay(document, path, true)
+        self.lay(document, path, true, is_seen)
     }
 
-    fn lay(&mut self, document: Document, path: PathBuf, is_untitled: bool) -> Result<(), String> {
+    /// `is_seen`: the eye is on what is in it already.
+    fn lay(
+        &mut self,
+        document: Document,
+        path: PathBuf,
+        is_untitled: bool,
+        is_seen: bool,
+    ) -> Result<(), String> {
         let state = document.state().clone();
         let Some(chosen) = state.objects().keys().next().cloned() else {
             return Err(format!("{}: has no objects", path.display()));
@@ -209,6 +269,7 @@ impl Desk {
             shapes: BTreeMap::new(),
             origin: all.center(),
             history: (Vec::new(), 0),
+            is_seen,
         });
         // The eye goes to the surface before panels tell of it.
         self.show();
@@ -219,23 +280,8 @@ impl Desk {
     /// Tells of all that panels show.
     fn lay_sheet(&mut self) {
         let Some(open) = &mut self.open else { return };
-        let things = open.shown.objects().iter().filter_map(|(name, object)| {
-            Some(Thing {
-                name: name.clone(),
-                field: object.field.shared(),
-                iso: object.iso()?,
-                own_box: object.field.world_box(),
-                world_from_object: open.shown.placement(name).ok()?,
-                is_volume: object.meta.source == formats::field::SourceKind::Volume,
-                unit: match object.meta.unit {
-                    formats::Unit::Unknown => "",
-                    unit => unit.symbol(),
-                },
-                coefficients: object.field.coefficient_count(),
-                holds: object.properties.holds.clone(),
-            })
-        });
-        let objects: Vec<Thing> = things.collect();
+        let names = open.shown.objects().keys();
+        let objects: Vec<Thing> = names.filter_map(|name| Thing::of(&open.shown, name)).collect();
         if let Some(document) = &mut open.document {
             open.history = match (document.counts(), document.history()) {
                 (Ok(counts), Ok(all)) => (all.into_iter().map(|edit| edit.title).collect(), counts.done),
@@ -288,7 +334,7 @@ impl Desk {
 
     fn reopen(&mut self, path: PathBuf, is_untitled: bool, chosen: String) -> Result<(), String> {
         let document = desk_files::open(&path, &mut Vec::new())?;
-        self.lay(document, path, is_untitled)?;
+        self.lay(document, path, is_untitled, true)?;
         self.choose(chosen)
     }
 
@@ -526,18 +572,16 @@ impl Open {
     }
 
     /// Where all surfaces lie, and what is up.
-    fn scene(&self) -> News {
+    fn scene(&mut self) -> News {
         let boxes = self.shapes.values().filter_map(Shape::bounding_box);
+        let is_volume = Thing::of(&self.shown, &self.chosen).is_some_and(|thing| thing.is_volume);
         let all = boxes.reduce(bspline::Aabb::hull);
-        let radius = all.map_or(1.0, |b| 0.5 * b.size().length());
-        let object = self.shown.object(&self.chosen);
-        let is_volume = object.is_ok_and(|o| o.meta.source == formats::field::SourceKind::Volume);
-        News::Scene {
-            origin: self.origin,
-            center: all.map_or(self.origin, |b| b.center()),
-            radius,
-            up: if is_volume { DVec3::Z } else { DVec3::Y },
-        }
+        News::scene(
+            self.origin,
+            all,
+            is_volume,
+            std::mem::replace(&mut self.is_seen, true),
+        )
     }
 
     /// A line of the world in the chosen object's.

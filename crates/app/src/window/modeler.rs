@@ -19,10 +19,10 @@ use super::tool::{Kind, Tool};
 use super::touch::{Held, Seen};
 use crate::cli::{desk_files, interrupt};
 use crate::panels;
-use crate::view::{Camera, Canvas, Look, Ray, pick};
+use crate::view::{Camera, Look, Paper, Ray, Screen, pick, scale_bar};
 
 /// Time after which a picture in which nothing moves is drawn whole.
-const STILL: Duration = Duration::from_millis(200);
+const STILL: Duration = Duration::from_millis(60);
 /// Share of the pixels of a side that are drawn while something moves.
 const ROUGH: f32 = 0.5;
 /// Time for which a message stays.
@@ -146,7 +146,9 @@ impl Bench {
 pub struct Modeler {
     pub(super) bench: Bench,
     news: Receiver<News>,
-    canvas: Option<Canvas>,
+    /// What the desk wakes.
+    context: Arc<Mutex<egui::Context>>,
+    screen: Option<Screen>,
     gesture: Option<Gesture>,
     /// What the mouse sets.
     pub(super) adjust: Option<Adjust>,
@@ -158,21 +160,48 @@ pub struct Modeler {
 impl Modeler {
     /// Begins the desk, with files to open.
     pub fn new(context: &eframe::CreationContext<'_>, files: Vec<PathBuf>) -> Self {
-        let canvas = context.wgpu_render_state.clone().map(Canvas::new);
-        let modeler = Self::on(&context.egui_ctx, canvas, desk_files::home());
-        close_when_asked(&context.egui_ctx);
+        let screen = context.wgpu_render_state.clone().map(Screen::new);
+        let modeler = Self::on(&context.egui_ctx, screen, desk_files::home());
+        close_when_asked(modeler.context.clone());
         for file in files {
             modeler.bench.order(Order::Open(file));
         }
         modeler
     }
 
+    /// Goes on in another window, on a card that is not lost.
+    pub(super) fn resume(&mut self, context: &egui::Context, screen: Option<Screen>) {
+        *self.context.lock().unwrap_or_else(PoisonError::into_inner) = context.clone();
+        self.screen = screen;
+        // Its pictures were the old window's.
+        self.bench.slices = self.bench.slices.take().map(|_| panels::Slices::new());
+        self.moved = Instant::now();
+        self.bench.order(Order::Show);
+    }
+
+    /// Whether the graphics card is lost: the window has to be opened anew.
+    pub(super) fn is_lost(&self) -> bool {
+        self.screen.as_ref().is_some_and(Screen::is_lost)
+    }
+
+    /// Ends the desk: a stroke that is under way becomes an edit.
+    pub(super) fn close(mut self) {
+        self.bench.cancel();
+        let (nobody, _) = channel();
+        // Its orders end, and with them the desk.
+        self.bench.orders = nobody;
+        if let Some(desk) = self.desk.take() {
+            let _ = desk.join();
+        }
+    }
+
     /// With nothing open.
-    pub(super) fn on(context: &egui::Context, canvas: Option<Canvas>, home: PathBuf) -> Self {
+    pub(super) fn on(context: &egui::Context, screen: Option<Screen>, home: PathBuf) -> Self {
+        let context = Arc::new(Mutex::new(context.clone()));
         let (orders, received) = channel();
         let (told, news) = channel();
         let cancel = Arc::new(Mutex::new(Cancel::new()));
-        let desk = Desk::new(told, wake(context), cancel.clone(), home.clone());
+        let desk = Desk::new(told, wake(context.clone()), cancel.clone(), home.clone());
         let desk = std::thread::Builder::new()
             .name("desk".into())
             .spawn(move || desk.work(&received))
@@ -190,6 +219,7 @@ impl Modeler {
                     camera: Camera::onto(DVec3::ZERO, 1.0, DVec3::Y),
                     cut: None,
                     paint: true,
+                    paper: Paper::Dark,
                 },
                 scene: (DVec3::ZERO, 1.0),
                 busy: None,
@@ -210,7 +240,8 @@ impl Modeler {
                 cancel,
             },
             news,
-            canvas,
+            context,
+            screen,
             gesture: None,
             adjust: None,
             moved: Instant::now(),
@@ -228,26 +259,30 @@ impl Modeler {
                     center,
                     radius,
                     up,
+                    is_finer,
                 } => {
                     self.bench.scene = (center, radius);
-                    self.bench.look.cut = None;
-                    self.bench.look.camera.up = up;
-                    self.bench.frame_all();
-                    if let Some(canvas) = &mut self.canvas {
+                    if !is_finer {
+                        self.bench.look.cut = None;
+                        self.bench.look.camera.up = up;
+                        self.bench.frame_all();
+                    }
+                    if let Some(Screen { canvas, .. }) = &mut self.screen {
                         canvas.begin(origin, center.distance(origin) + radius);
                     }
                 }
                 News::Patches(patches) => {
                     self.moved = Instant::now();
-                    if let Some(canvas) = &mut self.canvas {
+                    if let Some(Screen { canvas, .. }) = &mut self.screen {
                         patches.iter().for_each(|patch| canvas.put(patch));
                     }
                 }
                 News::Gone(object) => {
-                    if let Some(canvas) = &mut self.canvas {
+                    if let Some(Screen { canvas, .. }) = &mut self.screen {
                         canvas.forget(&object);
                     }
                 }
+                News::Empty => self.bench.sheet = None,
                 News::Busy(busy) => self.bench.busy = busy,
                 News::Held(held) => {
                     self.bench.held = held;
@@ -258,23 +293,27 @@ impl Modeler {
                 News::Failed(text) => self.bench.tell(text, true),
             }
         }
-        self.bench.triangles = self.canvas.as_ref().map_or(0, Canvas::triangles);
+        self.bench.triangles = self.screen.as_ref().map_or(0, |s| s.canvas.triangles());
     }
 
     /// The scene, and what the mouse does in it.
     fn viewport(&mut self, ui: &mut egui::Ui) {
         let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
         let is_still = self.moved.elapsed() > STILL && self.gesture.is_none();
-        if let Some(canvas) = &mut self.canvas {
+        if let Some(screen) = &mut self.screen {
             let share = if is_still { 1.0 } else { ROUGH };
             let pixels = (rect.size() * ui.ctx().pixels_per_point() * share).round();
             let size = [pixels.x as u32, pixels.y as u32];
-            let picture = canvas.draw(&self.bench.look, size, !is_still);
+            let picture = screen.draw(&self.bench.look, size, !is_still);
             let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
             ui.painter().image(picture, rect, whole, egui::Color32::WHITE);
         }
         if !is_still {
             ui.ctx().request_repaint_after(STILL);
+        }
+        if let Some(thing) = self.bench.sheet.as_ref().and_then(|s| s.objects.get(s.chosen)) {
+            let length_of_point = self.bench.look.camera.height / f64::from(rect.height());
+            scale_bar(ui.painter(), rect, length_of_point, thing.unit);
         }
         let over = response.hover_pos().or(response.interact_pointer_pos());
         if let Some(over) = over {
@@ -314,7 +353,8 @@ impl Modeler {
         }
         let tool = self.bench.tool_in_hand(keys);
         // While a scan is read or a file is written strokes would have to wait.
-        let under = self.under(rect, over).filter(|_| self.bench.busy.is_none());
+        let is_free = self.bench.busy.is_none() && self.gesture.is_none();
+        let under = is_free.then(|| self.under(rect, over)).flatten();
         if let Some(button) = pressed.filter(|_| response.hovered() && self.gesture.is_none()) {
             if let (PointerButton::Primary, true, Some((p, _))) = (button, self.bench.pins, under) {
                 self.bench.pin(p);
@@ -476,20 +516,25 @@ fn at(rect: Rect, p: Pos2) -> DVec2 {
 }
 
 /// Closes the window on Ctrl-C and SIGTERM, as its own button does.
-fn close_when_asked(context: &egui::Context) {
-    let (asked, context) = (interrupt::in_window(), context.clone());
+fn close_when_asked(context: Arc<Mutex<egui::Context>>) {
+    let asked = interrupt::in_window();
     std::thread::spawn(move || {
         while !asked.is_cancelled() {
             std::thread::sleep(Duration::from_millis(50));
         }
+        let context = context.lock().unwrap_or_else(PoisonError::into_inner);
         context.send_viewport_cmd(egui::ViewportCommand::Close);
         context.request_repaint();
     });
 }
 
-fn wake(context: &egui::Context) -> Arc<dyn Fn() + Send + Sync> {
-    let context = context.clone();
-    Arc::new(move || context.request_repaint())
+fn wake(context: Arc<Mutex<egui::Context>>) -> Arc<dyn Fn() + Send + Sync> {
+    Arc::new(move || {
+        context
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .request_repaint();
+    })
 }
 
 impl Modeler {
@@ -501,6 +546,12 @@ impl Modeler {
 
     /// All of the window.
     pub fn show(&mut self, ui: &mut egui::Ui) {
+        if self.is_lost() {
+            // What is in the hand goes to the disk; the next window shows it.
+            self.end_gesture();
+            ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
+            return;
+        }
         self.hear();
         self.keys(ui);
         let dropped: Vec<PathBuf> = ui.input(|i| {
@@ -531,23 +582,6 @@ impl Modeler {
         self.bench.tell_tool();
         if self.bench.message().is_some() {
             ui.ctx().request_repaint_after(Duration::from_secs(1));
-        }
-    }
-}
-
-impl eframe::App for Modeler {
-    fn ui(&mut self, ui: &mut egui::Ui, _: &mut eframe::Frame) {
-        self.show(ui);
-    }
-
-    /// A stroke that is under way becomes an edit.
-    fn on_exit(&mut self) {
-        self.bench.cancel();
-        let (nobody, _) = channel();
-        // Its orders end, and with them the desk.
-        self.bench.orders = nobody;
-        if let Some(desk) = self.desk.take() {
-            let _ = desk.join();
         }
     }
 }

@@ -4,6 +4,9 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use bspline::{Aabb, Field};
+use document::State;
+use formats::Unit;
+use formats::field::SourceKind;
 use glam::{DAffine3, DVec3};
 use tools::hold::Held;
 use tools::session::Stroke;
@@ -19,6 +22,8 @@ pub enum Order {
     Open(PathBuf),
     /// A new document with a block of clay.
     Clay,
+    /// All that is open is shown again.
+    Show,
     /// The document goes on under another name.
     Save(PathBuf),
     /// Writes the chosen object: a mesh, a field, or its scan with its edits.
@@ -72,11 +77,15 @@ pub enum News {
         radius: f64,
         /// In the world.
         up: DVec3,
+        /// Whether it is the scene that is shown, only finer: the eye stays where it is.
+        is_finer: bool,
     },
     /// Triangles in place of those that there were.
     Patches(Vec<Patch>),
     /// An object is no more.
     Gone(String),
+    /// Nothing is open any more.
+    Empty,
     /// What takes a while, and the share done; none when it is done.
     Busy(Option<(String, f64)>),
     /// What is in the hand now.
@@ -87,6 +96,19 @@ pub enum News {
     Note(String),
     /// Something that could not be done.
     Failed(String),
+}
+
+impl News {
+    /// The scene of surfaces in a box, if there are any.
+    pub fn scene(origin: DVec3, surfaces: Option<Aabb>, is_volume: bool, is_finer: bool) -> Self {
+        Self::Scene {
+            origin,
+            center: surfaces.map_or(origin, |b| b.center()),
+            radius: surfaces.map_or(1.0, |b| 0.5 * b.size().length()),
+            up: if is_volume { DVec3::Z } else { DVec3::Y },
+            is_finer,
+        }
+    }
 }
 
 /// All that panels show of a document.
@@ -127,6 +149,27 @@ pub struct Thing {
     pub coefficients: usize,
     /// Its constraints, in its own world.
     pub holds: Vec<Held>,
+}
+
+impl Thing {
+    /// An object of a state; none where it has no surface or no place.
+    pub fn of(state: &State, name: &str) -> Option<Self> {
+        let object = state.object(name).ok()?;
+        Some(Self {
+            name: name.into(),
+            field: object.field.shared(),
+            iso: object.iso()?,
+            own_box: object.field.world_box(),
+            world_from_object: state.placement(name).ok()?,
+            is_volume: object.meta.source == SourceKind::Volume,
+            unit: match object.meta.unit {
+                Unit::Unknown => "",
+                unit => unit.symbol(),
+            },
+            coefficients: object.field.coefficient_count(),
+            holds: object.properties.holds.clone(),
+        })
+    }
 }
 
 impl std::fmt::Debug for Sheet {

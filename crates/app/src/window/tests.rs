@@ -532,3 +532,85 @@ fn radius_and_strength_are_set_by_the_mouse() {
     // The clicks that ended it did nothing to the clay.
     assert_eq!(bench.sheet.as_ref().unwrap().history.len(), 0);
 }
+
+/// A card that is lost in the middle of a stroke: the stroke is on the disk, and the next window shows the same document.
+#[test]
+fn a_lost_card_loses_nothing() {
+    use eframe::egui_wgpu::{RenderState, RendererOptions, WgpuConfiguration, wgpu};
+
+    use crate::view::{Card, Screen};
+    let screen = || {
+        let setup = eframe::egui_wgpu::WgpuSetup::without_display_handle();
+        let configuration = WgpuConfiguration {
+            wgpu_setup: setup.clone(),
+            ..WgpuConfiguration::default()
+        };
+        let instance = pollster::block_on(setup.new_instance());
+        let state = RenderState::create(&configuration, &instance, None, RendererOptions::default());
+        pollster::block_on(state).expect("a card was there before")
+    };
+    match Card::open() {
+        Ok(_) => {}
+        Err(why) if std::env::var_os("ISOCLAY_NEEDS_CARD").is_some() => panic!("{why}"),
+        Err(why) => return eprintln!("SKIPPED a lost card: {why}"),
+    }
+    let home = tempfile::tempdir().unwrap();
+    let context = egui::Context::default();
+    let state = screen();
+    let device: wgpu::Device = state.device.clone();
+    let modeler = Modeler::on(&context, Some(Screen::new(state)), home.path().to_path_buf());
+    let mut window = Harness::builder()
+        .with_size([1280.0, 800.0])
+        .build_ui_state(|ui, modeler: &mut Modeler| modeler.show(ui), modeler);
+    window.step();
+    window.get_by_label("A block of clay").click();
+    wait_for(&mut window, "History");
+    window.hover_at(egui::pos2(620.0, 400.0));
+    window.step();
+    window.drag_at(egui::pos2(620.0, 400.0));
+    for x in 0..8 {
+        window.step();
+        window.hover_at(egui::pos2(620.0 + 6.0 * x as f32, 400.0));
+    }
+    window.step();
+    let triangles = window.state().bench().triangles;
+    assert!(triangles > 1000, "{triangles}");
+    device.destroy();
+    let _ = device.poll(wgpu::PollType::wait_indefinitely());
+    assert!(window.state().is_lost());
+    window.step();
+    // The window closes here; what it worked on goes on in the next.
+    let next = egui::Context::default();
+    window.state_mut().resume(&next, Some(Screen::new(screen())));
+    assert!(!window.state().is_lost());
+    let start = Instant::now();
+    while window.query_by_label_contains("carve on clay").is_none() || window.state().bench().triangles == 0 {
+        assert!(start.elapsed() < Duration::from_secs(60));
+        std::thread::sleep(Duration::from_millis(10));
+        window.step();
+    }
+    let path = window.state().bench().sheet.as_ref().unwrap().path.clone();
+    let kept = home.path().join("kept.isoclay");
+    std::fs::copy(path, &kept).unwrap();
+    assert_eq!(opened(&kept).counts().unwrap().done, 1);
+}
+
+/// What is seen of a scan while it is fitted: a scene of its own under the name of the scan, with nothing in its history.
+#[test]
+fn a_coarse_solid_is_seen_under_the_name_of_its_scan() {
+    let (name, object) = crate::cli::desk_files::clay_block().unwrap();
+    let told = super::preview::news(Path::new("scans/block.ply"), &name, object).unwrap();
+    let [
+        News::Scene { radius, is_finer, .. },
+        News::Patches(patches),
+        News::Sheet(sheet),
+    ] = &told[..]
+    else {
+        panic!("{told:?}")
+    };
+    // Half the diagonal of a block of 40 mm, rounded.
+    assert!(!is_finer && (30.0..36.0).contains(radius), "{radius}");
+    assert!(patches.iter().map(|p| p.indices.len()).sum::<usize>() > 3000);
+    assert_eq!(sheet.path, Path::new("scans/block.ply"));
+    assert!(sheet.is_untitled && sheet.history.is_empty() && sheet.objects[0].name == name);
+}

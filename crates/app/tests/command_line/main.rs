@@ -1,6 +1,7 @@
 //! The grammar of the command line, its exit codes, and what goes to stdout.
 
 mod batch;
+mod coarse;
 #[path = "../common/mod.rs"]
 mod common;
 mod devices;

@@ -1,0 +1,119 @@
+//! How triangles become pixels.
+
+use eframe::egui_wgpu::wgpu;
+
+use super::canvas::{COLOR, DEPTH};
+use super::shape::Vertex;
+
+/// How pictures of a number of samples a pixel are drawn.
+pub struct Brush {
+    /// Triangles in all light.
+    pub surface: wgpu::RenderPipeline,
+    /// In the light that reaches them.
+    pub lit: wgpu::RenderPipeline,
+    /// What is behind them.
+    pub paper: wgpu::RenderPipeline,
+}
+
+const VERTEX: wgpu::VertexBufferLayout<'_> = wgpu::VertexBufferLayout {
+    array_stride: size_of::<Vertex>() as u64,
+    step_mode: wgpu::VertexStepMode::Vertex,
+    attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32, 3 => Float32],
+};
+
+/// A way to draw: from corners to colours, if any, of so many samples a pixel.
+fn pipeline(
+    device: &wgpu::Device,
+    shader: &wgpu::ShaderModule,
+    layout: &wgpu::PipelineLayout,
+    [corner, color]: [&str; 2],
+    buffers: &[Option<wgpu::VertexBufferLayout<'_>>],
+    samples: u32,
+) -> wgpu::RenderPipeline {
+    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(corner),
+        layout: Some(layout),
+        vertex: wgpu::VertexState {
+            module: shader,
+            entry_point: Some(corner),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            buffers,
+        },
+        primitive: wgpu::PrimitiveState::default(),
+        depth_stencil: Some(wgpu::DepthStencilState {
+            format: DEPTH,
+            depth_write_enabled: Some(true),
+            depth_compare: Some(wgpu::CompareFunction::LessEqual),
+            stencil: wgpu::StencilState::default(),
+            bias: wgpu::DepthBiasState::default(),
+        }),
+        multisample: wgpu::MultisampleState {
+            count: samples,
+            ..wgpu::MultisampleState::default()
+        },
+        fragment: (!color.is_empty()).then_some(wgpu::FragmentState {
+            module: shader,
+            entry_point: Some(color),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            targets: &[Some(COLOR.into())],
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
+}
+
+fn layout(device: &wgpu::Device, groups: &[Option<&wgpu::BindGroupLayout>]) -> wgpu::PipelineLayout {
+    device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some("scene"),
+        bind_group_layouts: groups,
+        immediate_size: 0,
+    })
+}
+
+impl Brush {
+    /// By a shader.
+    pub fn new(
+        device: &wgpu::Device,
+        shader: &wgpu::ShaderModule,
+        [scene, lights]: [&wgpu::BindGroupLayout; 2],
+        samples: u32,
+    ) -> Self {
+        let lit = layout(device, &[Some(scene), Some(lights)]);
+        let plain = layout(device, &[Some(scene)]);
+        Self {
+            surface: pipeline(
+                device,
+                shader,
+                &plain,
+                ["corner", "shade"],
+                &[Some(VERTEX)],
+                samples,
+            ),
+            lit: pipeline(
+                device,
+                shader,
+                &lit,
+                ["corner", "shade_lit"],
+                &[Some(VERTEX)],
+                samples,
+            ),
+            paper: pipeline(device, shader, &plain, ["paper", "paper_color"], &[], samples),
+        }
+    }
+}
+
+/// Triangles as a light sees them.
+pub fn shadow(
+    device: &wgpu::Device,
+    shader: &wgpu::ShaderModule,
+    scene: &wgpu::BindGroupLayout,
+) -> wgpu::RenderPipeline {
+    pipeline(
+        device,
+        shader,
+        &layout(device, &[Some(scene)]),
+        ["lit", ""],
+        &[Some(VERTEX)],
+        1,
+    )
+}

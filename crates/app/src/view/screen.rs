@@ -1,0 +1,66 @@
+//! Pictures of the scene in the window.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use eframe::egui_wgpu::{RenderState, wgpu};
+
+use super::{Canvas, Look};
+
+/// Lights in the sky: more take longer than a picture should.
+pub const SKY: usize = 16;
+
+/// A canvas whose pictures egui shows.
+pub struct Screen {
+    /// What draws them.
+    pub canvas: Canvas,
+    state: RenderState,
+    is_lost: Arc<AtomicBool>,
+    /// Whole and rough pictures, as egui knows them.
+    shown: [Option<(wgpu::Texture, egui::TextureId)>; 2],
+}
+
+impl Screen {
+    /// On the card that egui uses.
+    pub fn new(state: RenderState) -> Self {
+        let is_lost = Arc::new(AtomicBool::new(false));
+        let told = is_lost.clone();
+        state.device.set_device_lost_callback(move |_, _| {
+            told.store(true, Ordering::Relaxed);
+        });
+        Self {
+            is_lost,
+            canvas: Canvas::new(&state.device, &state.queue, SKY),
+            state,
+            shown: [None, None],
+        }
+    }
+
+    /// Whether the card is lost.
+    pub fn is_lost(&self) -> bool {
+        self.is_lost.load(Ordering::Relaxed)
+    }
+
+    /// As [`Canvas::draw`].
+    pub fn draw(&mut self, look: &Look, size: [u32; 2], is_rough: bool) -> egui::TextureId {
+        let picture = self.canvas.draw(look, size, is_rough);
+        let shown = &mut self.shown[usize::from(is_rough)];
+        if let Some((texture, id)) = shown
+            && texture == picture
+        {
+            return *id;
+        }
+        // egui takes pictures as the screen wants them.
+        let view = picture.create_view(&wgpu::TextureViewDescriptor {
+            format: Some(wgpu::TextureFormat::Rgba8Unorm),
+            ..wgpu::TextureViewDescriptor::default()
+        });
+        let mut renderer = self.state.renderer.write();
+        if let Some((_, old)) = shown.take() {
+            renderer.free_texture(&old);
+        }
+        let id = renderer.register_native_texture(&self.state.device, &view, wgpu::FilterMode::Linear);
+        *shown = Some((picture.clone(), id));
+        id
+    }
+}
