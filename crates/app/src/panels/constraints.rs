@@ -12,7 +12,7 @@ pub fn constraints(ui: &mut egui::Ui, bench: &mut Bench) {
         return;
     };
     egui::CollapsingHeader::new("Constraints")
-        .default_open(!thing.holds.is_empty())
+        .default_open(true)
         .show(ui, |ui| {
             ui.toggle_value(&mut bench.pins, "Pin points (N)")
                 .on_hover_text("A click on the solid holds the surface there, whatever force tools do");

@@ -524,11 +524,11 @@ fn radius_and_strength_are_set_by_the_mouse() {
     set(&mut window, egui::Modifiers::NONE, egui::Key::F, 80.0);
     click(&mut window, at + egui::vec2(80.0, 0.0));
     let larger = window.state().bench().tool.radius;
-    assert!((larger / before.radius - 0.5f64.exp()).abs() < 1e-6, "{larger}");
+    assert!((larger / before.radius - 0.5f64.exp()).abs() < 1e-3, "{larger}");
     set(&mut window, egui::Modifiers::SHIFT, egui::Key::F, 60.0);
     click(&mut window, at + egui::vec2(60.0, 0.0));
     let bench = window.state().bench();
-    assert!((bench.tool.strength - before.strength - 0.25).abs() < 1e-6);
+    assert!((bench.tool.strength - before.strength - 0.25).abs() < 1e-3);
     // The clicks that ended it did nothing to the clay.
     assert_eq!(bench.sheet.as_ref().unwrap().history.len(), 0);
 }
