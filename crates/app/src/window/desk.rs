@@ -306,52 +306,53 @@ impl Desk {
     /// Goes on in a copy under another name.
     fn save(&mut self, path: &Path) -> Result<(), String> {
         self.end();
-        let Some(open) = self.open.take() else {
+        let Some(open) = &mut self.open else { return Ok(()) };
+        let (from, was_untitled) = (open.path.clone(), open.is_untitled);
+        if from == path {
             return Ok(());
-        };
+        }
         // Every edit is in its file already.
-        let (from, chosen) = (open.path.clone(), open.chosen.clone());
-        let open_untitled = open.is_untitled;
-        drop(open);
-        let copied = match from == path {
-            true => Ok(()),
-            false => formats::atomic::replace(path, |out| {
-                std::io::copy(&mut std::fs::File::open(&from)?, out).map(drop)
-            }),
-        };
-        let (path, is_untitled) = match &copied {
-            Ok(()) => (path.to_path_buf(), false),
-            Err(_) => (from.clone(), open_untitled),
-        };
-        let was_untitled = open_untitled && copied.is_ok();
-        self.reopen(path.clone(), is_untitled, chosen)?;
-        if was_untitled && from != path {
+        open.document = None;
+        let copied = formats::atomic::replace(path, |out| {
+            std::io::copy(&mut std::fs::File::open(&from)?, out).map(drop)
+        });
+        if copied.is_ok() {
+            (open.path, open.is_untitled) = (path.to_path_buf(), false);
+        }
+        self.reopen()?;
+        if was_untitled && copied.is_ok() {
             // It has a name now. What cannot be removed is only in the way.
             let _ = std::fs::remove_file(&from);
         }
         copied.map_err(|e| format!("{}: {e}", path.display()))
     }
 
-    fn reopen(&mut self, path: PathBuf, is_untitled: bool, chosen: String) -> Result<(), String> {
-        let document = desk_files::open(&path, &mut Vec::new())?;
-        self.lay(document, path, is_untitled, true)?;
-        self.choose(chosen)
+    /// Opens the file anew whose document was closed; what is seen of it stays.
+    fn reopen(&mut self) -> Result<(), String> {
+        let Some(open) = &mut self.open else { return Ok(()) };
+        match desk_files::open(&open.path, &mut Vec::new()) {
+            Ok(document) => self.take_back(document),
+            Err(why) => {
+                self.open = None;
+                self.tell(News::Empty);
+                return Err(why);
+            }
+        }
+        Ok(())
     }
 
     fn export(&mut self, out: &Path, scan: Option<&Path>) -> Result<(), String> {
         self.end();
-        let Some(open) = self.open.take() else {
-            return Ok(());
-        };
-        let (path, is_untitled, chosen) = (open.path.clone(), open.is_untitled, open.chosen.clone());
+        let Some(open) = &mut self.open else { return Ok(()) };
         // The command opens it for itself alone.
-        drop(open);
+        open.document = None;
+        let (path, chosen) = (open.path.clone(), open.chosen.clone());
         let file = out.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let show = |stage: &str, share: f64| self.tell(News::Busy(Some((format!("{file}: {stage}"), share))));
         show("writing", 0.0);
         let written = desk_files::export(&path, &chosen, out, scan, &self.begin_long(), &show);
         self.tell(News::Busy(None));
-        self.reopen(path, is_untitled, chosen)?;
+        self.reopen()?;
         written.map(|()| self.tell(News::Note(format!("{} is written", out.display()))))
     }
 
@@ -477,17 +478,24 @@ impl Desk {
         self.open.as_mut()?.document.take()
     }
 
-    /// Takes the document back, or opens it anew where it was lost.
-    pub(super) fn take_back(&mut self, document: Option<Document>) -> Result<(), String> {
-        let Some(open) = &mut self.open else { return Ok(()) };
-        let Some(document) = document else {
-            let (path, is_untitled, chosen) = (open.path.clone(), open.is_untitled, open.chosen.clone());
-            return self.reopen(path, is_untitled, chosen);
-        };
-        open.shown = document.state().clone();
-        open.document = Some(document);
-        self.lay_sheet();
+    /// Takes the document back; without one it was lost, and is opened anew.
+    ///
+    /// # Errors
+    /// That it cannot be opened; then nothing is open any more.
+    pub(super) fn return_lent(&mut self, document: Option<Document>) -> Result<(), String> {
+        match document {
+            Some(document) => self.take_back(document),
+            None => self.reopen()?,
+        }
         Ok(())
+    }
+
+    fn take_back(&mut self, document: Document) {
+        if let Some(open) = &mut self.open {
+            open.shown = document.state().clone();
+            open.document = Some(document);
+        }
+        self.lay_sheet();
     }
 
     /// A device has done edits.

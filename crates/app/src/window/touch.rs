@@ -235,12 +235,12 @@ impl Desk {
         let (sculpting, _) = match ran {
             Ok(ran) => ran,
             Err(why) => {
-                self.take_back(None)?;
+                self.return_lent(None)?;
                 return Err(format!("the edit is not on the disk: {why}"));
             }
         };
         let (document, _, notes) = sculpting.close();
-        self.take_back(Some(document))?;
+        self.return_lent(Some(document))?;
         notes.into_iter().for_each(|note| self.tell(News::Note(note)));
         Ok(next)
     }
