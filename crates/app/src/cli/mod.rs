@@ -47,7 +47,6 @@ mod phantom;
 mod picture;
 mod progress;
 pub mod quantity;
-mod report;
 mod sample;
 mod simulate;
 mod solves;
