@@ -175,5 +175,9 @@ fn grids_over(around: &Aabb, fields: &[PyRef<'_, CoreField>]) -> Grids {
         cells: cells.to_array().map(|n| n as u32),
     };
     let levels = 1 + (step / finest).log2().ceil().max(0.0) as usize;
-    Grids { lattice, levels }
+    Grids {
+        lattice,
+        levels,
+        slope: fields[0].grids.slope,
+    }
 }

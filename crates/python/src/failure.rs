@@ -21,6 +21,10 @@ pub enum Failure {
     Cancelled,
     /// A value that cannot be used.
     Value(String),
+    /// A document.
+    Document(String),
+    /// A script.
+    Script(String),
     /// Python itself.
     Python(PyErr),
 }
@@ -95,6 +99,8 @@ fn raised(py: Python<'_>, failure: Failure) -> PyResult<PyErr> {
         Failure::Python(error) => return Ok(error),
         Failure::Value(why) => return Ok(PyValueError::new_err(why)),
         Failure::Cancelled => ("Cancelled", ("cancelled",).into_pyobject(py)?),
+        Failure::Document(why) => ("DocumentProblem", (why,).into_pyobject(py)?),
+        Failure::Script(why) => ("BadScript", (why,).into_pyobject(py)?),
         Failure::Fit(error) => of_fit(py, error)?,
         Failure::File(error) => of_file(py, error)?,
     };

@@ -3,10 +3,11 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use bspline::hierarchical::Lattice;
-use bspline::{Aabb, Field, Frame, Jet};
+use bspline::hierarchical::{Lattice, MAX_LEVELS};
+use bspline::{Aabb, Field, Frame, HierarchicalSpline, Jet};
 use document::{is_of_mesh, read_report, with_report};
 use fitting::FitReport;
+use fitting::field::{Aim, FieldFitOptions, fit_field};
 use formats::field::{AnyField, FieldMeta, SourceKind, decode, encode};
 use formats::{ReadLimits, Unit};
 use glam::DVec3;
@@ -47,6 +48,8 @@ pub struct Grids {
     pub lattice: Lattice,
     /// Levels of its cells.
     pub levels: usize,
+    /// How steep it is, per world length.
+    pub slope: f64,
 }
 
 /// Asks the spline of either precision.
@@ -66,6 +69,7 @@ impl CoreField {
         let grids = either!(&levels, f => Grids {
             lattice: f.grids(),
             levels: f.depth(),
+            slope: f.steepness(),
         });
         Self {
             solid: either!(&levels, f => Arc::new(f.clone())),
@@ -240,6 +244,57 @@ impl CoreField {
             Ok(values)
         })?;
         PyArray1::from_vec(py, values).reshape(shape)
+    }
+
+    /// One spline that stays by the field: within `tolerance`, a world length, of its surface, with the right sign elsewhere; or
+    /// if `everywhere`, within `tolerance`, a value, of it.
+    fn baked(
+        &self,
+        py: Python<'_>,
+        iso: f64,
+        tolerance: Option<f64>,
+        everywhere: bool,
+        wishes: Wishes,
+    ) -> PyResult<Self> {
+        let (field, grids) = (self.solid.clone(), self.grids);
+        let finest = grids.levels.min(MAX_LEVELS - 1);
+        let length = 0.02 * grids.lattice.spacing(grids.levels - 1).min_element();
+        let aim = match everywhere {
+            true => Aim::Density {
+                tolerance: tolerance.unwrap_or(length * grids.slope),
+            },
+            false => Aim::Surface {
+                iso,
+                tolerance: tolerance.unwrap_or(length),
+            },
+        };
+        let (levels, tolerance) = run(py, &wishes, move |control| {
+            let start =
+                HierarchicalSpline::<f32>::schoenberg(grids.lattice, grids.slope, |p| field.value(p))?;
+            let options = FieldFitOptions {
+                aim,
+                finest,
+                look: false,
+            };
+            let around = grids.lattice.world_box();
+            let (made, ..) = fit_field(&*field, &start, &around, &options, control)?;
+            let tolerance = match aim {
+                Aim::Density { tolerance } | Aim::Surface { tolerance, .. } => tolerance,
+            };
+            Ok((made, tolerance))
+        })?;
+        let report = FitReport {
+            tolerance,
+            coefficients: levels.coefficient_count(),
+            ..FitReport::default()
+        };
+        let meta = FieldMeta {
+            source: SourceKind::Other,
+            iso: Some(iso),
+            unit: self.meta.unit,
+            ..FieldMeta::default()
+        };
+        Ok(fitted(AnyField::F32(levels), report, meta))
     }
 
     /// Numbers that the field stays between everywhere in a box.

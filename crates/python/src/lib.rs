@@ -5,19 +5,26 @@
 //! made in Python, where users read them.
 
 mod arrays;
+mod blocks;
 mod csg;
+mod document;
 mod failure;
 mod field;
 mod fit;
 mod mesh;
 mod run;
+mod simulation;
 
 use pyo3::prelude::*;
 
 #[pymodule]
 mod _isoclay {
     #[pymodule_export]
+    use crate::blocks::{join_blocks, with_leaf_errors};
+    #[pymodule_export]
     use crate::csg::{complement, difference, grown, intersection, moved, union};
+    #[pymodule_export]
+    use crate::document::CoreDocument;
     #[pymodule_export]
     use crate::field::CoreField;
     #[pymodule_export]
@@ -26,6 +33,8 @@ mod _isoclay {
     use crate::mesh::{mesh_of, write_mesh};
     #[pymodule_export]
     use crate::run::CancelToken;
+    #[pymodule_export]
+    use crate::simulation::CoreSimulation;
 
     use pyo3::prelude::*;
 

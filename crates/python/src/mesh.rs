@@ -12,10 +12,9 @@ use formats::meshes::Mesh as Written;
 use glam::{DAffine3, DVec3};
 use numpy::PyArray2;
 use pyo3::prelude::*;
-use tools::malleable::Malleable;
 
 use crate::arrays::{corners, points, rows, vectors};
-use crate::field::{CoreField, either, unit_of};
+use crate::field::{CoreField, unit_of};
 use crate::run::{Wishes, brief, run};
 
 /// How fine the triangles are to be; one of them, or as fine as the fit.
@@ -44,10 +43,6 @@ pub fn mesh_of<'py>(
     let field = Arc::clone(&core.solid);
     let grids = core.grids;
     let (meta, report) = (core.meta.clone(), core.report.clone());
-    let slope = match &core.levels {
-        Some(levels) => either!(levels, f => f.steepness()),
-        None => 1.0,
-    };
     let (mesh, notes) = run(py, &wishes, move |control| {
         let mut notes = Vec::new();
         if let Some(n) = fine.resolution {
@@ -70,7 +65,7 @@ pub fn mesh_of<'py>(
             field: &*field,
             lattice: &grids.lattice,
             levels: grids.levels,
-            slope,
+            slope: grids.slope,
             meta: &meta,
             report: &report,
             iso,

@@ -25,7 +25,7 @@ fn threshold<N: Number>(values: &[N]) -> Option<f64> {
     }
     let mut histogram = [0u64; BINS];
     for &v in values {
-        let bin = ((f64::from(v.into()) - low) / width).clamp(0.0, (BINS - 1) as f64);
+        let bin = ((f64::from(v.float()) - low) / width).clamp(0.0, (BINS - 1) as f64);
         histogram[bin as usize] += 1;
     }
     let total = values.len() as f64;

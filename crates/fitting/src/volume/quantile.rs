@@ -26,7 +26,7 @@ fn value(ordered: u32) -> f32 {
 fn histogram<N: Number>(values: &[N], bin: impl Fn(f32) -> Option<usize> + Sync) -> Vec<usize> {
     let count = |chunk: &[N]| {
         let mut h = vec![0_u32; BINS];
-        for b in chunk.iter().filter_map(|&v| bin(v.into())) {
+        for b in chunk.iter().filter_map(|&v| bin(v.float())) {
             h[b] += 1;
         }
         h

@@ -193,7 +193,7 @@ fn extremes<N: Number>(values: &[N]) -> (f32, f32, usize) {
         .par_chunks(1 << 16)
         .map(|chunk| {
             chunk.iter().fold(start, |(lo, hi, odd), &v| {
-                let v: f32 = v.into();
+                let v = v.float();
                 let bad = usize::from(!v.is_finite());
                 (
                     if v < lo { v } else { lo },

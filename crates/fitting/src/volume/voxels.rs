@@ -34,10 +34,24 @@ impl<'a> From<&'a Vec<f32>> for Voxels<'a> {
 }
 
 /// A number that a voxel may be stored as.
-pub(crate) trait Number: Copy + Into<f32> + Sync {}
+pub(crate) trait Number: Copy + Sync {
+    /// The same number as a float.
+    fn float(self) -> f32;
+}
 
-impl Number for f32 {}
-impl Number for i16 {}
+impl Number for f32 {
+    #[inline(always)]
+    fn float(self) -> f32 {
+        self
+    }
+}
+
+impl Number for i16 {
+    #[inline(always)]
+    fn float(self) -> f32 {
+        f32::from(self)
+    }
+}
 
 /// Asks the numbers of either type.
 macro_rules! each {
@@ -65,10 +79,10 @@ impl Voxels<'_> {
     #[inline(always)]
     pub(crate) fn at(&self, dims: [usize; 3], [x, y, z]: [usize; 3]) -> f32 {
         let [nx, ny, nz] = dims;
-        each!(self, values, order => f32::from(values[match order {
+        each!(self, values, order => values[match order {
             Order::XFastest => x + nx * (y + ny * z),
             Order::ZFastest => z + nz * (y + ny * x),
-        }]))
+        }].float())
     }
 
     /// Voxels `(0.., y, z)` times `scale`.
@@ -79,12 +93,12 @@ impl Voxels<'_> {
             Order::XFastest => {
                 let start = (z * ny + y) * nx;
                 for (o, &v) in out.iter_mut().zip(&values[start..start + nx]) {
-                    *o = T::from_f64(f64::from(v)) * scale;
+                    *o = T::from_f64(f64::from(v.float())) * scale;
                 }
             }
             Order::ZFastest => {
                 for (o, &v) in out.iter_mut().zip(values[z + nz * y..].iter().step_by(nz * ny)) {
-                    *o = T::from_f64(f64::from(v)) * scale;
+                    *o = T::from_f64(f64::from(v.float())) * scale;
                 }
             }
         })

@@ -12,16 +12,22 @@ Long work leaves the interpreter free, hears Ctrl-C, tells its progress, and giv
 """
 
 from . import errors
+from ._document import Document, Edit
+from ._field import REASONS, Field, difference, intersection, union
 from ._fit import fit, fit_mesh, fit_points, fit_volume
 from ._isoclay import CancelToken, __version__
-from ._field import REASONS, Field, difference, intersection, union
 from ._mesh import Mesh
+from ._simulation import Region, Simulation
 
 __all__ = [
     "REASONS",
     "CancelToken",
+    "Document",
+    "Edit",
     "Field",
     "Mesh",
+    "Region",
+    "Simulation",
     "__version__",
     "difference",
     "errors",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import html
 import json
 from typing import Any, cast
@@ -11,6 +12,7 @@ import numpy.typing as npt
 
 from . import _inputs, _isoclay
 from ._mesh import Mesh
+from ._picture import drawn, png
 from ._wishes import PathLike, Progress, Tolerance, tolerance as parsed, wishes
 
 Array = npt.NDArray[np.float64]
@@ -191,6 +193,24 @@ class Field:
             raise ValueError(f"the field names no surface; choose iso= between {low:g} and {high:g}")
         return float(iso)
 
+    def baked(
+        self,
+        tolerance: float | None = None,
+        *,
+        everywhere: bool = False,
+        threads: int | None = None,
+        progress: Progress | None = None,
+        cancel: _isoclay.CancelToken | None = None,
+    ) -> Field:
+        """One spline in place of a formula, which can be saved and sculpted.
+
+        Args:
+            tolerance: How far it may be off: a length at the surface, elsewhere it has the right sign; or if ``everywhere`` a
+                value at any place. A fiftieth of the finest knot interval if not given.
+        """
+        asked = wishes(threads, None, progress, cancel)
+        return Field(self._core.baked(self._level(None), tolerance, everywhere, asked))
+
     # What it is
 
     @property
@@ -304,8 +324,18 @@ class Field:
         kind = "a formula" if self.is_formula else f"a {self.source}"
         return f"<isoclay.Field of {kind}: {', '.join(parts)}>"
 
+    def picture(
+        self, size: int = 320, *, toward: npt.ArrayLike = (0.5, 0.35, 1.0), up: npt.ArrayLike = (0.0, 1.0, 0.0)
+    ) -> npt.NDArray[np.uint8]:
+        """The solid as seen from the direction ``toward``, with ``up`` upwards: ``(size, size, 3)`` colours."""
+        return drawn(self, self._level(None), size, np.asarray(toward, float), np.asarray(up, float))
+
+    def _repr_png_(self) -> bytes | None:
+        """A picture, for notebooks."""
+        return None if self.iso is None else png(self.picture())
+
     def _repr_html_(self) -> str:
-        """A table of figures, for notebooks."""
+        """A table of figures with a picture, for notebooks."""
         report = self.report
         shown = [("box", " to ".join(str(np.round(corner, 4).tolist()) for corner in self.box))]
         shown += [("unit", self.unit or "unknown"), ("iso", "none" if self.iso is None else f"{self.iso:.6g}")]
@@ -313,7 +343,12 @@ class Field:
             shown.append(("coefficients", f"{self.coefficient_count:,}".replace(",", " ")))
         shown += [(name, f"{report[name]:.4g}") for name in ("rms", "p95", "max", "tolerance") if name in report]
         rows = "".join(f"<tr><th>{html.escape(k)}</th><td>{html.escape(v)}</td></tr>" for k, v in shown)
-        return f"<table><caption>isoclay field of {html.escape(self.source)}</caption>{rows}</table>"
+        picture = self._repr_png_()
+        shown_picture = ""
+        if picture is not None:
+            data = base64.b64encode(picture).decode("ascii")
+            shown_picture = f'<img alt="picture of the solid" src="data:image/png;base64,{data}">'
+        return f"<div>{shown_picture}<table><caption>isoclay field of {html.escape(self.source)}</caption>{rows}</table></div>"
 
 
 def _mm(unit: str | None) -> float:

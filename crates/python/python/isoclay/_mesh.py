@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -50,12 +51,8 @@ class Mesh:
 
     def to_trimesh(self) -> Any:
         """A ``trimesh.Trimesh`` of the same vertices; needs trimesh."""
-        import trimesh
-
-        return trimesh.Trimesh(self.vertices, self.triangles, process=False)
+        return import_module("trimesh").Trimesh(self.vertices, self.triangles, process=False)
 
     def to_pyvista(self) -> Any:
         """A ``pyvista.PolyData`` of the same vertices; needs pyvista."""
-        import pyvista
-
-        return pyvista.PolyData.from_regular_faces(self.vertices, self.triangles)
+        return import_module("pyvista").PolyData.from_regular_faces(self.vertices, self.triangles)

@@ -55,9 +55,9 @@ def choice(
     """What may be chosen of any fit, as the Rust side reads it."""
     if precision not in ("f32", "f64"):
         raise ValueError(f"precision is {precision!r}; write 'f32' or 'f64'")
-    for name, number in (("coefficients", coefficients), ("max_depth", max_depth)):
-        if number is not None and number < 0:
-            raise ValueError(f"{name} is {number}; it has to be positive")
+    for option, count in (("coefficients", coefficients), ("max_depth", max_depth)):
+        if count is not None and count < 0:
+            raise ValueError(f"{option} is {count}; it has to be positive")
     number, tolerance_in = tolerance(tolerance_)
     arguments = {
         "tolerance": tolerance_,

@@ -30,7 +30,7 @@ class Cancelled(IsoclayError):
     """A :class:`isoclay.CancelToken` asked to stop."""
 
 
-class MemoryLimit(IsoclayError, MemoryError):
+class MemoryLimit(MemoryError, IsoclayError):
     """The work would hold more than ``memory`` allows."""
 
     def __init__(self, message: str, needed: int, limit: int) -> None:
