@@ -41,7 +41,7 @@ fn volume_fit(c: &mut Criterion) {
     let values = head(DIMS, 0.02, 1);
     let view = VolumeView {
         dims: DIMS,
-        values: &values,
+        values: (&values).into(),
         world_from_voxel: DAffine3::IDENTITY,
     };
     let mut group = c.benchmark_group("volume_fit");

@@ -2,7 +2,7 @@
 
 use bspline::{Field, HierarchicalSpline, Real};
 use fitting::phantoms::{SplitMix64, head};
-use fitting::volume::{VolumeMethod, VolumeOptions, VolumeView, fit_volume};
+use fitting::volume::{Order, VolumeMethod, VolumeOptions, VolumeView, Voxels, fit_volume, otsu_threshold};
 use fitting::{Control, FitError, FitReport, StopReason};
 use glam::{DAffine3, DMat3, DVec3};
 
@@ -28,7 +28,7 @@ fn oblique() -> DAffine3 {
 fn fit<T: Real>(dims: [usize; 3], values: &[f32], options: VolumeOptions) -> Outcome<T> {
     let view = VolumeView {
         dims,
-        values,
+        values: values.into(),
         world_from_voxel: oblique(),
     };
     fit_volume(&view, &options, &mut Control::default())
@@ -487,7 +487,7 @@ fn progress_rises_to_one() {
     let values = head(dims, 0.02, 0);
     let view = VolumeView {
         dims,
-        values: &values,
+        values: (&values).into(),
         world_from_voxel: oblique(),
     };
     for options in [
@@ -514,5 +514,40 @@ fn progress_rises_to_one() {
         assert!(fractions.windows(2).all(|w| w[0] <= w[1]), "{fractions:?}");
         assert_eq!(fractions.last(), Some(&1.0));
         assert!(fractions.len() < 400);
+    }
+}
+
+#[test]
+fn neither_type_nor_order_of_the_voxels_shows_in_a_bit() {
+    let dims = [21, 34, 17];
+    let [nx, ny, nz] = dims;
+    let whole: Vec<i16> = head(dims, 0.02, 4)
+        .iter()
+        .map(|v| (v * 1000.0) as i16 - 300)
+        .collect();
+    let turned: Vec<i16> = (0..whole.len())
+        .map(|i| whole[i / (ny * nz) + nx * (i / nz % ny + ny * (i % nz))])
+        .collect();
+    let floats = |v: &[i16]| -> Vec<f32> { v.iter().map(|&v| f32::from(v)).collect() };
+    let (whole_floats, turned_floats) = (floats(&whole), floats(&turned));
+    let stored = [
+        Voxels::F32(&whole_floats, Order::XFastest),
+        Voxels::F32(&turned_floats, Order::ZFastest),
+        Voxels::I16(&whole, Order::XFastest),
+        Voxels::I16(&turned, Order::ZFastest),
+    ];
+    for options in [VolumeOptions::default(), INTERPOLATE] {
+        let [first, others @ ..] = stored.map(|values| {
+            let view = VolumeView {
+                dims,
+                values,
+                world_from_voxel: oblique(),
+            };
+            let (field, report) = fit_volume::<f32>(&view, &options, &mut Control::default()).unwrap();
+            (field.sha256(), report, otsu_threshold(values))
+        });
+        for other in others {
+            assert_eq!(other, first);
+        }
     }
 }

@@ -17,7 +17,7 @@ fn refusal(dims: [usize; 3], values: &[f32], options: VolumeOptions) -> FitError
     fit_volume::<f32>(
         &VolumeView {
             dims,
-            values,
+            values: values.into(),
             world_from_voxel: DAffine3::IDENTITY,
         },
         &options,
@@ -62,7 +62,7 @@ fn map_that_cannot_be_inverted_is_refused() {
     let flat = DAffine3::from_scale(DVec3::new(1.0, 0.0, 1.0));
     let view = VolumeView {
         dims: [2, 2, 2],
-        values: &[0.0; 8],
+        values: (&[0.0; 8][..]).into(),
         world_from_voxel: flat,
     };
     let result = fit_volume::<f32>(&view, &VolumeOptions::default(), &mut Control::default());
@@ -131,7 +131,7 @@ fn memory_ceiling_is_obeyed() {
     let values = head(dims, 0.0, 0);
     let view = VolumeView {
         dims,
-        values: &values,
+        values: (&values).into(),
         world_from_voxel: DAffine3::IDENTITY,
     };
     let run = |options: VolumeOptions, limit: u64| {
@@ -169,7 +169,7 @@ fn cancelled_fit_stops_at_once() {
     let values = head(dims, 0.02, 0);
     let view = VolumeView {
         dims,
-        values: &values,
+        values: (&values).into(),
         world_from_voxel: DAffine3::IDENTITY,
     };
     for options in [VolumeOptions::default(), INTERPOLATE] {

@@ -45,15 +45,6 @@ fn that_matter(arguments: impl Iterator<Item = String>) -> Vec<String> {
     kept
 }
 
-/// Whether a field says that it was fitted to a mesh.
-pub fn is_of_mesh(open: &OpenField) -> bool {
-    stored(open)["input_kind"] == "mesh"
-}
-
-fn stored(open: &OpenField) -> Value {
-    serde_json::from_str(&open.meta().provenance).unwrap_or_default()
-}
-
 /// Refuses an input that `open` was not fitted to, as far as the field tells.
 ///
 /// # Errors

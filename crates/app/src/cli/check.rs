@@ -268,7 +268,7 @@ fn measure_volume(open: &OpenField, volume: &Volume, pictures: bool) -> Outcome<
     let header = &volume.header;
     let view = VolumeView {
         dims: header.dims,
-        values: &volume.values,
+        values: (&volume.values).into(),
         world_from_voxel: header.world_from_voxel,
     };
     let own = either!(open.levels()?, f => fitting::volume::measure_volume(f, &view))?;

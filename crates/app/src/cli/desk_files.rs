@@ -3,7 +3,7 @@
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-use document::{Document, Object, State};
+use document::{Document, Object, State, with_report};
 use etcetera::BaseStrategy;
 use fitting::{Cancel, Control, FitReport};
 use formats::field::{FieldMeta, SourceKind};
@@ -17,7 +17,6 @@ use super::ceiling::of_another;
 use super::document::{self as on_documents, new};
 use super::failure::{Failure, Outcome};
 use super::quantity::{Memory, human_bytes};
-use super::report::with_report;
 use super::source::{FIELDS, Source, scratch};
 
 /// Told the stage and the share done.

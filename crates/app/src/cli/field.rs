@@ -13,7 +13,6 @@ use tools::malleable::Malleable;
 use super::failure::{Failure, Outcome};
 use super::input::limits;
 use super::output::Output;
-use super::report;
 use super::source::{FIELDS, Source};
 use super::summary::hex;
 
@@ -139,7 +138,7 @@ impl OpenField {
             Solid::Levels(field) => either!(field, f => f.coefficient_count()),
             Solid::Knots(field) => field.coefficients().len(),
         };
-        let report = report::read(&meta, coefficients)
+        let report = document::read_report(&meta, coefficients)
             .map_err(|why| Failure::input(format!("{}: {why}", source.name())))?;
         Ok(Self {
             placement,
@@ -374,7 +373,7 @@ fn not_loaded(source: &Source, e: FormatError) -> Failure {
 
 /// Writes a fitted field; returns its SHA-256.
 pub fn save(output: &Output, field: &AnyField, report: &FitReport, meta: FieldMeta) -> Outcome<String> {
-    let meta = report::with_report(meta, report);
+    let meta = document::with_report(meta, report);
     either!(field, f => save_as(output, f, &meta))
 }
 

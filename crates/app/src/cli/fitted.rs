@@ -2,8 +2,9 @@
 
 use std::num::NonZeroUsize;
 
+use document::Solve;
 use fitting::mesh::{MeshDefects, MeshOptions, fit_mesh};
-use fitting::points::{NormalForm, OrientedPoints, PointOptions, fit_points};
+use fitting::points::{NormalForm, PointOptions, fit_points};
 use fitting::volume::{VolumeMethod, VolumeOptions, VolumeView, fit_volume, otsu_threshold};
 use fitting::{Control, FitError, FitReport, StopReason};
 use formats::Unit;
@@ -19,7 +20,6 @@ use super::fit_choice::{Choice, Method, Precision};
 use super::flags;
 use super::input::{Input, bounding_box};
 use super::quantity::{Tolerance, human_number};
-use super::solves::Solve;
 use super::summary::Summary;
 use super::unoriented::Oriented;
 
@@ -174,11 +174,7 @@ fn fit_cloud<T: Stored>(cloud: &PointCloud, choice: &Choice, control: &mut Contr
         *limit = limit.saturating_sub(oriented.bytes());
     }
     let unit = stated_unit(cloud.unit, choice.unit)?;
-    let points = OrientedPoints {
-        positions: oriented.positions(),
-        normals: oriented.normals(),
-        certainty: oriented.certainty(),
-    };
+    let points = oriented.points();
     let diagonal = points.diagonal();
     let options = PointOptions {
         tolerance: choice
@@ -279,7 +275,7 @@ fn fit_voxels<T: Stored>(volume: &Volume, choice: &Choice, control: &mut Control
     let unit = stated_unit(header.unit, choice.unit)?;
     let view = VolumeView {
         dims: header.dims,
-        values: &volume.values,
+        values: (&volume.values).into(),
         world_from_voxel: header.world_from_voxel,
     };
     // Only a share of the range has to look at every voxel for it.

@@ -35,7 +35,7 @@ pub fn fault(fault: &Fault) -> String {
 }
 
 /// What the fitting library advises, and the option for it.
-const ADVICE: [(&str, &str); 7] = [
+const ADVICE: [(&str, &str); 10] = [
     ("fit them by the robust loss", "--robust"),
     ("fit it as a cloud", "--as cloud"),
     ("a mesh can be trimmed there", "isoclay mesh --trim"),
@@ -49,6 +49,9 @@ const ADVICE: [(&str, &str); 7] = [
         "raise the coefficients and the depth allowed",
         "--coefficients, --max-depth",
     ),
+    ("triangles are made for that", "finer: --tolerance, --triangles"),
+    ("raise the tolerance", "--tolerance"),
+    ("allow more triangles", "--triangles"),
 ];
 
 /// `text` with the option behind each piece of advice.

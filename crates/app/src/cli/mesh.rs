@@ -9,7 +9,7 @@ use formats::field::SourceKind;
 use super::cost::Cost;
 use super::failure::{Failure, Outcome};
 use super::field::{FieldArgs, OpenField};
-use super::fineness::{Adaptive, Fineness, failed, watch};
+use super::fineness::{self, Fineness, failed, of_tolerance, watch};
 use super::mesh_check::MeshQuality;
 use super::mesh_output::{MESHES, MeshOutput};
 use super::output::Output;
@@ -109,13 +109,15 @@ pub fn run(args: &Args) -> Outcome {
         }
         None => {
             let fineness = match (args.tolerance, args.triangles) {
-                (Some(tolerance), _) => Fineness::Error(tolerance),
+                (Some(tolerance), _) => of_tolerance(tolerance, &open)?,
                 (_, Some(most)) => Fineness::Triangles(most),
                 _ => Fineness::OfTheFit,
             };
             let (field, levels, iso) = (open.field(), open.level_count(), options.iso);
-            let mut adaptive = Adaptive::new(&open, field, levels, iso, !args.open, fineness, &cancel, &bar)?;
-            let made = adaptive.mesh(fineness, &mut notes)?;
+            let closed = !args.open;
+            let made = fineness::mesh(
+                &open, field, levels, iso, closed, fineness, &mut notes, &cancel, &bar,
+            )?;
             notes.extend(doubts(0, made.report.nan_nodes));
             (made.mesh, None)
         }

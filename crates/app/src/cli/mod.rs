@@ -52,7 +52,6 @@ mod progress;
 pub mod quantity;
 #[cfg(feature = "window")]
 mod render;
-mod report;
 mod sample;
 mod simulate;
 mod solves;

@@ -14,7 +14,7 @@ use tools::scene::{Scene, SimulateError, Simulation, StepLine};
 use super::cost::Cost;
 use super::failure::{Failure, Outcome};
 use super::field::{self, OpenField, either};
-use super::fineness::{Adaptive, Fineness};
+use super::fineness::{self, Fineness};
 use super::mesh_output::MESHES;
 use super::output::Output;
 use super::overwrite::refuse_own_input;
@@ -245,19 +245,18 @@ impl Stage<'_> {
                 "a mesh needs the density of the surface; write iso above all tables of the scene",
             ));
         };
-        let fineness = Fineness::OfTheFit;
-        let levels = field.level_count();
-        let mut adaptive = Adaptive::new(
+        let made = fineness::mesh(
             self.open,
             field,
-            levels,
+            field.level_count(),
             iso,
             true,
-            fineness,
+            Fineness::OfTheFit,
+            notes,
             self.cancel,
             &self.bar,
         )?;
-        Ok(adaptive.mesh(fineness, notes)?.mesh)
+        Ok(made.mesh)
     }
 
     /// Writes the field with what is known of the one it was made from; returns its SHA-256.

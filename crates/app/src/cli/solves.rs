@@ -1,46 +1,8 @@
-//! How the solver of a fit ended, as files, tables and JSON tell it.
+//! How the solver of a fit ended, as tables tell it.
 
-use fitting::SolverOutcome;
-use serde::{Deserialize, Serialize};
+use document::Solve;
 
 use super::quantity::human_number;
-
-/// A [`SolverOutcome`].
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub struct Solve {
-    /// Level, as `depth` counts them; none where all were solved jointly.
-    level: Option<usize>,
-    iterations: usize,
-    /// Share of the starting residual that was left.
-    residual: f64,
-    /// Share asked for; none where the number of iterations is fixed.
-    goal: Option<f64>,
-    converged: bool,
-}
-
-impl From<&SolverOutcome> for Solve {
-    fn from(s: &SolverOutcome) -> Self {
-        Self {
-            level: s.depth,
-            iterations: s.iterations,
-            residual: s.residual,
-            goal: s.goal,
-            converged: s.is_converged,
-        }
-    }
-}
-
-impl From<Solve> for SolverOutcome {
-    fn from(s: Solve) -> Self {
-        Self {
-            depth: s.level,
-            iterations: s.iterations,
-            residual: s.residual,
-            goal: s.goal,
-            is_converged: s.converged,
-        }
-    }
-}
 
 /// One short row: how often was solved, with how many iterations, and what did not converge.
 pub fn row(solves: &[Solve]) -> Option<String> {

@@ -1,5 +1,6 @@
 use std::io::{self, Write};
 
+use document::Solve;
 use serde::Serialize;
 
 use super::cost::{self, Cost};
@@ -8,7 +9,7 @@ use super::keep::LeftOut;
 use super::mesh_check::MeshQuality;
 use super::output::Output;
 use super::quantity::{human_bytes, human_count, human_number};
-use super::solves::{self, Solve};
+use super::solves;
 
 /// What a subcommand tells when it is done: one JSON object, or a table. Fields that do not apply stay `None` and
 /// are left out.

@@ -7,6 +7,7 @@
 mod band;
 mod cloud;
 mod confidence;
+mod estimated;
 pub(crate) mod kernel;
 mod local;
 mod outliers;
@@ -21,6 +22,7 @@ use glam::DVec3;
 use crate::{Control, FitError};
 use cloud::Cloud;
 pub use confidence::leaf_confidence;
+pub use estimated::EstimatedCloud;
 use kernel::{Gradient, Target};
 use surface::{Surface, total};
 use tree::Tree;

@@ -327,7 +327,7 @@ mod tests {
 
     fn started<'a, T: Real>(domain: &'a Domain<T>, values: &'a [f32]) -> Adaptive<'a, T> {
         let samples = Samples {
-            values,
+            values: values.into(),
             dims: DIMS,
             scale: T::one(),
         };

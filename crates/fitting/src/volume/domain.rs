@@ -4,6 +4,7 @@ use bspline::Real;
 
 use super::axis::Axis;
 use super::rows::{FiveTaps, Phases};
+use super::voxels::Voxels;
 
 /// Planes of the finest level that one task works on. Fixed, so that no result depends on the thread count;
 /// 48 planes cost 8 % of repeated halo work, and a volume of 181 planes gives four tasks. A multiple of
@@ -65,7 +66,7 @@ impl<T: Real> Domain<T> {
 /// Voxel values of the caller, scaled by a power of two and continued by the edge value into the padding.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Samples<'a, T> {
-    pub values: &'a [f32],
+    pub values: Voxels<'a>,
     pub dims: [usize; 3],
     /// Power of two that brings the largest magnitude into `[1/2, 1)`: squares neither overflow nor vanish.
     pub scale: T,
@@ -76,11 +77,9 @@ impl<T: Real> Samples<'_, T> {
     #[inline(always)]
     pub fn row(&self, y: usize, z: usize, out: &mut [T]) {
         let [nx, ny, nz] = self.dims;
-        let start = (z.min(nz - 1) * ny + y.min(ny - 1)) * nx;
         let (inside, beyond) = out.split_at_mut(nx);
-        for (o, &v) in inside.iter_mut().zip(&self.values[start..start + nx]) {
-            *o = T::from_f64(f64::from(v)) * self.scale;
-        }
+        self.values
+            .row(self.dims, y.min(ny - 1), z.min(nz - 1), self.scale, inside);
         beyond.fill(inside[nx - 1]);
     }
 }

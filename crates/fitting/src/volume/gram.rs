@@ -172,7 +172,7 @@ mod tests {
             // -f at the samples is the residual of data that are zero.
             let zeros = vec![0.0; dims.iter().product()];
             let samples = Samples {
-                values: &zeros,
+                values: (&zeros).into(),
                 dims,
                 scale: 1.0,
             };

@@ -49,7 +49,7 @@ pub(crate) fn interpolate_voxels<T: Real>(dims: [usize; 3], values: &[f32]) -> (
     let dense = interpolating_coefficients(
         &domain,
         &Samples {
-            values,
+            values: values.into(),
             dims,
             scale: T::one(),
         },
@@ -66,7 +66,7 @@ mod tests {
     fn max_residual<T: Real>(dims: [usize; 3], values: &[f32]) -> f64 {
         let domain = Domain::<T>::new(dims, 3);
         let samples = Samples {
-            values,
+            values: values.into(),
             dims,
             scale: T::one(),
         };

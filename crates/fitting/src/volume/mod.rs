@@ -36,9 +36,11 @@ mod rows;
 mod select;
 mod tolerance;
 mod view;
+mod voxels;
 
 pub use again::{VolumeErrors, measure_volume};
 pub use fit::fit_volume;
 pub(crate) use interpolate::interpolate_voxels;
 pub use otsu::otsu_threshold;
 pub use view::{VolumeMethod, VolumeOptions, VolumeView};
+pub use voxels::{Order, Voxels};

@@ -35,9 +35,9 @@ pub(crate) fn noise_level<T: Real>(domain: &Domain<T>, samples: &Samples<T>, res
         let (x, y, z) = (i % nx, i / nx % ny, i / (nx * ny));
         let magnitude = residual[(z * py + y) * px + x].abs().as_f64() as f32;
         all.push(magnitude);
-        let value = samples.values[i];
-        let flat =
-            (x == 0 || samples.values[i - 1] == value) && (x + 1 == nx || samples.values[i + 1] == value);
+        let at = |x| samples.values.at(samples.dims, [x, y, z]);
+        let value = at(x);
+        let flat = (x == 0 || at(x - 1) == value) && (x + 1 == nx || at(x + 1) == value);
         if !flat {
             textured.push(magnitude);
         }

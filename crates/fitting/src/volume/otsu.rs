@@ -1,4 +1,5 @@
 use super::quantile::quantiles;
+use super::voxels::{Number, Voxels, each};
 
 /// Classes of the histogram.
 const BINS: usize = 256;
@@ -12,7 +13,11 @@ const BINS: usize = 256;
 ///
 /// # Panics
 /// If `values` is empty.
-pub fn otsu_threshold(values: &[f32]) -> Option<f64> {
+pub fn otsu_threshold<'a>(values: impl Into<Voxels<'a>>) -> Option<f64> {
+    each!(values.into(), values, _order => threshold(values))
+}
+
+fn threshold<N: Number>(values: &[N]) -> Option<f64> {
     let [low, high] = quantiles(values, [0.01, 0.99]).map(f64::from);
     let width = (high - low) / BINS as f64;
     if width <= 0.0 {
@@ -20,7 +25,7 @@ pub fn otsu_threshold(values: &[f32]) -> Option<f64> {
     }
     let mut histogram = [0u64; BINS];
     for &v in values {
-        let bin = ((f64::from(v) - low) / width).clamp(0.0, (BINS - 1) as f64);
+        let bin = ((f64::from(v.float()) - low) / width).clamp(0.0, (BINS - 1) as f64);
         histogram[bin as usize] += 1;
     }
     let total = values.len() as f64;
@@ -66,6 +71,6 @@ mod tests {
         let mut values: Vec<f32> = (0..1000).map(|i| if i % 3 == 0 { 10.0 } else { 90.0 }).collect();
         values[5] = 1e9;
         assert!((otsu_threshold(&values).unwrap() - 50.0).abs() < 0.5);
-        assert_eq!(otsu_threshold(&[7.0; 20]), None);
+        assert_eq!(otsu_threshold(&[7.0_f32; 20][..]), None);
     }
 }

@@ -2,6 +2,8 @@
 
 use rayon::prelude::*;
 
+use super::voxels::Number;
+
 const CHUNK: usize = 1 << 20;
 const BINS: usize = 1 << 16;
 
@@ -21,10 +23,10 @@ fn value(ordered: u32) -> f32 {
 }
 
 /// Histogram of `bin(v)` over the values for which there is one.
-fn histogram(values: &[f32], bin: impl Fn(f32) -> Option<usize> + Sync) -> Vec<usize> {
-    let count = |chunk: &[f32]| {
+fn histogram<N: Number>(values: &[N], bin: impl Fn(f32) -> Option<usize> + Sync) -> Vec<usize> {
+    let count = |chunk: &[N]| {
         let mut h = vec![0_u32; BINS];
-        for b in chunk.iter().filter_map(|&v| bin(v)) {
+        for b in chunk.iter().filter_map(|&v| bin(v.float())) {
             h[b] += 1;
         }
         h
@@ -55,7 +57,7 @@ fn bin_of_rank(histogram: &[usize], rank: usize) -> (usize, usize) {
 ///
 /// # Panics
 /// If `values` is empty.
-pub(crate) fn quantiles<const N: usize>(values: &[f32], qs: [f64; N]) -> [f32; N] {
+pub(crate) fn quantiles<N: Number, const Q: usize>(values: &[N], qs: [f64; Q]) -> [f32; Q] {
     assert!(!values.is_empty(), "no values, no quantile");
     let high = histogram(values, |v| Some((ordered(v) >> 16) as usize));
     qs.map(|q| {

@@ -227,7 +227,7 @@ mod tests {
             .map(|_| random.normal() as f32)
             .collect();
         let samples = Samples {
-            values: &values,
+            values: (&values).into(),
             dims,
             scale: 1.0,
         };

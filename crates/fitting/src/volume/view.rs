@@ -5,6 +5,7 @@ use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 
 use super::quantile::quantiles;
+use super::voxels::{Number, Voxels, each};
 use crate::FitError;
 
 /// Largest magnitude that can be fitted: coefficients, up to 27 times a voxel, have to stay finite in `f32`.
@@ -15,8 +16,8 @@ const LARGEST: f32 = f32::MAX / 1024.0;
 pub struct VolumeView<'a> {
     /// Voxels along x, y, z.
     pub dims: [usize; 3],
-    /// Density of voxel `(x, y, z)` at `x + nx (y + ny z)`.
-    pub values: &'a [f32],
+    /// Densities, as many as there are voxels.
+    pub values: Voxels<'a>,
     /// Voxel indices (voxel centres on integers) to world.
     pub world_from_voxel: DAffine3,
 }
@@ -105,30 +106,12 @@ impl VolumeView<'_> {
                 map.to_cols_array()
             )));
         }
-        let start = (f32::INFINITY, f32::NEG_INFINITY, 0_usize);
-        let (min, max, odd) = self
-            .values
-            .par_chunks(1 << 16)
-            .map(|chunk| {
-                chunk.iter().fold(start, |(lo, hi, odd), &v| {
-                    let bad = usize::from(!v.is_finite());
-                    (
-                        if v < lo { v } else { lo },
-                        if v > hi { v } else { hi },
-                        odd + bad,
-                    )
-                })
-            })
-            .reduce(|| start, |a, b| (a.0.min(b.0), a.1.max(b.1), a.2 + b.2));
-        let place = |bad: fn(&f32) -> bool| {
-            let i = self.values.iter().position(bad).expect("counted above");
-            format!(
-                "voxel ({}, {}, {}) is {}",
-                i % nx,
-                i / nx % ny,
-                i / (nx * ny),
-                self.values[i]
-            )
+        let (min, max, odd) = each!(self.values, values, _order => extremes(values));
+        let place = |bad: fn(f32) -> bool| {
+            let at = |i| [i % nx, i / nx % ny, i / (nx * ny)];
+            let mut voxels = (0..self.values.len()).map(|i| (at(i), self.values.at(self.dims, at(i))));
+            let ([x, y, z], value) = voxels.find(|v| bad(v.1)).expect("counted above");
+            format!("voxel ({x}, {y}, {z}) is {value}")
         };
         if odd > 0 {
             return Err(FitError::Degenerate(format!(
@@ -146,7 +129,7 @@ impl VolumeView<'_> {
         Ok(Overview {
             min,
             max,
-            percentiles: quantiles(self.values, [0.01, 0.99]),
+            percentiles: each!(self.values, values, _order => quantiles(values, [0.01, 0.99])),
         })
     }
 
@@ -163,19 +146,21 @@ impl VolumeView<'_> {
     /// it is at least a hundredth of its largest value; for a constant volume, 1.
     pub(crate) fn typical_slope(&self, overview: &Overview) -> f64 {
         const PROBES: usize = 1 << 18;
-        let strides = [1, self.dims[0], self.dims[0] * self.dims[1]];
+        let [nx, ny, _] = self.dims;
         // Gradients are covectors: world gradient = inverse transpose · voxel gradient.
         let world = self.world_from_voxel.matrix3.inverse().transpose();
         let stride = self.values.len().div_ceil(PROBES);
         let mut magnitudes: Vec<f32> = (0..self.values.len())
             .step_by(stride)
             .map(|i| {
+                let voxel = [i % nx, i / nx % ny, i / (nx * ny)];
                 let difference = |a: usize| {
-                    let k = i / strides[a] % self.dims[a];
-                    let (back, ahead) = (usize::from(k > 0), usize::from(k + 1 < self.dims[a]));
-                    let steps = (back + ahead).max(1) as f64;
-                    let at = |j: usize| f64::from(self.values[j]);
-                    (at(i + ahead * strides[a]) - at(i - back * strides[a])) / steps
+                    let (mut back, mut ahead) = (voxel, voxel);
+                    back[a] = voxel[a].saturating_sub(1);
+                    ahead[a] = (voxel[a] + 1).min(self.dims[a] - 1);
+                    let steps = (ahead[a] - back[a]).max(1) as f64;
+                    let at = |voxel| f64::from(self.values.at(self.dims, voxel));
+                    (at(ahead) - at(back)) / steps
                 };
                 (world * DVec3::new(difference(0), difference(1), difference(2))).length() as f32
             })
@@ -199,6 +184,25 @@ impl VolumeView<'_> {
             1.0
         }
     }
+}
+
+/// The least and the largest number, and how many are not finite.
+fn extremes<N: Number>(values: &[N]) -> (f32, f32, usize) {
+    let start = (f32::INFINITY, f32::NEG_INFINITY, 0_usize);
+    values
+        .par_chunks(1 << 16)
+        .map(|chunk| {
+            chunk.iter().fold(start, |(lo, hi, odd), &v| {
+                let v = v.float();
+                let bad = usize::from(!v.is_finite());
+                (
+                    if v < lo { v } else { lo },
+                    if v > hi { v } else { hi },
+                    odd + bad,
+                )
+            })
+        })
+        .reduce(|| start, |a, b| (a.0.min(b.0), a.1.max(b.1), a.2 + b.2))
 }
 
 impl VolumeOptions {

@@ -36,7 +36,7 @@ pub fn head() -> Sculpture {
     let volume = volume.expect("a scan of the repository");
     let view = VolumeView {
         dims: volume.header.dims,
-        values: &volume.values,
+        values: (&volume.values).into(),
         world_from_voxel: volume.header.world_from_voxel,
     };
     let fitted = fit_volume(&view, &VolumeOptions::default(), &mut Control::default());

@@ -55,8 +55,8 @@ pub struct StepLine {
 }
 
 /// A scene on its field.
-pub struct Simulation<'a, T> {
-    scene: &'a Scene,
+pub struct Simulation<T> {
+    scene: Scene,
     /// The field without the changes of the region since it was cut out or let go.
     field: HierarchicalSpline<T>,
     region: Region<T>,
@@ -86,13 +86,13 @@ const ROUNDING: f64 = 1e-9;
 /// Share of the energy that an adaptive step may create.
 const ENERGY_GAIN: f64 = 0.01;
 
-impl<'a, T: Real> Simulation<'a, T> {
+impl<T: Real> Simulation<T> {
     /// The scene at its start. `iso` is the density of the field's surface; `layers` are what is painted on the field.
     ///
     /// # Errors
     /// [`SimulateError::Scene`].
     pub fn new(
-        scene: &'a Scene,
+        scene: &Scene,
         field: HierarchicalSpline<T>,
         iso: Option<f64>,
         layers: &Layers,
@@ -123,7 +123,7 @@ impl<'a, T: Real> Simulation<'a, T> {
             time: 0.0,
             next_dt: scene.time.step.0,
             work: 0.0,
-            scene,
+            scene: scene.clone(),
             field,
             region,
             samples,
@@ -225,7 +225,7 @@ impl<'a, T: Real> Simulation<'a, T> {
                 left
             };
         }
-        let scene = self.scene;
+        let scene = &self.scene;
         let whens = scene.pull.iter().map(|p| &p.when);
         let whens = whens
             .chain(scene.force.iter().map(|f| &f.when))

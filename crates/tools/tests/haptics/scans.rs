@@ -34,7 +34,7 @@ fn head(options: VolumeOptions) -> Scan {
     let volume = formats::volumes::read(&data("head.nii.gz"), &as_it_is, &limits).unwrap();
     let view = VolumeView {
         dims: volume.header.dims,
-        values: &volume.values,
+        values: (&volume.values).into(),
         world_from_voxel: volume.header.world_from_voxel,
     };
     Scan {

@@ -1,6 +1,6 @@
 use std::path::PathBuf;
 
-use document::{Document, Object, State};
+use document::{Document, Object, State, with_report};
 use fitting::{Cancel, FitReport};
 use formats::Unit;
 use formats::field::{AnyField, FieldMeta, SourceKind};
@@ -17,7 +17,6 @@ use crate::cli::field::OpenField;
 use crate::cli::interrupt;
 use crate::cli::progress::Bar;
 use crate::cli::quantity::{finite, positive};
-use crate::cli::report::with_report;
 use crate::cli::source::{FIELDS, Source};
 use crate::cli::volume_choice::{Length, OneOrThree};
 

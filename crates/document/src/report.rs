@@ -1,11 +1,9 @@
 //! Reports of fits as they stand in field files.
 
 use fitting::orient::Route;
-use fitting::{FitReport, Leaf, SignReport, StopReason};
+use fitting::{FitReport, Leaf, SignReport, SolverOutcome, StopReason};
 use formats::field::{FieldMeta, LeafRecord};
 use serde::{Deserialize, Serialize};
-
-use super::solves::Solve;
 
 /// The figures of a [`FitReport`]; leaves and notes have places of their own.
 #[derive(Serialize, Deserialize)]
@@ -37,8 +35,47 @@ struct Signs {
     unsure_count: usize,
 }
 
+/// A [`SolverOutcome`], as files and JSON tell it.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct Solve {
+    /// Level, as `depth` counts them; none where all were solved jointly.
+    pub level: Option<usize>,
+    /// Iterations done.
+    pub iterations: usize,
+    /// Share of the starting residual that was left.
+    pub residual: f64,
+    /// Share asked for; none where the number of iterations is fixed.
+    pub goal: Option<f64>,
+    /// Whether what was asked for was reached.
+    pub converged: bool,
+}
+
+impl From<&SolverOutcome> for Solve {
+    fn from(s: &SolverOutcome) -> Self {
+        Self {
+            level: s.depth,
+            iterations: s.iterations,
+            residual: s.residual,
+            goal: s.goal,
+            converged: s.is_converged,
+        }
+    }
+}
+
+impl From<Solve> for SolverOutcome {
+    fn from(s: Solve) -> Self {
+        Self {
+            depth: s.level,
+            iterations: s.iterations,
+            residual: s.residual,
+            goal: s.goal,
+            is_converged: s.converged,
+        }
+    }
+}
+
 /// What a file says of a fit with that many coefficients, or why it cannot be read.
-pub fn read(meta: &FieldMeta, coefficients: usize) -> Result<FitReport, String> {
+pub fn read_report(meta: &FieldMeta, coefficients: usize) -> Result<FitReport, String> {
     let figures: Figures = serde_json::from_str(&meta.report)
         .map_err(|e| format!("its fit report cannot be read ({e}); fit the input again"))?;
     let leaves: Option<Vec<Leaf>> = meta.leaves.iter().map(leaf).collect();
