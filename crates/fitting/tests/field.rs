@@ -437,9 +437,10 @@ fn a_push_is_written_into_a_scan() {
 #[test]
 fn densities_are_met_at_every_voxel_off_the_crease() {
     let dims = [40, 44, 36];
+    let voxels = head(dims, 0.0, 1);
     let view = VolumeView {
         dims,
-        values: (&head(dims, 0.0, 1)).into(),
+        values: (&voxels).into(),
         world_from_voxel: DAffine3::from_scale(DVec3::new(4.0, 4.0, 5.0)),
     };
     let (onto, _): (HierarchicalSpline<f32>, _) =
