@@ -21,7 +21,7 @@ def main(out: Path) -> None:
 
         # %% One volume, in blocks; a zarr or dask array goes in the same way, read by the workers
         voxels = np.asarray(image.dataobj)
-        field = fit_volume_blocks(voxels, image.affine, client=client, tolerance="2%", block=96)
+        field = fit_volume_blocks(voxels, image.affine, client=client, tolerance="2%", block=64)
         print(field, field.report["rms"], field.notes)
         field.save(out / "head-blocks.iclay")
         field.mesh(triangles=20_000).save(out / "head-blocks.ply")

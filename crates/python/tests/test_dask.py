@@ -42,8 +42,8 @@ def test_many_files_are_fitted_and_bad_ones_named(client, data, tmp_path):
     assert isinstance(outcomes[2].error, isoclay.errors.BadFile)
     assert outcomes[0].sha256 == isoclay.fit(data / "bunny.obj.gz").sha256
     assert isoclay.Field.load(outcomes[1].saved).sha256 == outcomes[1].sha256
-    here = isoclay_dask._mapped(None, isoclay_dask._outcome, [(str(paths[1]), None, {})], 0)
-    assert [o.sha256 for o in here] == [outcomes[1].sha256]
+    here = isoclay_dask._Here().submit(isoclay_dask._outcome, str(paths[1]), None, {})
+    assert here.field.sha256 == here.sha256 == outcomes[1].sha256
 
 
 def test_blocks_interpolate_as_one_piece(client, volume):

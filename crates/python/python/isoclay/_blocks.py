@@ -1,12 +1,16 @@
-"""Fits of volumes block by block. The functions that workers run take and give plain values."""
+"""Fits of volumes block by block.
+
+A fit of a block gives up what it knows of the halo and keeps the functions and leaves of its own block; such fields add up. So
+what a worker holds is a block with its halo, and the functions of the blocks round it.
+"""
 
 from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +21,6 @@ from ._fit import fit_volume
 from ._wishes import tolerance as parsed
 
 Doubles: TypeAlias = npt.NDArray[np.float64]
-Run: TypeAlias = Callable[[Callable[..., Any], Sequence[tuple[Any, ...]]], Iterable[Any]]
 
 LEAF = 4
 """Voxels along the cell that errors are told of."""
@@ -28,6 +31,16 @@ ROUNDS = 3
 """Rounds of repair at most: the first mends what two blocks chose differently, the next what that left."""
 REACH = 2
 """Voxels round a leaf whose functions reach well into it."""
+
+
+class Runner(Protocol):
+    """Where work is done."""
+
+    def submit(self, work: Callable[..., Any], *arguments: Any) -> Any:
+        """Begins a piece of work. What it gives may be an argument of others, in lists too."""
+
+    def gather(self, handles: list[Any]) -> list[Any]:
+        """What pieces of work gave, in their order."""
 
 
 @dataclass(frozen=True)
@@ -106,9 +119,36 @@ class Block:
     origin: tuple[int, int, int]
     end: tuple[int, int, int]
 
-    def part(self, field: Field, mask: npt.NDArray[np.uint8] | None = None) -> dict[str, Any]:
-        """What is taken of a fit, for ``join_blocks``."""
-        return {"field": field._core, "origin": self.origin, "low": self.low, "high": self.high, "mask": mask}
+    def is_near(self, other: Block, reach: int) -> bool:
+        """Whether another block begins within a reach of what is read for this one."""
+        spans = zip(self.origin, self.end, other.low, other.high, strict=True)
+        return all(low < end + reach and high > origin - reach for origin, end, low, high in spans)
+
+
+def own_part(
+    plan: Plan, block: Block, field: Field, tolerance: float, mask: npt.NDArray[np.uint8] | None = None
+) -> Field:
+    """Of a fit of a block with its halo the functions and leaves of the block, in the grids of the whole volume."""
+    part = {"field": field._core, "origin": block.origin, "low": block.low, "high": block.high, "mask": mask}
+    return _joined(plan, None, [part], tolerance, None)
+
+
+def added(plan: Plan, base: Field | None, fields: list[Field], tolerance: float, iso: float | None) -> Field:
+    """The sum of fields in the grids of the whole volume; leaves are those of the base, if there is one."""
+    whole = {"origin": (0, 0, 0), "low": (0, 0, 0), "high": plan.shape, "mask": None}
+    return _joined(plan, base, [{"field": field._core, **whole} for field in fields], tolerance, iso)
+
+
+def _joined(
+    plan: Plan, base: Field | None, parts: list[dict[str, Any]], tolerance: float, iso: float | None
+) -> Field:
+    story = {
+        "program": f"isoclay {_isoclay.__version__} (Python)",
+        "input_kind": "volume",
+        "arguments": {"block": plan.block, "halo": plan.halo, "method": plan.method, "tolerance": tolerance},
+    }
+    core, rows = None if base is None else base._core, plan.affine[:3].tolist()
+    return Field(_isoclay.join_blocks(core, parts, plan.shape, rows, tolerance, iso, plan.unit, json.dumps(story)))
 
 
 def histogram(plan: Plan, block: Block) -> tuple[npt.NDArray[np.int64], int]:
@@ -152,16 +192,18 @@ def noise(plan: Plan, block: Block) -> float:
 
 
 def block_fitted(plan: Plan, block: Block, tolerance: float) -> Field:
-    """The fit of a block with its halo."""
+    """What the fit of a block with its halo says of the block."""
     options: dict[str, Any] = {"method": "interpolate"} if plan.method == "interpolate" else {"tolerance": tolerance}
-    return fit_volume(plan.read(block), plan.affine_at(block.origin), threads=plan.threads, **options)
+    field = fit_volume(plan.read(block), plan.affine_at(block.origin), threads=plan.threads, **options)
+    return own_part(plan, block, field, tolerance)
 
 
 def block_measured(
-    plan: Plan, block: Block, field: Field, tolerance: float | None
-) -> tuple[Doubles, Doubles, Field | None, npt.NDArray[np.uint8] | None]:
-    """Root mean square and largest residual of each leaf of a block; and where leaves exceed the tolerance, a fit that takes
-    the residual away, with the functions of it that are needed."""
+    plan: Plan, block: Block, fields: list[Field], tolerance: float, mend: bool
+) -> tuple[Doubles, Doubles, Field | None]:
+    """Root mean square and largest residual of each leaf of a block, of the sum of the fields near it; and where leaves exceed
+    the tolerance, functions to add that take the residual away there."""
+    field = added(plan, None, fields, tolerance, None)
     array = plan.read(block)
     affine = plan.affine_at(block.origin)
     residual = array.astype(np.float64) - field.sample(affine=affine, shape=array.shape, threads=plan.threads)[0]
@@ -180,8 +222,8 @@ def block_measured(
         slice((block.low[a] - block.origin[a]) // LEAF, _own_end(block, a, plan.shape[a], len(starts[a])))
         for a in range(3)
     )
-    if tolerance is None or not (rms > tolerance).any():
-        return rms[own], largest[own], None, None
+    if not mend or not (rms > tolerance).any():
+        return rms[own], largest[own], None
     bad = rms > tolerance
     for axis in range(3):
         lengths = np.diff([*starts[axis], residual.shape[axis]])
@@ -197,7 +239,17 @@ def block_measured(
             wide[tuple(back)] |= mask[tuple(ahead)]
         mask = wide
     detail = fit_volume(residual.astype(np.float32), affine, method="interpolate", threads=plan.threads)
-    return rms[own], largest[own], detail, mask.astype(np.uint8)
+    return rms[own], largest[own], own_part(plan, block, detail, tolerance, mask.astype(np.uint8))
+
+
+def detail_of(measured: tuple[Doubles, Doubles, Field | None]) -> Field | None:
+    """What a measurement asks to add."""
+    return measured[2]
+
+
+def errors_of(measured: tuple[Doubles, Doubles, Field | None]) -> tuple[Doubles, Doubles, bool]:
+    """What a measurement found, and whether it asks to add something."""
+    return measured[0], measured[1], measured[2] is not None
 
 
 def _own_end(block: Block, axis: int, whole: int, count: int) -> int:
@@ -205,58 +257,51 @@ def _own_end(block: Block, axis: int, whole: int, count: int) -> int:
 
 
 def blocks_fitted(
-    plan: Plan,
-    tolerance: float | str | None,
-    run: Run,
-    share: Callable[[Field], Any],
-    progress: Callable[[str, float], object],
+    plan: Plan, tolerance: float | str | None, runner: Runner, progress: Callable[[str, float], object]
 ) -> Field:
     """The field of the whole volume."""
     progress("looking at the volume", 0.0)
     counts, odd = np.zeros(BINS, np.int64), 0
-    for part, bad in run(histogram, [(plan, block) for block in plan.blocks(0)]):
+    for part, bad in runner.gather([runner.submit(histogram, plan, block) for block in plan.blocks(0)]):
         counts += part
         odd += bad
     if odd:
         raise ValueError(f"{odd} voxels are not finite; replace them, for example by the value of air, before fitting")
     span, iso = overview(counts)
     blocks = plan.blocks(plan.halo)
-    wanted = _tolerance(plan, tolerance, span, blocks, run, progress)
+    wanted = _tolerance(plan, tolerance, span, blocks, runner, progress)
     progress("fitting blocks", 0.1)
-    fields = run(block_fitted, [(plan, block, wanted) for block in blocks])
-    parts = [block.part(field) for block, field in zip(blocks, fields, strict=True)]
-    progress("joining", 0.6)
-    story = {
-        "program": f"isoclay {_isoclay.__version__} (Python)",
-        "input_kind": "volume",
-        "arguments": {"blocks": plan.block, "halo": plan.halo, "method": plan.method, "tolerance": tolerance},
-    }
-
-    def joined(base: Field | None, parts: list[dict[str, Any]]) -> Field:
-        core = None if base is None else base._core
-        rows = plan.affine[:3].tolist()
-        return Field(
-            _isoclay.join_blocks(core, parts, plan.shape, rows, wanted, iso, plan.unit, json.dumps(story))
-        )
-
-    field = joined(None, parts)
-    del parts
+    fits = [runner.submit(block_fitted, plan, block, wanted) for block in blocks]
     notes = [f"put together from {len(blocks)} blocks of {plan.block} voxels with a halo of {plan.halo}"]
     if plan.method == "interpolate":
+        field = added(plan, None, runner.gather(fits), wanted, iso)
+        progress("done", 1.0)
         return _told(field, field.leaves["rms"], field.leaves["max"], notes)
-    repaired = plan.blocks(32)
+    measured_blocks = plan.blocks(32)
+    near = [[n for n, other in enumerate(blocks) if block.is_near(other, LEAF)] for block in measured_blocks]
+    pieces: list[list[Any]] = [[fit] for fit in fits]
+    details: list[Any] = []
     for turn in range(ROUNDS + 1):
-        progress("measuring", 0.65 + 0.08 * turn)
-        last = turn == ROUNDS
-        shared = share(field)
-        found = list(run(block_measured, [(plan, b, shared, None if last else wanted) for b in repaired]))
-        details = [b.part(d, m) for b, (_, _, d, m) in zip(repaired, found, strict=True) if d is not None]
-        if not details:
-            rms, largest = _in_place(plan, repaired, found, field)
-            progress("done", 1.0)
-            return _told(field, rms, largest, notes)
-        field = joined(field, details)
-    raise AssertionError("the last round measures alone")
+        measured = [
+            runner.submit(block_measured, plan, block, [piece for n in near[b] for piece in pieces[n]], wanted, turn < ROUNDS)
+            for b, block in enumerate(measured_blocks)
+        ]
+        found = runner.gather([runner.submit(errors_of, one) for one in measured])
+        progress("mending", 0.6 + 0.1 * turn)
+        if not any(asks for *_, asks in found):
+            break
+        more = [runner.submit(detail_of, one) if asks else None for one, (*_, asks) in zip(measured, found, strict=True)]
+        for piece, detail in zip(pieces, more, strict=True):
+            if detail is not None:
+                piece.append(detail)
+                details.append(detail)
+    progress("joining", 0.95)
+    field = added(plan, None, runner.gather(fits), wanted, iso)
+    if details:
+        field = added(plan, field, runner.gather(details), wanted, iso)
+    rms, largest = _in_place(plan, measured_blocks, found, field)
+    progress("done", 1.0)
+    return _told(field, rms, largest, notes)
 
 
 def _tolerance(
@@ -264,7 +309,7 @@ def _tolerance(
     asked: float | str | None,
     span: float,
     blocks: list[Block],
-    run: Run,
+    runner: Runner,
     progress: Callable[[str, float], object],
 ) -> float:
     if plan.method == "interpolate":
@@ -280,7 +325,7 @@ def _tolerance(
         return number * span / 100 if kind == "%" else number
     progress("estimating the noise", 0.05)
     step = -(-len(blocks) // NOISE_BLOCKS)
-    found = list(run(noise, [(plan, block) for block in blocks[::step]]))
+    found = runner.gather([runner.submit(noise, plan, block) for block in blocks[::step]])
     # As in one piece: the rms of a leaf of noise alone stays below 1.25 of it, and clean data is met to 0.5 %.
     return max(1.25 * float(np.median(found)), 0.005 * span)
 
@@ -291,7 +336,7 @@ def _in_place(
     """The errors of the blocks' leaves in the order of the field's."""
     cells = tuple(max(-(-(n - 1) // LEAF), 1) for n in plan.shape)
     rms, largest = np.zeros(cells, np.float32), np.zeros(cells, np.float32)
-    for block, (part, most, _, _) in zip(blocks, found, strict=True):
+    for block, (part, most, _) in zip(blocks, found, strict=True):
         place = tuple(slice(v // LEAF, v // LEAF + n) for v, n in zip(block.low, part.shape, strict=True))
         rms[place], largest[place] = part, most
     at = tuple(field.leaves["cell"].T)

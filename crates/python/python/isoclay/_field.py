@@ -325,10 +325,16 @@ class Field:
         return f"<isoclay.Field of {kind}: {', '.join(parts)}>"
 
     def picture(
-        self, size: int = 320, *, toward: npt.ArrayLike = (0.5, 0.35, 1.0), up: npt.ArrayLike = (0.0, 1.0, 0.0)
+        self, size: int = 320, *, toward: npt.ArrayLike | None = None, up: npt.ArrayLike | None = None
     ) -> npt.NDArray[np.uint8]:
-        """The solid as seen from the direction ``toward``, with ``up`` upwards: ``(size, size, 3)`` colours."""
-        return drawn(self, self._level(None), size, np.asarray(toward, float), np.asarray(up, float))
+        """The solid as seen from the direction ``toward``, with ``up`` upwards: ``(size, size, 3)`` colours.
+
+        Volumes are seen from the front with z upwards, all else with y upwards.
+        """
+        of_volume = self.source == "volume"
+        eye = toward if toward is not None else ((-0.5, 1.0, 0.35) if of_volume else (0.5, 0.35, 1.0))
+        upwards = up if up is not None else ((0.0, 0.0, 1.0) if of_volume else (0.0, 1.0, 0.0))
+        return drawn(self, self._level(None), size, np.asarray(eye, float), np.asarray(upwards, float))
 
     def _repr_png_(self) -> bytes | None:
         """A picture, for notebooks."""

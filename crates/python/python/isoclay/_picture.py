@@ -50,6 +50,10 @@ def drawn(
     places = np.stack([rows, columns, depth], axis=1) @ affine[:3, :3].T + affine[:3, 3]
     gradients = field.gradient(places)
     normals = -gradients / np.maximum(np.linalg.norm(gradients, axis=1, keepdims=True), 1e-30)
+    # Where the solid was cut at its box, the field's normal is not that of the cut.
+    faces = np.concatenate([places - low, high - places], axis=1)
+    cut = faces.min(axis=1) < along
+    normals[cut] = np.concatenate([-np.eye(3), np.eye(3)])[faces[cut].argmin(axis=1)]
     normals = normals @ axes.T
     sun = np.clip(normals @ (_SUN / np.linalg.norm(_SUN)), 0, 1)
     light = 0.25 + 0.2 * (normals[:, 1] + 1) + 0.65 * sun

@@ -65,8 +65,8 @@ def fit_many(
     if output is not None:
         Path(output).mkdir(parents=True, exist_ok=True)
         targets = [str(Path(output) / name) for name in _distinct(names)]
-    calls = [(name, target, {"threads": threads, **options}) for name, target in zip(names, targets, strict=True)]
-    return list(_mapped(_client(client), _outcome, calls, retries))
+    runner, chosen = _runner(_client(client), retries), {"threads": threads, **options}
+    return runner.gather([runner.submit(_outcome, *pair, chosen) for pair in zip(names, targets, strict=True)])
 
 
 def _distinct(paths: Sequence[str]) -> list[str]:
@@ -104,12 +104,31 @@ def _client(client: Any) -> Any:
         return None
 
 
-def _mapped(client: Any, work: Callable[..., Any], calls: Sequence[tuple[Any, ...]], retries: int) -> Iterable[Any]:
-    """``work`` of each call, in the order of the calls."""
-    if client is None:
-        return (work(*call) for call in calls)
-    futures = [client.submit(work, *call, retries=retries, pure=False) for call in calls]
-    return client.gather(futures)  # type: ignore[no-any-return]
+class _Here:
+    """Work done at once, by the caller."""
+
+    def submit(self, work: Callable[..., Any], *arguments: Any) -> Any:
+        return work(*arguments)
+
+    def gather(self, handles: list[Any]) -> list[Any]:
+        return handles
+
+
+class _There:
+    """Work done by the workers of a client."""
+
+    def __init__(self, client: Any, retries: int) -> None:
+        self.client, self.retries = client, retries
+
+    def submit(self, work: Callable[..., Any], *arguments: Any) -> Any:
+        return self.client.submit(work, *arguments, retries=self.retries, pure=False)
+
+    def gather(self, handles: list[Any]) -> list[Any]:
+        return list(self.client.gather(handles))
+
+
+def _runner(client: Any, retries: int) -> _Here | _There:
+    return _Here() if client is None else _There(client, retries)
 
 
 def fit_volume_blocks(
@@ -127,9 +146,9 @@ def fit_volume_blocks(
     threads: int = 1,
     progress: Callable[[str, float], object] | None = None,
 ) -> Field:
-    """Fits a volume block by block, so that no worker holds more than a block with its halo.
+    """Fits a volume block by block, so that no worker holds more than a block with its halo and the field near it.
 
-    The field is held whole by the caller, and with ``adaptive`` by each worker while errors are measured; the voxels never are.
+    The caller holds the field, never the voxels.
 
     Args:
         volume: Anything with a shape, a dtype and slices, such as an array of zarr, dask or NumPy, read by the workers.
@@ -146,16 +165,8 @@ def fit_volume_blocks(
         threads: Of each fit.
         progress: Called with a stage and the share done.
     """
-    known = _client(client)
     plan = Plan(volume, matrix(affine), order, method, block, halo, unit, threads)
-
-    def run(work: Callable[..., Any], calls: Sequence[tuple[Any, ...]]) -> Iterable[Any]:
-        return _mapped(known, work, calls, retries)
-
-    def share(field: Field) -> Any:
-        return field if known is None else known.scatter(field, hash=False)
-
-    return blocks_fitted(plan, tolerance, run, share, progress or (lambda stage, share: None))
+    return blocks_fitted(plan, tolerance, _runner(_client(client), retries), progress or (lambda stage, share: None))
 
 
 def ome_zarr(group: Any, level: int = 0) -> tuple[Any, np.ndarray[Any, Any], Literal["zyx"], str | None]:
