@@ -62,12 +62,15 @@ pub fn touch(context: &egui::Context, bench: &mut Bench) {
     egui::Window::new("Touch")
         .open(&mut is_open)
         .resizable(false)
-        .default_pos(egui::pos2(212.0, 60.0))
+        .default_pos(egui::pos2(212.0, 440.0))
         .show(context, |ui| {
             ui.set_width(250.0);
             match &bench.held {
                 Some(held) => {
-                    ui.strong(format!("{} is in the hand", held.device));
+                    ui.strong(match held.mouse {
+                        Some(_) => "The mouse leads the tool".into(),
+                        None => format!("{} is in the hand", held.device),
+                    });
                     if held.mouse.is_some() {
                         presses(ui, &mut wish.press);
                     }
