@@ -50,7 +50,7 @@ impl<T> Deref for Lent<T> {
             return &[];
         }
         // SAFETY: NumPy has laid out `len` aligned elements there, as its flags of a dense, aligned array said, and the held
-        // array keeps them there: NumPy refuses to resize an array that others refer to.
+        // array keeps them there: NumPy resizes no array that others refer to, unless it is told not to look.
         unsafe { std::slice::from_raw_parts(self.start, self.len) }
     }
 }
