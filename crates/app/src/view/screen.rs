@@ -36,8 +36,14 @@ impl Screen {
         }
     }
 
-    /// Whether the card is lost.
-    pub fn is_lost(&self) -> bool {
+    /// Whether the card is lost. `waits` until it has done what it was told, without which it may not know yet.
+    pub fn is_lost(&self, waits: bool) -> bool {
+        let poll = match waits {
+            true => wgpu::PollType::wait_indefinitely(),
+            false => wgpu::PollType::Poll,
+        };
+        // That it fails is told by the callback.
+        let _ = self.state.device.poll(poll);
         self.is_lost.load(Ordering::Relaxed)
     }
 

@@ -83,8 +83,8 @@ fn unlike(some: &[Option<f64>], others: &[Option<f64>], tolerance: f64) -> Optio
     })
 }
 
-/// Silhouettes within a pixel, depths within a tolerance: of the card, of the processor, and of lines to the field itself. The mesh
-/// leaves the field by 0.02 at most, a fifth of a pixel.
+/// Silhouettes within a pixel, depths within a tolerance: of the card and of the processor, which show one mesh, a third of a pixel's
+/// width; of lines to the field itself three pixels, as the mesh leaves it by a fifth of a pixel, and depths fall steeply at rims.
 #[test]
 fn the_card_the_processor_and_the_field_show_one_solid() {
     let Some(card) = card("card against processor") else {
@@ -113,9 +113,9 @@ fn the_card_the_processor_and_the_field_show_one_solid() {
             .collect();
         let count = by_card.iter().flatten().count();
         assert!(count > 5000, "only {count} pixels show anything");
-        for (name, others) in [("processor", &by_processor), ("field", &by_lines)] {
+        for (name, others, tolerance) in [("processor", &by_processor, 0.03), ("field", &by_lines, 0.25)] {
             for (a, b) in [(&by_card, others), (others, &by_card)] {
-                let at = unlike(a, b, 0.03);
+                let at = unlike(a, b, tolerance);
                 assert_eq!(at.map(|n| (n, a[n], b[n])), None, "card against {name}");
             }
         }

@@ -212,7 +212,10 @@ impl Desk {
         seen.into_iter().flatten().for_each(|news| self.tell(news));
         let whole = match cancel.is_cancelled() {
             true => Err("cancelled".into()),
-            false => fit(&options),
+            false => {
+                show("reading all of it", 0.0);
+                fit(&options)
+            }
         };
         if whole.is_err() && is_seen {
             self.show_again();

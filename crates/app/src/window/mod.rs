@@ -16,33 +16,38 @@ pub mod touch;
 mod tests;
 
 use std::cell::RefCell;
+use std::panic::AssertUnwindSafe;
 use std::path::PathBuf;
 use std::rc::Rc;
+use std::time::{Duration, Instant};
 
 pub use modeler::Bench;
 use modeler::Modeler;
 
 use crate::view::Screen;
 
+/// What works in the window, and stays when that falls.
+type Shared = Rc<RefCell<Option<Modeler>>>;
+
+/// Windows that are opened in a row on graphics cards that are lost at once. The first after a fall does not always open.
+const TRIALS: usize = 5;
+/// Time after which a card was not lost at once.
+const LONG: Duration = Duration::from_secs(10);
+
 /// A window with the modeler in it.
-struct Frame {
-    modeler: Option<Modeler>,
-    /// Where the modeler goes when the window closes because the graphics card is lost.
-    left: Rc<RefCell<Option<Modeler>>>,
-}
+struct Frame(Shared);
 
 impl eframe::App for Frame {
     fn ui(&mut self, ui: &mut egui::Ui, _: &mut eframe::Frame) {
-        if let Some(modeler) = &mut self.modeler {
+        if let Some(modeler) = &mut *self.0.borrow_mut() {
             modeler.show(ui);
         }
     }
 
     fn on_exit(&mut self) {
-        match self.modeler.take() {
-            Some(modeler) if modeler.is_lost() => *self.left.borrow_mut() = Some(modeler),
-            Some(modeler) => modeler.close(),
-            None => {}
+        let mut modeler = self.0.borrow_mut();
+        if let Some(modeler) = modeler.take_if(|m| !m.is_lost(false)) {
+            modeler.close();
         }
     }
 }
@@ -53,17 +58,32 @@ impl eframe::App for Frame {
 /// # Errors
 /// What keeps it from opening, and what helps.
 pub fn run(mut files: Vec<PathBuf>) -> Result<(), String> {
-    let left = Rc::new(RefCell::new(None));
+    let modeler = Shared::default();
+    let mut trials = 0;
     loop {
-        let outcome = once(std::mem::take(&mut files), &left);
-        if left.borrow().is_none() {
-            return outcome;
+        let start = Instant::now();
+        // egui falls where it finds no card any more.
+        let once = AssertUnwindSafe(|| once(std::mem::take(&mut files), &modeler));
+        let outcome = std::panic::catch_unwind(once);
+        let left = modeler.borrow_mut().take();
+        trials = if start.elapsed() < LONG { trials + 1 } else { 1 };
+        match (outcome, left) {
+            (_, Some(left)) if left.is_lost(true) && trials < TRIALS => {
+                if trials == 1 {
+                    eprintln!("isoclay: the graphics card was lost; the window opens again");
+                }
+                *modeler.borrow_mut() = Some(left);
+            }
+            (outcome, left) => {
+                left.into_iter().for_each(Modeler::close);
+                return outcome.unwrap_or_else(|fall| std::panic::resume_unwind(fall));
+            }
         }
     }
 }
 
 /// One window, with what is left of the one before.
-fn once(files: Vec<PathBuf>, left: &Rc<RefCell<Option<Modeler>>>) -> Result<(), String> {
+fn once(files: Vec<PathBuf>, shared: &Shared) -> Result<(), String> {
     let options = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
             .with_title("isoclay")
@@ -79,24 +99,19 @@ fn once(files: Vec<PathBuf>, left: &Rc<RefCell<Option<Modeler>>>) -> Result<(), 
         },
         ..eframe::NativeOptions::default()
     };
-    let before = left.borrow_mut().take();
-    let left = left.clone();
+    let shared = shared.clone();
     let begun = eframe::run_native(
         "isoclay",
         options,
         Box::new(move |context| {
-            let modeler = match before {
-                None => Modeler::new(context, files),
-                Some(mut modeler) => {
+            match &mut *shared.borrow_mut() {
+                Some(before) => {
                     let screen = context.wgpu_render_state.clone().map(Screen::new);
-                    modeler.resume(&context.egui_ctx, screen);
-                    modeler
+                    before.resume(&context.egui_ctx, screen);
                 }
-            };
-            Ok(Box::new(Frame {
-                modeler: Some(modeler),
-                left,
-            }))
+                none => *none = Some(Modeler::new(context, files)),
+            }
+            Ok(Box::new(Frame(shared)))
         }),
     );
     begun.map_err(|why| {

@@ -172,6 +172,7 @@ impl Modeler {
     /// Goes on in another window, on a card that is not lost.
     pub(super) fn resume(&mut self, context: &egui::Context, screen: Option<Screen>) {
         *self.context.lock().unwrap_or_else(PoisonError::into_inner) = context.clone();
+        self.end_gesture();
         self.screen = screen;
         // Its pictures were the old window's.
         self.bench.slices = self.bench.slices.take().map(|_| panels::Slices::new());
@@ -179,9 +180,9 @@ impl Modeler {
         self.bench.order(Order::Show);
     }
 
-    /// Whether the graphics card is lost: the window has to be opened anew.
-    pub(super) fn is_lost(&self) -> bool {
-        self.screen.as_ref().is_some_and(Screen::is_lost)
+    /// Whether the graphics card is lost, so that the window has to be opened anew; as [`Screen::is_lost`].
+    pub(super) fn is_lost(&self, waits: bool) -> bool {
+        self.screen.as_ref().is_some_and(|screen| screen.is_lost(waits))
     }
 
     /// Ends the desk: a stroke that is under way becomes an edit.
@@ -546,7 +547,7 @@ impl Modeler {
 
     /// All of the window.
     pub fn show(&mut self, ui: &mut egui::Ui) {
-        if self.is_lost() {
+        if self.is_lost(false) {
             // What is in the hand goes to the disk; the next window shows it.
             self.end_gesture();
             ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
