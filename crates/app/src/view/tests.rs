@@ -66,13 +66,17 @@ fn round<T: Copy>(all: &[T], n: usize) -> impl Iterator<Item = T> {
     inside.map(move |(x, y)| all[(y * w + x) as usize])
 }
 
-/// Of depths in pixels the first that has none like it in the same pixel of `others` or beside it, within a tolerance.
+/// Of depths in pixels the first that has none like it in the same pixel of `others` or beside it, within a tolerance. At rims depths
+/// fall too steeply for that: there any will do.
 fn unlike(some: &[Option<f64>], others: &[Option<f64>], tolerance: f64) -> Option<usize> {
     (0..some.len()).find(|n| {
         let near: Vec<Option<f64>> = round(others, *n).collect();
         let Some(depth) = some[*n] else {
             return near.iter().all(Option::is_some);
         };
+        if near.contains(&None) {
+            return near.iter().all(Option::is_none);
+        }
         let (low, high) = near
             .iter()
             .flatten()
@@ -84,7 +88,7 @@ fn unlike(some: &[Option<f64>], others: &[Option<f64>], tolerance: f64) -> Optio
 }
 
 /// Silhouettes within a pixel, depths within a tolerance: of the card and of the processor, which show one mesh, a third of a pixel's
-/// width; of lines to the field itself three pixels, as the mesh leaves it by a fifth of a pixel, and depths fall steeply at rims.
+/// width; of lines to the field itself twice that, as the mesh leaves it by a fifth of a pixel.
 #[test]
 fn the_card_the_processor_and_the_field_show_one_solid() {
     let Some(card) = card("card against processor") else {
@@ -113,7 +117,7 @@ fn the_card_the_processor_and_the_field_show_one_solid() {
             .collect();
         let count = by_card.iter().flatten().count();
         assert!(count > 5000, "only {count} pixels show anything");
-        for (name, others, tolerance) in [("processor", &by_processor, 0.03), ("field", &by_lines, 0.25)] {
+        for (name, others, tolerance) in [("processor", &by_processor, 0.03), ("field", &by_lines, 0.06)] {
             for (a, b) in [(&by_card, others), (others, &by_card)] {
                 let at = unlike(a, b, tolerance);
                 assert_eq!(at.map(|n| (n, a[n], b[n])), None, "card against {name}");

@@ -122,7 +122,7 @@ impl Desk {
                 desk_files::clay_block().and_then(|(name, object)| self.start(&name, object, false))
             }
             Order::Show => {
-                self.show_again();
+                self.show_again(true);
                 Ok(())
             }
             Order::Save(path) => self.save(&path),
@@ -184,7 +184,11 @@ impl Desk {
                 fitted?
             }
         };
-        self.start(&name, object, is_seen)
+        let started = self.start(&name, object, is_seen);
+        if started.is_err() && is_seen {
+            self.show_again(false);
+        }
+        started
     }
 
     /// The object that a scan becomes, and whether a coarse one is seen meanwhile.
@@ -218,17 +222,18 @@ impl Desk {
             }
         };
         if whole.is_err() && is_seen {
-            self.show_again();
+            self.show_again(false);
         }
         whole.map(|whole| (whole, is_seen))
     }
 
-    /// What was shown before something else was looked at.
-    fn show_again(&mut self) {
+    /// All that is open, on which the eye may be still.
+    fn show_again(&mut self, is_seen: bool) {
         match &mut self.open {
             None => self.tell(News::Empty),
             Some(open) => {
                 open.shapes.clear();
+                open.is_seen = is_seen;
                 self.show();
                 self.lay_sheet();
             }

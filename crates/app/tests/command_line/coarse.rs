@@ -6,20 +6,17 @@ use super::common::{Bench, number};
 #[test]
 fn a_first_look_takes_a_part_of_the_samples() {
     let bench = Bench::new();
-    bench.json("phantom head -o head.nii --size 160");
-    bench.json("phantom torus -o cloud.ply --count 70000");
+    bench.json("phantom head -o head.nii --size 132");
+    bench.json("phantom torus -o cloud.ply --count 31000");
     let used = |command: &str| number(&bench.json(command), "used_count");
-    let (voxels, points) = (160f64.powi(3), 70_000f64);
-    // Of 160 voxels none may be left out: 128 have to remain along each axis.
+    let (voxels, points) = (132f64.powi(3), 31_000f64);
+    // Of 132 voxels none may be left out: 128 have to remain along each axis.
     assert_eq!(used("fit head.nii -o head.iclay --coarse"), voxels);
     assert_eq!(
         used("fit head.nii -o head.iclay --coarse --stride 2"),
         voxels / 8.0
     );
-    assert_eq!(
-        used("fit cloud.ply -o cloud.iclay --coarse"),
-        (points / 3.0).ceil()
-    );
+    assert_eq!(used("fit cloud.ply -o cloud.iclay --coarse"), points / 2.0);
     let coarse = bench.json("info cloud.iclay");
     let whole = bench.json("fit cloud.ply -o whole.iclay");
     assert!(number(&coarse, "depth") <= 6.0);
