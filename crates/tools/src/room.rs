@@ -43,10 +43,13 @@ impl Canvas {
     /// What is left to say of a box that was another one before.
     pub fn growth_since(&self, before: &Self) -> Option<String> {
         let lattice = self.field.lattice();
-        let b = lattice.world_box();
-        let [min, max] = [b.min, b.max].map(|p| p.to_array());
-        (lattice != before.field.lattice())
-            .then(|| format!("the box of the field has grown: {min:?} to {max:?}"))
+        let size = lattice.world_box().size();
+        (lattice != before.field.lattice()).then(|| {
+            format!(
+                "the box of the field has grown to {:.3} × {:.3} × {:.3}",
+                size.x, size.y, size.z
+            )
+        })
     }
 
     fn step(&self, face: Face) -> u32 {

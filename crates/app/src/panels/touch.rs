@@ -62,7 +62,7 @@ pub fn touch(context: &egui::Context, bench: &mut Bench) {
     egui::Window::new("Touch")
         .open(&mut is_open)
         .resizable(false)
-        .default_pos(egui::pos2(212.0, 440.0))
+        .default_pos(egui::pos2(730.0, 36.0))
         .show(context, |ui| {
             ui.set_width(250.0);
             match &bench.held {
