@@ -1,6 +1,7 @@
 //! The program that people open: what is seen in the middle, panels round it, and a desk that does the work on a thread of its own.
 
 mod adjust;
+mod bench;
 mod desk;
 mod gesture;
 mod hand;
@@ -21,7 +22,7 @@ use std::path::PathBuf;
 use std::rc::Rc;
 use std::time::{Duration, Instant};
 
-pub use modeler::Bench;
+pub use bench::Bench;
 use modeler::Modeler;
 
 use crate::view::Screen;
