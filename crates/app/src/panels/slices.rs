@@ -114,11 +114,15 @@ pub fn slices(context: &egui::Context, bench: &mut Bench) {
                 let (before, range) = (slices.window, slices.range);
                 let [black, white] = &mut slices.window;
                 let label = ui.label("Black");
-                ui.add(egui::Slider::new(black, range[0]..=range[1]).max_decimals(2))
-                    .labelled_by(label.id);
+                ui.add(
+                    egui::Slider::new(black, range[0]..=range[1]).custom_formatter(|n, _| human_number(n)),
+                )
+                .labelled_by(label.id);
                 let label = ui.label("White");
-                ui.add(egui::Slider::new(white, range[0]..=range[1]).max_decimals(2))
-                    .labelled_by(label.id);
+                ui.add(
+                    egui::Slider::new(white, range[0]..=range[1]).custom_formatter(|n, _| human_number(n)),
+                )
+                .labelled_by(label.id);
                 if slices.window != before {
                     slices.is_old = true;
                 }
@@ -186,7 +190,7 @@ fn plane(ui: &mut egui::Ui, slices: &mut Slices, n: usize, axis: usize, name: &s
     let (low, high) = (thing.own_box.min[axis], thing.own_box.max[axis]);
     let mut place = low + share * (high - low);
     ui.spacing_mut().slider_width = WIDE - 80.0;
-    let slider = egui::Slider::new(&mut place, low..=high).max_decimals(1);
+    let slider = egui::Slider::new(&mut place, low..=high).custom_formatter(|n, _| human_number(n));
     if ui
         .add(slider)
         .on_hover_text(format!("Where the {} plane lies", name.to_lowercase()))

@@ -1,5 +1,6 @@
 //! On the left: the tools and how they are set.
 
+use crate::cli::quantity::human_number;
 use crate::window::Bench;
 use crate::window::tool::Kind;
 
@@ -34,7 +35,7 @@ pub fn tools(ui: &mut egui::Ui, bench: &mut Bench) {
     let slider = egui::Slider::new(&mut radius, RADII[0] * size..=RADII[1] * size)
         .logarithmic(true)
         .suffix(format!(" {unit}"))
-        .max_decimals(2);
+        .custom_formatter(|n, _| human_number(n));
     ui.spacing_mut().slider_width = 96.0;
     if ui.add(slider).labelled_by(label.id).changed() {
         bench.tool.radius = radius / size;
@@ -48,7 +49,7 @@ pub fn tools(ui: &mut egui::Ui, bench: &mut Bench) {
         let mut height = (at - center).dot(normal);
         let label = ui.label("Clipping plane");
         let slider = egui::Slider::new(&mut height, -radius..=radius)
-            .max_decimals(2)
+            .custom_formatter(|n, _| human_number(n))
             .suffix(format!(" {unit}"));
         if ui.add(slider).labelled_by(label.id).changed() {
             bench.look.cut = Some((center + height * normal, normal));

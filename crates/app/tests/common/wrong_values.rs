@@ -168,7 +168,7 @@ pub const ROWS: &[Row] = &[
     ("sample", "--memory", "@volume --memory *lots", "2GiB"),
     ("mesh check eval picture render simulate", "--memory", "@cloud --memory *2Gib", "2GiB"),
     ("phantom", "--memory", "sphere -o out.ply --memory *lots", "2GiB"),
-    ("charts_fit charts_dynamics charts_masks charts_hard charts_orient charts_edits charts_fields charts_tools charts_haptics", "--memory", "-o charts --memory *lots", "2GiB"),
+    ("charts_fit charts_dynamics charts_masks charts_hard charts_orient charts_edits charts_fields charts_tools charts_haptics charts_window", "--memory", "-o charts --memory *lots", "2GiB"),
     ("fit mesh check eval picture render simulate", "--threads", "@cloud --threads *0", "1 to 1024"),
     ("fit", "--threads", "@cloud --threads *100000", "1 to 1024"),
     ("sample", "--threads", "@volume --threads *two", "1 to 1024"),
