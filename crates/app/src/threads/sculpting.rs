@@ -75,17 +75,20 @@ impl Sculpting {
 
     /// With tools that work where a ball of some radius touches the surface, and not where the hand is in it. What takes hold does so there,
     /// and goes with the hand.
+    #[cfg(feature = "window")]
     pub fn touching(mut self, radius: f64) -> Self {
         self.touching = Some(radius);
         self
     }
 
     /// What the button begins, to be exchanged between strokes.
+    #[cfg(feature = "window")]
     pub fn tool(&self) -> Arc<Mutex<Option<Stroke>>> {
         self.tool.clone()
     }
 
     /// Titles of the edits as they are made, for whoever takes them.
+    #[cfg(feature = "window")]
     pub fn titles(&self) -> Arc<Mutex<Vec<String>>> {
         self.titles.clone()
     }
