@@ -387,6 +387,15 @@ fn wait_for(window: &mut Harness<'_, Modeler>, what: &str) {
     }
 }
 
+/// One with a block of clay in it.
+fn window_with_clay(home: &Path) -> Harness<'static, Modeler> {
+    let mut window = window(home);
+    window.step();
+    window.get_by_label("A block of clay").click();
+    wait_for(&mut window, "History");
+    window
+}
+
 #[test]
 fn the_first_minute_needs_no_file() {
     let home = tempfile::tempdir().unwrap();
@@ -413,10 +422,7 @@ fn the_first_minute_needs_no_file() {
 #[test]
 fn a_drag_is_a_stroke_and_the_history_undoes_it() {
     let home = tempfile::tempdir().unwrap();
-    let mut window = window(home.path());
-    window.step();
-    window.get_by_label("A block of clay").click();
-    wait_for(&mut window, "History");
+    let mut window = window_with_clay(home.path());
     window.hover_at(egui::pos2(620.0, 400.0));
     window.step();
     window.drag_at(egui::pos2(620.0, 400.0));
@@ -479,10 +485,7 @@ fn click(window: &mut Harness<'_, Modeler>, at: egui::Pos2) {
 #[test]
 fn clicks_pin_and_the_panel_frees() {
     let home = tempfile::tempdir().unwrap();
-    let mut window = window(home.path());
-    window.step();
-    window.get_by_label("A block of clay").click();
-    wait_for(&mut window, "History");
+    let mut window = window_with_clay(home.path());
     window.key_press(egui::Key::N);
     window.step();
     click(&mut window, egui::pos2(620.0, 400.0));
@@ -503,10 +506,7 @@ fn clicks_pin_and_the_panel_frees() {
 #[test]
 fn radius_and_strength_are_set_by_the_mouse() {
     let home = tempfile::tempdir().unwrap();
-    let mut window = window(home.path());
-    window.step();
-    window.get_by_label("A block of clay").click();
-    wait_for(&mut window, "History");
+    let mut window = window_with_clay(home.path());
     let at = egui::pos2(620.0, 400.0);
     let set = |window: &mut Harness<'_, Modeler>, keys, key, way: f32| {
         window.hover_at(at);

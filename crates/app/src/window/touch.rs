@@ -99,23 +99,12 @@ impl Desk {
     pub(super) fn touch(&mut self, wanted: &Wanted, orders: &Receiver<Order>) -> Option<Order> {
         self.end();
         let begun = self.take(wanted);
-        let (held, device) = match begun {
-            Ok(begun) => begun,
-            Err(why) => {
-                self.tell(News::Failed(why));
-                self.let_go();
-                return orders.recv().ok();
-            }
-        };
-        let next = self.feel(wanted, &held, device, orders);
-        match next {
-            Ok(next) => next,
-            Err(why) => {
-                self.tell(News::Failed(why));
-                self.let_go();
-                orders.recv().ok()
-            }
-        }
+        let felt = begun.and_then(|(held, device)| self.feel(wanted, &held, device, orders));
+        felt.unwrap_or_else(|why| {
+            self.tell(News::Failed(why));
+            self.let_go();
+            orders.recv().ok()
+        })
     }
 
     /// Opens the device.
