@@ -90,9 +90,9 @@ def main() -> None:
             progress=lambda stage, share: stages.setdefault(stage, time.perf_counter() - start),
         )
         took = time.perf_counter() - start
-        workers = client.run(peak_mib)
+        workers, busy = client.run(peak_mib), sum(client.run(time.process_time).values()) + time.process_time()
         caller = peak_mib()
-    print(f"{asked.n}^3, {asked.method}, blocks of {asked.block} with a halo of {asked.halo}: {took:.0f} s")
+    print(f"{asked.n}^3, {asked.method}, blocks of {asked.block} with a halo of {asked.halo}: {took:.0f} s, {busy:.0f} of the processor")
     print("stages begin at " + ", ".join(f"{stage} {second:.0f} s" for stage, second in stages.items()))
     print("peak MiB of the workers " + ", ".join(f"{mib:.0f}" for mib in workers.values()) + f"; of the caller {caller:.0f}")
     size = os.path.getsize(field.path)

@@ -4,6 +4,7 @@
 //! Blocks begin at bricks of level 0, so that a brick and all finer ones in its place are of one block, and parts are disjoint.
 
 mod part;
+mod rank;
 mod ticket;
 mod write;
 
