@@ -28,6 +28,7 @@ mod preview;
 mod records;
 mod report;
 mod revision;
+mod samples;
 mod state;
 mod words;
 
@@ -42,6 +43,9 @@ pub use live::Live;
 pub use object::{Object, Properties};
 pub use preview::Preview;
 pub use report::{Solve, read_report, with_report};
-pub use revision::{CloudError, Journey, VolumeRevision, revise_cloud, revise_volume};
+pub use revision::{
+    CloudError, Course, Journey, VolumeRevision, WriteBackError, revise_cloud, revise_volume,
+};
+pub use samples::Samples;
 pub use state::State;
 pub use words::{human_count, human_number};

@@ -3,10 +3,15 @@
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard};
 
-use document::{Command, CommandError, Document, DocumentError, Lost, Object, Options, State};
+use document::{
+    Command, CommandError, Course, Document, DocumentError, Lost, Object, Options, Samples, State,
+    WriteBackError,
+};
 use fitting::FitReport;
-use formats::ReadLimits;
+use fitting::volume::VolumeView;
 use formats::field::AnyField;
+use formats::volumes::VolumeOptions;
+use formats::{Kind, ReadLimits};
 use numpy::PyArray2;
 use pyo3::prelude::*;
 use tools::body::Body;
@@ -235,6 +240,51 @@ impl CoreDocument {
         Ok(done)
     }
 
+    /// Writes the scan that an object was fitted to with the object's edits; what is to be told.
+    fn export_like(
+        &self,
+        py: Python<'_>,
+        name: &str,
+        scan: PathBuf,
+        fill: Option<f64>,
+        output: PathBuf,
+    ) -> PyResult<Vec<String>> {
+        let course = self.with(py, |document| Ok(Course::of(document, name)?))?;
+        brief(py, || {
+            let limits = ReadLimits { max_bytes: u64::MAX };
+            let belongs = |samples: Samples| {
+                let (object, file) = (format!("object {name:?}"), scan.display().to_string());
+                let differs = samples.differ_from(course.meta(), course.extent(), &object, &file);
+                differs.map_or(Ok(()), |differs| {
+                    Err(Failure::value(format!(
+                        "{differs}; give the whole scan that it was fitted to"
+                    )))
+                })
+            };
+            match formats::detect(&scan)? {
+                Kind::Volume(_) => {
+                    let options = VolumeOptions::default();
+                    let volume = formats::volumes::read(&scan, &options, &limits)?;
+                    belongs(Samples::Volume(&VolumeView {
+                        dims: volume.header.dims,
+                        values: (&volume.values).into(),
+                        world_from_voxel: volume.header.world_from_voxel,
+                    }))?;
+                    Ok(course.write_volume(&scan, &options, &volume, fill, &output, &limits)?)
+                }
+                Kind::Cloud(_) => {
+                    let cloud = formats::points::read(&scan, &limits)?;
+                    belongs(Samples::Cloud(&cloud.positions))?;
+                    Ok(course.write_cloud(&scan, &cloud, &output, &limits)?)
+                }
+                Kind::Mesh(_) | Kind::Field => Err(Failure::value(format!(
+                    "{}: volumes and clouds are written back, and this is neither; mesh the object, or export its field",
+                    scan.display()
+                ))),
+            }
+        })
+    }
+
     /// Corners of the box of an object, in its own world.
     fn object_box<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let state = self.state(py)?;
@@ -311,6 +361,16 @@ impl From<CommandError> for Failure {
             CommandError::Document(error) => error.into(),
             CommandError::Cancelled(error) => error.into(),
             error => Self::Script(error.to_string()),
+        }
+    }
+}
+
+impl From<WriteBackError> for Failure {
+    fn from(error: WriteBackError) -> Self {
+        match error {
+            WriteBackError::Document(error) => error.into(),
+            WriteBackError::Reading(error) | WriteBackError::Writing(error) => Self::File(error),
+            error => Self::Document(error.to_string()),
         }
     }
 }

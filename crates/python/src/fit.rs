@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use bspline::Aabb;
+use document::Samples;
 use fitting::mesh::MeshOptions;
 use fitting::orient::{EstimatedCloud, OrientOptions, Route};
 use fitting::points::{NormalForm, OrientedPoints, PointOptions};
@@ -74,9 +75,10 @@ impl Choice {
         }
     }
 
-    fn meta(&self, source: SourceKind, unit: Unit, kind: &str) -> FieldMeta {
+    fn meta(&self, source: SourceKind, unit: Unit, samples: Samples) -> FieldMeta {
         let mut story: Value = serde_json::from_str(&self.provenance).unwrap_or_default();
-        story["input_kind"] = kind.into();
+        story["input_kind"] = samples.kind().into();
+        story["input_digest"] = samples.digest().into();
         FieldMeta {
             source,
             unit,
@@ -196,7 +198,7 @@ fn cloud(
     Ok(fitted(
         field,
         report,
-        choice.meta(SourceKind::Cloud, unit, "cloud"),
+        choice.meta(SourceKind::Cloud, unit, Samples::Cloud(positions)),
     ))
 }
 
@@ -249,7 +251,7 @@ fn mesh(
     Ok(fitted(
         field,
         report,
-        choice.meta(SourceKind::Cloud, unit, "mesh"),
+        choice.meta(SourceKind::Cloud, unit, Samples::Mesh(vertices, triangles)),
     ))
 }
 
@@ -335,7 +337,7 @@ fn volume(
     };
     let meta = FieldMeta {
         iso: otsu_threshold(view.values),
-        ..choice.meta(SourceKind::Volume, unit, "volume")
+        ..choice.meta(SourceKind::Volume, unit, Samples::Volume(view))
     };
     Ok(fitted(field, report, meta))
 }

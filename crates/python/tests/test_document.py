@@ -3,8 +3,10 @@
 import pickle
 import subprocess
 
+import nibabel
 import numpy as np
 import pytest
+from conftest import sphere_points
 
 import isoclay
 
@@ -75,6 +77,45 @@ def test_a_pickled_document_is_a_copy(document, ball):
         copy.undo()
         assert copy["ball"].sha256 == ball.sha256
     assert document["ball"].sha256 != ball.sha256
+
+
+def test_a_scan_is_written_with_the_edits(program, data, tmp_path):
+    scan = data / "head.nii.gz"
+    with isoclay.Document.new(tmp_path / "h.isoclay", {"head": isoclay.fit(scan, tolerance="4%")}) as document:
+        document.export("head", tmp_path / "same.nii", like=scan)
+        images = [nibabel.load(path) for path in (scan, tmp_path / "same.nii")]
+        assert np.array_equal(*(np.asarray(image.dataobj) for image in images))
+        middle = document["head"].box.mean(axis=0).tolist()
+        document.sculpt({"carve": {"shape": {"sphere": {"radius": 12.0}}, "along": [middle]}})
+        notes = document.export("head", tmp_path / "carved.nii", like=scan, fill=-7)
+        assert "voxels changed" in notes[0] and "-7" in notes[1]
+        changed = np.asarray(nibabel.load(tmp_path / "carved.nii").dataobj) != np.asarray(images[0].dataobj)
+        assert 1000 < changed.sum() < 20_000
+        with pytest.raises(ValueError, match="give the whole scan"):
+            document.export("head", tmp_path / "other.nii", like=tmp_path / "carved.nii")
+        document["head"].mesh(resolution=8).save(tmp_path / "mesh.stl")
+        with pytest.raises(ValueError, match="neither"):
+            document.export("head", tmp_path / "other.stl", like=tmp_path / "mesh.stl")
+        with pytest.raises(ValueError, match="like="):
+            document.export("head", tmp_path / "other.iclay", fill=3)
+        assert document.export("head", tmp_path / "field.iclay") == []
+    call = [program, "export", tmp_path / "h.isoclay", "--like", scan, "--fill", "-7", "-o", tmp_path / "program.nii"]
+    subprocess.run(call, check=True, capture_output=True)
+    assert (tmp_path / "program.nii").read_bytes() == (tmp_path / "carved.nii").read_bytes()
+
+
+def test_a_cloud_is_written_with_the_edits(tmp_path):
+    points = sphere_points()
+    np.savetxt(tmp_path / "ball.xyz", np.hstack([points, points]))
+    field = isoclay.fit(tmp_path / "ball.xyz")
+    with isoclay.Document.new(tmp_path / "b.isoclay", {"ball": field}) as document:
+        document.sculpt(STROKE)
+        notes = document.export("ball", tmp_path / "new.xyz", like=tmp_path / "ball.xyz")
+        assert "points moved" in notes[0]
+        assert np.loadtxt(tmp_path / "new.xyz")[:, 2].max() > 1.15
+        document["late"] = field
+        with pytest.raises(isoclay.errors.DocumentProblem, match="was not there"):
+            document.export("late", tmp_path / "late.xyz", like=tmp_path / "ball.xyz")
 
 
 def test_bad_scripts_are_named(document):

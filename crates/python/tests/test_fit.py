@@ -28,6 +28,19 @@ def test_a_field_has_the_hash_of_the_command_line(program, data, tmp_path, name)
     assert loaded.report["rms"] == pytest.approx(told["rms"])
 
 
+def test_a_field_remembers_its_samples(program, data, tmp_path):
+    scan, saved = data / "head.nii.gz", str(tmp_path / "field.iclay")
+    image = nibabel.load(scan)
+    for field in (isoclay.fit(scan, tolerance="8%"), isoclay.fit_volume(image, tolerance="8%")):
+        field.save(saved)
+        of_program(program, "check", saved, str(scan))
+    voxels = np.asarray(image.dataobj).copy()
+    voxels[3, 4, 5] += 1
+    isoclay.fit_volume(voxels, image.affine, unit="mm", tolerance="8%").save(saved)
+    done = subprocess.run([program, "check", saved, scan], capture_output=True, text=True)
+    assert done.returncode == 2 and "other samples" in done.stderr
+
+
 def test_an_image_gives_the_hash_of_its_file(program, data, tmp_path):
     path = data / "head.nii.gz"
     told = of_program(program, "fit", str(path), "-o", str(tmp_path / "f.iclay"), "--tolerance", "4%")

@@ -75,9 +75,12 @@ impl Voxels<'_> {
         self.len() == 0
     }
 
-    /// Voxel `(x, y, z)`.
+    /// Voxel `(x, y, z)` of a volume of `dims` voxels.
+    ///
+    /// # Panics
+    /// If there is no such voxel.
     #[inline(always)]
-    pub(crate) fn at(&self, dims: [usize; 3], [x, y, z]: [usize; 3]) -> f32 {
+    pub fn at(&self, dims: [usize; 3], [x, y, z]: [usize; 3]) -> f32 {
         let [nx, ny, nz] = dims;
         each!(self, values, order => values[match order {
             Order::XFastest => x + nx * (y + ny * z),

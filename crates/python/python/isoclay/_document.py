@@ -176,9 +176,27 @@ class Document:
         """
         return self._core.replay(wishes(threads, None, progress))
 
-    def export(self, name: str, path: PathLike) -> None:
-        """Writes an object as it is now as a field file."""
+    def export(
+        self, name: str, path: PathLike, *, like: PathLike | None = None, fill: float | None = None
+    ) -> list[str]:
+        """Writes an object as it is now as a field file; returns what is to be told.
+
+        Args:
+            like: The scan that the object was fitted to, a volume or a cloud: it is written with the edits in place of the field,
+                in its own format, and what was not touched stays as it is.
+            fill: Density of what was carved from a volume: air if it is not given, -1000 HU, or where the unit is not known what
+                1 % of the voxels are below.
+
+        Raises:
+            ValueError: Of a scan that the object was not fitted to.
+            isoclay.errors.DocumentProblem: Of an object that cannot be written back.
+        """
+        if like is not None:
+            return self._core.export_like(name, Path(like), fill, Path(path))
+        if fill is not None:
+            raise ValueError("fill is for a scan with edits; give it by like=")
         self[name].save(path)
+        return []
 
     def __repr__(self) -> str:
         if self._core.is_closed:

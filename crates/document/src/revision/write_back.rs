@@ -1,0 +1,220 @@
+//! A scan written with the edits of the object that was fitted to it.
+
+use std::path::Path;
+
+use bspline::{Aabb, HierarchicalSpline};
+use formats::field::FieldMeta;
+use formats::points::PointCloud;
+use formats::volumes::{Revision, Volume, VolumeOptions, save_revised};
+use formats::{Fault, FormatError, ReadLimits};
+
+use super::{CloudError, Journey, VolumeRevision, revise_cloud, revise_volume};
+use crate::{Command, Document, DocumentError, Object, human_count, human_number};
+
+/// Density of air in Hounsfield units.
+const AIR: f64 = -1000.0;
+
+/// Share of a volume's voxels that are taken for air where nothing names its unit.
+const THINNEST: f64 = 0.01;
+
+/// What became of an object since the document began.
+pub struct Course {
+    /// As it was then, in the box that it has now.
+    fitted: Object,
+    /// As it is.
+    now: Object,
+    /// What was moved since.
+    journey: Journey,
+    /// Names the document's state.
+    identity: [u8; 32],
+    /// The box that it had.
+    extent: Aabb,
+}
+
+/// Why a scan is not written with edits.
+#[derive(Debug, thiserror::Error)]
+pub enum WriteBackError {
+    /// The document cannot be read, or has no such object.
+    #[error(transparent)]
+    Document(#[from] DocumentError),
+    /// The object is of no scan.
+    #[error("{0}")]
+    NoScan(&'static str),
+    /// The document does not go back to a fit, or one without a surface.
+    #[error("{0}")]
+    NoFit(String),
+    /// Rows of the scan cannot be told from each other.
+    #[error(
+        "{0} of its points were left out when it was read, so that rows cannot be told; convert the scan and fit that"
+    )]
+    LeftOut(String),
+    /// The two are no versions of one field.
+    #[error("{0}; was the object replaced?")]
+    Replaced(#[source] CloudError),
+    /// The scan cannot be read.
+    #[error(transparent)]
+    Reading(FormatError),
+    /// The output cannot be written.
+    #[error(transparent)]
+    Writing(FormatError),
+}
+
+impl Course {
+    /// Looks back to the beginning of a document.
+    ///
+    /// # Errors
+    /// [`WriteBackError::Document`]; [`WriteBackError::NoFit`] if the object was not there, or is no longer known as it was.
+    pub fn of(document: &mut Document, name: &str) -> Result<Self, WriteBackError> {
+        let counts = document.counts()?;
+        if counts.forgotten > 0 {
+            return Err(WriteBackError::NoFit(format!(
+                "the document has forgotten its first {} edits, and with them the field of the fit; export the field and \
+                 sample it like the scan",
+                human_count(counts.forgotten as usize)
+            )));
+        }
+        let now = document.state().object(name)?.clone();
+        let first = document.first_state()?;
+        let fitted = first.objects().get(name).ok_or_else(|| {
+            WriteBackError::NoFit(format!(
+                "object {name:?} was not there when the document began; only what was fitted to a scan can be written back"
+            ))
+        })?;
+        let mut commands: Vec<Command> = Vec::new();
+        for n in 0..counts.done {
+            // What another version of the program wrote is no move that this one knows.
+            commands.extend(serde_json::from_value(document.command(n)?).ok());
+        }
+        Ok(Self {
+            journey: Journey::new(&commands, name, &now.field.world_box()),
+            identity: document.state().sha256(),
+            extent: fitted.field.world_box(),
+            // The box may have grown since.
+            fitted: fitted.in_box_of(&now),
+            now,
+        })
+    }
+
+    /// What stood beside the field of the fit.
+    pub fn meta(&self) -> &FieldMeta {
+        &self.fitted.meta
+    }
+
+    /// The box of the fit.
+    pub fn extent(&self) -> &Aabb {
+        &self.extent
+    }
+
+    /// Writes the cloud of file `scan` with the edits; returns what is to be told.
+    ///
+    /// # Errors
+    /// Of a cloud that cannot be written back, and of the files.
+    pub fn write_cloud(
+        &self,
+        scan: &Path,
+        cloud: &PointCloud,
+        output: &Path,
+        limits: &ReadLimits,
+    ) -> Result<Vec<String>, WriteBackError> {
+        let left_out = cloud.file_count - cloud.positions.len();
+        if left_out > 0 {
+            return Err(WriteBackError::LeftOut(human_count(left_out)));
+        }
+        let iso = self.now.iso().unwrap_or(0.0);
+        let (fitted, now) = self.fields()?;
+        let changes = revise_cloud(fitted, now, &cloud.positions, iso, &self.journey)
+            .map_err(WriteBackError::Replaced)?;
+        formats::points::save_revised(scan, &changes, output, limits).map_err(|e| match e.fault {
+            Fault::Io { .. } => WriteBackError::Writing(e),
+            _ => WriteBackError::Reading(e),
+        })?;
+        let count = |n: usize| human_count(n);
+        Ok(vec![format!(
+            "{} of {} points moved with the surface, {} are on no surface any more, {} are new (behind those of the scan)",
+            count(changes.moved.len()),
+            count(cloud.positions.len()),
+            count(changes.removed.len()),
+            count(changes.added.len()),
+        )])
+    }
+
+    /// Writes the volume of file `scan` with the edits; `fill` is the density of what was carved, air if it is not given.
+    /// Returns what is to be told.
+    ///
+    /// # Errors
+    /// Of a volume that cannot be written back, and of the files.
+    pub fn write_volume(
+        &self,
+        scan: &Path,
+        options: &VolumeOptions,
+        volume: &Volume,
+        fill: Option<f64>,
+        output: &Path,
+        limits: &ReadLimits,
+    ) -> Result<Vec<String>, WriteBackError> {
+        let iso =
+            (self.now.meta.iso).ok_or_else(|| WriteBackError::NoFit("the object names no surface".into()))?;
+        let fill = fill.unwrap_or_else(|| air(&self.now.meta, volume));
+        let (fitted, now) = self.fields()?;
+        let revision = revise_volume(fitted, now, volume, iso, fill, &self.journey)
+            .map_err(|e| WriteBackError::Replaced(e.into()))?;
+        let told =
+            save_revised(scan, options, &revision.changes, &self.identity, output, limits).map_err(|e| {
+                match e.fault {
+                    Fault::Io { .. } => WriteBackError::Writing(e.fault.at(output)),
+                    _ => WriteBackError::Reading(e),
+                }
+            })?;
+        Ok(sentences(&revision, &told, volume, fill))
+    }
+
+    /// The fields of an object that was fitted to a scan.
+    fn fields(&self) -> Result<(&HierarchicalSpline<f32>, &HierarchicalSpline<f32>), WriteBackError> {
+        let both = self.fitted.field.levels().zip(self.now.field.levels());
+        both.ok_or(WriteBackError::NoScan(
+            "the object is a block on knots of its own, fitted to no scan; export its field, or mesh it",
+        ))
+    }
+}
+
+/// The density of what is taken out.
+fn air(meta: &FieldMeta, volume: &Volume) -> f64 {
+    if meta.density_unit == "HU" {
+        return AIR;
+    }
+    let mut values = volume.values.clone();
+    let rank = (values.len() as f64 * THINNEST) as usize;
+    let (_, value, _) = values.select_nth_unstable_by(rank, f32::total_cmp);
+    f64::from(*value)
+}
+
+fn sentences(revision: &VolumeRevision, told: &Revision, volume: &Volume, fill: f64) -> Vec<String> {
+    let mut notes = vec![format!(
+        "{} of {} voxels changed, {} left the solid and {} joined it",
+        human_count(told.changed),
+        human_count(volume.values.len()),
+        human_count(revision.carved),
+        human_count(revision.added),
+    )];
+    if revision.is_filled() {
+        notes.push(format!(
+            "what was carved has density {} (fill)",
+            human_number(fill)
+        ));
+    }
+    if told.rounding > 0.0 {
+        notes.push(format!(
+            "voxels are {}: densities are off by at most {}",
+            volume.header.stored,
+            human_number(told.rounding)
+        ));
+    }
+    if told.clamped > 0 {
+        notes.push(format!(
+            "{} densities are beyond what {} can hold; the nearest that it can was written",
+            human_count(told.clamped),
+            volume.header.stored
+        ));
+    }
+    notes
+}
