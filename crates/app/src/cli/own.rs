@@ -141,10 +141,11 @@ pub fn ask(subcommand: &str, arguments: impl Iterator<Item = OsString>) -> Outco
         .unwrap_or_default();
     match serde_json::from_slice(last) {
         Ok(Value::Object(object)) if out.status.success() => Ok(object),
-        _ => Err(Failure::input(format!(
-            "{subcommand}: {}",
-            String::from_utf8_lossy(&out.stderr).trim()
-        ))),
+        _ => {
+            let said = String::from_utf8_lossy(&out.stderr);
+            let said = said.trim().trim_start_matches("isoclay: ");
+            Err(Failure::input(format!("{subcommand}: {said}")))
+        }
     }
 }
 

@@ -57,6 +57,12 @@ impl Subject {
             let arguments = [input.as_os_str().into(), to.as_os_str().into()].into_iter();
             own::ask("convert", arguments.chain(options.iter().map(OsString::from))).map(drop)
         };
+        if kind == formats::Kind::Field {
+            return Err(Failure::usage(format!(
+                "{}: is a fitted field; give what it was fitted to: {SAMPLES}",
+                source.name()
+            )));
+        }
         if let formats::Kind::Volume(_) = kind {
             let given = directory.join("given.nrrd");
             convert(&given, &["--store", "float32"])?;
