@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
@@ -25,12 +26,17 @@ use crate::view::{Camera, Look, Paper, Ray, Screen, pick, scale_bar};
 const STILL: Duration = Duration::from_millis(60);
 /// Share of the pixels of a side that are drawn while something moves.
 const ROUGH: f32 = 0.5;
+/// Longest time that a picture waits for the desk. A dab takes 7 to 14 ms, a picture without a graphics card 40.
+const MEETING: Duration = Duration::from_millis(15);
+
 /// The window.
 pub struct Modeler {
     pub(super) bench: Bench,
     news: Receiver<News>,
     /// What the desk wakes.
     context: Arc<Mutex<egui::Context>>,
+    /// Whether the window waits for news, so that nobody has to wake it.
+    is_listening: Arc<AtomicBool>,
     screen: Option<Screen>,
     gesture: Option<Gesture>,
     /// What the mouse sets.
@@ -85,7 +91,9 @@ impl Modeler {
         let (orders, received) = channel();
         let (told, news) = channel();
         let cancel = Arc::new(Mutex::new(Cancel::new()));
-        let desk = Desk::new(told, wake(context.clone()), cancel.clone(), home.clone());
+        let is_listening = Arc::<AtomicBool>::default();
+        let wake = wake(context.clone(), is_listening.clone());
+        let desk = Desk::new(told, wake, cancel.clone(), home.clone());
         let desk = std::thread::Builder::new()
             .name("desk".into())
             .spawn(move || desk.work(&received))
@@ -125,6 +133,7 @@ impl Modeler {
             },
             news,
             context,
+            is_listening,
             screen,
             gesture: None,
             adjust: None,
@@ -136,53 +145,83 @@ impl Modeler {
     /// Takes what the desk told.
     fn hear(&mut self) {
         while let Ok(news) = self.news.try_recv() {
-            match news {
-                News::Sheet(sheet) => self.bench.sheet = Some(sheet),
-                News::Scene {
-                    origin,
-                    center,
-                    radius,
-                    up,
-                    is_finer,
-                } => {
-                    self.bench.scene = (center, radius);
-                    if !is_finer {
-                        self.bench.look.cut = None;
-                        self.bench.look.camera.up = up;
-                        self.bench.frame_all();
-                    }
-                    if let Some(Screen { canvas, .. }) = &mut self.screen {
-                        canvas.begin(origin, center.distance(origin) + radius);
-                    }
-                }
-                News::Patches(patches) => {
-                    self.moved = Instant::now();
-                    if let Some(Screen { canvas, .. }) = &mut self.screen {
-                        patches.iter().for_each(|patch| canvas.put(patch));
-                    }
-                }
-                News::Gone(object) => {
-                    if let Some(Screen { canvas, .. }) = &mut self.screen {
-                        canvas.forget(&object);
-                    }
-                }
-                News::Empty => self.bench.sheet = None,
-                News::Busy(busy) => self.bench.busy = busy,
-                News::Held(held) => {
-                    self.bench.held = held;
-                    self.bench.seen = None;
-                }
-                News::Seen(seen) => self.bench.seen = Some(seen),
-                News::Note(text) => self.bench.tell(text, false),
-                News::Failed(text) => self.bench.tell(text, true),
-            }
+            self.take(news);
         }
         self.bench.triangles = self.screen.as_ref().map_or(0, |s| s.canvas.triangles());
+    }
+
+    fn take(&mut self, news: News) {
+        match news {
+            News::Sheet(sheet) => self.bench.sheet = Some(sheet),
+            News::Scene {
+                origin,
+                center,
+                radius,
+                up,
+                is_finer,
+            } => {
+                self.bench.scene = (center, radius);
+                if !is_finer {
+                    self.bench.look.cut = None;
+                    self.bench.look.camera.up = up;
+                    self.bench.frame_all();
+                }
+                if let Some(Screen { canvas, .. }) = &mut self.screen {
+                    canvas.begin(origin, center.distance(origin) + radius);
+                }
+            }
+            News::Patches(patches) => {
+                self.moved = Instant::now();
+                if let Some(Screen { canvas, .. }) = &mut self.screen {
+                    patches.iter().for_each(|patch| canvas.put(patch));
+                }
+            }
+            News::Gone(object) => {
+                if let Some(Screen { canvas, .. }) = &mut self.screen {
+                    canvas.forget(&object);
+                }
+            }
+            News::Empty => self.bench.sheet = None,
+            News::Busy(busy) => self.bench.busy = busy,
+            News::Held(held) => {
+                self.bench.held = held;
+                self.bench.seen = None;
+            }
+            News::Seen(seen) => self.bench.seen = Some(seen),
+            News::Note(text) => self.bench.tell(text, false),
+            News::Failed(text) => self.bench.tell(text, true),
+        }
+    }
+
+    /// Waits a little for what the desk makes of a stroke: else the next picture would show it, not this one.
+    fn meet_desk(&mut self) {
+        self.is_listening.store(true, Ordering::SeqCst);
+        let until = Instant::now() + MEETING;
+        loop {
+            let rest = until.saturating_duration_since(Instant::now());
+            let Ok(news) = self.news.recv_timeout(rest) else {
+                break;
+            };
+            let is_shown = matches!(news, News::Patches(_));
+            self.take(news);
+            if is_shown {
+                break;
+            }
+        }
+        self.is_listening.store(false, Ordering::SeqCst);
+        // What was told meanwhile has woken nobody.
+        self.hear();
     }
 
     /// The scene, and what the mouse does in it.
     fn viewport(&mut self, ui: &mut egui::Ui) {
         let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
+        // What the mouse does now shows in this picture, which is painted below what is drawn over it.
+        let below = ui.painter().add(egui::Shape::Noop);
+        let over = response.hover_pos().or(response.interact_pointer_pos());
+        if let Some(over) = over {
+            self.pointer(ui, rect, &response, over);
+        }
         let is_still = self.moved.elapsed() > STILL && self.gesture.is_none();
         if let Some(screen) = &mut self.screen {
             let share = if is_still { 1.0 } else { ROUGH };
@@ -190,7 +229,8 @@ impl Modeler {
             let size = [pixels.x as u32, pixels.y as u32];
             let picture = screen.draw(&self.bench.look, size, !is_still);
             let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
-            ui.painter().image(picture, rect, whole, egui::Color32::WHITE);
+            let image = egui::Shape::image(picture, rect, whole, egui::Color32::WHITE);
+            ui.painter().set(below, image);
         }
         if !is_still {
             ui.ctx().request_repaint_after(STILL);
@@ -198,10 +238,6 @@ impl Modeler {
         if let Some(thing) = self.bench.sheet.as_ref().and_then(|s| s.objects.get(s.chosen)) {
             let length_of_point = self.bench.look.camera.height / f64::from(rect.height());
             scale_bar(ui.painter(), rect, length_of_point, thing.unit);
-        }
-        let over = response.hover_pos().or(response.interact_pointer_pos());
-        if let Some(over) = over {
-            self.pointer(ui, rect, &response, over);
         }
         self.draw_holds(ui, rect);
         self.draw_hand(ui, rect);
@@ -273,8 +309,11 @@ impl Modeler {
         match &mut self.gesture {
             Some(Gesture::Stroke(path)) => {
                 let steps: Vec<Pos2> = moves.into_iter().flat_map(|to| path.to(to)).collect();
-                for step in steps {
-                    self.bench.order(Order::Along(self.ray(rect, step)));
+                for step in &steps {
+                    self.bench.order(Order::Along(self.ray(rect, *step)));
+                }
+                if !steps.is_empty() {
+                    self.meet_desk();
                 }
             }
             Some(Gesture::Orbit) if way != DVec2::ZERO => {
@@ -412,12 +451,12 @@ fn close_when_asked(context: Arc<Mutex<egui::Context>>) {
     });
 }
 
-fn wake(context: Arc<Mutex<egui::Context>>) -> Arc<dyn Fn() + Send + Sync> {
+fn wake(context: Arc<Mutex<egui::Context>>, is_listening: Arc<AtomicBool>) -> Arc<dyn Fn() + Send + Sync> {
     Arc::new(move || {
-        context
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .request_repaint();
+        if !is_listening.load(Ordering::SeqCst) {
+            let context = context.lock().unwrap_or_else(PoisonError::into_inner);
+            context.request_repaint();
+        }
     })
 }
 
