@@ -26,8 +26,8 @@ use crate::view::{Camera, Look, Paper, Ray, Screen, pick, scale_bar};
 const STILL: Duration = Duration::from_millis(60);
 /// Share of the pixels of a side that are drawn while something moves.
 const ROUGH: f32 = 0.5;
-/// Longest time that a picture waits for the desk. A dab takes 7 to 14 ms, a picture without a graphics card 40.
-const MEETING: Duration = Duration::from_millis(15);
+/// Longest time that a picture waits for the desk. A dab takes 7 to 14 ms, more on a busy machine; a picture without a graphics card 40.
+const MEETING: Duration = Duration::from_millis(30);
 
 /// The window.
 pub struct Modeler {
