@@ -44,24 +44,24 @@ def good(n, folder):
         solid = ['sphere', 'torus', 'gyroid', 'tetrahedron'][n // 4 % 4]
         ending, made = CLOUDS[n // 4 % len(CLOUDS)], folder / f'{solid}-{n}.ply'
         noise = ['0', '0.2%', '1%'][n // 16 % 3]
-        ask('phantom', solid, '-o', made, '--count', rng.randint(800, 6000), '--seed', n, *(['--noise', noise] if noise != '0' else []))
+        ask('phantom', solid, '-o', made, '--count', rng.randint(2000, 12000), '--seed', n, *(['--noise', noise] if noise != '0' else []))
         return made if ending == 'ply' else converted(made, ending)
     if kind == 1:
         field = work / f'{n}.iclay'
         ask('fit', root / 'data/bunny.obj.gz', '-o', field, '--max-depth', 6 + n // 4 % 2)
         made = folder / f'bunny-{n}.{MESHES[n // 4 % len(MESHES)]}'
-        ask('mesh', field, '-o', made, '--triangles', rng.randint(600, 8000))
+        ask('mesh', field, '-o', made, '--triangles', rng.randint(1500, 12000))
         field.unlink()
         return made
     if kind == 2:
         made = folder / f'head-{n}.nii'
-        ask('phantom', 'head', '-o', made, '--size', rng.randint(12, 40), '--seed', n)
+        ask('phantom', 'head', '-o', made, '--size', rng.randint(20, 56), '--seed', n)
         return converted(made, VOLUMES[n // 4 % len(VOLUMES)])
     if n // 4 % 5 == 0:
         made = folder / f'series-{n}'
         shutil.copytree(root / 'crates/formats/tests/data/dicom/ct', made)
         return made
-    first, steps = rng.randint(0, 30), rng.randint(2, 4)
+    first, steps = rng.randint(0, 30), rng.randint(2, 3)
     made = folder / f'part-{n}.nrrd'
     ask('convert', root / 'data/head.nii.gz', made, '--region', f'{first}:{first + 60},0:96,10:90', '--stride', steps)
     return made

@@ -89,9 +89,23 @@ fn views(ui: &mut egui::Ui, bench: &mut Bench) {
             bench.order(Order::LetGo);
         }
     }
+    let mut measures = bench.measure.is_some();
+    if ui.checkbox(&mut measures, "Measure (M)").changed() {
+        bench.measure = measures.then(Default::default);
+    }
     ui.checkbox(&mut bench.shows_log, "Log");
     ui.separator();
-    egui::widgets::global_theme_preference_buttons(ui);
+    let mut theme = ui.options(|o| o.theme_preference);
+    ui.horizontal(|ui| {
+        for (is, name) in [
+            (egui::ThemePreference::Dark, "Dark"),
+            (egui::ThemePreference::Light, "Light"),
+            (egui::ThemePreference::System, "As the system"),
+        ] {
+            ui.selectable_value(&mut theme, is, name);
+        }
+    });
+    ui.ctx().set_theme(theme);
 }
 
 fn item<'a>(text: &'a str, keys: &'a str) -> egui::Button<'a> {

@@ -3,6 +3,7 @@
 mod constraints;
 mod document;
 mod log;
+mod measure;
 mod menu;
 mod path_box;
 mod slices;
@@ -15,6 +16,7 @@ mod touch;
 pub use constraints::{constraints, next_pin};
 pub use document::document;
 pub use log::log;
+pub use measure::measure;
 pub use menu::menu;
 pub use path_box::{PathBox, path_box};
 pub use slices::{Slices, slices};

@@ -20,7 +20,7 @@ pub use camera::{Camera, Ray};
 pub use canvas::{Canvas, Look, Paper};
 pub use card::Card;
 pub use histogram::Histogram;
-pub use pick::pick;
+pub use pick::{leave, pick};
 pub use scale_bar::scale_bar;
 pub use screen::{SKY, Screen};
 pub use shape::{Patch, Shape};

@@ -96,6 +96,21 @@ impl Shape {
         })
     }
 
+    /// Of its triangles, which are closed where the solid does not leave the field's box.
+    pub fn area_and_volume(&self) -> [f64; 2] {
+        let (mut area, mut volume) = (0.0, 0.0);
+        for (vertices, indices) in self.parts.values().flat_map(BTreeMap::values) {
+            for corners in indices.chunks_exact(3) {
+                let [a, b, c] =
+                    [0, 1, 2].map(|n| glam::Vec3::from(vertices[corners[n] as usize].at).as_dvec3());
+                let across = (b - a).cross(c - a);
+                area += 0.5 * across.length();
+                volume += a.dot(across) / 6.0;
+            }
+        }
+        [area, volume]
+    }
+
     /// Whether it can follow to another state of its object.
     pub fn follows(&self, object: &Object, world_from_object: DAffine3) -> bool {
         self.world_box == object.field.world_box()

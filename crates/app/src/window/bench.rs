@@ -10,11 +10,12 @@ use egui::Modifiers;
 use fitting::Cancel;
 use glam::DVec3;
 
+use super::measure::{Mark, Measure};
 use super::orders::{Order, Sheet};
 use super::tool::{Kind, Tool};
 use super::touch::{Held, Seen};
 use crate::panels;
-use crate::view::{Camera, Look};
+use crate::view::{Camera, Look, leave};
 
 /// Time for which a message stays.
 const READ: Duration = Duration::from_secs(8);
@@ -47,6 +48,8 @@ pub struct Bench {
     pub densities: Option<panels::Densities>,
     /// Whether all that was told is shown.
     pub shows_log: bool,
+    /// What is measured, if clicks do that.
+    pub measure: Option<Measure>,
     /// Whether clicks pin the surface.
     pub pins: bool,
     /// How a device is to be held, if that panel is shown.
@@ -111,6 +114,24 @@ impl Bench {
         let hold = serde_json::json!({ "name": panels::next_pin(thing), "points": [own.to_array()] });
         let stroke = serde_json::from_value(serde_json::json!({ "hold": hold }));
         self.order(Order::Do(Box::new(stroke.expect("a finite place can be held"))));
+    }
+
+    /// Marks a place of the chosen object's surface to be measured from.
+    pub(super) fn mark(&mut self, p: DVec3, normal: DVec3) {
+        let thing = self
+            .sheet
+            .as_ref()
+            .and_then(|sheet| sheet.objects.get(sheet.chosen));
+        let wall = thing.and_then(|thing| {
+            let own = thing.world_from_object.inverse();
+            let inward = own.transform_vector3(-normal).try_normalize()?;
+            let from = own.transform_point3(p);
+            let beyond = leave(&*thing.field, thing.iso, &thing.own_box, from, inward)?;
+            Some(thing.world_from_object.transform_point3(beyond).distance(p))
+        });
+        if let Some(measure) = &mut self.measure {
+            measure.marks.push(Mark { at: p, wall });
+        }
     }
 
     /// Tells what holds the tool when another one is chosen, or it is set otherwise.

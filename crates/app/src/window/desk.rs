@@ -137,6 +137,13 @@ impl Desk {
             Order::Drop => self.drop_stroke(),
             Order::Undo(count) => self.turn_back(|d| d.undo(count).map(drop)),
             Order::Redo(count) => self.turn_back(|d| d.redo(count).map(drop)),
+            Order::Weigh(name) => {
+                let shape = self.open.as_ref().and_then(|open| open.shapes.get(&name));
+                if let Some(shape) = shape {
+                    self.tell(News::Size(name, shape.area_and_volume()));
+                }
+                Ok(())
+            }
             Order::Do(stroke) => self.apply(*stroke),
             Order::Take(wanted) => {
                 self.wanted = Some(wanted);

@@ -6,6 +6,7 @@ mod desk;
 mod gesture;
 mod hand;
 mod marks;
+pub mod measure;
 mod modeler;
 pub mod orders;
 mod preview;

@@ -60,6 +60,7 @@ impl Modeler {
 
     /// Goes on in another window, on a card that is not lost.
     pub(super) fn resume(&mut self, context: &egui::Context, screen: Option<Screen>) {
+        style(context);
         *self.context.lock().unwrap_or_else(PoisonError::into_inner) = context.clone();
         self.end_gesture();
         self.screen = screen;
@@ -87,6 +88,7 @@ impl Modeler {
 
     /// With nothing open.
     pub(super) fn on(context: &egui::Context, screen: Option<Screen>, home: PathBuf) -> Self {
+        style(context);
         let context = Arc::new(Mutex::new(context.clone()));
         let (orders, received) = channel();
         let (told, news) = channel();
@@ -123,6 +125,7 @@ impl Modeler {
                 scratch: None,
                 densities: None,
                 shows_log: false,
+                measure: None,
                 pins: false,
                 touch: None,
                 held: None,
@@ -183,6 +186,11 @@ impl Modeler {
             }
             News::Empty => self.bench.sheet = None,
             News::Busy(busy) => self.bench.busy = busy,
+            News::Size(name, size) => {
+                if let Some(measure) = &mut self.bench.measure {
+                    measure.size = Some((name, size));
+                }
+            }
             News::Held(held) => {
                 self.bench.held = held;
                 self.bench.seen = None;
@@ -240,6 +248,7 @@ impl Modeler {
             scale_bar(ui.painter(), rect, length_of_point, thing.unit);
         }
         self.draw_holds(ui, rect);
+        self.draw_marks(ui, rect);
         self.draw_hand(ui, rect);
         if response.drag_stopped() || !ui.input(|i| i.pointer.any_down()) {
             self.end_gesture();
@@ -276,9 +285,15 @@ impl Modeler {
         let is_free = self.bench.busy.is_none() && self.gesture.is_none();
         let under = is_free.then(|| self.under(rect, over)).flatten();
         if let Some(button) = pressed.filter(|_| response.hovered() && self.gesture.is_none()) {
-            if let (PointerButton::Primary, true, Some((p, _))) = (button, self.bench.pins, under) {
-                self.bench.pin(p);
-                return;
+            if let (PointerButton::Primary, Some((p, normal))) = (button, under) {
+                if self.bench.measure.is_some() {
+                    self.bench.mark(p, normal);
+                    return;
+                }
+                if self.bench.pins {
+                    self.bench.pin(p);
+                    return;
+                }
             }
             self.gesture = Some(match (button, keys.shift, keys.alt) {
                 (PointerButton::Primary, _, false) if self.leads_by_mouse() && under.is_some() => {
@@ -408,6 +423,12 @@ impl Modeler {
         if pressed(Modifiers::NONE, Key::N) {
             self.bench.pins ^= true;
         }
+        if pressed(Modifiers::NONE, Key::M) {
+            self.bench.measure = match self.bench.measure {
+                Some(_) => None,
+                None => Some(Default::default()),
+            };
+        }
         for kind in Kind::ALL {
             if pressed(Modifiers::NONE, kind.key()) {
                 self.bench.tool.kind = kind;
@@ -430,6 +451,11 @@ impl Modeler {
             self.moved = Instant::now();
         }
     }
+}
+
+/// Hints are read too: egui's own are too faint for that.
+fn style(context: &egui::Context) {
+    context.all_styles_mut(|style| style.visuals.weak_text_alpha = 0.85);
 }
 
 /// Where a point of the screen is in the picture, in heights of it.
@@ -501,6 +527,7 @@ impl Modeler {
         panels::slices(ui.ctx(), &mut self.bench);
         panels::path_box(ui.ctx(), &mut self.bench);
         panels::touch(ui.ctx(), &mut self.bench);
+        panels::measure(ui.ctx(), &mut self.bench);
         panels::log(ui.ctx(), &mut self.bench);
         self.bench.tell_tool();
         if self.bench.message().is_some() {

@@ -52,6 +52,8 @@ pub enum Order {
     Undo(usize),
     /// Does edits again.
     Redo(usize),
+    /// Asks for area and volume of an object.
+    Weigh(String),
     /// One stroke that needs no hand.
     Do(Box<Stroke>),
     /// Takes a device in the hand, or another one.
@@ -88,6 +90,8 @@ pub enum News {
     Empty,
     /// What takes a while, and the share done; none when it is done.
     Busy(Option<(String, f64)>),
+    /// Area and volume of an object, of the world's lengths.
+    Size(String, [f64; 2]),
     /// What is in the hand now.
     Held(Option<touch::Held>),
     /// What it does and feels.

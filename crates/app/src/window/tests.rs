@@ -10,6 +10,8 @@ use egui_kittest::kittest::Queryable;
 use fitting::{Cancel, Control};
 use glam::DVec3;
 
+mod panels;
+
 use super::desk::Desk;
 use super::modeler::Modeler;
 use super::orders::{News, Order, Sheet};
