@@ -4,7 +4,7 @@
 
 mod batch;
 mod belongs;
-mod ceiling;
+pub mod ceiling;
 mod chart_all;
 mod chart_dynamics;
 mod chart_edits;
@@ -114,7 +114,7 @@ enum Command {
     Picture(picture::Args),
     /// Draw the same picture on the graphics card, faster; without one the processor draws it
     #[cfg(feature = "window")]
-    Render(picture::Args),
+    Render(render::Args),
     /// Move a region of a field by a scripted scene: forces, matter and constraints over time
     Simulate(simulate::Args),
     /// Make a document of fields, to be edited with a history
@@ -270,7 +270,7 @@ impl Command {
             Self::Phantom(a) => (a.json, is_stdout(&a.output)),
             Self::Picture(a) => (a.json, is_stdout(&a.output)),
             #[cfg(feature = "window")]
-            Self::Render(a) => (a.json, is_stdout(&a.output)),
+            Self::Render(a) => (a.picture.json, is_stdout(&a.picture.output)),
             Self::Simulate(a) => (a.json, is_stdout(&a.output)),
             Self::New(a) => (a.json, false),
             Self::Sculpt(a) => (a.json, a.preview.as_deref().is_some_and(is_stdout)),

@@ -19,7 +19,7 @@ const FINER: [usize; 2] = [1, 2];
 /// Chord error over the diagonal of the box: half a pixel where the box fills a screen.
 const ERROR: f64 = 8e-4;
 /// Radius of curvature, over the diagonal of the box, at which a hollow is half as dark as it can be.
-const HOLLOW: f64 = 0.02;
+pub const HOLLOW: f64 = 0.02;
 
 /// A corner of triangles, in the world from the origin of the picture.
 #[repr(C)]

@@ -15,7 +15,7 @@ use super::orders::{Order, Sheet};
 use super::tool::{Kind, Tool};
 use super::touch::{Held, Seen};
 use crate::panels;
-use crate::view::{Camera, Look, leave};
+use crate::view::{Camera, Histogram, Look, Mode, leave};
 
 /// Time for which a message stays.
 const READ: Duration = Duration::from_secs(8);
@@ -46,6 +46,10 @@ pub struct Bench {
     pub scratch: Option<tempfile::TempDir>,
     /// How often which density is in the chosen object.
     pub densities: Option<panels::Densities>,
+    /// Whether the card draws without triangles.
+    pub can_cast: bool,
+    /// Of which object the densities are that show black and white.
+    pub density_of: Option<String>,
     /// Whether all that was told is shown.
     pub shows_log: bool,
     /// What is measured, if clicks do that.
@@ -141,6 +145,24 @@ impl Bench {
             self.order(Order::Tool(tool));
         }
         self.told_tool = self.held.is_some().then_some(tool);
+    }
+
+    /// Shows the densities of the chosen object from its surface to the highest, once they are shown at all.
+    pub(super) fn know_density(&mut self) {
+        let Some(thing) = self
+            .sheet
+            .as_ref()
+            .and_then(|sheet| sheet.objects.get(sheet.chosen))
+        else {
+            return;
+        };
+        let has_density = self.look.mode != Mode::Mesh;
+        if !has_density || self.density_of.as_ref() == Some(&thing.name) {
+            return;
+        }
+        let histogram = Histogram::new(&*thing.field, &thing.own_box);
+        self.look.density = histogram.shown(thing.iso);
+        self.density_of = Some(thing.name.clone());
     }
 
     /// Looks at the whole scene.

@@ -5,6 +5,7 @@ mod bench;
 mod desk;
 mod gesture;
 mod hand;
+mod kept;
 mod marks;
 pub mod measure;
 mod modeler;

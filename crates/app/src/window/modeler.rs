@@ -8,6 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use egui::layers::ShapeIdx;
 use egui::{Key, Modifiers, PointerButton, Pos2, Rect, Sense};
 use fitting::Cancel;
 use glam::{DVec2, DVec3};
@@ -16,6 +17,7 @@ use super::adjust::Adjust;
 use super::bench::Bench;
 use super::desk::Desk;
 use super::gesture::{Gesture, Way};
+use super::kept::Kept;
 use super::orders::{News, Order};
 use super::tool::{Kind, Tool};
 use crate::cli::{desk_files, interrupt};
@@ -24,8 +26,6 @@ use crate::view::{Camera, Look, Paper, Ray, Screen, pick, scale_bar};
 
 /// Time after which a picture in which nothing moves is drawn whole.
 const STILL: Duration = Duration::from_millis(60);
-/// Share of the pixels of a side that are drawn while something moves.
-const ROUGH: f32 = 0.5;
 /// Longest time that a picture waits for the desk. A dab takes 7 to 14 ms, more on a busy machine; a picture without a graphics card 40.
 const MEETING: Duration = Duration::from_millis(30);
 
@@ -44,6 +44,9 @@ pub struct Modeler {
     /// When something moved last.
     moved: Instant,
     desk: Option<JoinHandle<()>>,
+    /// How things are looked at, as it is written in a directory.
+    kept: Kept,
+    home: PathBuf,
 }
 
 impl Modeler {
@@ -100,6 +103,7 @@ impl Modeler {
             .name("desk".into())
             .spawn(move || desk.work(&received))
             .expect("the system has threads enough");
+        let kept = Kept::read(&home);
         Self {
             bench: Bench {
                 sheet: None,
@@ -113,6 +117,8 @@ impl Modeler {
                     camera: Camera::onto(DVec3::ZERO, 1.0, DVec3::Y),
                     cut: None,
                     paint: true,
+                    mode: kept.mode,
+                    density: [0.0, 1.0],
                     paper: Paper::Dark,
                 },
                 scene: (DVec3::ZERO, 1.0),
@@ -124,6 +130,8 @@ impl Modeler {
                 kept: desk_files::kept(&home),
                 scratch: None,
                 densities: None,
+                can_cast: true,
+                density_of: None,
                 shows_log: false,
                 measure: None,
                 pins: false,
@@ -142,6 +150,8 @@ impl Modeler {
             adjust: None,
             moved: Instant::now(),
             desk: Some(desk),
+            kept,
+            home,
         }
     }
 
@@ -177,6 +187,11 @@ impl Modeler {
                 self.moved = Instant::now();
                 if let Some(Screen { canvas, .. }) = &mut self.screen {
                     patches.iter().for_each(|patch| canvas.put(patch));
+                }
+            }
+            News::Solid(object, solid) => {
+                if let Some(Screen { canvas, .. }) = &mut self.screen {
+                    canvas.put_solid(&object, *solid);
                 }
             }
             News::Gone(object) => {
@@ -231,14 +246,10 @@ impl Modeler {
             self.pointer(ui, rect, &response, over);
         }
         let is_still = self.moved.elapsed() > STILL && self.gesture.is_none();
-        if let Some(screen) = &mut self.screen {
-            let share = if is_still { 1.0 } else { ROUGH };
-            let pixels = (rect.size() * ui.ctx().pixels_per_point() * share).round();
-            let size = [pixels.x as u32, pixels.y as u32];
-            let picture = screen.draw(&self.bench.look, size, !is_still);
-            let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
-            let image = egui::Shape::image(picture, rect, whole, egui::Color32::WHITE);
-            ui.painter().set(below, image);
+        self.bench.know_density();
+        let is_done = self.draw(ui, below, rect, is_still);
+        if !is_done {
+            ui.ctx().request_repaint();
         }
         if !is_still {
             ui.ctx().request_repaint_after(STILL);
@@ -253,6 +264,42 @@ impl Modeler {
         if response.drag_stopped() || !ui.input(|i| i.pointer.any_down()) {
             self.end_gesture();
         }
+    }
+
+    /// Draws the scene in place of a shape, or as much of it as there is time for; whether that is all.
+    fn draw(&mut self, ui: &egui::Ui, below: ShapeIdx, rect: Rect, is_still: bool) -> bool {
+        let Some(screen) = &mut self.screen else {
+            return true;
+        };
+        let look = &self.bench.look;
+        let pixels = rect.size() * ui.ctx().pixels_per_point();
+        let rough = screen
+            .canvas
+            .rough_share(look.mode, f64::from(pixels.x * pixels.y));
+        let mut draw = |is_rough: bool| {
+            let pixels = if is_rough { pixels * rough } else { pixels }.round();
+            screen.draw(look, [pixels.x as u32, pixels.y as u32], is_rough)
+        };
+        let whole = is_still.then(|| draw(false));
+        // Until all rows are drawn the rough picture shows below them.
+        let shown = match &whole {
+            Some(whole) if whole.rows >= 1.0 => None,
+            _ => Some(draw(true)),
+        };
+        let is_done = whole
+            .as_ref()
+            .or(shown.as_ref())
+            .is_none_or(|drawn| drawn.is_done);
+        let shown = shown.map(|drawn| (drawn.picture, 1.0));
+        let whole = whole.map(|drawn| (drawn.picture, drawn.rows));
+        let pictures = shown.into_iter().chain(whole).map(|(picture, rows)| {
+            let corner = rect.min + egui::vec2(rect.width(), rows * rect.height());
+            let part = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, rows));
+            let rect = Rect::from_min_max(rect.min, corner);
+            egui::Shape::image(picture, rect, part, egui::Color32::WHITE)
+        });
+        ui.painter().set(below, egui::Shape::Vec(pictures.collect()));
+        is_done
     }
 
     fn end_gesture(&mut self) {
@@ -420,6 +467,9 @@ impl Modeler {
             self.bench.tool.radius = (self.bench.tool.radius * 1.15).min(panels::RADII[1]);
         }
         self.adjust_by_keys(ui);
+        if pressed(Modifiers::NONE, Key::V) && self.bench.can_cast {
+            self.bench.look.mode = panels::next_mode(self.bench.look.mode);
+        }
         if pressed(Modifiers::NONE, Key::N) {
             self.bench.pins ^= true;
         }
@@ -502,6 +552,7 @@ impl Modeler {
             return;
         }
         self.hear();
+        self.bench.can_cast = self.screen.as_ref().is_none_or(|screen| screen.canvas.can_cast());
         self.keys(ui);
         let dropped: Vec<PathBuf> = ui.input(|i| {
             let files = i.raw.dropped_files.iter();
@@ -530,6 +581,9 @@ impl Modeler {
         panels::measure(ui.ctx(), &mut self.bench);
         panels::log(ui.ctx(), &mut self.bench);
         self.bench.tell_tool();
+        if let Err(why) = self.kept.keep(self.bench.look.mode, &self.home) {
+            self.bench.tell(why, true);
+        }
         if self.bench.message().is_some() {
             ui.ctx().request_repaint_after(Duration::from_secs(1));
         }

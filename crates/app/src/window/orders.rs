@@ -13,7 +13,7 @@ use tools::session::Stroke;
 
 use super::tool::Tool;
 use super::touch::{self, Seen, Wanted};
-use crate::view::{Patch, Ray};
+use crate::view::{Patch, Ray, Solid};
 
 /// What the window asks. Lines are those under the mouse, in the world.
 #[derive(Clone, Debug)]
@@ -84,6 +84,8 @@ pub enum News {
     },
     /// Triangles in place of those that there were.
     Patches(Vec<Patch>),
+    /// The spline of an object, in place of the one that there was.
+    Solid(String, Box<Solid>),
     /// An object is no more.
     Gone(String),
     /// Nothing is open any more.

@@ -211,6 +211,8 @@ pub const ROWS: &[Row] = &[
     ("mesh", "--keep", "@cloud --keep *5unit3", "smaller volume"),
     ("mesh", "--axes", "@cloud --axes *xyz", "lps"),
     ("picture render", "--size", "@cloud --size *8", "1200x900"),
+    ("render", "--mode", "@cloud --mode *points", "volume"),
+    ("render", "--density", "@cloud --mode volume --density *9,1", "lower one first"),
     ("picture render", "--azimuth", "@cloud --azimuth *east", "number"),
     ("picture render", "--elevation", "@cloud --elevation *inf", "finite"),
     ("picture render", "--up", "@cloud --up *w", "x, y, z"),
