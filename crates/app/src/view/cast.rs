@@ -18,7 +18,7 @@ const LEAST: u32 = 4;
 const MOST: u32 = 4096;
 /// Time for a picture while something moves, ms, and the shares of the pixels of a side that it may have.
 const MOVING: f64 = 80.0;
-const SHARES: [f32; 3] = [0.5, 0.34, 0.25];
+const SHARES: [f32; 4] = [0.5, 0.34, 0.25, 0.18];
 
 /// Solids, and pictures of them that are under way.
 pub struct Cast {
@@ -126,7 +126,7 @@ impl Cast {
             .millis()
             .filter(|ms| *ms > 0.0 && self.rough_pixels > 0.0)
         else {
-            return SHARES[1];
+            return SHARES[2];
         };
         let of_pixel = millis / self.rough_pixels;
         let fits = |share: &f32| f64::from(share * share) * pixels * of_pixel < MOVING;
