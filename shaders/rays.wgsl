@@ -37,11 +37,11 @@ const INSIDE_ALL: u32 = 0xfffffffdu;
 // Coefficients along an edge of a brick, and cells.
 const HALO: u32 = 11u;
 const CELLS: f32 = 8.0;
-// After these the ranges of its blocks of 2 cells a side, each in one number, as shares of the range of the brick, which comes last.
+// After these the ranges of its cells, two in each number, as shares of the range of the brick, which comes last.
 const RANGES: u32 = 1331u;
-const LEAST: u32 = 1395u;
-const SPAN: u32 = 1396u;
-const BRICK: u32 = 1397u;
+const LEAST: u32 = 1587u;
+const SPAN: u32 = 1588u;
+const BRICK: u32 = 1589u;
 
 @group(2) @binding(0) var<uniform> eye: Eye;
 @group(2) @binding(1) var<storage, read> solids: array<Solid>;
@@ -74,59 +74,61 @@ fn row(at: u32) -> vec4<f32> {
   return bitcast<vec4<f32>>(vec4(bricks[at], bricks[at + 1u], bricks[at + 2u], bricks[at + 3u]));
 }
 
-fn plane(at: u32, y: vec4<f32>, z: vec4<f32>) -> f32 {
-  return dot(y, vec4(dot(z, row(at)), dot(z, row(at + HALO)), dot(z, row(at + 2u * HALO)), dot(z, row(at + 3u * HALO))));
-}
+// The coefficients that a cell is evaluated from, row by row along z: read once, for to read takes longer than all else.
+struct Cell {
+  rows: array<vec4<f32>, 16>,
+};
 
-// The cell of a brick in which a place of it lies, 0 to 8 along each axis, and where in that.
-fn cell_of(c: vec3<f32>) -> vec3<f32> {
-  return clamp(floor(c), vec3(0.0), vec3(CELLS - 1.0));
-}
-
-fn first_of(brick: u32, cell: vec3<f32>) -> u32 {
+fn read_cell(brick: u32, cell: vec3<f32>) -> Cell {
   let k = vec3<u32>(cell);
-  return brick * BRICK + (k.x * HALO + k.y) * HALO + k.z;
+  let x0 = brick * BRICK + (k.x * HALO + k.y) * HALO + k.z;
+  let x1 = x0 + HALO * HALO;
+  let x2 = x1 + HALO * HALO;
+  let x3 = x2 + HALO * HALO;
+  return Cell(array<vec4<f32>, 16>(
+    row(x0), row(x0 + HALO), row(x0 + 2u * HALO), row(x0 + 3u * HALO),
+    row(x1), row(x1 + HALO), row(x1 + 2u * HALO), row(x1 + 3u * HALO),
+    row(x2), row(x2 + HALO), row(x2 + 2u * HALO), row(x2 + 3u * HALO),
+    row(x3), row(x3 + HALO), row(x3 + 2u * HALO), row(x3 + 3u * HALO),
+  ));
 }
 
-fn weighed(at: u32, x: vec4<f32>, y: vec4<f32>, z: vec4<f32>) -> f32 {
-  let step = HALO * HALO;
-  return dot(x, vec4(plane(at, y, z), plane(at + step, y, z), plane(at + 2u * step, y, z), plane(at + 3u * step, y, z)));
+fn weighed(c: Cell, x: vec4<f32>, y: vec4<f32>, z: vec4<f32>) -> f32 {
+  let r = c.rows;
+  let plane_0 = y.x * r[0] + y.y * r[1] + y.z * r[2] + y.w * r[3];
+  let plane_1 = y.x * r[4] + y.y * r[5] + y.z * r[6] + y.w * r[7];
+  let plane_2 = y.x * r[8] + y.y * r[9] + y.z * r[10] + y.w * r[11];
+  let plane_3 = y.x * r[12] + y.y * r[13] + y.z * r[14] + y.w * r[15];
+  return dot(z, x.x * plane_0 + x.y * plane_1 + x.z * plane_2 + x.w * plane_3);
 }
 
-fn value(brick: u32, c: vec3<f32>) -> f32 {
-  let cell = cell_of(c);
-  let t = c - cell;
-  return weighed(first_of(brick, cell), weights(t.x), weights(t.y), weights(t.z));
+// At a place of the cell, 0 to 1 along each axis.
+fn value(c: Cell, t: vec3<f32>) -> f32 {
+  return weighed(c, weights(t.x), weights(t.y), weights(t.z));
 }
 
-// By the cells of the brick.
-fn gradient(brick: u32, c: vec3<f32>) -> vec3<f32> {
-  let cell = cell_of(c);
-  let t = c - cell;
-  let at = first_of(brick, cell);
+// By the cell.
+fn gradient(c: Cell, t: vec3<f32>) -> vec3<f32> {
   let x = weights(t.x);
   let y = weights(t.y);
   let z = weights(t.z);
-  return vec3(weighed(at, slopes(t.x), y, z), weighed(at, x, slopes(t.y), z), weighed(at, x, y, slopes(t.z)));
+  return vec3(weighed(c, slopes(t.x), y, z), weighed(c, x, slopes(t.y), z), weighed(c, x, y, slopes(t.z)));
 }
 
-fn hessian(brick: u32, c: vec3<f32>) -> mat3x3<f32> {
-  let cell = cell_of(c);
-  let t = c - cell;
-  let at = first_of(brick, cell);
+fn hessian(c: Cell, t: vec3<f32>) -> mat3x3<f32> {
   let x = weights(t.x);
   let y = weights(t.y);
   let z = weights(t.z);
   let dx = slopes(t.x);
   let dy = slopes(t.y);
   let dz = slopes(t.z);
-  let xy = weighed(at, dx, dy, z);
-  let xz = weighed(at, dx, y, dz);
-  let yz = weighed(at, x, dy, dz);
+  let xy = weighed(c, dx, dy, z);
+  let xz = weighed(c, dx, y, dz);
+  let yz = weighed(c, x, dy, dz);
   return mat3x3(
-    weighed(at, bends(t.x), y, z), xy, xz,
-    xy, weighed(at, x, bends(t.y), z), yz,
-    xz, yz, weighed(at, x, y, bends(t.z)),
+    weighed(c, bends(t.x), y, z), xy, xz,
+    xy, weighed(c, x, bends(t.y), z), yz,
+    xz, yz, weighed(c, x, y, bends(t.z)),
   );
 }
 
@@ -155,7 +157,7 @@ fn through(line: Line, low: vec3<f32>, high: vec3<f32>) -> vec3<f32> {
   return vec3(start, min(leaves.x, min(leaves.y, leaves.z)), axis);
 }
 
-// A cube on one side of the density, or a block of 2 cells a side of a brick.
+// A cube on one side of the density, or an octant of a brick.
 struct Spot {
   low: vec3<f32>,
   size: f32,
@@ -168,45 +170,36 @@ struct Spot {
 
 // The largest cube round a place of a solid that need not be looked into, for the density that is looked for.
 fn find(solid: u32, p: vec3<f32>, level: f32) -> Spot {
-  var spot: Spot;
   var at = solids[solid].root;
   var low = vec3(0.0);
   var size = solids[solid].width;
   for (var depth = 0; depth < 40; depth += 1) {
     if (nodes[at].high <= level || nodes[at].low > level) {
-      spot = Spot(low, size, select(INSIDE_ALL, OUTSIDE, nodes[at].high <= level), low, 1.0);
-      return spot;
+      return Spot(low, size, select(INSIDE_ALL, OUTSIDE, nodes[at].high <= level), low, 1.0);
     }
     let half = 0.5 * size;
     let is_far = p >= low + half;
-    let octant = 4u * u32(is_far.x) + 2u * u32(is_far.y) + u32(is_far.z);
-    let next = nodes[at].octants[octant];
+    let next = nodes[at].octants[4u * u32(is_far.x) + 2u * u32(is_far.y) + u32(is_far.z)];
     let corner = select(low, low + half, is_far);
-    if (next == OUTSIDE || next == INSIDE_ALL) {
-      spot = Spot(corner, half, next, low, 1.0);
-      return spot;
-    }
     if (next == OWN) {
-      let brick = nodes[at].brick;
-      let scale = CELLS / size;
-      let block = clamp(floor((p - low) * (0.5 * scale)), vec3(0.0), vec3(3.0));
-      let k = vec3<u32>(block);
-      let share = unpack2x16unorm(bricks[brick * BRICK + RANGES + 16u * k.x + 4u * k.y + k.z]);
-      let ends = bitcast<f32>(bricks[brick * BRICK + LEAST]) + share * bitcast<f32>(bricks[brick * BRICK + SPAN]);
-      spot = Spot(low + block * (2.0 / scale), 2.0 / scale, brick, low, scale);
-      if (ends.y <= level) {
-        spot.brick = OUTSIDE;
-      } else if (ends.x > level) {
-        spot.brick = INSIDE_ALL;
-      }
-      return spot;
+      return Spot(corner, half, nodes[at].brick, low, CELLS / size);
+    }
+    if (next >= INSIDE_ALL) {
+      return Spot(corner, half, next, low, 1.0);
     }
     at = next;
     low = corner;
     size = half;
   }
-  spot = Spot(low, size, OUTSIDE, low, 1.0);
-  return spot;
+  return Spot(low, size, OUTSIDE, low, 1.0);
+}
+
+// Least and largest coefficient of a cell, given those of the brick.
+fn range_of(brick: u32, cell: vec3<f32>, least: f32, span: f32) -> vec2<f32> {
+  let k = vec3<u32>(cell);
+  let n = (k.x * 8u + k.y) * 8u + k.z;
+  let word = bricks[brick * BRICK + RANGES + n / 2u] >> (16u * (n & 1u));
+  return least + span * unpack4x8unorm(word).xy;
 }
 
 // The brick round a place of a solid, whatever its density.
@@ -235,11 +228,6 @@ fn is_brick(spot: Spot) -> bool {
 
 fn at_length(line: Line, t: f32) -> vec3<f32> {
   return line.start + t * line.way;
-}
-
-// How far the density of a block is above the surface.
-fn above(spot: Spot, line: Line, t: f32, iso: f32) -> f32 {
-  return value(spot.brick, (at_length(line, t) - spot.corner) * spot.scale) - iso;
 }
 
 // A line as a solid's lattice has it.
@@ -273,20 +261,21 @@ struct Hit {
 const NOTHING: u32 = 0xffffffffu;
 const BY_SURFACE: u32 = 4u;
 
-// Cells from one look at the density to the next, most cubes on a line, and most steps to the surface once it is passed.
-const STEP: f32 = 0.5;
+// Most cubes on a line, most cells of one, and most steps to the surface once it is passed.
 const MOST: i32 = 1000;
+const MOST_CELLS: i32 = 12;
 const NEARER: i32 = 8;
 
-// Where the density between two lengths rises through that of the surface: regula falsi as the Illinois rule has it [Dowell71].
-fn crossing(spot: Spot, line: Line, iso: f32, outside: vec2<f32>, inside: vec2<f32>) -> f32 {
+// Where the density between two lengths along a line through a cell rises through that of the surface: regula falsi as the Illinois rule
+// has it [Dowell71].
+fn crossing(c: Cell, line: Line, iso: f32, outside: vec2<f32>, inside: vec2<f32>) -> f32 {
   var a = outside;
   var b = inside;
   var side = 0;
   for (var n = 0; n < NEARER; n += 1) {
     let t = clamp((a.x * b.y - b.x * a.y) / (b.y - a.y), a.x, b.x);
-    let f = above(spot, line, t, iso);
-    if (abs(f) < 1e-6 * max(abs(iso), inside.y - outside.y)) {
+    let f = value(c, at_length(line, t)) - iso;
+    if (abs(f) < 1e-5 * (inside.y - outside.y)) {
       return t;
     }
     if (f > 0.0) {
@@ -302,18 +291,50 @@ fn crossing(spot: Spot, line: Line, iso: f32, outside: vec2<f32>, inside: vec2<f
   return b.x;
 }
 
+// The first way into the surface between two lengths along a line through a cell; before them where there is none.
+fn enter_cell(c: Cell, line: Line, iso: f32, from_t: f32, to_t: f32) -> f32 {
+  let f_a = value(c, at_length(line, from_t)) - iso;
+  if (f_a > 0.0) {
+    return from_t;
+  }
+  let half = 0.5 * (to_t - from_t);
+  let mid = from_t + half;
+  let f_m = value(c, at_length(line, mid)) - iso;
+  let f_b = value(c, at_length(line, to_t)) - iso;
+  var inside = vec2(mid, f_m);
+  var outside = vec2(from_t, f_a);
+  if (f_m <= 0.0) {
+    inside = vec2(to_t, f_b);
+    outside = vec2(mid, f_m);
+    // A line that grazes rises between two looks: to where a parabola through all three is highest.
+    let bend = f_a - 2.0 * f_m + f_b;
+    let aside = 0.5 * (f_a - f_b) / min(bend, -1e-30);
+    let high = f_m - 0.25 * (f_a - f_b) * aside;
+    if (bend < 0.0 && abs(aside) < 1.0 && high > 0.2 * bend) {
+      let top = mid + aside * half;
+      let f_top = value(c, at_length(line, top)) - iso;
+      if (f_top > 0.0) {
+        inside = vec2(top, f_top);
+        if (aside < 0.0) {
+          outside = vec2(from_t, f_a);
+        }
+      }
+    }
+  }
+  if (inside.y <= 0.0) {
+    return from_t - 1.0;
+  }
+  return crossing(c, line, iso, outside, inside);
+}
+
 // The first way into one solid, not farther than `most`.
 fn enter(n: u32, world_line: Line, most: f32) -> Hit {
   let part = part_of(n, world_line);
   let line = in_lattice(n, world_line);
   let iso = solids[n].iso;
   let little = solids[n].little;
-  let speed = length(line.way);
   let last = min(part.y, most);
   var t = part.x;
-  // What was found last, at `t`; and before that.
-  var now = -1.0;
-  var is_known = false;
   for (var k = 0; k < MOST; k += 1) {
     if (t >= last) {
       break;
@@ -325,43 +346,32 @@ fn enter(n: u32, world_line: Line, most: f32) -> Hit {
         return Hit(t, n, select(BY_SURFACE, u32(part.z), t == part.x));
       }
       t = next;
-      is_known = false;
       continue;
     }
-    if (!is_known) {
-      now = above(spot, line, t, iso);
-      is_known = true;
-    }
-    if (now > 0.0) {
-      return Hit(t, n, select(BY_SURFACE, u32(part.z), t == part.x));
-    }
-    let count = max(ceil((next - t) * speed * spot.scale / STEP), 1.0);
-    let step = (next - t) / count;
-    var then = now;
-    for (var i = 0.0; i < count; i += 1.0) {
-      let from_t = t;
-      let f = above(spot, line, from_t + step, iso);
-      if (f > 0.0) {
-        return Hit(crossing(spot, line, iso, vec2(from_t, now), vec2(from_t + step, f)), n, BY_SURFACE);
+    let least = bitcast<f32>(bricks[spot.brick * BRICK + LEAST]);
+    let span = bitcast<f32>(bricks[spot.brick * BRICK + SPAN]);
+    let in_brick = Line((line.start - spot.corner) * spot.scale, line.way * spot.scale);
+    let first = (spot.low - spot.corner) * spot.scale;
+    for (var i = 0; i < MOST_CELLS; i += 1) {
+      if (t >= next) {
+        break;
       }
-      // A line that grazes rises between two looks: to where a parabola through three of them is highest.
-      if (i > 0.0 && now >= then && now >= f) {
-        let bend = then - 2.0 * now + f;
-        let aside = 0.5 * (then - f) / min(bend, -1e-30);
-        let high = now - 0.25 * (then - f) * aside;
-        if (high > 0.1 * bend) {
-          let top_t = from_t + clamp(aside, -1.0, 1.0) * step;
-          let top = above(spot, line, top_t, iso);
-          if (top > 0.0) {
-            return Hit(crossing(spot, line, iso, vec2(from_t - step, then), vec2(top_t, top)), n, BY_SURFACE);
-          }
+      let cell = clamp(floor(at_length(in_brick, t + little)), first, first + 3.0);
+      let to_t = clamp(through(in_brick, cell, cell + 1.0).y, t + 2.0 * little, next + 2.0 * little);
+      let range = range_of(spot.brick, cell, least, span);
+      if (range.y > iso) {
+        if (range.x > iso) {
+          return Hit(t, n, select(BY_SURFACE, u32(part.z), t == part.x));
+        }
+        let in_cell = Line(in_brick.start - cell, in_brick.way);
+        let hit = enter_cell(read_cell(spot.brick, cell), in_cell, iso, t, to_t);
+        if (hit >= t) {
+          return Hit(hit, n, select(BY_SURFACE, u32(part.z), hit == part.x));
         }
       }
-      then = now;
-      now = f;
-      t = from_t + step;
+      t = to_t;
     }
-    t = next;
+    t = max(t, next);
   }
   return Hit(most, NOTHING, 0u);
 }
@@ -395,22 +405,22 @@ fn shape_at(n: u32, line: Line, t: f32, by: u32, bent: bool) -> Shape {
   let inner = in_lattice(n, line);
   // At the middle of the range no brick is on one side alone.
   let spot = look_up(n, at_length(inner, t));
-  let c = (at_length(inner, t) - spot.corner) * spot.scale;
+  let at = (at_length(inner, t) - spot.corner) * spot.scale;
+  let cell = clamp(floor(at), vec3(0.0), vec3(CELLS - 1.0));
+  let has_brick = is_brick(spot);
+  let c = read_cell(select(0u, spot.brick, has_brick), cell);
   var shape = Shape(-line.way, 0.0, 0.0);
-  if (!is_brick(spot)) {
-    return shape;
-  }
-  let up = turn * (gradient(spot.brick, c) * spot.scale);
+  let up = turn * (gradient(c, at - cell) * spot.scale);
   let steep = max(length(up), 1e-30);
   shape.normal = -up / steep;
   if (bent) {
-    let h = turn * (hessian(spot.brick, c) * (spot.scale * spot.scale)) * transpose(turn);
+    let h = turn * (hessian(c, at - cell) * (spot.scale * spot.scale)) * transpose(turn);
     let all = h[0].x + h[1].y + h[2].z;
     let curved = -(all - dot(shape.normal, h * shape.normal)) / steep;
     shape.ridge = tanh(clamp(0.5 * solids[n].cells.w * curved, -9.0, 9.0));
   }
   if (by != BY_SURFACE) {
-    shape.shade = shade_of(value(spot.brick, c));
+    shape.shade = shade_of(value(c, at - cell));
     // Out of the box across an axis, or towards the clipping plane.
     var flat = scene.cut_normal.xyz;
     if (by < 3u) {
@@ -418,7 +428,7 @@ fn shape_at(n: u32, line: Line, t: f32, by: u32, bent: bool) -> Shape {
       let toward = normalize(turn * axis);
       flat = select(toward, -toward, dot(toward, line.way) > 0.0);
     }
-    if (by == 3u || dot(shape.normal, flat) < 0.5) {
+    if (by == 3u || !has_brick || dot(shape.normal, flat) < 0.5) {
       shape.normal = flat;
     }
   }
@@ -505,7 +515,7 @@ fn again(at: vec2<f32>, lit: bool) -> vec4<f32> {
   }
   // As the eye has it, which tells dark from less dark best.
   let differ = sqrt(high) - sqrt(low);
-  if (max(differ.x, max(differ.y, differ.z)) < 0.07) {
+  if (max(differ.x, max(differ.y, differ.z)) < 0.1) {
     discard;
   }
   var sum = vec4(0.0);
@@ -561,47 +571,55 @@ fn volume(@builtin(position) at: vec4<f32>) -> @location(0) vec4<f32> {
     let turn = transpose(mat3x3(map[0].xyz, map[1].xyz, map[2].xyz));
     let speed = length(line.way);
     let last = min(part.y, most);
+    let little = solids[n].little;
     var t = part.x;
-    var now = 0.0;
-    var is_known = false;
     for (var k = 0; k < MOST; k += 1) {
-      if (t >= last || left < 0.01) {
+      if (t >= last || left < 0.03) {
         break;
       }
-      let spot = find(n, at_length(line, t + solids[n].little), eye.density.x);
-      let next = min(max(through(line, spot.low, spot.low + spot.size).y, t + 2.0 * solids[n].little), last);
-      if (!is_brick(spot) && spot.brick != INSIDE_ALL) {
-        t = next;
-        is_known = false;
+      let spot = find(n, at_length(line, t + little), eye.density.x);
+      let next = min(max(through(line, spot.low, spot.low + spot.size).y, t + 2.0 * little), last);
+      if (spot.brick == OUTSIDE) {
+        t = max(next, t + 2.0 * little);
         continue;
       }
-      let here = look_up(n, at_length(line, t + solids[n].little));
-      if (!is_known) {
-        now = above(here, line, t, 0.0);
-        is_known = true;
-      }
-      let count = max(ceil((next - t) * speed * here.scale / eye.density.w), 1.0);
-      let step = (next - t) / count;
-      for (var i = 0.0; i < count; i += 1.0) {
-        let f = above(here, line, t + step, 0.0);
-        let share = 1.0 - exp(-eye.density.z * step * mean_taken(now, f));
-        if (share > 0.002) {
-          let c = (at_length(line, t + 0.5 * step) - here.corner) * here.scale;
-          let up = turn * (gradient(here.brick, c) * here.scale);
+      let here = look_up(n, at_length(line, t + little));
+      let least = bitcast<f32>(bricks[here.brick * BRICK + LEAST]);
+      let span_here = bitcast<f32>(bricks[here.brick * BRICK + SPAN]);
+      let in_brick = Line((line.start - here.corner) * here.scale, line.way * here.scale);
+      for (var j = 0; j < 2 * MOST_CELLS; j += 1) {
+        if (t >= next || left < 0.03) {
+          break;
+        }
+        let cell = clamp(floor(at_length(in_brick, t + little)), vec3(0.0), vec3(CELLS - 1.0));
+        let to_t = min(max(through(in_brick, cell, cell + 1.0).y, t + 2.0 * little), max(next, t + 2.0 * little));
+        if (range_of(here.brick, cell, least, span_here).y > eye.density.x) {
+          let c = read_cell(here.brick, cell);
+          let in_cell = Line(in_brick.start - cell, in_brick.way);
+          let count = max(ceil((to_t - t) * speed * here.scale / eye.density.w), 1.0);
+          let step = (to_t - t) / count;
+          let mid = at_length(in_cell, 0.5 * (t + to_t));
+          let up = turn * (gradient(c, mid) * here.scale);
           let steep = length(up);
           let n_out = -up / max(steep, 1e-30);
           let facing = max(dot(n_out, lights.way[SUN].xyz), 0.0);
           let light = 0.05 + 0.55 + 0.30 * dot(n_out, scene.axes[1].xyz) + 0.95 * facing;
           // Where the density hardly changes there is no side that light could fall on.
           let is_sided = clamp(steep * eye.picture.w / (10.0 * span), 0.0, 1.0);
-          let own = mix(SOFT_PART, HARD_PART, shade_of(0.5 * (now + f)));
-          color += left * share * own * mix(0.7, light, is_sided);
-          left *= 1.0 - share;
+          let lit = mix(0.7, light, is_sided);
+          var now = value(c, at_length(in_cell, t));
+          for (var i = 0.0; i < count; i += 1.0) {
+            let f = value(c, at_length(in_cell, t + (i + 1.0) * step));
+            let share = 1.0 - exp(-eye.density.z * step * mean_taken(now, f));
+            let own = mix(SOFT_PART, HARD_PART, shade_of(0.5 * (now + f)));
+            color += left * share * own * lit;
+            left *= 1.0 - share;
+            now = f;
+          }
         }
-        now = f;
-        t += step;
+        t = to_t;
       }
-      t = next;
+      t = max(t, next);
     }
   }
   let behind = textureLoad(ground, vec2<i32>(at.xy), 0).rgb;

@@ -56,7 +56,7 @@ pub fn menu(ui: &mut egui::Ui, bench: &mut Bench) {
             ui.label(egui::RichText::new(name).strong())
                 .on_hover_text(sheet.path.display().to_string());
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                ui.horizontal(|ui| super::modes(ui, bench));
+                super::modes(ui, bench);
             });
         }
     });

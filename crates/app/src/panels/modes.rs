@@ -24,10 +24,10 @@ pub fn next_mode(mode: Mode) -> Mode {
     MODES[(at + 1) % MODES.len()].0
 }
 
-/// One of the ways is chosen.
+/// One of the ways is chosen, from the right end of a row on.
 pub fn modes(ui: &mut egui::Ui, bench: &mut Bench) {
     ui.spacing_mut().item_spacing.x = 2.0;
-    for (mode, name, hint) in MODES {
+    for (mode, name, hint) in MODES.into_iter().rev() {
         let is_possible = bench.can_cast || mode == Mode::Mesh;
         let button = egui::Button::selectable(bench.look.mode == mode, name);
         let button = ui

@@ -10,15 +10,15 @@ use eframe::egui_wgpu::wgpu;
 use super::canvas::{Canvas, Drawn, Look, Mode, Target};
 use super::rays::{Eye, Pass, Passes, Prepared, Rays};
 
-/// Time that a strip of rows may take, ms: as long as the window may be without an answer.
-const STRIP: f64 = 70.0;
+/// Time from one strip of rows to the next, ms, that of the panels included: as long as the window may be without an answer.
+const STRIP: f64 = 200.0;
 /// Rows of the first, and the fewest and the most.
-const ROWS: u32 = 24;
+const ROWS: u32 = 48;
 const LEAST: u32 = 4;
 const MOST: u32 = 4096;
-/// Time for a picture while something moves, ms, and the shares of the pixels of a side that it may have.
-const MOVING: f64 = 80.0;
-const SHARES: [f32; 3] = [0.5, 0.34, 0.25];
+/// Time from one picture to the next while something moves, ms, that of the panels included, and the shares of the pixels of a side that it may have.
+const MOVING: f64 = 160.0;
+const SHARES: [f32; 4] = [0.5, 0.34, 0.25, 0.18];
 
 /// Solids, and pictures of them that are under way.
 pub struct Cast {
@@ -55,7 +55,7 @@ enum Stage {
     Done,
 }
 
-/// How long the card took for what it was told last.
+/// How long it was from what the card was told last until that was done, as the next look at the card finds it.
 struct Clock {
     micros: Arc<AtomicU64>,
 }
@@ -126,7 +126,7 @@ impl Cast {
             .millis()
             .filter(|ms| *ms > 0.0 && self.rough_pixels > 0.0)
         else {
-            return SHARES[1];
+            return SHARES[2];
         };
         let of_pixel = millis / self.rough_pixels;
         let fits = |share: &f32| f64::from(share * share) * pixels * of_pixel < MOVING;

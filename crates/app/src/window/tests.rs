@@ -629,6 +629,7 @@ fn a_coarse_solid_is_seen_under_the_name_of_its_scan() {
     let [
         News::Scene { radius, is_finer, .. },
         News::Patches(patches),
+        News::Solid(..),
         News::Sheet(sheet),
     ] = &told[..]
     else {

@@ -3,17 +3,17 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use bspline::hierarchical::{HALO, HALO_LEN};
+use bspline::hierarchical::{BRICK, BRICK_LEN, HALO, HALO_LEN};
 use eframe::egui_wgpu::wgpu;
 use rayon::prelude::*;
 use rustc_hash::FxBuildHasher;
 
 use super::cube::Totals;
 
-/// Blocks of 2 cells along an edge of a brick.
-const BLOCKS: usize = 4;
-/// Numbers that the card has of a brick: its coefficients, the ranges of its blocks, and its own.
-const RECORD: usize = HALO_LEN + BLOCKS * BLOCKS * BLOCKS + 2;
+/// Cells of a brick.
+const CELLS: usize = BRICK_LEN;
+/// Numbers that the card has of a brick: its coefficients, the ranges of its cells, two in each, and its own.
+const RECORD: usize = HALO_LEN + CELLS / 2 + 2;
 /// Bytes of them.
 pub const RECORD_BYTES: u64 = (RECORD * size_of::<f32>()) as u64;
 
@@ -126,22 +126,26 @@ fn buffer(device: &wgpu::Device, bricks: usize) -> wgpu::Buffer {
 
 /// What the card has of a brick, see `shaders/rays.wgsl`, and the range of its coefficients.
 fn record(totals: &Totals) -> (Vec<u32>, [f32; 2]) {
-    const MOST: f32 = 65535.0;
+    const MOST: f32 = 255.0;
     let [low, high] = range(totals.iter().copied());
-    // Its rounding, and that of the sums that evaluate it, stay below this.
+    // Rounding, and that of the sums that evaluate it, stays below this.
     let slack = 1e-5 * low.abs().max(high.abs()).max(f32::MIN_POSITIVE);
     let (least, span) = (low - slack, high - low + 2.0 * slack);
+    let share = |x: f32| (x - least) / span * MOST;
+    let of_cell = |cell: usize| {
+        let at = [cell / (BRICK * BRICK), cell / BRICK % BRICK, cell % BRICK];
+        let rows = (0..4).flat_map(|i| (0..4).map(move |j| ((at[0] + i) * HALO + at[1] + j) * HALO + at[2]));
+        let [low, high] = range(rows.flat_map(|row| totals[row..row + 4].iter().copied()));
+        let low = (share(low - slack) - 0.1).floor().clamp(0.0, MOST) as u32;
+        let high = (share(high + slack) + 0.1).ceil().clamp(0.0, MOST) as u32;
+        low | high << 8
+    };
     let mut record: Vec<u32> = totals.iter().map(|total| total.to_bits()).collect();
-    for block in 0..BLOCKS.pow(3) {
-        let at = [block / (BLOCKS * BLOCKS), block / BLOCKS % BLOCKS, block % BLOCKS].map(|k| 2 * k);
-        let rows = (0..5).flat_map(|i| (0..5).map(move |j| ((at[0] + i) * HALO + at[1] + j) * HALO + at[2]));
-        let read = rows.flat_map(|row| totals[row..row + 5].iter().copied());
-        let [low, high] = range(read);
-        let share = |x: f32| (x - least) / span * MOST;
-        let low = (share(low - slack).floor() - 1.0).clamp(0.0, MOST) as u32;
-        let high = (share(high + slack).ceil() + 1.0).clamp(0.0, MOST) as u32;
-        record.push(low | high << 16);
-    }
+    record.extend(
+        (0..CELLS)
+            .step_by(2)
+            .map(|cell| of_cell(cell) | of_cell(cell + 1) << 16),
+    );
     record.extend([least, span].map(f32::to_bits));
     (record, [least, least + span])
 }

@@ -10,9 +10,9 @@ use crate::view::canvas::Look;
 /// Radius of curvature, over the diagonal of the box, at which a hollow is half as dark as it can be.
 pub const HOLLOW: f64 = crate::view::shape::HOLLOW;
 /// Radii of the scene after which white has taken all but a twentieth of the light.
-const DEEP: f64 = 1.0 / 30.0;
+const DEEP: f64 = 1.0 / 40.0;
 /// Cells from one look at the density to the next, while something moves and else.
-const STEPS: [f32; 2] = [1.0, 0.5];
+const STEPS: [f32; 2] = [2.0, 0.9];
 
 /// See `shaders/rays.wgsl`.
 #[repr(C)]
