@@ -184,8 +184,18 @@ pub fn draw(args: &Args, another: Draw) -> Outcome {
         open: &open,
     };
     let drawing = LazyCell::new(|| Drawing::new(&asked.scene, &view));
-    let pixels = another(&asked, &view)?.unwrap_or_else(|| drawing.pixels(&clay));
-    let of_errors = errors.map(|output| (output, drawing.pixels(&error_color(&open))));
+    let (pixels, of_errors) = match (another(&asked, &view)?, errors) {
+        (Some(pixels), None) => (pixels, None),
+        (None, None) => (drawing.pixels(&clay), None),
+        (Some(pixels), Some(output)) => {
+            let of_errors = drawing.pixels(&error_color(&open));
+            (pixels, Some((output, of_errors)))
+        }
+        (None, Some(output)) => {
+            let [pixels, of_errors] = drawing.pictures([&clay, &error_color(&open)]);
+            (pixels, Some((output, of_errors)))
+        }
+    };
     interrupt::check(&cancel)?;
     if let Some((output, pixels)) = &of_errors {
         write(output, args.size, pixels)?;
