@@ -231,10 +231,11 @@ fn write_all<W: Write>(out: W, body: impl FnOnce(&mut dyn Write) -> io::Result<(
     result
 }
 
-fn directory_of(target: &Path) -> PathBuf {
+/// The directory that a file is in, or is to be in.
+pub(crate) fn directory_of(target: &Path) -> &Path {
     match target.parent() {
-        Some(p) if !p.as_os_str().is_empty() => p.to_path_buf(),
-        _ => PathBuf::from("."),
+        Some(p) if !p.as_os_str().is_empty() => p,
+        _ => Path::new("."),
     }
 }
 

@@ -20,7 +20,7 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _isoclay {
     #[pymodule_export]
-    use crate::blocks::{join_blocks, with_leaf_errors};
+    use crate::blocks::{block_part, finished_block, near_field, write_blocks};
     #[pymodule_export]
     use crate::csg::{complement, difference, grown, intersection, moved, union};
     #[pymodule_export]

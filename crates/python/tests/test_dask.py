@@ -1,5 +1,6 @@
 """Many fits, and fits by blocks, on workers that may be lost."""
 
+import functools
 import os
 import shutil
 
@@ -8,6 +9,7 @@ import pytest
 from conftest import blob, sphere_points
 
 import isoclay
+from isoclay import _blocks
 from isoclay import dask as isoclay_dask
 
 distributed = pytest.importorskip("distributed")
@@ -19,8 +21,8 @@ SHAPE = (112, 96, 100)
 @pytest.fixture(scope="module")
 def client():
     with (
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
-        distributed.Client(cluster) as client,
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster,
+        distributed.Client(cluster, set_as_default=False) as client,
     ):
         yield client
 
@@ -72,10 +74,56 @@ def test_blocks_keep_the_tolerance_and_are_no_worse_at_their_borders(client, vol
     assert mean(at_border) <= 1.02 * mean(~at_border)
 
 
-def test_neither_workers_nor_losses_nor_storage_show(client, volume, tmp_path):
-    here = isoclay_dask.fit_volume_blocks(volume, tolerance=30, block=64, client=None)
-    there = isoclay_dask.fit_volume_blocks(volume, tolerance=30, block=64, client=client)
-    assert here.sha256 == there.sha256
+def test_a_file_has_the_bytes_of_the_field_and_is_made_on_from_what_is_there(volume, tmp_path, monkeypatch):
+    wishes = {"tolerance": 10, "block": 64, "scratch": tmp_path / "parts"}
+    first = isoclay_dask.fit_volume_blocks(volume, output=tmp_path / "first.iclay", **wishes)
+    field = isoclay_dask.fit_volume_blocks(volume, tolerance=10, block=64)
+    assert first.sha256 == field.sha256 == first.load().sha256
+    assert first.coefficient_count == field.coefficient_count
+    first.load().save(tmp_path / "again.iclay")
+    assert (tmp_path / "first.iclay").read_bytes() == (tmp_path / "again.iclay").read_bytes()
+    parts = sorted((tmp_path / "parts").iterdir())
+    assert any("mend" in path.name for path in parts)
+
+    # Nothing is fitted a second time, and what is not there is.
+    def refused(*arguments, **options):
+        raise RuntimeError("fitted")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(_blocks, "fit_volume", refused)
+        second = isoclay_dask.fit_volume_blocks(volume, output=tmp_path / "second.iclay", **wishes)
+        assert second.sha256 == first.sha256
+        for changed in ({"tolerance": 11}, {"affine": 2.0}):
+            with pytest.raises(RuntimeError, match="fitted"):
+                isoclay_dask.fit_volume_blocks(volume, output=tmp_path / "third.iclay", **{**wishes, **changed})
+        with pytest.raises(RuntimeError, match="fitted"):
+            isoclay_dask.fit_volume_blocks(volume + 1, output=tmp_path / "third.iclay", **wishes)
+    assert not (tmp_path / "third.iclay").exists()
+    parts[0].write_bytes(parts[0].read_bytes()[:-1])
+    with pytest.raises(isoclay.errors.BadFile, match=parts[0].name):
+        isoclay_dask.fit_volume_blocks(volume, output=tmp_path / "fourth.iclay", **wishes)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["again.iclay", "first.iclay", "parts", "second.iclay"]
+
+
+class Backwards:
+    """Does work as late as it can, the last first."""
+
+    def share(self, value):
+        return value
+
+    def submit(self, work, *arguments):
+        return functools.cache(lambda: work(*(self.done(argument) for argument in arguments)))
+
+    def done(self, value):
+        if isinstance(value, list):
+            return [self.done(one) for one in reversed(value)][::-1]
+        return value() if hasattr(value, "cache_info") else value
+
+    def each(self, handles):
+        return iter(self.done(handles))
+
+
+def test_neither_order_nor_storage_shows(volume, tmp_path, monkeypatch):
     group = zarr.open_group(tmp_path / "image.zarr", mode="w")
     stored = group.create_array("0", shape=SHAPE[::-1], chunks=(32, 32, 32), dtype="i2")
     stored[...] = volume.transpose(2, 1, 0)
@@ -98,27 +146,49 @@ def test_neither_workers_nor_losses_nor_storage_show(client, volume, tmp_path):
     }
     array, affine, order, unit = isoclay_dask.ome_zarr(tmp_path / "image.zarr")
     assert np.array_equal(affine, [[0.5, 0, 0, 7], [0, 1, 0, 6], [0, 0, 2, 5], [0, 0, 0, 1]])
+    wishes = {"unit": unit, "tolerance": 10, "block": 64}
+    field = isoclay_dask.fit_volume_blocks(volume, affine, **wishes)
+    assert field.unit == "mm"
+    assert isoclay_dask.fit_volume_blocks(array, affine, order=order, **wishes).sha256 == field.sha256
+    monkeypatch.setattr(isoclay_dask, "_runner", lambda *_: Backwards())
+    assert isoclay_dask.fit_volume_blocks(volume, affine, **wishes).sha256 == field.sha256
+
+
+def test_neither_workers_nor_losses_show(client, tmp_path):
+    """256 voxels along each side in blocks of 64: blocks with neighbours all round, whose fits do not meet the tolerance together."""
+    n = 256
+    stored = zarr.create_array(tmp_path / "volume.zarr", shape=(n, n, n), chunks=(64, 64, 64), dtype="i2")
+    noise = np.random.default_rng(5).standard_normal((n, n, n), dtype=np.float32)
+    stored[...] = (blob((n, n, n)) + 12 * noise).astype(np.int16)
     marker = tmp_path / "died"
-    fields = [
-        isoclay_dask.fit_volume_blocks(source, affine, order=order, unit=unit, tolerance=30, block=64, client=client)
-        for source in (array, Mortal(array, marker))
-    ]
+    wishes = {"tolerance": 18, "block": 64}
+    with (
+        distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0") as cluster,
+        distributed.Client(cluster, set_as_default=False) as one,
+    ):
+        first = isoclay_dask.fit_volume_blocks(stored, client=one, output=tmp_path / "one.iclay", **wishes)
+    mortal = Mortal(stored, marker, 100)
+    second = isoclay_dask.fit_volume_blocks(mortal, client=client, output=tmp_path / "two.iclay", **wishes)
     assert marker.exists()
-    assert fields[0].sha256 == fields[1].sha256
-    assert fields[0].unit == "mm"
+    assert first.sha256 == second.sha256
+    assert (tmp_path / "one.iclay").read_bytes() == (tmp_path / "two.iclay").read_bytes()
+    leaves = first.load().leaves
+    assert leaves["samples"].sum() == n**3
+    assert leaves["rms"].max() <= 18
 
 
 class Mortal:
-    """An array whose first reader among the workers dies."""
+    """An array that kills the worker that reads more than so many voxels along an axis of it for the first time."""
 
-    def __init__(self, array, marker):
-        self.array, self.marker, self.shape, self.dtype = array, marker, array.shape, array.dtype
+    def __init__(self, array, marker, most):
+        self.array, self.marker, self.most, self.shape, self.dtype = array, marker, most, array.shape, array.dtype
 
     def __getitem__(self, places):
-        if not self.marker.exists():
+        part = self.array[places]
+        if max(part.shape) > self.most and not self.marker.exists():
             self.marker.write_text("")
             os._exit(1)
-        return self.array[places]
+        return part
 
 
 def test_bad_wishes_are_named(volume):

@@ -45,6 +45,7 @@ pub use brick::{
     BRICK, BRICK_LEN, BrickKey, Corrections, DenseCorrections, HALO, HALO_LEN, LevelCorrections, active_slots,
 };
 pub use difference::{BrickChange, BrickDiff, DiffError};
+pub use digest::digest_below;
 pub use edit::{BrickEdit, LevelEdit};
 pub use functions::{EditError, MAX_LEVELS};
 pub use grown::shifted;

@@ -2,7 +2,6 @@ use std::fmt;
 use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
-use sha2::{Digest, Sha256};
 
 use super::brick::{BRICK, BRICK_LEN, DenseCorrections, HALO_LEN};
 use super::functions::{EditError, check_functions};
@@ -218,18 +217,7 @@ impl<T: Real> HierarchicalSpline<T> {
     ///
     /// The first time takes as long as hashing all coefficients; of a version made by an edit, as the edit.
     pub fn sha256(&self) -> [u8; 32] {
-        let mut hash = Sha256::new();
-        hash.update(b"isoclay-field-2");
-        hash.update(T::NAME);
-        for n in self.lattice.cells {
-            hash.update(n.to_le_bytes());
-        }
-        for x in self.lattice.world_from_lattice.to_cols_array() {
-            hash.update(x.to_le_bytes());
-        }
-        hash.update(self.place.slope.to_le_bytes());
-        hash.update(self.root.digest());
-        hash.finalize().into()
+        Self::identity(&self.lattice, self.place.slope, self.root.digest())
     }
 
     /// Bound on what rounding can do to one evaluation of the value inside the box.

@@ -1,6 +1,7 @@
 //! Chunks: type, compression, lengths, CRC-32, payload.
 
-use std::io::{self, Write};
+use std::fs::File;
+use std::io::{self, BufWriter, Read, Seek, Write};
 
 use super::cursor::Cursor;
 use crate::Fault;
@@ -23,18 +24,113 @@ pub(super) type Kind = [u8; 4];
 pub(super) fn write(out: &mut dyn Write, kind: Kind, raw: &[u8]) -> io::Result<()> {
     let packed = match raw.len() {
         0..WORTH_PACKING => None,
-        _ => Some(zstd::bulk::compress(raw, LEVEL)?).filter(|p| p.len() < raw.len()),
+        length => Some(pack(&mut &raw[..], length as u64, Vec::new())?).filter(|p| p.len() < length),
     };
     let (method, payload) = packed.as_deref().map_or((STORED, raw), |p| (ZSTD, p));
+    let mut sum = crc32fast::Hasher::new();
+    sum.update(payload);
+    out.write_all(&head(
+        kind,
+        method,
+        [payload.len(), raw.len()].map(|n| n as u64),
+        &sum,
+    ))?;
+    out.write_all(payload)
+}
+
+/// Writes one chunk of `length` bytes that are nowhere in memory, the same to the bit. `raw` begins them anew; `scratch`, empty,
+/// takes the packed ones until their number is known.
+pub(super) fn write_stream<'a>(
+    out: &mut dyn Write,
+    kind: Kind,
+    length: u64,
+    raw: &mut dyn FnMut() -> io::Result<Box<dyn Read + 'a>>,
+    scratch: &mut File,
+) -> io::Result<()> {
+    if length < WORTH_PACKING as u64 {
+        let mut few = Vec::new();
+        raw()?.read_to_end(&mut few)?;
+        return write(out, kind, &few);
+    }
+    let mut kept = Summed::new(BufWriter::new(&mut *scratch));
+    pack(&mut raw()?, length, &mut kept)?;
+    let (packed, sum) = kept.finish()?;
+    let (method, stored, sum) = match packed < length {
+        true => (ZSTD, packed, sum),
+        false => {
+            let mut all = Summed::new(io::sink());
+            io::copy(&mut raw()?, &mut all)?;
+            (STORED, length, all.finish()?.1)
+        }
+    };
+    out.write_all(&head(kind, method, [stored, length], &sum))?;
+    let copied = match method {
+        ZSTD => {
+            scratch.rewind()?;
+            io::copy(scratch, out)?
+        }
+        _ => io::copy(&mut raw()?, out)?,
+    };
+    debug_assert_eq!(copied, stored);
+    Ok(())
+}
+
+/// Packs as a stream, so that the bits do not depend on what was in memory at once.
+fn pack<W: Write>(raw: &mut dyn Read, length: u64, out: W) -> io::Result<W> {
+    let mut encoder = zstd::stream::write::Encoder::new(out, LEVEL)?;
+    encoder.set_pledged_src_size(Some(length))?;
+    io::copy(raw, &mut encoder)?;
+    encoder.finish()
+}
+
+/// Counts what passes, and sums it up.
+struct Summed<W> {
+    out: W,
+    length: u64,
+    sum: crc32fast::Hasher,
+}
+
+impl<W: Write> Summed<W> {
+    fn new(out: W) -> Self {
+        Self {
+            out,
+            length: 0,
+            sum: crc32fast::Hasher::new(),
+        }
+    }
+
+    /// How much it was, and its sum.
+    fn finish(mut self) -> io::Result<(u64, crc32fast::Hasher)> {
+        self.out.flush()?;
+        Ok((self.length, self.sum))
+    }
+}
+
+impl<W: Write> Write for Summed<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let n = self.out.write(bytes)?;
+        self.sum.update(&bytes[..n]);
+        self.length += n as u64;
+        Ok(n)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+}
+
+/// What stands in front of a payload of that sum: `lengths` are those of the payload and of what it unpacks to.
+fn head(kind: Kind, method: u32, lengths: [u64; 2], payload: &crc32fast::Hasher) -> [u8; HEAD] {
     let mut head = [0; HEAD];
     head[..4].copy_from_slice(&kind);
     head[4..8].copy_from_slice(&method.to_le_bytes());
-    head[8..16].copy_from_slice(&(payload.len() as u64).to_le_bytes());
-    head[16..24].copy_from_slice(&(raw.len() as u64).to_le_bytes());
-    let crc = checksum(&head, payload);
-    head[24..].copy_from_slice(&crc.to_le_bytes());
-    out.write_all(&head)?;
-    out.write_all(payload)
+    head[8..16].copy_from_slice(&lengths[0].to_le_bytes());
+    head[16..24].copy_from_slice(&lengths[1].to_le_bytes());
+    let mut crc = crc32fast::Hasher::new();
+    crc.update(&head[..24]);
+    crc.combine(payload);
+    head[24..].copy_from_slice(&crc.finalize().to_le_bytes());
+    head
 }
 
 /// CRC-32 of the head up to the checksum and of the payload as stored.

@@ -3,6 +3,7 @@
 use std::io::{self, Write};
 
 use bspline::HierarchicalSpline;
+use bspline::hierarchical::Lattice;
 
 use super::chunk::{self, Kind};
 use super::kinds::{END, HEADER, LEAVES, LEVEL, SIGNS};
@@ -34,11 +35,16 @@ pub(super) fn check<T: Stored>(field: &HierarchicalSpline<T>, meta: &FieldMeta) 
         let texts = [&meta.density_unit, &meta.report, &meta.provenance];
         valid::lengths(texts.into_iter().chain(&meta.notes), meta)
     };
-    all().map_err(|Wrong { what, value }| Fault::Output {
+    all().map_err(made_wrongly)
+}
+
+/// What is to be written and no field has.
+pub(super) fn made_wrongly(Wrong { what, value }: Wrong) -> Fault {
+    Fault::Output {
         what,
         value,
         remedy: "no field has this; fit the input again",
-    })
+    }
 }
 
 /// Writes a checked field.
@@ -47,14 +53,12 @@ pub(super) fn write<T: Stored>(
     field: &HierarchicalSpline<T>,
     meta: &FieldMeta,
 ) -> io::Result<()> {
-    out.write_all(&MAGIC)?;
-    out.write_all(&VERSION.to_le_bytes())?;
-    let mut count = 0u32;
+    begin::<T>(out, field.lattice(), field.slope(), field.level_count(), meta)?;
+    let mut count = 1u32;
     let mut put = |kind: Kind, raw: &[u8]| {
         count += 1;
         chunk::write(out, kind, raw)
     };
-    put(HEADER, &header(field, meta))?;
     for level in 0..field.level_count() {
         put(LEVEL, &to_bytes(level as u32, &field.corrections(level)))?;
     }
@@ -75,20 +79,28 @@ pub(super) fn write<T: Stored>(
     chunk::write(out, END, &count.to_le_bytes())
 }
 
-fn header<T: Stored>(field: &HierarchicalSpline<T>, meta: &FieldMeta) -> Vec<u8> {
-    let lattice = field.lattice();
+/// Writes all up to the first level: magic, version, header.
+pub(super) fn begin<T: Stored>(
+    out: &mut dyn Write,
+    lattice: &Lattice,
+    slope: f64,
+    level_count: usize,
+    meta: &FieldMeta,
+) -> io::Result<()> {
+    out.write_all(&MAGIC)?;
+    out.write_all(&VERSION.to_le_bytes())?;
     let mut raw = beside::marks::<T>(meta).to_vec();
-    raw.extend((field.level_count() as u32).to_le_bytes());
+    raw.extend((level_count as u32).to_le_bytes());
     lattice.cells.iter().for_each(|n| raw.extend(n.to_le_bytes()));
     lattice
         .world_from_lattice
         .to_cols_array()
         .iter()
         .for_each(|x| raw.extend(x.to_le_bytes()));
-    raw.extend(field.slope().to_le_bytes());
+    raw.extend(slope.to_le_bytes());
     raw.extend(meta.iso.unwrap_or(0.0).to_le_bytes());
     beside::put_text(&mut raw, &meta.density_unit);
-    raw
+    chunk::write(out, HEADER, &raw)
 }
 
 /// The leaf table, a column after the other: columns of like numbers pack several times better than rows.

@@ -13,3 +13,4 @@ pub(super) const END: Kind = *b"DONE";
 pub(super) const KNOTS_HEADER: Kind = *b"SPLN";
 pub(super) const KNOTS: Kind = *b"KNOT";
 pub(super) const COEFFICIENTS: Kind = *b"COEF";
+pub(super) const PAGES: Kind = *b"PAGE";

@@ -2,6 +2,7 @@
 
 mod beside;
 mod chunk;
+mod columns;
 mod cursor;
 mod decode;
 mod difference;
@@ -9,6 +10,8 @@ mod encode;
 mod kinds;
 mod knots;
 mod levels;
+mod part;
+mod sink;
 mod stored;
 mod valid;
 
@@ -21,6 +24,8 @@ pub use decode::decode;
 pub use difference::{DIFFERENCE_MAGIC, decode_difference, encode_difference};
 pub use encode::encode;
 pub use knots::{KNOTS_MAGIC, decode_knots, decode_knots_difference, encode_knots, encode_knots_difference};
+pub use part::{PART_MAGIC, PartIndex, encode_part};
+pub use sink::{FieldSink, Frame, save_stream};
 pub use stored::Stored;
 
 use crate::limits::Budget;
@@ -129,5 +134,7 @@ pub fn load(path: &Path, limits: &ReadLimits) -> Result<LoadedField, FormatError
     load().map_err(|fault: Fault| fault.at(path))
 }
 
+#[cfg(test)]
+mod stream_tests;
 #[cfg(test)]
 mod tests;

@@ -9,10 +9,10 @@ use super::*;
 use crate::atomic::tests::survives_a_full_disk;
 
 /// Numbers without a generator crate: xorshift64.
-struct Random(u64);
+pub(super) struct Random(pub(super) u64);
 
 impl Random {
-    fn next(&mut self) -> u64 {
+    pub(super) fn next(&mut self) -> u64 {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 7;
         self.0 ^= self.0 << 17;
@@ -21,7 +21,7 @@ impl Random {
 }
 
 /// A field of three levels on an oblique lattice; cells do not fill the last bricks.
-fn sample<T: Stored>(seed: u64, bricks_per_level: usize) -> HierarchicalSpline<T> {
+pub(super) fn sample<T: Stored>(seed: u64, bricks_per_level: usize) -> HierarchicalSpline<T> {
     let mut random = Random(seed);
     let cells = [11, 9, 17];
     let world_from_lattice = DAffine3 {
@@ -56,7 +56,7 @@ fn sample<T: Stored>(seed: u64, bricks_per_level: usize) -> HierarchicalSpline<T
     HierarchicalSpline::from_corrections(lattice, 0.75, levels)
 }
 
-fn meta() -> FieldMeta {
+pub(super) fn meta() -> FieldMeta {
     FieldMeta {
         source: SourceKind::Volume,
         unit: Unit::Millimetre,

@@ -10,6 +10,7 @@ use super::voxel::StoreAs;
 use super::vti;
 #[cfg(feature = "medical")]
 use super::{metaimage, nifti, nrrd};
+use crate::atomic::directory_of;
 use crate::file_name::{extension, is_gz_name};
 use crate::{Fault, FormatError, Unit};
 
@@ -84,15 +85,11 @@ pub fn save_slices<E: From<FormatError>>(
 }
 
 fn save_with(path: &Path, grid: &Grid, store: StoreAs, next: &mut NextSlice) -> Result<(), FormatError> {
-    let scratch = match path.parent() {
-        Some(p) if !p.as_os_str().is_empty() => p,
-        _ => Path::new("."),
-    };
     let slices = Slices {
         grid,
         store,
         next,
-        scratch,
+        scratch: directory_of(path),
     };
     let is_gz = is_gz_name(path);
     match extension(path).as_str() {

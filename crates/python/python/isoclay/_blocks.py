@@ -1,16 +1,18 @@
-"""Fits of volumes block by block.
+"""Volumes in blocks: how they are cut, what is seen of them before, and what a worker does with a block.
 
-A fit of a block gives up what it knows of the halo and keeps the functions and leaves of its own block; such fields add up. So
+A fit of a block gives up what it knows of the halo and keeps the functions and leaves of its own block, its part; parts add up. So
 what a worker holds is a block with its halo, and the functions of the blocks round it.
 """
 
 from __future__ import annotations
 
+import hashlib
 import itertools
-import json
-from collections.abc import Callable
+import os
+import uuid
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeAlias
+from pathlib import Path
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -18,29 +20,21 @@ import numpy.typing as npt
 from . import _isoclay
 from ._field import Field
 from ._fit import fit_volume
-from ._wishes import tolerance as parsed
 
 Doubles: TypeAlias = npt.NDArray[np.float64]
+Ticket: TypeAlias = bytes | str
+"""Bytes, or the file that has them."""
+Voxel: TypeAlias = tuple[int, int, int]
 
 LEAF = 4
 """Voxels along the cell that errors are told of."""
+ALIGN = 32
+"""Voxels along a brick of the coarsest level: blocks begin there."""
+FORGOTTEN = 16
+"""Voxels after which a prefilter has forgotten a voxel."""
 BINS = 1 << 16
-NOISE_BLOCKS = 8
-"""Blocks that are asked for the noise."""
-ROUNDS = 3
-"""Rounds of repair at most: the first mends what two blocks chose differently, the next what that left."""
 REACH = 2
 """Voxels round a leaf whose functions reach well into it."""
-
-
-class Runner(Protocol):
-    """Where work is done."""
-
-    def submit(self, work: Callable[..., Any], *arguments: Any) -> Any:
-        """Begins a piece of work. What it gives may be an argument of others, in lists too."""
-
-    def gather(self, handles: list[Any]) -> list[Any]:
-        """What pieces of work gave, in their order."""
 
 
 @dataclass(frozen=True)
@@ -63,38 +57,49 @@ class Plan:
             raise ValueError(f"order is {self.order!r}; write 'xyz' for [i, j, k], or 'zyx' for [k, j, i]")
         if self.method not in ("adaptive", "interpolate"):
             raise ValueError(f"method is {self.method!r}; write 'adaptive' or 'interpolate'")
-        if self.block < 32 or self.block % 32:
+        if self.block < ALIGN or self.block % ALIGN:
             raise ValueError(f"block is {self.block}; it has to be a multiple of 32, 32 or more")
-        step = 16 if self.method == "interpolate" else 32
+        step = FORGOTTEN if self.method == "interpolate" else ALIGN
         if self.halo < step or self.halo % step:
             raise ValueError(f"halo is {self.halo}; to fit by {self.method!r} it has to be a multiple of {step}")
 
     @property
-    def shape(self) -> tuple[int, int, int]:
+    def shape(self) -> Voxel:
         """Voxels along x, y, z."""
         shape = tuple(int(n) for n in self.volume.shape)
         return shape[::-1] if self.order == "zyx" else shape  # type: ignore[return-value]
 
-    def blocks(self, halo: int) -> list[Block]:
-        """All blocks, in a fixed order."""
+    @property
+    def rows(self) -> list[list[float]]:
+        """The affine as the Rust side takes it."""
+        rows: list[list[float]] = self.affine[:3].tolist()
+        return rows
+
+    def cuts(self) -> list[list[tuple[int, int]]]:
+        """First voxel of the blocks, and that behind their last, on each axis."""
         cuts = []
         for n in self.shape:
             starts = list(range(0, n, self.block))
             # A remainder that a halo would swallow goes with the block before.
-            if len(starts) > 1 and n - starts[-1] < 32:
+            if len(starts) > 1 and n - starts[-1] < ALIGN:
                 starts.pop()
             cuts.append([*zip(starts, [*starts[1:], n], strict=True)])
-        made = []
-        for (x0, x1), (y0, y1), (z0, z1) in itertools.product(*cuts):
-            low, high = (x0, y0, z0), (x1, y1, z1)
-            origin = tuple(max(0, v - halo) for v in low)
-            end = tuple(min(n, v + halo) for v, n in zip(high, self.shape, strict=True))
-            made.append(Block(low, high, origin, end))  # type: ignore[arg-type]
-        return made
+        return cuts
+
+    def blocks(self) -> list[Block]:
+        """All blocks, in a fixed order: z fastest."""
+        products = itertools.product(*self.cuts())
+        return [Block(*zip(*spans, strict=True)) for spans in products]
+
+    def wide(self, block: Block, halo: int) -> Block:
+        """A block with a halo, as far as there are voxels."""
+        low = tuple(max(0, v - halo) for v in block.low)
+        high = tuple(min(n, v + halo) for v, n in zip(block.high, self.shape, strict=True))
+        return Block(low, high)  # type: ignore[arg-type]
 
     def read(self, block: Block) -> npt.NDArray[Any]:
-        """Voxels ``[i, j, k]`` of a block with its halo."""
-        places = tuple(slice(a, b) for a, b in zip(block.origin, block.end, strict=True))
+        """Voxels ``[i, j, k]`` of a block."""
+        places = tuple(slice(a, b) for a, b in zip(block.low, block.high, strict=True))
         if self.order == "zyx":
             places = places[::-1]
         part = self.volume[places]
@@ -103,7 +108,7 @@ class Plan:
         array = np.asarray(part)
         return array.transpose(2, 1, 0) if self.order == "zyx" else array
 
-    def affine_at(self, origin: tuple[int, int, int]) -> Doubles:
+    def affine_at(self, origin: Voxel) -> Doubles:
         """The affine of a part that begins at a voxel."""
         moved = self.affine.copy()
         moved[:3, 3] = self.affine[:3, :3] @ origin + self.affine[:3, 3]
@@ -112,55 +117,83 @@ class Plan:
 
 @dataclass(frozen=True)
 class Block:
-    """A block of voxels, from ``low`` to before ``high``, and what is read for it, from ``origin`` to before ``end``."""
+    """Voxels from ``low`` to before ``high``."""
 
-    low: tuple[int, int, int]
-    high: tuple[int, int, int]
-    origin: tuple[int, int, int]
-    end: tuple[int, int, int]
-
-    def is_near(self, other: Block, reach: int) -> bool:
-        """Whether another block begins within a reach of what is read for this one."""
-        spans = zip(self.origin, self.end, other.low, other.high, strict=True)
-        return all(low < end + reach and high > origin - reach for origin, end, low, high in spans)
+    low: Voxel
+    high: Voxel
 
 
-def own_part(
-    plan: Plan, block: Block, field: Field, tolerance: float, mask: npt.NDArray[np.uint8] | None = None
-) -> Field:
-    """Of a fit of a block with its halo the functions and leaves of the block, in the grids of the whole volume."""
-    part = {"field": field._core, "origin": block.origin, "low": block.low, "high": block.high, "mask": mask}
-    return _joined(plan, None, [part], tolerance, None)
+@dataclass(frozen=True)
+class Shelf:
+    """Where parts are kept: in the memory of the workers, or in files of a directory that all of them see."""
+
+    directory: str | None
+    name: str
+    """What the files' names begin with; it tells fits apart that share a directory."""
+
+    def find(self, part: str) -> str | None:
+        """The file of a part that is there already, as after a fit that was cut off."""
+        path = self._path(part)
+        return path if path is not None and os.path.exists(path) else None
+
+    def put(self, part: str, content: bytes) -> Ticket:
+        """Keeps a part. A file is whole or not there; two workers that write one write the same."""
+        path = self._path(part)
+        if path is None:
+            return content
+        passing = f"{path}.{uuid.uuid4().hex}.tmp"
+        try:
+            with open(passing, "wb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(passing, path)
+        except OSError:
+            Path(passing).unlink(missing_ok=True)
+            raise
+        return path
+
+    def _path(self, part: str) -> str | None:
+        return None if self.directory is None else os.path.join(self.directory, f"{self.name}-{part}")
 
 
-def added(plan: Plan, base: Field | None, fields: list[Field], tolerance: float, iso: float | None) -> Field:
-    """The sum of fields in the grids of the whole volume; leaves are those of the base, if there is one."""
-    whole = {"origin": (0, 0, 0), "low": (0, 0, 0), "high": plan.shape, "mask": None}
-    return _joined(plan, base, [{"field": field._core, **whole} for field in fields], tolerance, iso)
+@dataclass(frozen=True)
+class Job:
+    """What all tasks of a fit share."""
+
+    plan: Plan
+    tolerance: float
+    shelf: Shelf
 
 
-def _joined(
-    plan: Plan, base: Field | None, parts: list[dict[str, Any]], tolerance: float, iso: float | None
-) -> Field:
-    story = {
-        "program": f"isoclay {_isoclay.__version__} (Python)",
-        "input_kind": "volume",
-        "arguments": {"block": plan.block, "halo": plan.halo, "method": plan.method, "tolerance": tolerance},
-    }
-    core, rows = None if base is None else base._core, plan.affine[:3].tolist()
-    return Field(_isoclay.join_blocks(core, parts, plan.shape, rows, tolerance, iso, plan.unit, json.dumps(story)))
+# What is seen of a volume before it is fitted
 
 
-def histogram(plan: Plan, block: Block) -> tuple[npt.NDArray[np.int64], int]:
-    """How often each number occurs, by the first 16 bits of its float, ordered; and how many are not finite."""
-    values = np.ascontiguousarray(plan.read(block), dtype=np.float32).reshape(-1)
+@dataclass(frozen=True)
+class Look:
+    """How often numbers occur in a block, by the first 16 bits of their floats, ordered, those that occur; how many are not
+    finite; and a digest of the voxels."""
+
+    bins: npt.NDArray[np.uint16]
+    counts: npt.NDArray[np.int64]
+    odd: int
+    digest: bytes
+
+
+def looked_at(plan: Plan, block: Block) -> Look:
+    """A first look at a block."""
+    array = np.ascontiguousarray(plan.read(block))
+    digest = hashlib.sha256(array.data).digest()
+    values = array.astype(np.float32, copy=False).reshape(-1)
     bits = values.view(np.uint32)
     ordered = np.where(bits >> 31 == 1, ~bits, bits | np.uint32(1 << 31))
-    return np.bincount(ordered >> 16, minlength=BINS), int(np.count_nonzero(~np.isfinite(values)))
+    counts = np.bincount(ordered >> 16, minlength=BINS)
+    bins = np.nonzero(counts)[0]
+    return Look(bins.astype(np.uint16), counts[bins], int(np.count_nonzero(~np.isfinite(values))), digest)
 
 
 def _middles(bins: npt.NDArray[np.intp]) -> Doubles:
-    """The middles of bins of :func:`histogram`."""
+    """The middles of the bins of a :class:`Look`."""
     ordered = (bins.astype(np.uint32) << 16) | np.uint32(1 << 15)
     bits = np.where(ordered >> 31 == 1, ordered & np.uint32(0x7FFFFFFF), ~ordered)
     return bits.astype(np.uint32).view(np.float32).astype(np.float64)
@@ -187,162 +220,158 @@ def overview(counts: npt.NDArray[np.int64]) -> tuple[float, float | None]:
 
 def noise(plan: Plan, block: Block) -> float:
     """Standard deviation of the noise of a block."""
-    field = fit_volume(plan.read(block), plan.affine_at(block.origin), threads=plan.threads)
+    wide = plan.wide(block, plan.halo)
+    field = fit_volume(plan.read(wide), plan.affine_at(wide.low), threads=plan.threads)
     return float(field.report["noise"] or 0.0)
 
 
-def block_fitted(plan: Plan, block: Block, tolerance: float) -> Field:
-    """What the fit of a block with its halo says of the block."""
-    options: dict[str, Any] = {"method": "interpolate"} if plan.method == "interpolate" else {"tolerance": tolerance}
-    field = fit_volume(plan.read(block), plan.affine_at(block.origin), threads=plan.threads, **options)
-    return own_part(plan, block, field, tolerance)
+# What is done with a block
 
 
-def block_measured(
-    plan: Plan, block: Block, fields: list[Field], tolerance: float, mend: bool
-) -> tuple[Doubles, Doubles, Field | None]:
-    """Root mean square and largest residual of each leaf of a block, of the sum of the fields near it; and where leaves exceed
-    the tolerance, functions to add that take the residual away there."""
-    field = added(plan, None, fields, tolerance, None)
-    array = plan.read(block)
-    affine = plan.affine_at(block.origin)
-    residual = array.astype(np.float64) - field.sample(affine=affine, shape=array.shape, threads=plan.threads)[0]
-    cells = tuple(max(-(-(n - 1) // LEAF), 1) for n in plan.shape)
-    starts = []
-    for axis in range(3):
-        first, last = block.origin[axis] // LEAF, min((block.end[axis] - 1) // LEAF, cells[axis] - 1)
-        starts.append(np.arange(first, last + 1) * LEAF - block.origin[axis])
-    squares, sizes, largest = residual**2, np.ones_like(residual), np.abs(residual)
-    for axis in range(3):
-        squares = np.add.reduceat(squares, starts[axis], axis)
-        sizes = np.add.reduceat(sizes, starts[axis], axis)
-        largest = np.maximum.reduceat(largest, starts[axis], axis)
-    rms = np.sqrt(squares / sizes)
-    own = tuple(
-        slice((block.low[a] - block.origin[a]) // LEAF, _own_end(block, a, plan.shape[a], len(starts[a])))
-        for a in range(3)
+@dataclass(frozen=True)
+class Finished:
+    """What is known of a block in the end."""
+
+    part: Ticket
+    """Its functions."""
+    leaves: Ticket
+    """The errors of its leaves."""
+    counts: list[int]
+    """Functions of each level."""
+    digests: bytes
+    """Of what stands in the places of its coarsest bricks."""
+    slope: float
+    """Of its fit."""
+
+
+def fitted(job: Job, number: int, block: Block) -> Ticket:
+    """What the fit of a block with its halo says of the block: its part."""
+    kept = job.shelf.find(f"fit-{number}")
+    if kept is not None:
+        return kept
+    wide = job.plan.wide(block, job.plan.halo)
+    field = fit_volume(
+        job.plan.read(wide), job.plan.affine_at(wide.low), tolerance=job.tolerance, threads=job.plan.threads
     )
-    if not mend or not (rms > tolerance).any():
-        return rms[own], largest[own], None
-    bad = rms > tolerance
+    return job.shelf.put(f"fit-{number}", _part(job.plan, block, field, wide.low))
+
+
+def interpolated(job: Job, number: int, block: Block) -> Finished:
+    """All that is to be known of a block whose voxels are met."""
+    names = f"fit-{number}", f"leaves-{number}"
+    part, leaves = (job.shelf.find(name) for name in names)
+    if part is None or leaves is None:
+        plan = job.plan
+        wide = plan.wide(block, plan.halo)
+        field = fit_volume(plan.read(wide), plan.affine_at(wide.low), method="interpolate", threads=plan.threads)
+        put_part = job.shelf.put(names[0], _part(plan, block, field, wide.low))
+        own = _own_leaves(plan, block, wide)
+        table = field.leaves
+        cells = tuple(table["cell"].max(axis=0) + 1)
+        errors = [table[error].reshape(cells[::-1]).transpose(2, 1, 0)[own] for error in ("rms", "max")]
+        return finished(job, number, [put_part], (job.shelf.put(names[1], _leaves(*errors)), None))
+    return finished(job, number, [part], (leaves, None))
+
+
+def measured(job: Job, number: int, turn: int, block: Block, parts: list[Ticket], mend: bool) -> tuple[Ticket, Ticket | None]:
+    """The errors of the leaves of a block, of the sum of the parts near it; and where leaves exceed the tolerance, functions to
+    add that take the residual away there."""
+    names = f"leaves-{number}-{turn}", f"mend-{number}-{turn}"
+    kept = job.shelf.find(names[0])
+    if kept is not None:
+        return kept, job.shelf.find(names[1])
+    plan = job.plan
+    # Leaves beside the block, to ask for the same at a border as the neighbour does.
+    wide = plan.wide(block, LEAF)
+    _, rms, largest = _residual(plan, block, wide, parts)
+    own = _own_leaves(plan, block, wide)
+    detail = None
+    if mend and (rms > job.tolerance).any():
+        wider = plan.wide(block, FORGOTTEN)
+        residual, again, _ = _residual(plan, block, wider, parts)
+        field = fit_volume(
+            residual.astype(np.float32), plan.affine_at(wider.low), method="interpolate", threads=plan.threads
+        )
+        mask = _near(again > job.tolerance, _starts(plan, wider), residual.shape)
+        detail = job.shelf.put(names[1], _part(plan, block, field, wider.low, mask.astype(np.uint8)))
+    # Last, for who finds it takes the other to be there.
+    return job.shelf.put(names[0], _leaves(rms[own], largest[own])), detail
+
+
+def mending(found: tuple[Ticket, Ticket | None]) -> Ticket | None:
+    """What a measurement asks to add."""
+    return found[1]
+
+
+def asks(found: tuple[Ticket, Ticket | None]) -> bool:
+    """Whether a measurement asks to add something."""
+    return found[1] is not None
+
+
+def finished(job: Job, number: int, parts: list[Ticket], found: tuple[Ticket, Ticket | None]) -> Finished:
+    """A block of which nothing is asked any more."""
+    content, counts, digests, slope = _isoclay.finished_block(parts, job.plan.shape)
+    part = parts[0] if content is None else job.shelf.put(f"sum-{number}", content)
+    return Finished(part, found[0], counts, digests, slope)
+
+
+def _part(
+    plan: Plan, block: Block, field: Field, origin: Voxel, mask: npt.NDArray[np.uint8] | None = None
+) -> bytes:
+    return _isoclay.block_part(field._core, origin, block.low, block.high, plan.shape, mask)
+
+
+def _leaves(rms: Doubles, largest: Doubles) -> bytes:
+    """Tables ``[x, y, z]`` as they are kept: x fastest."""
+    return b"".join(np.ascontiguousarray(table.transpose(2, 1, 0), dtype="<f4").tobytes() for table in (rms, largest))
+
+
+def _cell_count(plan: Plan, axis: int) -> int:
+    return max(-(-(plan.shape[axis] - 1) // LEAF), 1)
+
+
+def _starts(plan: Plan, wide: Block) -> list[npt.NDArray[np.intp]]:
+    """First voxels of the leaves in a part, which begins with one, on each axis. The very last voxel has no leaf of its own."""
+    ends = [min((wide.high[a] - 1) // LEAF, _cell_count(plan, a) - 1) for a in range(3)]
+    return [np.arange(wide.low[a] // LEAF, ends[a] + 1) * LEAF - wide.low[a] for a in range(3)]
+
+
+def _own_leaves(plan: Plan, block: Block, wide: Block) -> tuple[slice, ...]:
+    """Where the leaves of a block are among those of a part round it."""
+    ends = (_cell_count(plan, a) if block.high[a] >= plan.shape[a] else block.high[a] // LEAF for a in range(3))
+    return tuple(slice((block.low[a] - wide.low[a]) // LEAF, end - wide.low[a] // LEAF) for a, end in enumerate(ends))
+
+
+def _residual(plan: Plan, block: Block, wide: Block, parts: list[Ticket]) -> tuple[Doubles, Doubles, Doubles]:
+    """What the sum of parts leaves at the voxels of a block with a halo; root mean square and largest of each leaf."""
+    box = plan.wide(block, ALIGN)
+    core = _isoclay.near_field(parts, plan.shape, plan.rows, box.low, box.high, wide.low, wide.high)
+    array = plan.read(wide)
+    here = plan.affine_at(wide.low)
+    residual = array.astype(np.float64)
+    residual -= Field(core).sample(affine=here, shape=array.shape, threads=plan.threads)[0]
+    squares, sizes, largest = residual**2, np.ones((1, 1, 1)), np.abs(residual)
+    for axis, starts in enumerate(_starts(plan, wide)):
+        squares = np.add.reduceat(squares, starts, axis)
+        largest = np.maximum.reduceat(largest, starts, axis)
+        counts = np.diff([*starts, residual.shape[axis]])
+        sizes = sizes * counts.reshape([-1 if a == axis else 1 for a in range(3)])
+    return residual, np.sqrt(squares / sizes), largest
+
+
+def _near(
+    bad: npt.NDArray[np.bool_], starts: list[npt.NDArray[np.intp]], shape: tuple[int, ...]
+) -> npt.NDArray[np.bool_]:
+    """The voxels of leaves, and those within reach of them."""
     for axis in range(3):
-        lengths = np.diff([*starts[axis], residual.shape[axis]])
-        bad = np.repeat(bad, lengths, axis)
-    mask = bad.copy()
+        bad = np.repeat(bad, np.diff([*starts[axis], shape[axis]]), axis)
     for axis in range(3):
-        wide = mask.copy()
+        wide = bad.copy()
         for step in range(1, REACH + 1):
             ahead = [slice(None)] * 3
             back = [slice(None)] * 3
             ahead[axis], back[axis] = slice(step, None), slice(None, -step)
-            wide[tuple(ahead)] |= mask[tuple(back)]
-            wide[tuple(back)] |= mask[tuple(ahead)]
-        mask = wide
-    detail = fit_volume(residual.astype(np.float32), affine, method="interpolate", threads=plan.threads)
-    return rms[own], largest[own], own_part(plan, block, detail, tolerance, mask.astype(np.uint8))
-
-
-def detail_of(measured: tuple[Doubles, Doubles, Field | None]) -> Field | None:
-    """What a measurement asks to add."""
-    return measured[2]
-
-
-def errors_of(measured: tuple[Doubles, Doubles, Field | None]) -> tuple[Doubles, Doubles, bool]:
-    """What a measurement found, and whether it asks to add something."""
-    return measured[0], measured[1], measured[2] is not None
-
-
-def _own_end(block: Block, axis: int, whole: int, count: int) -> int:
-    return count if block.high[axis] >= whole else (block.high[axis] - block.origin[axis]) // LEAF
-
-
-def blocks_fitted(
-    plan: Plan, tolerance: float | str | None, runner: Runner, progress: Callable[[str, float], object]
-) -> Field:
-    """The field of the whole volume."""
-    progress("looking at the volume", 0.0)
-    counts, odd = np.zeros(BINS, np.int64), 0
-    for part, bad in runner.gather([runner.submit(histogram, plan, block) for block in plan.blocks(0)]):
-        counts += part
-        odd += bad
-    if odd:
-        raise ValueError(f"{odd} voxels are not finite; replace them, for example by the value of air, before fitting")
-    span, iso = overview(counts)
-    blocks = plan.blocks(plan.halo)
-    wanted = _tolerance(plan, tolerance, span, blocks, runner, progress)
-    progress("fitting blocks", 0.1)
-    fits = [runner.submit(block_fitted, plan, block, wanted) for block in blocks]
-    notes = [f"put together from {len(blocks)} blocks of {plan.block} voxels with a halo of {plan.halo}"]
-    if plan.method == "interpolate":
-        field = added(plan, None, runner.gather(fits), wanted, iso)
-        progress("done", 1.0)
-        return _told(field, field.leaves["rms"], field.leaves["max"], notes)
-    measured_blocks = plan.blocks(32)
-    near = [[n for n, other in enumerate(blocks) if block.is_near(other, LEAF)] for block in measured_blocks]
-    pieces: list[list[Any]] = [[fit] for fit in fits]
-    details: list[Any] = []
-    for turn in range(ROUNDS + 1):
-        measured = [
-            runner.submit(block_measured, plan, block, [piece for n in near[b] for piece in pieces[n]], wanted, turn < ROUNDS)
-            for b, block in enumerate(measured_blocks)
-        ]
-        found = runner.gather([runner.submit(errors_of, one) for one in measured])
-        progress("mending", 0.6 + 0.1 * turn)
-        if not any(asks for *_, asks in found):
-            break
-        more = [runner.submit(detail_of, one) if asks else None for one, (*_, asks) in zip(measured, found, strict=True)]
-        for piece, detail in zip(pieces, more, strict=True):
-            if detail is not None:
-                piece.append(detail)
-                details.append(detail)
-    progress("joining", 0.95)
-    field = added(plan, None, runner.gather(fits), wanted, iso)
-    if details:
-        field = added(plan, field, runner.gather(details), wanted, iso)
-    rms, largest = _in_place(plan, measured_blocks, found, field)
-    progress("done", 1.0)
-    return _told(field, rms, largest, notes)
-
-
-def _tolerance(
-    plan: Plan,
-    asked: float | str | None,
-    span: float,
-    blocks: list[Block],
-    runner: Runner,
-    progress: Callable[[str, float], object],
-) -> float:
-    if plan.method == "interpolate":
-        if asked is not None:
-            raise ValueError("to interpolate leaves no residual; leave the tolerance out, or fit by 'adaptive'")
-        return 0.0
-    number, kind = parsed(asked)
-    if kind == "mm":
-        raise ValueError(f"tolerance is {asked!r}, a length; that of a volume is a density, or a share such as '0.5%'")
-    if number is not None:
-        if not number > 0:
-            raise ValueError(f"tolerance is {asked!r}; it has to be positive")
-        return number * span / 100 if kind == "%" else number
-    progress("estimating the noise", 0.05)
-    step = -(-len(blocks) // NOISE_BLOCKS)
-    found = runner.gather([runner.submit(noise, plan, block) for block in blocks[::step]])
-    # As in one piece: the rms of a leaf of noise alone stays below 1.25 of it, and clean data is met to 0.5 %.
-    return max(1.25 * float(np.median(found)), 0.005 * span)
-
-
-def _in_place(
-    plan: Plan, blocks: list[Block], found: list[Any], field: Field
-) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
-    """The errors of the blocks' leaves in the order of the field's."""
-    cells = tuple(max(-(-(n - 1) // LEAF), 1) for n in plan.shape)
-    rms, largest = np.zeros(cells, np.float32), np.zeros(cells, np.float32)
-    for block, (part, most, _) in zip(blocks, found, strict=True):
-        place = tuple(slice(v // LEAF, v // LEAF + n) for v, n in zip(block.low, part.shape, strict=True))
-        rms[place], largest[place] = part, most
-    at = tuple(field.leaves["cell"].T)
-    return rms[at], largest[at]
-
-
-def _told(field: Field, rms: Any, largest: Any, notes: list[str]) -> Field:
-    rms, largest = (np.ascontiguousarray(a, np.float32) for a in (rms, largest))
-    return Field(_isoclay.with_leaf_errors(field._core, rms, largest, notes))
+            wide[tuple(ahead)] |= bad[tuple(back)]
+            wide[tuple(back)] |= bad[tuple(ahead)]
+        bad = wide
+    return bad

@@ -14,19 +14,21 @@ __all__ = [
     "CoreField",
     "CoreSimulation",
     "__version__",
+    "block_part",
     "complement",
     "difference",
+    "finished_block",
     "fit_file",
     "fit_mesh",
     "fit_points",
     "fit_volume",
     "grown",
     "intersection",
-    "join_blocks",
     "mesh_of",
     "moved",
+    "near_field",
     "union",
-    "with_leaf_errors",
+    "write_blocks",
     "write_mesh",
 ]
 __version__: str
@@ -135,19 +137,27 @@ class CoreSimulation:
     def densities(self) -> _Doubles: ...
     def positions(self) -> _Doubles: ...
 
-def join_blocks(
-    base: CoreField | None,
-    parts: list[dict[str, Any]],
+def block_part(
+    core: CoreField,
+    origin: tuple[int, ...],
+    low: tuple[int, ...],
+    high: tuple[int, ...],
+    shape: tuple[int, ...],
+    mask: npt.NDArray[np.uint8] | None,
+) -> bytes: ...
+def near_field(
+    parts: list[bytes | str],
     shape: tuple[int, ...],
     affine: _Rows,
-    tolerance: float,
-    iso: float | None,
-    unit: str | None,
-    provenance: str,
+    origin: tuple[int, ...],
+    end: tuple[int, ...],
+    low: tuple[int, ...],
+    high: tuple[int, ...],
 ) -> CoreField: ...
-def with_leaf_errors(
-    core: CoreField, rms: npt.NDArray[np.float32], largest: npt.NDArray[np.float32], notes: list[str]
-) -> CoreField: ...
+def finished_block(
+    parts: list[bytes | str], shape: tuple[int, ...]
+) -> tuple[bytes | None, list[int], bytes, float]: ...
+def write_blocks(blocks: dict[str, Any], wishes: dict[str, Any]) -> str: ...
 def fit_points(
     points: _Doubles,
     normals: _Doubles | None,

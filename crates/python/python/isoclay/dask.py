@@ -8,20 +8,24 @@ done again elsewhere; the result does not depend on it, to the bit. See ``docs/s
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, overload
 
 import numpy as np
 
-from ._blocks import Plan, blocks_fitted
+from ._blocks import Plan
+from ._blocks_run import FieldFile, run
 from ._field import Field
 from ._fit import fit
 from ._inputs import matrix
-from ._wishes import PathLike
+from ._wishes import PathLike, Progress
 
-__all__ = ["Outcome", "fit_many", "fit_volume_blocks", "ome_zarr"]
+_AT_ONCE = 64
+"""Results that are asked for at once."""
+
+__all__ = ["FieldFile", "Outcome", "fit_many", "fit_volume_blocks", "ome_zarr"]
 
 
 @dataclass(frozen=True)
@@ -66,7 +70,7 @@ def fit_many(
         Path(output).mkdir(parents=True, exist_ok=True)
         targets = [str(Path(output) / name) for name in _distinct(names)]
     runner, chosen = _runner(_client(client), retries), {"threads": threads, **options}
-    return runner.gather([runner.submit(_outcome, *pair, chosen) for pair in zip(names, targets, strict=True)])
+    return list(runner.each([runner.submit(_outcome, *pair, chosen) for pair in zip(names, targets, strict=True)]))
 
 
 def _distinct(paths: Sequence[str]) -> list[str]:
@@ -107,11 +111,14 @@ def _client(client: Any) -> Any:
 class _Here:
     """Work done at once, by the caller."""
 
+    def share(self, value: Any) -> Any:
+        return value
+
     def submit(self, work: Callable[..., Any], *arguments: Any) -> Any:
         return work(*arguments)
 
-    def gather(self, handles: list[Any]) -> list[Any]:
-        return handles
+    def each(self, handles: list[Any]) -> Iterator[Any]:
+        return iter(handles)
 
 
 class _There:
@@ -120,21 +127,35 @@ class _There:
     def __init__(self, client: Any, retries: int) -> None:
         self.client, self.retries = client, retries
 
+    def share(self, value: Any) -> Any:
+        # As the result of a task it is made again where the worker that has it is lost.
+        return self.submit(_same, value)
+
     def submit(self, work: Callable[..., Any], *arguments: Any) -> Any:
         return self.client.submit(work, *arguments, retries=self.retries, pure=False)
 
-    def gather(self, handles: list[Any]) -> list[Any]:
-        return list(self.client.gather(handles))
+    def each(self, handles: list[Any]) -> Iterator[Any]:
+        for start in range(0, len(handles), _AT_ONCE):
+            some = handles[start : start + _AT_ONCE]
+            # Their results leave the workers as soon as they are here.
+            handles[start : start + _AT_ONCE] = [None] * len(some)
+            yield from self.client.gather(some)
+
+
+def _same(value: Any) -> Any:
+    return value
 
 
 def _runner(client: Any, retries: int) -> _Here | _There:
     return _Here() if client is None else _There(client, retries)
 
 
+@overload
 def fit_volume_blocks(
     volume: Any,
     affine: Any = None,
     *,
+    output: None = None,
     client: Any = None,
     order: Literal["xyz", "zyx"] = "xyz",
     method: Literal["adaptive", "interpolate"] = "adaptive",
@@ -142,17 +163,55 @@ def fit_volume_blocks(
     block: int = 128,
     halo: int = 32,
     unit: str | None = None,
+    scratch: PathLike | None = None,
     retries: int = 2,
     threads: int = 1,
-    progress: Callable[[str, float], object] | None = None,
-) -> Field:
-    """Fits a volume block by block, so that no worker holds more than a block with its halo and the field near it.
+    progress: Progress | None = None,
+) -> Field: ...
+@overload
+def fit_volume_blocks(
+    volume: Any,
+    affine: Any = None,
+    *,
+    output: PathLike,
+    client: Any = None,
+    order: Literal["xyz", "zyx"] = "xyz",
+    method: Literal["adaptive", "interpolate"] = "adaptive",
+    tolerance: float | str | None = None,
+    block: int = 128,
+    halo: int = 32,
+    unit: str | None = None,
+    scratch: PathLike | None = None,
+    retries: int = 2,
+    threads: int = 1,
+    progress: Progress | None = None,
+) -> FieldFile: ...
+def fit_volume_blocks(
+    volume: Any,
+    affine: Any = None,
+    *,
+    output: PathLike | None = None,
+    client: Any = None,
+    order: Literal["xyz", "zyx"] = "xyz",
+    method: Literal["adaptive", "interpolate"] = "adaptive",
+    tolerance: float | str | None = None,
+    block: int = 128,
+    halo: int = 32,
+    unit: str | None = None,
+    scratch: PathLike | None = None,
+    retries: int = 2,
+    threads: int = 1,
+    progress: Progress | None = None,
+) -> Field | FieldFile:
+    """Fits a volume block by block, so that no worker holds more than a block with its halo and the functions round it.
 
-    The caller holds the field, never the voxels.
+    With ``output`` the field goes to a file in a stream, and nobody holds it: the caller has a plane of bricks at a time. Without,
+    the field comes back, and the caller has to have room for it.
 
     Args:
         volume: Anything with a shape, a dtype and slices, such as an array of zarr, dask or NumPy, read by the workers.
         affine: Map from voxel indices ``(i, j, k)`` to the world, 4 by 4, or spacings.
+        output: A field file, ``.iclay``, written all or nothing: the bytes that :meth:`isoclay.Field.save` writes.
         client: A ``distributed.Client``.
         order: ``"xyz"`` for ``[i, j, k]``, ``"zyx"`` for ``[k, j, i]``.
         method: ``"interpolate"`` is the fit in one piece but for rounding; ``"adaptive"`` keeps the same tolerance in every
@@ -161,12 +220,18 @@ def fit_volume_blocks(
             eight blocks justifies if not given.
         block: Voxels along a block, a multiple of 32.
         halo: Voxels that a block sees of its neighbours, a multiple of 32, or of 16 to interpolate.
+        unit: Of lengths.
+        scratch: A directory, as the workers see it, for what is known of each block. It stays, and a fit of the same voxels in
+            the same way that was cut off goes on from there. If it is not given, ``output`` has one beside it for a while, and
+            without ``output`` the workers hold it in memory.
         retries: How often a block is tried again.
         threads: Of each fit.
         progress: Called with a stage and the share done.
     """
     plan = Plan(volume, matrix(affine), order, method, block, halo, unit, threads)
-    return blocks_fitted(plan, tolerance, _runner(_client(client), retries), progress or (lambda stage, share: None))
+    runner = _runner(_client(client), retries)
+    names = (None if path is None else os.fspath(path) for path in (output, scratch))
+    return run(plan, tolerance, runner, progress or (lambda stage, share: None), *names)
 
 
 def ome_zarr(group: Any, level: int = 0) -> tuple[Any, np.ndarray[Any, Any], Literal["zyx"], str | None]:
