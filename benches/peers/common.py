@@ -1,4 +1,4 @@
-"""Meshes, clouds, clocks and exact distances for the comparison with peers. Needs numpy and open3d."""
+"""Files and clocks for runs of other programs. Needs numpy."""
 import os, re, resource
 import numpy as np
 
@@ -38,23 +38,20 @@ def positions(table):
     return np.stack([table[k] for k in 'xyz'], 1).astype(float)
 
 
-def read_mesh(path):
-    table, faces = read_ply(path)
-    return positions(table), faces
-
-
 def read_cloud(path):
     table, _ = read_ply(path)
     return positions(table), np.stack([table[k] for k in ('nx', 'ny', 'nz')], 1).astype(float)
 
 
-def write_cloud(path, points, normals):
-    rows = np.concatenate([points, normals], 1).astype('<f4')
-    names = ('x', 'y', 'z', 'nx', 'ny', 'nz')
-    with open(path, 'wb') as f:
-        f.write(('ply\nformat binary_little_endian 1.0\nelement vertex %d\n' % len(points)
-                 + ''.join(f'property float {n}\n' for n in names) + 'end_header\n').encode())
-        f.write(rows.tobytes())
+def read_nrrd(path):
+    """Volume of float32, little-endian, plain or packed, as [k, j, i]."""
+    import gzip
+    head, _, rest = open(path, 'rb').read().partition(b'\n\n')
+    keys = dict(line.split(': ', 1) for line in head.decode().split('\n')[1:] if ': ' in line and not line.startswith('#'))
+    if keys['type'] != 'float' or keys.get('endian', 'little') != 'little':
+        raise SystemExit(f'{path}: only little-endian float32 is read here')
+    data = gzip.decompress(rest) if keys['encoding'] == 'gzip' else rest
+    return np.frombuffer(data, '<f4').reshape([int(n) for n in keys['sizes'].split()][::-1])
 
 
 def write_mesh(path, points, faces):
@@ -104,46 +101,3 @@ class Clock:
         usage = resource.getrusage(resource.RUSAGE_SELF)
         self.cpu = usage.ru_utime + usage.ru_stime - self.usage.ru_utime - self.usage.ru_stime
         self.peak_mib = int(re.search(r'VmHWM:\s+(\d+)', open('/proc/self/status').read()).group(1)) / 1024
-
-
-# ---------------------------------------------------------------- errors
-class Surface:
-    """Exact distances to triangles (Embree by way of Open3D)."""
-    def __init__(self, points, faces):
-        import open3d as o3d
-        self.tensor = o3d.core.Tensor
-        self.center, self.size = points.mean(0), np.ptp(points, axis=0).max()
-        self.scene = o3d.t.geometry.RaycastingScene()
-        self.scene.add_triangles(self.tensor(((points - self.center) / self.size).astype(np.float32)), self.tensor(faces.astype(np.uint32)))
-
-    def distance(self, points):
-        local = ((points - self.center) / self.size).astype(np.float32)
-        found = self.scene.compute_closest_points(self.tensor(local))['points'].numpy()
-        return np.linalg.norm(local - found, axis=1) * self.size
-
-
-def sample_surface(points, faces, count, seed=0):
-    """Points spread evenly by area."""
-    random = np.random.default_rng(seed)
-    a, b, c = (points[faces[:, k]] for k in range(3))
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    i = np.searchsorted(np.cumsum(area) / area.sum(), random.random(count)).clip(0, len(faces) - 1)
-    u, v = random.random((2, count))
-    over = u + v > 1
-    u[over], v[over] = 1 - u[over], 1 - v[over]
-    return a[i] + u[:, None] * (b - a)[i] + v[:, None] * (c - a)[i]
-
-
-def errors(clean, truth, result, diagonal):
-    """fwd: from the clean points to the result; bwd: from the result to the truth; 1e-4 of the diagonal."""
-    points, faces = result
-    good = np.isfinite(points).all(1)
-    faces = faces[good[faces].all(1)]
-    points = np.where(good[:, None], points, points[good].mean(0))
-    if len(clean) > 100_000:
-        clean = clean[np.random.default_rng(0).choice(len(clean), 100_000, replace=False)]
-    fwd = Surface(points, faces).distance(clean) / diagonal * 1e4
-    bwd = truth.distance(sample_surface(points, faces, 100_000)) / diagonal * 1e4
-    rms = lambda d: float(np.sqrt((d * d).mean()))
-    return dict(triangles=len(faces), fwd_rms=rms(fwd), fwd_p95=float(np.percentile(fwd, 95)), fwd_max=float(fwd.max()),
-                bwd_rms=rms(bwd), bwd_p95=float(np.percentile(bwd, 95)))

@@ -8,7 +8,7 @@
 # PoissonRecon and SSDRecon themselves are in neither Debian nor PyPI (Open3D and MeshLab both carry the screened Poisson
 # reconstruction of the same authors). With g++, libpng-dev, libjpeg-dev and zlib1g-dev:
 #   git clone https://github.com/mkazhdan/PoissonRecon && make -C PoissonRecon poissonrecon ssdrecon
-#   POISSONRECON=PoissonRecon/Bin/Linux benches/peers/venv/bin/python benches/peers/compare.py ... --peers PoissonRecon:8,SSDRecon:8
+#   POISSONRECON=PoissonRecon/Bin/Linux isoclay compare --python benches/peers/venv/bin/python --peers PoissonRecon:8,SSDRecon:8
 set -euo pipefail
 venv=${1:-"$(dirname "$0")/venv"}
 python3 -m venv "$venv"

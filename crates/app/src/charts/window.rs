@@ -14,12 +14,12 @@ use tools::live::Pose;
 
 use super::ball::{Ball, median, middle};
 use super::{Chart, Series};
-use crate::view::{Camera, Canvas, Card, Look, Paper, Patch, SKY, Shape};
+use crate::view::{BUDGET, Camera, Canvas, Card, Look, Mode, Paper, Patch, SKY, Shape, Solid};
 use crate::window::tool::{Kind, Tool};
 
 /// Finest levels of the balls.
 const DEPTHS: [u32; 3] = [2, 3, 4];
-/// Pixels of a whole picture; a rough one has half as many along each side.
+/// Pixels of a whole picture; a rough one has fewer along each side.
 const SIZE: [u32; 2] = [1280, 720];
 /// Dabs of which the median is taken, and steps of each stroke.
 const DABS: usize = 8;
@@ -75,7 +75,7 @@ fn measure(card: &Card, ball: &Ball) -> Result<WindowCosts, String> {
         .map_err(|e| e.to_string())?;
     let within = object.field.world_box();
     let origin = within.center();
-    let mut canvas = Canvas::new(&card.device, &card.queue, SKY);
+    let mut canvas = Canvas::new(&card.device, &card.queue, SKY, BUDGET);
     let start = Instant::now();
     let mut shape = Shape::new(&object, 0.0, DAffine3::IDENTITY).map_err(|e| e.to_string())?;
     let patches = shape.all("ball", origin);
@@ -87,19 +87,45 @@ fn measure(card: &Card, ball: &Ball) -> Result<WindowCosts, String> {
         camera: Camera::onto(origin, 0.5 * size.length(), DVec3::Y),
         cut: None,
         paint: true,
+        mode: Mode::Mesh,
+        density: [0.0, 1.0],
         paper: Paper::Dark,
     };
-    let mut picture = |canvas: &mut Canvas, is_rough: bool| {
+    let mut by = |mode: Mode, canvas: &mut Canvas, is_rough: bool| {
         look.camera.orbit(DVec2::new(0.01, 0.0));
-        let size = if is_rough { SIZE.map(|n| n / 2) } else { SIZE };
-        canvas.draw(&look, size, is_rough);
+        look.mode = mode;
+        let pixels = SIZE.map(f64::from);
+        let share = if is_rough {
+            canvas.rough_share(mode, pixels[0] * pixels[1])
+        } else {
+            1.0
+        };
+        canvas.draw_all(
+            &look,
+            pixels.map(|n| (n * f64::from(share)).round() as u32),
+            is_rough,
+        );
         card.finish();
     };
     // The first of each is made ready, too.
-    for is_rough in [true, false] {
-        picture(&mut canvas, is_rough);
-    }
-    let [rough, whole] = [true, false].map(|is_rough| median(20, |_| picture(&mut canvas, is_rough)) / 1e3);
+    let mut times = |mode: Mode, count: usize, canvas: &mut Canvas| {
+        [true, false].map(|is_rough| {
+            by(mode, canvas, is_rough);
+            median(count, |_| by(mode, canvas, is_rough)) / 1e3
+        })
+    };
+    let [rough, whole] = times(Mode::Mesh, 20, &mut canvas);
+    let without_triangles = if canvas.can_cast() {
+        canvas.put_solid(
+            "ball",
+            Solid::of(&object, 0.0, DAffine3::IDENTITY).ok_or("the ball has no levels")?,
+        );
+        [Mode::Rays, Mode::Volume].map(|mode| times(mode, 5, &mut canvas))
+    } else {
+        [[f64::NAN; 2]; 2]
+    };
+    let [[rays_rough, rays], [volume_rough, volume]] = without_triangles;
+    let mut picture = |canvas: &mut Canvas, is_rough: bool| by(Mode::Mesh, canvas, is_rough);
     let mut relit = || {
         canvas.put(&patches[0]);
         picture(&mut canvas, false);
@@ -131,6 +157,10 @@ fn measure(card: &Card, ball: &Ball) -> Result<WindowCosts, String> {
             ("rough_picture_ms", rough),
             ("whole_picture_ms", whole),
             ("whole_picture_after_edit_ms", whole_after_edit),
+            ("rough_rays_ms", rays_rough),
+            ("whole_rays_ms", rays),
+            ("rough_volume_ms", volume_rough),
+            ("whole_volume_ms", volume),
             ("simulation_share_beside_pictures", beside / alone),
         ],
     })

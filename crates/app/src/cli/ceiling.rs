@@ -12,6 +12,8 @@ use super::cost::{data_bytes, rss_bytes};
 use super::end;
 use super::failure::{Failure, OrFail, Outcome};
 use super::quantity::{Memory, human_bytes};
+#[cfg(feature = "window")]
+use crate::view::BUDGET;
 
 static CEILING: OnceLock<Memory> = OnceLock::new();
 
@@ -108,6 +110,12 @@ pub fn of_another() -> Option<Memory> {
     let left = limit().map(|Memory(most)| most.saturating_sub(rss_bytes().unwrap_or(0)).max(LEAST));
     let spare = spare_bytes().map(|spare| (spare / 4 * 3).max(LEAST));
     left.into_iter().chain(spare).min().map(Memory)
+}
+
+/// What bricks on a graphics card may take, which is often this process's own memory: a quarter of the user's ceiling, if there is one.
+#[cfg(feature = "window")]
+pub fn of_bricks() -> u64 {
+    limit().map_or(BUDGET, |Memory(most)| BUDGET.min(most / 4))
 }
 
 /// Bytes that the system can give without swapping.

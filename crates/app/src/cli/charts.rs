@@ -1,6 +1,5 @@
 use std::ffi::OsString;
 use std::io::{self, Write};
-use std::iter::once;
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
@@ -8,7 +7,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use fitting::Cancel;
 use fitting::phantoms::Solid;
 use formats::Kind;
-use serde_json::{Map, Value};
+use serde_json::Value;
 
 #[cfg(feature = "window")]
 use super::chart_window;
@@ -21,8 +20,8 @@ use super::quantity::between;
 use super::source::{SAMPLES, Source, scratch};
 use super::staged::{StagedFiles, publish};
 use super::{
-    chart_dynamics, chart_edits, chart_fields, chart_haptics, chart_masks, chart_mesh, chart_orient,
-    chart_tools,
+    chart_all, chart_dynamics, chart_edits, chart_fields, chart_haptics, chart_masks, chart_mesh,
+    chart_orient, chart_tools,
 };
 use crate::charts::{Chart, Configuration, Input, Measurement, Scene, noise, outliers, sweeps};
 
@@ -56,6 +55,8 @@ enum Subject {
     /// The window: time to show a dab of a tool, and to draw, against the size of the field
     #[cfg(feature = "window")]
     Window(chart_window::Args),
+    /// All of these with their usual inputs, each in a process of its own: takes an hour and more
+    All(chart_all::Args),
     /// Noise against the resolution chosen and the error, and outliers against the error with and without --robust
     Hard(HardArgs),
 }
@@ -110,7 +111,7 @@ impl Args {
             Subject::Haptics(a) => a.json,
             #[cfg(feature = "window")]
             Subject::Window(a) => a.json,
-            Subject::Orient(_) | Subject::Mesh(_) | Subject::Hard(_) => false,
+            Subject::Orient(_) | Subject::Mesh(_) | Subject::Hard(_) | Subject::All(_) => false,
         }
     }
 }
@@ -131,6 +132,7 @@ pub fn run(args: &Args) -> Outcome {
         #[cfg(feature = "window")]
         Subject::Window(args) => chart_window::run(args, &cancel),
         Subject::Hard(args) => hard(args, &cancel),
+        Subject::All(args) => chart_all::run(args, &cancel),
     }
 }
 
@@ -228,7 +230,7 @@ impl Prepared {
         }
         let make = |path: &Path, options: &[&str]| {
             let fixed = [name, "--count", "50000", "-o"].map(OsString::from).into_iter();
-            ask(
+            own::ask(
                 "phantom",
                 fixed
                     .chain([path.into()])
@@ -295,7 +297,10 @@ impl Prepared {
                 "-o".into(),
                 field.clone().into_os_string(),
             ];
-            fits.push(ask("fit", arguments.into_iter().chain(options.map(Into::into)))?);
+            fits.push(own::ask(
+                "fit",
+                arguments.into_iter().chain(options.map(Into::into)),
+            )?);
         }
         let mut fit = fits[0].clone();
         for key in ["seconds", "cpu_seconds", "peak_rss_bytes"] {
@@ -311,7 +316,7 @@ impl Prepared {
             fit.insert(key.into(), value);
         }
         fit.remove("output");
-        let check = ask(
+        let check = own::ask(
             "check",
             [field.into_os_string(), self.measured.clone().into_os_string()].into_iter(),
         )?;
@@ -322,24 +327,5 @@ impl Prepared {
             p95: figure("p95"),
             fit,
         })
-    }
-}
-
-/// Runs a subcommand with `--json` and reads its last line.
-fn ask(subcommand: &str, arguments: impl Iterator<Item = OsString>) -> Outcome<Map<String, Value>> {
-    let arguments = once(subcommand.into()).chain(arguments);
-    let out = own::run(arguments.chain(once("--json".into()))).or_limit()?;
-    let last = out
-        .stdout
-        .trim_ascii()
-        .rsplit(|b| *b == b'\n')
-        .next()
-        .unwrap_or_default();
-    match serde_json::from_slice(last) {
-        Ok(Value::Object(object)) if out.status.success() => Ok(object),
-        _ => Err(Failure::input(format!(
-            "{subcommand}: {}",
-            String::from_utf8_lossy(&out.stderr).trim()
-        ))),
     }
 }

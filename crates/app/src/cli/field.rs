@@ -203,6 +203,18 @@ impl OpenField {
         }
     }
 
+    /// The field as it is asked, in levels.
+    ///
+    /// # Errors
+    /// If it is on knots of its own.
+    #[cfg(feature = "window")]
+    pub fn placed_levels(&self) -> Outcome<&AnyField> {
+        match &self.asked {
+            Solid::Levels(field) => Ok(field),
+            Solid::Knots(_) => self.levels(),
+        }
+    }
+
     /// The field as it was read, if it is on knots of its own.
     pub fn knots(&self) -> Option<&TensorSpline<f32>> {
         match &self.field {

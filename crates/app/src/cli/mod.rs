@@ -4,7 +4,8 @@
 
 mod batch;
 mod belongs;
-mod ceiling;
+pub mod ceiling;
+mod chart_all;
 mod chart_dynamics;
 mod chart_edits;
 mod chart_fields;
@@ -19,6 +20,7 @@ mod chart_window;
 mod charts;
 mod check;
 mod coarse;
+mod compare;
 mod convert;
 mod cost;
 #[cfg(feature = "window")]
@@ -49,6 +51,7 @@ mod own;
 mod phantom;
 mod picture;
 mod progress;
+mod python;
 pub mod quantity;
 #[cfg(feature = "window")]
 mod render;
@@ -111,7 +114,7 @@ enum Command {
     Picture(picture::Args),
     /// Draw the same picture on the graphics card, faster; without one the processor draws it
     #[cfg(feature = "window")]
-    Render(picture::Args),
+    Render(render::Args),
     /// Move a region of a field by a scripted scene: forces, matter and constraints over time
     Simulate(simulate::Args),
     /// Make a document of fields, to be edited with a history
@@ -134,6 +137,8 @@ enum Command {
     Devices(devices::Args),
     /// Draw speed against accuracy
     Charts(charts::Args),
+    /// Run other programs, as far as they are installed, on the same inputs, and write one table of time and error
+    Compare(compare::Args),
     /// Open the window, with files in it, as isoclay alone does
     #[cfg(feature = "window")]
     Open(open::Args),
@@ -195,6 +200,7 @@ pub fn main() -> ExitCode {
         Command::Feel(a) => document::feel::run(a),
         Command::Devices(a) => devices::run(a),
         Command::Charts(a) => charts::run(a),
+        Command::Compare(a) => compare::run(a),
         #[cfg(feature = "window")]
         Command::Open(a) => open::run(a),
     });
@@ -264,7 +270,7 @@ impl Command {
             Self::Phantom(a) => (a.json, is_stdout(&a.output)),
             Self::Picture(a) => (a.json, is_stdout(&a.output)),
             #[cfg(feature = "window")]
-            Self::Render(a) => (a.json, is_stdout(&a.output)),
+            Self::Render(a) => (a.picture.json, is_stdout(&a.picture.output)),
             Self::Simulate(a) => (a.json, is_stdout(&a.output)),
             Self::New(a) => (a.json, false),
             Self::Sculpt(a) => (a.json, a.preview.as_deref().is_some_and(is_stdout)),
@@ -275,6 +281,7 @@ impl Command {
             Self::Feel(a) => (a.json, a.output.as_deref().is_some_and(is_stdout)),
             Self::Devices(a) => (a.json, false),
             Self::Charts(a) => (a.json(), false),
+            Self::Compare(a) => (a.json, a.output.as_deref().is_some_and(is_stdout)),
             #[cfg(feature = "window")]
             Self::Open(_) => (false, false),
         }

@@ -3,10 +3,15 @@
 
 use std::ffi::OsString;
 use std::io::{self, Read};
+use std::iter::once;
 use std::path::PathBuf;
 use std::process::{Child, ChildStderr, ChildStdout, Command, ExitStatus, Output, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
+
+use serde_json::{Map, Value};
+
+use super::failure::{Failure, OrFail, Outcome};
 
 /// The runs under way, by number.
 static RUNNING: Mutex<Vec<(u32, Child)>> = Mutex::new(Vec::new());
@@ -106,9 +111,9 @@ impl Drop for Run {
     }
 }
 
-/// Runs this program with `arguments` and gathers what it prints.
-pub fn run(arguments: impl Iterator<Item = OsString>) -> io::Result<Output> {
-    let (run, mut pipes) = Run::start(program()?.args(arguments))?;
+/// Runs a command, with nothing to read, and gathers what it prints.
+pub fn output(command: &mut Command) -> io::Result<Output> {
+    let (run, mut pipes) = Run::start(command)?;
     let (mut stdout, mut stderr) = (Vec::new(), Vec::new());
     std::thread::scope(|scope| {
         let errors = scope.spawn(|| pipes.stderr.read_to_end(&mut stderr));
@@ -121,6 +126,27 @@ pub fn run(arguments: impl Iterator<Item = OsString>) -> io::Result<Output> {
         stdout,
         stderr,
     })
+}
+
+/// Runs a subcommand of this program with `--json` and reads its last line.
+pub fn ask(subcommand: &str, arguments: impl Iterator<Item = OsString>) -> Outcome<Map<String, Value>> {
+    let arguments = once(subcommand.into()).chain(arguments);
+    let mut command = program().or_limit()?;
+    let out = output(command.args(arguments).arg("--json")).or_limit()?;
+    let last = out
+        .stdout
+        .trim_ascii()
+        .rsplit(|b| *b == b'\n')
+        .next()
+        .unwrap_or_default();
+    match serde_json::from_slice(last) {
+        Ok(Value::Object(object)) if out.status.success() => Ok(object),
+        _ => {
+            let said = String::from_utf8_lossy(&out.stderr);
+            let said = said.trim().trim_start_matches("isoclay: ");
+            Err(Failure::input(format!("{subcommand}: {said}")))
+        }
+    }
 }
 
 /// Ends the runs under way, and lets none begin any more: for a program that is about to exit, whose files such a run

@@ -99,12 +99,22 @@ fn point(s: &str) -> Result<DVec3, String> {
     }
 }
 
+/// What is to be drawn.
+pub struct Asked<'a> {
+    /// Its field.
+    pub open: &'a OpenField,
+    /// Where its surface is.
+    pub iso: f64,
+    /// Its triangles.
+    pub scene: Scene<'a>,
+}
+
 /// Draws a scene another way, in RGB bytes; none where it cannot.
-pub type Draw<'a> = &'a dyn Fn(&Scene, &View) -> Option<Vec<u8>>;
+pub type Draw<'a> = &'a dyn Fn(&Asked, &View) -> Outcome<Option<Vec<u8>>>;
 
 /// Draws a field file.
 pub fn run(args: &Args) -> Outcome {
-    draw(args, &|_, _| None)
+    draw(args, &|_, _| Ok(None))
 }
 
 /// Draws a field file another way, and as ever where that cannot.
@@ -164,14 +174,28 @@ pub fn draw(args: &Args, another: Draw) -> Outcome {
         return Err(args.nothing_there(&whole));
     }
     bar.show("drawing", 0.5);
-    let scene = Scene {
-        field: open.field(),
-        seen: surface_of(&mesh),
-        shading: surface_of(&whole),
+    let asked = Asked {
+        iso: options.iso,
+        scene: Scene {
+            field: open.field(),
+            seen: surface_of(&mesh),
+            shading: surface_of(&whole),
+        },
+        open: &open,
     };
-    let drawing = LazyCell::new(|| Drawing::new(&scene, &view));
-    let pixels = another(&scene, &view).unwrap_or_else(|| drawing.pixels(&clay));
-    let of_errors = errors.map(|output| (output, drawing.pixels(&error_color(&open))));
+    let drawing = LazyCell::new(|| Drawing::new(&asked.scene, &view));
+    let (pixels, of_errors) = match (another(&asked, &view)?, errors) {
+        (Some(pixels), None) => (pixels, None),
+        (None, None) => (drawing.pixels(&clay), None),
+        (Some(pixels), Some(output)) => {
+            let of_errors = drawing.pixels(&error_color(&open));
+            (pixels, Some((output, of_errors)))
+        }
+        (None, Some(output)) => {
+            let [pixels, of_errors] = drawing.pictures([&clay, &error_color(&open)]);
+            (pixels, Some((output, of_errors)))
+        }
+    };
     interrupt::check(&cancel)?;
     if let Some((output, pixels)) = &of_errors {
         write(output, args.size, pixels)?;

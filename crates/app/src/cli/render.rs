@@ -1,15 +1,83 @@
-use super::failure::Outcome;
-use super::picture::{self, Args};
-use crate::picture::{Scene, View};
-use crate::view::{Card, still};
+use glam::DAffine3;
 
-/// Draws a field file on the graphics card, and as `picture` does where there is none.
+use super::ceiling::of_bricks;
+use super::failure::{Failure, Outcome};
+use super::picture::{self, Asked};
+use super::quantity::finite;
+use crate::picture::View;
+use crate::view::{Card, Histogram, Manner, Mode, Solid, still};
+
+/// Arguments of `isoclay render`.
+#[derive(clap::Args)]
+// Those of `picture` are a group of the same name.
+#[group(skip)]
+pub struct Args {
+    #[command(flatten)]
+    pub picture: picture::Args,
+    /// How the solid becomes a picture
+    #[arg(long, value_enum, default_value_t = Mode::Mesh)]
+    mode: Mode,
+    /// Densities that are black and white with --mode volume [default: from that of the surface to the highest]
+    #[arg(long, value_name = "BLACK,WHITE", value_parser = density, allow_hyphen_values = true)]
+    density: Option<[f64; 2]>,
+}
+
+fn density(s: &str) -> Result<[f64; 2], String> {
+    let numbers: Result<Vec<f64>, String> = s.split(',').map(|n| finite(n.trim())).collect();
+    match numbers.as_deref() {
+        Ok(&[black, white]) if black < white => Ok([black, white]),
+        _ => Err("write two densities with a comma between, the lower one first: -200,900".into()),
+    }
+}
+
+impl Args {
+    /// What is drawn without triangles, if anything is to be.
+    fn solid(&self, asked: &Asked) -> Outcome<Option<Solid>> {
+        if self.mode == Mode::Mesh {
+            return Ok(None);
+        }
+        let field = asked.open.placed_levels()?.to_single();
+        Ok(Some(Solid {
+            field: field.map_err(|e| Failure::input(e.to_string()))?,
+            iso: asked.iso,
+            world_from_object: DAffine3::IDENTITY,
+        }))
+    }
+
+    fn density(&self, asked: &Asked) -> [f64; 2] {
+        self.density.unwrap_or_else(|| {
+            let within = asked.open.lattice().world_box();
+            Histogram::new(asked.open.field(), &within).shown(asked.iso)
+        })
+    }
+}
+
+/// Draws a field file on the graphics card; without one `picture` draws the surface, and nobody the density.
 pub fn run(args: &Args) -> Outcome {
-    let on_card = |scene: &Scene, view: &View| {
-        let drawn = Card::open().and_then(|card| still(&card, scene, view));
-        drawn
-            .inspect_err(|why| eprintln!("isoclay: {why}; the processor draws instead"))
-            .ok()
+    if args.density.is_some() && args.mode != Mode::Volume {
+        return Err(Failure::usage(
+            "--density: only --mode volume shows densities; add that, or leave it out",
+        ));
+    }
+    let on_card = |asked: &Asked, view: &View| {
+        let solid = args.solid(asked)?;
+        let drawn = Card::open().and_then(|card| {
+            let manner = Manner {
+                mode: args.mode,
+                solid: solid.as_ref(),
+                density: args.density(asked),
+                bricks: of_bricks(),
+            };
+            still(&card, &asked.scene, view, manner)
+        });
+        match drawn {
+            Ok(pixels) => Ok(Some(pixels)),
+            Err(why) if args.mode == Mode::Volume => Err(Failure::limit(format!("--mode volume: {why}"))),
+            Err(why) => {
+                eprintln!("isoclay: {why}; the processor draws instead");
+                Ok(None)
+            }
+        }
     };
-    picture::draw(args, &on_card)
+    picture::draw(&args.picture, &on_card)
 }

@@ -55,6 +55,9 @@ pub fn menu(ui: &mut egui::Ui, bench: &mut Bench) {
             };
             ui.label(egui::RichText::new(name).strong())
                 .on_hover_text(sheet.path.display().to_string());
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                super::modes(ui, bench);
+            });
         }
     });
 }
@@ -89,9 +92,23 @@ fn views(ui: &mut egui::Ui, bench: &mut Bench) {
             bench.order(Order::LetGo);
         }
     }
+    let mut measures = bench.measure.is_some();
+    if ui.checkbox(&mut measures, "Measure (M)").changed() {
+        bench.measure = measures.then(Default::default);
+    }
     ui.checkbox(&mut bench.shows_log, "Log");
     ui.separator();
-    egui::widgets::global_theme_preference_buttons(ui);
+    let mut theme = ui.options(|o| o.theme_preference);
+    ui.horizontal(|ui| {
+        for (is, name) in [
+            (egui::ThemePreference::Dark, "Dark"),
+            (egui::ThemePreference::Light, "Light"),
+            (egui::ThemePreference::System, "As the system"),
+        ] {
+            ui.selectable_value(&mut theme, is, name);
+        }
+    });
+    ui.ctx().set_theme(theme);
 }
 
 fn item<'a>(text: &'a str, keys: &'a str) -> egui::Button<'a> {

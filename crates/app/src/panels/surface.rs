@@ -6,7 +6,7 @@ use bspline::Field;
 use serde_json::json;
 
 use crate::cli::quantity::human_number;
-use crate::view::Histogram;
+use crate::view::{Histogram, Mode};
 use crate::window::Bench;
 use crate::window::orders::{Order, Thing};
 
@@ -49,6 +49,10 @@ pub fn surface(ui: &mut egui::Ui, bench: &mut Bench) {
                 return;
             };
             let chosen = show(ui, densities, thing);
+            if bench.look.mode != Mode::Mesh {
+                let range = densities.histogram.range;
+                shades(ui, &mut bench.look.density, range);
+            }
             if let Some(iso) = chosen.filter(|iso| *iso != thing.iso) {
                 let stroke = serde_json::from_value(json!({ "surface": { "iso": iso } }));
                 bench.order(Order::Do(Box::new(
@@ -57,6 +61,17 @@ pub fn surface(ui: &mut egui::Ui, bench: &mut Bench) {
             }
         });
     ui.add_space(10.0);
+}
+
+/// Densities that show black and white.
+fn shades(ui: &mut egui::Ui, [black, white]: &mut [f64; 2], [low, high]: [f64; 2]) {
+    ui.horizontal(|ui| {
+        for (name, density) in [("Black", black), ("White", white)] {
+            let label = ui.label(name);
+            let value = egui::DragValue::new(density).speed((high - low) / 300.0);
+            ui.add(value).labelled_by(label.id);
+        }
+    });
 }
 
 /// The histogram with the density in it; returns the one that is chosen.

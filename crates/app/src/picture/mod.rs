@@ -130,17 +130,23 @@ impl<'a> Drawing<'a> {
 
     /// RGB bytes, rows from the top.
     pub fn pixels(&self, color: Color) -> Vec<u8> {
+        let [pixels] = self.pictures([color]);
+        pixels
+    }
+
+    /// The same for pictures that differ in their colours alone: light is the same for all.
+    pub fn pictures<const N: usize>(&self, colors: [Color; N]) -> [Vec<u8>; N] {
         let lights = Lights {
             sky: &self.sky,
             sun: &self.sun,
             up: self.up,
         };
         let height = self.camera.size[1] / SAMPLES;
-        let rows: Vec<Vec<u8>> = (0..height)
+        let rows: Vec<[Vec<u8>; N]> = (0..height)
             .into_par_iter()
-            .map(|y| draw_row(self.scene, &self.camera, &lights, color, y))
+            .map(|y| draw_row(self.scene, &self.camera, &lights, colors, y))
             .collect();
-        rows.concat()
+        std::array::from_fn(|n| rows.iter().flat_map(|row| &row[n]).copied().collect())
     }
 }
 
@@ -172,8 +178,14 @@ struct Shaded {
     flat: DVec3,
 }
 
-/// RGB bytes of one row of pixels.
-fn draw_row(scene: &Scene, camera: &DepthMap, lights: &Lights, color: Color, y: usize) -> Vec<u8> {
+/// RGB bytes of one row of pixels, in each of the colours.
+fn draw_row<const N: usize>(
+    scene: &Scene,
+    camera: &DepthMap,
+    lights: &Lights,
+    colors: [Color; N],
+    y: usize,
+) -> [Vec<u8>; N] {
     let width = camera.size[0] / SAMPLES;
     let (mut points, mut shaded) = (Vec::new(), Vec::new());
     let fade = 1.0 - 0.25 * y as f64 * SAMPLES as f64 / camera.size[1] as f64;
@@ -213,6 +225,7 @@ fn draw_row(scene: &Scene, camera: &DepthMap, lights: &Lights, color: Color, y: 
             }));
         }
     }
+    let mut rows: [_; N] = std::array::from_fn(|_| row.clone());
     let mut jets = vec![(0.0, DVec3::ZERO); points.len()];
     scene.field.values_gradients(&points, &mut jets);
     for ((s, &p), (_, gradient)) in shaded.iter().zip(&points).zip(&jets) {
@@ -220,18 +233,16 @@ fn draw_row(scene: &Scene, camera: &DepthMap, lights: &Lights, color: Color, y: 
         // Where the solid was cut at its box, the field's normal is not that of the cut.
         let n = if smooth.dot(s.flat) > 0.5 { smooth } else { s.flat };
         let n = if n.dot(camera.axes.row(2)) < -0.2 { -n } else { n };
-        row[s.pixel] += color(p).powf(2.2) * lights.reaching(p, n) * s.samples as f64;
+        let light = lights.reaching(p, n);
+        for (row, color) in rows.iter_mut().zip(colors) {
+            row[s.pixel] += color(p).powf(2.2) * light * s.samples as f64;
+        }
     }
-    let mut bytes = Vec::with_capacity(3 * width);
-    for sum in row {
-        let linear = sum / (SAMPLES * SAMPLES) as f64;
-        bytes.extend(
-            linear
-                .to_array()
-                .map(|c| (c.clamp(0.0, 1.0).powf(1.0 / 2.2) * 255.0 + 0.5) as u8),
-        );
-    }
-    bytes
+    rows.map(|row| {
+        let byte = |c: f64| (c.clamp(0.0, 1.0).powf(1.0 / 2.2) * 255.0 + 0.5) as u8;
+        let linear = row.into_iter().map(|sum| sum / (SAMPLES * SAMPLES) as f64);
+        linear.flat_map(|c| c.to_array().map(byte)).collect()
+    })
 }
 
 impl Lights<'_> {

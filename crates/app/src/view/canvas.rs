@@ -8,12 +8,16 @@ use glam::{DMat4, DVec3};
 
 use super::Camera;
 use super::brush::{Brush, shadow};
+use super::cast::Cast;
 use super::lights::{self, Axes, Lights};
+use super::rays::Solid;
 use super::read;
 use super::shape::Patch;
 
 /// Samples of a pixel in a picture that stays.
 const SAMPLES: u32 = 4;
+/// Share of the pixels of a side that are drawn of triangles while something moves.
+const ROUGH: f32 = 0.5;
 /// Of all depths.
 pub const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 /// Pictures are kept in linear light, and shown as the screen wants them.
@@ -28,8 +32,27 @@ pub struct Look {
     pub cut: Option<(DVec3, DVec3)>,
     /// Whether painted stiffness shows.
     pub paint: bool,
+    /// How solids become pixels.
+    pub mode: Mode,
+    /// Densities that are black and white, where densities are shown.
+    pub density: [f64; 2],
     /// What is behind all.
     pub paper: Paper,
+}
+
+/// How solids become pixels.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, clap::ValueEnum,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum Mode {
+    /// By the triangles of their surfaces
+    #[default]
+    Mesh,
+    /// By lines to the surface of the spline itself
+    Rays,
+    /// As mist, denser where the density is higher
+    Volume,
 }
 
 /// What is behind all.
@@ -71,25 +94,35 @@ struct Held {
 }
 
 /// Where a picture is drawn to.
-struct Target {
-    size: [u32; 2],
+pub(super) struct Target {
+    pub(super) size: [u32; 2],
     /// Of several samples; without it the picture itself is drawn to.
     rough: Option<wgpu::TextureView>,
-    depth: wgpu::Texture,
-    picture: wgpu::Texture,
+    pub(super) depth: wgpu::Texture,
+    pub(super) picture: wgpu::Texture,
     /// What it shows.
     drawn: Option<Look>,
 }
 
+/// A picture, or what there is of it.
+pub struct Drawn {
+    /// The pixels.
+    pub picture: wgpu::Texture,
+    /// Share of its rows, from the top, that are drawn.
+    pub rows: f32,
+    /// Whether it stays as it is.
+    pub is_done: bool,
+}
+
 /// The graphics card with what it holds of a scene.
 pub struct Canvas {
-    device: wgpu::Device,
-    queue: wgpu::Queue,
+    pub(super) device: wgpu::Device,
+    pub(super) queue: wgpu::Queue,
     scene: wgpu::Buffer,
     /// Maps of all lights.
     maps: wgpu::Buffer,
-    bindings: wgpu::BindGroup,
-    lights: Lights,
+    pub(super) bindings: wgpu::BindGroup,
+    pub(super) lights: Lights,
     /// Round which eye the maps of the sky were drawn, unless the triangles are others since.
     sky: Option<Axes>,
     shadow: wgpu::RenderPipeline,
@@ -101,13 +134,15 @@ pub struct Canvas {
     /// The same.
     targets: [Option<Target>; 2],
     /// The origin of the triangles in the world, and the size of all of them.
-    origin: DVec3,
-    radius: f64,
+    pub(super) origin: DVec3,
+    pub(super) radius: f64,
+    /// What draws without triangles; none where the card cannot.
+    pub(super) cast: Option<Box<Cast>>,
 }
 
 impl Canvas {
-    /// On a card. Whole pictures have so many lights in the sky.
-    pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, sky: usize) -> Self {
+    /// On a card. Whole pictures have so many lights in the sky; bricks of splines take so many bytes at most.
+    pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, sky: usize, bricks: u64) -> Self {
         let shader = device.create_shader_module(wgpu::include_wgsl!("../../../../shaders/surface.wgsl"));
         let buffer = |label, size| {
             device.create_buffer(&wgpu::BufferDescriptor {
@@ -142,7 +177,11 @@ impl Canvas {
             }),
         });
         let looked_up = Lights::layout(device);
+        // As many as `shaders/rays.wgsl` reads.
+        let can_cast = device.limits().max_storage_buffers_per_shader_stage >= 3;
+        let layouts = [layout.clone(), looked_up.clone()];
         Self {
+            cast: can_cast.then(|| Box::new(Cast::new(device, queue, layouts, bricks))),
             brushes: [1, SAMPLES].map(|n| Brush::new(device, &shader, [&layout, &looked_up], n)),
             shadow: shadow(device, &shader, &layout),
             lights: Lights::new(device, &looked_up, sky),
@@ -164,18 +203,49 @@ impl Canvas {
     fn renew(&mut self) {
         self.sky = None;
         self.targets.iter_mut().flatten().for_each(|t| t.drawn = None);
+        self.cast.iter_mut().for_each(|cast| cast.renew());
+    }
+
+    /// Whether it can draw without triangles.
+    pub fn can_cast(&self) -> bool {
+        self.cast.is_some()
+    }
+
+    /// Share of the pixels of a side for pictures while something moves, of so many in all.
+    pub fn rough_share(&self, mode: Mode, pixels: f64) -> f32 {
+        match &self.cast {
+            Some(cast) if mode != Mode::Mesh => cast.rough_share(pixels),
+            _ => ROUGH,
+        }
+    }
+
+    /// Whether all that was drawn without triangles is as fine as it is.
+    #[cfg(test)]
+    pub fn is_whole(&self) -> bool {
+        self.cast.as_ref().is_some_and(|cast| cast.rays.is_whole())
+    }
+
+    /// Puts a spline in place of the one that an object was, to be drawn without triangles.
+    pub fn put_solid(&mut self, object: &str, solid: Solid) {
+        if let Some(cast) = &mut self.cast
+            && cast.rays.put(object, solid)
+        {
+            cast.renew();
+        }
     }
 
     /// Forgets all triangles: those that come next lie about another origin.
     pub fn begin(&mut self, origin: DVec3, radius: f64) {
         (self.origin, self.radius) = (origin, radius);
         self.held.clear();
+        self.cast.iter_mut().for_each(|cast| cast.rays.clear());
         self.renew();
     }
 
     /// Forgets those of an object.
     pub fn forget(&mut self, object: &str) {
         self.held.retain(|(name, _), _| name != object);
+        self.cast.iter_mut().for_each(|cast| cast.rays.forget(object));
         self.renew();
     }
 
@@ -224,41 +294,63 @@ impl Canvas {
         self.held.values().map(|held| held.count as usize / 3).sum()
     }
 
-    /// A picture of so many pixels: rough while something moves. It is drawn anew only if it would be another.
-    pub fn draw(&mut self, look: &Look, size: [u32; 2], is_rough: bool) -> &wgpu::Texture {
+    /// A picture of so many pixels: rough while something moves. It is drawn anew only if it would be another. Without triangles a whole
+    /// one takes several calls, each for some of its rows.
+    pub fn draw(&mut self, look: &Look, size: [u32; 2], is_rough: bool) -> Drawn {
         let most = self.device.limits().max_texture_dimension_2d;
         let size = size.map(|n| n.clamp(1, most));
+        if look.mode != Mode::Mesh
+            && let Some(cast) = self.cast.take()
+        {
+            return self.draw_by_lines(cast, look, size, is_rough);
+        }
         let which = usize::from(!is_rough);
         let target = match self.targets[which].take() {
             Some(target) if target.size == size => target,
             _ => self.new_target(size, if is_rough { 1 } else { SAMPLES }),
         };
         if target.drawn != Some(*look) {
-            self.paint(&target, look, which);
+            // What is cut off would still throw its shadow.
+            let is_lit = !is_rough && look.cut.is_none();
+            self.paint(&target, look, which, is_lit, |_| true);
         }
         let target = Target {
             drawn: Some(*look),
             ..target
         };
-        &self.targets[which].insert(target).picture
+        Drawn {
+            picture: self.targets[which].insert(target).picture.clone(),
+            rows: 1.0,
+            is_done: true,
+        }
     }
 
-    fn paint(&mut self, target: &Target, look: &Look, which: usize) {
-        let brush = &self.brushes[which];
-        let size = target.size;
+    /// Tells the card of a look, and where its lights stand.
+    pub(super) fn tell(&self, look: &Look, size: [u32; 2]) {
         let aspect = f64::from(size[0]) / f64::from(size[1]);
-        // What is cut off would still throw its shadow.
-        let is_lit = target.rough.is_some() && look.cut.is_none();
         let scene = self.scene_of(look, aspect);
         self.queue
             .write_buffer(&self.scene, 0, bytemuck::bytes_of(&scene));
         let axes = look.camera.axes();
         // It takes as long as all else, and nobody sees it turn.
-        let is_sky_old = self.sky.is_none();
         let of_sky = self.sky.unwrap_or(axes);
         let maps = lights::maps(self.lights.count, [of_sky, axes], self.radius);
         self.queue
             .write_buffer(&self.maps, 0, bytemuck::cast_slice(&maps));
+    }
+
+    /// Draws the triangles of those objects that are `shown`; in the light that reaches them if `is_lit`.
+    pub(super) fn paint(
+        &mut self,
+        target: &Target,
+        look: &Look,
+        which: usize,
+        is_lit: bool,
+        shown: impl Fn(&str) -> bool,
+    ) {
+        let brush = &self.brushes[which];
+        self.tell(look, target.size);
+        let is_sky_old = self.sky.is_none();
         let mut encoder = self
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
@@ -310,11 +402,12 @@ impl Canvas {
             } else {
                 pass.set_pipeline(&brush.surface);
             }
-            draw(self.held.values(), &mut pass, 0);
+            let shown = self.held.iter().filter(|((name, _), _)| shown(name));
+            draw(shown.map(|(_, held)| held), &mut pass, 0);
         }
         self.queue.submit([encoder.finish()]);
         if is_lit {
-            self.sky = Some(of_sky);
+            self.sky.get_or_insert(look.camera.axes());
         }
     }
 
@@ -340,7 +433,7 @@ impl Canvas {
         }
     }
 
-    fn new_target(&self, size: [u32; 2], samples: u32) -> Target {
+    pub(super) fn new_target(&self, size: [u32; 2], samples: u32) -> Target {
         let texture = |format, samples, usage| {
             self.device.create_texture(&wgpu::TextureDescriptor {
                 label: Some("picture"),
@@ -361,7 +454,10 @@ impl Canvas {
         let picture = texture(
             COLOR,
             1,
-            attachment | wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC,
+            attachment
+                | wgpu::TextureUsages::TEXTURE_BINDING
+                | wgpu::TextureUsages::COPY_SRC
+                | wgpu::TextureUsages::COPY_DST,
         );
         let whole = wgpu::TextureViewDescriptor::default();
         let rough = (samples > 1).then(|| texture(COLOR, samples, attachment).create_view(&whole));
@@ -372,7 +468,7 @@ impl Canvas {
             sample_count: samples,
             dimension: wgpu::TextureDimension::D2,
             format: DEPTH,
-            usage: attachment | wgpu::TextureUsages::COPY_SRC,
+            usage: attachment | wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC,
             view_formats: &[],
         });
         Target {
@@ -389,9 +485,21 @@ impl Canvas {
     /// # Errors
     /// That the card is lost or has no memory left.
     pub fn pixels(&mut self, look: &Look, size: [u32; 2], is_rough: bool) -> Result<Vec<u8>, String> {
-        let picture = self.draw(look, size, is_rough).clone();
+        let picture = self.draw_all(look, size, is_rough);
         let bytes = read::bytes(&self.device, &self.queue, &picture)?;
         Ok(bytes.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect())
+    }
+
+    /// As [`draw`](Self::draw), until it is done.
+    pub fn draw_all(&mut self, look: &Look, size: [u32; 2], is_rough: bool) -> wgpu::Texture {
+        loop {
+            let drawn = self.draw(look, size, is_rough);
+            if drawn.is_done {
+                return drawn.picture;
+            }
+            // It can only fail where the card is lost, and then nothing is to be waited for.
+            let _ = self.device.poll(wgpu::PollType::wait_indefinitely());
+        }
     }
 
     /// How far towards the eye, from its centre, a view without perspective shows the surface in each pixel; none where there is none.
@@ -400,8 +508,15 @@ impl Canvas {
     /// As [`pixels`](Self::pixels).
     #[cfg(test)]
     pub fn depths(&mut self, look: &Look, size: [u32; 2]) -> Result<Vec<Option<f64>>, String> {
-        self.draw(look, size, true);
-        let depth = &self.targets[0].as_ref().expect("it was drawn").depth;
+        self.draw_all(look, size, true);
+        let depth = match look.mode {
+            Mode::Mesh => &self.targets[0].as_ref().expect("it was drawn").depth,
+            _ => self
+                .cast
+                .as_ref()
+                .and_then(|cast| cast.depth())
+                .expect("it was drawn"),
+        };
         let bytes = read::bytes(&self.device, &self.queue, depth)?;
         let reach = self.radius + look.camera.center.distance(self.origin);
         let toward_eye = |depth: &f32| (*depth < 1.0).then(|| reach * (1.0 - 2.0 * f64::from(*depth)));

@@ -50,6 +50,25 @@ impl Histogram {
         Self { range, bars }
     }
 
+    /// Density below which a share of all samples lie, to a bar's width.
+    pub fn quantile(&self, share: f64) -> f64 {
+        let all: u32 = self.bars.iter().sum();
+        let mut left = share * f64::from(all);
+        let below = self.bars.iter().take_while(|n| {
+            left -= f64::from(**n);
+            left > 0.0
+        });
+        let [low, high] = self.range;
+        low + (below.count() + 1) as f64 / BARS as f64 * (high - low)
+    }
+
+    /// Densities that show black and white where the surface is at one: from that on, the highest few white.
+    pub fn shown(&self, iso: f64) -> [f64; 2] {
+        let [low, high] = self.range;
+        let white = f64::max(self.quantile(0.995), iso + 0.05 * (high - low));
+        [iso, white]
+    }
+
     /// Heights of the bars, 0 to 1. A scan is mostly air: the square root lets the rest be seen.
     pub fn heights(&self) -> impl Iterator<Item = f32> {
         let most = self.bars.iter().copied().max().unwrap_or(1).max(1) as f32;

@@ -15,10 +15,19 @@ const BISECTIONS: usize = 40;
 pub fn pick(field: &dyn Field, iso: f64, within: &Aabb, ray: &Ray) -> Option<(DVec3, DVec3)> {
     let [from, to] = through(within, ray)?;
     let at = |t: f64| ray.from + t * ray.along;
-    let enters = enter(field, iso, [at(from), at(to)], 0)?;
+    let enters = crossing(field, iso, [at(from), at(to)], true, 0)?;
     let gradient = field.value_gradient(enters).1;
     let normal = -gradient.try_normalize()?;
     Some((enters, normal))
+}
+
+/// Where a line that begins on the surface, and goes into the solid, leaves it first; none where it stays inside as far as the box goes.
+pub fn leave(field: &dyn Field, iso: f64, within: &Aabb, from: DVec3, along: DVec3) -> Option<DVec3> {
+    let [_, to] = through(within, &Ray { from, along })?;
+    // Past what rounding leaves of the start outside.
+    let start = 1e-6 * within.size().length();
+    let at = |t: f64| from + t * along;
+    crossing(field, iso, [at(start), at(to)], false, 0)
 }
 
 /// Ways along the line to where it goes into a box and out of it.
@@ -39,27 +48,31 @@ fn through(b: &Aabb, ray: &Ray) -> Option<[f64; 2]> {
     (from < to).then_some([from, to])
 }
 
-/// The first way in on a piece of the line, halved so often: pieces that the bounds of the field exclude are left out.
-fn enter(field: &dyn Field, iso: f64, [a, b]: [DVec3; 2], halvings: u32) -> Option<DVec3> {
+/// The first way in, or out, on a piece of the line, halved so often: pieces that the bounds of the field exclude are left out.
+fn crossing(field: &dyn Field, iso: f64, [a, b]: [DVec3; 2], goes_in: bool, halvings: u32) -> Option<DVec3> {
     let range = field.bounds_along(a, b);
     if range.hi <= iso || range.lo > iso {
         return None;
     }
-    let is_inside = |p: DVec3| field.value(p) > iso;
+    let is_beyond = |p: DVec3| (field.value(p) > iso) == goes_in;
     if halvings < SHORTEST {
         let middle = 0.5 * (a + b);
-        let first = enter(field, iso, [a, middle], halvings + 1);
-        return first.or_else(|| enter(field, iso, [middle, b], halvings + 1));
+        let first = crossing(field, iso, [a, middle], goes_in, halvings + 1);
+        return first.or_else(|| crossing(field, iso, [middle, b], goes_in, halvings + 1));
     }
-    if is_inside(a) || !is_inside(b) {
+    if is_beyond(a) || !is_beyond(b) {
         return None;
     }
-    let (mut out, mut inside) = (a, b);
+    let (mut before, mut beyond) = (a, b);
     for _ in 0..BISECTIONS {
-        let middle = 0.5 * (out + inside);
-        *(if is_inside(middle) { &mut inside } else { &mut out }) = middle;
+        let middle = 0.5 * (before + beyond);
+        *(if is_beyond(middle) {
+            &mut beyond
+        } else {
+            &mut before
+        }) = middle;
     }
-    Some(inside)
+    Some(beyond)
 }
 
 #[cfg(test)]
@@ -99,6 +112,30 @@ mod tests {
             let first = first.into_iter().find(|q| field.value(*q) > 0.0).unwrap();
             assert!(first.distance(p) < 2e-3, "{first} and {p}");
         }
+    }
+
+    #[test]
+    fn a_line_into_a_ball_leaves_it_at_the_other_side() {
+        let field = two_balls();
+        let b = field.lattice().world_box();
+        for n in 0..100 {
+            let (sine, cosine) = (0.063 * f64::from(n)).sin_cos();
+            let from = DVec3::new(-40.0, 1.5 * sine, 2.0 * cosine);
+            let ray = Ray {
+                from,
+                along: DVec3::X,
+            };
+            let (p, normal) = pick(&field, 0.0, &b, &ray).expect("it hits");
+            let out = leave(&field, 0.0, &b, p, -normal).expect("the ball ends");
+            assert!(field.value(out).abs() < 1e-6, "{out}");
+            // Through the middle, which the normal goes through as far as the spline is a ball.
+            let through = 0.5 * (out + p);
+            assert!(through.distance(DVec3::new(-5.0, 0.0, 0.0)) < 0.3, "{through}");
+            // From one ball into the other: the first way out counts.
+            let first = leave(&field, 0.0, &b, p, DVec3::X).expect("it ends");
+            assert!(first.x < -1.9, "{first}");
+        }
+        assert_eq!(leave(&field, 0.0, &b, DVec3::ZERO, DVec3::Y), None);
     }
 
     #[test]

@@ -5,10 +5,22 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use eframe::egui_wgpu::{RenderState, wgpu};
 
+use super::canvas::Drawn;
 use super::{Canvas, Look};
+use crate::cli::ceiling::of_bricks;
 
 /// Lights in the sky: more take longer than a picture should.
 pub const SKY: usize = 16;
+
+/// A picture that egui shows: see [`Drawn`].
+pub struct Shown {
+    /// As egui knows it.
+    pub picture: egui::TextureId,
+    /// Share of its rows, from the top, that are drawn.
+    pub rows: f32,
+    /// Whether it stays as it is.
+    pub is_done: bool,
+}
 
 /// A canvas whose pictures egui shows.
 pub struct Screen {
@@ -30,7 +42,7 @@ impl Screen {
         });
         Self {
             is_lost,
-            canvas: Canvas::new(&state.device, &state.queue, SKY),
+            canvas: Canvas::new(&state.device, &state.queue, SKY, of_bricks()),
             state,
             shown: [None, None],
         }
@@ -48,11 +60,25 @@ impl Screen {
     }
 
     /// As [`Canvas::draw`].
-    pub fn draw(&mut self, look: &Look, size: [u32; 2], is_rough: bool) -> egui::TextureId {
-        let picture = self.canvas.draw(look, size, is_rough);
+    pub fn draw(&mut self, look: &Look, size: [u32; 2], is_rough: bool) -> Shown {
+        let Drawn {
+            picture,
+            rows,
+            is_done,
+        } = self.canvas.draw(look, size, is_rough);
+        let picture = self.known(picture, is_rough);
+        Shown {
+            picture,
+            rows,
+            is_done,
+        }
+    }
+
+    /// A picture, as egui knows it.
+    fn known(&mut self, picture: wgpu::Texture, is_rough: bool) -> egui::TextureId {
         let shown = &mut self.shown[usize::from(is_rough)];
         if let Some((texture, id)) = shown
-            && texture == picture
+            && *texture == picture
         {
             return *id;
         }
@@ -66,7 +92,7 @@ impl Screen {
             renderer.free_texture(&old);
         }
         let id = renderer.register_native_texture(&self.state.device, &view, wgpu::FilterMode::Linear);
-        *shown = Some((picture.clone(), id));
+        *shown = Some((picture, id));
         id
     }
 }

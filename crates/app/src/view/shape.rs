@@ -19,7 +19,7 @@ const FINER: [usize; 2] = [1, 2];
 /// Chord error over the diagonal of the box: half a pixel where the box fills a screen.
 const ERROR: f64 = 8e-4;
 /// Radius of curvature, over the diagonal of the box, at which a hollow is half as dark as it can be.
-const HOLLOW: f64 = 0.02;
+pub const HOLLOW: f64 = 0.02;
 
 /// A corner of triangles, in the world from the origin of the picture.
 #[repr(C)]
@@ -94,6 +94,21 @@ impl Shape {
             world_from_object,
             parts: BTreeMap::new(),
         })
+    }
+
+    /// Of its triangles, which are closed where the solid does not leave the field's box.
+    pub fn area_and_volume(&self) -> [f64; 2] {
+        let (mut area, mut volume) = (0.0, 0.0);
+        for (vertices, indices) in self.parts.values().flat_map(BTreeMap::values) {
+            for corners in indices.chunks_exact(3) {
+                let [a, b, c] =
+                    [0, 1, 2].map(|n| glam::Vec3::from(vertices[corners[n] as usize].at).as_dvec3());
+                let across = (b - a).cross(c - a);
+                area += 0.5 * across.length();
+                volume += a.dot(across) / 6.0;
+            }
+        }
+        [area, volume]
     }
 
     /// Whether it can follow to another state of its object.

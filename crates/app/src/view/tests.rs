@@ -1,16 +1,18 @@
 //! The graphics card against the processor, against the field itself, and against how it drew before.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::sync::Arc;
 
-use bspline::hierarchical::Lattice;
+use bspline::hierarchical::{BrickKey, DenseCorrections, Lattice, LevelCorrections};
 use bspline::polygonize::{BlockMesh, Mesh, PolygonizeOptions};
 use bspline::{Aabb, Frame, HierarchicalSpline};
 use document::Object;
 use formats::field::FieldMeta;
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DVec2, DVec3};
 
 use super::still::easel;
-use super::{Camera, Canvas, Card, Look, Paper, SKY, Shape, pick, still};
+use super::{BUDGET, Camera, Canvas, Card, Look, MESH, Manner, Mode, Paper, SKY, Shape, Solid, pick, still};
 use crate::picture::{Drawing, Scene, Surface, View, clay, depths};
 
 const SIZE: [usize; 2] = [240, 180];
@@ -42,6 +44,78 @@ fn meshed(field: &HierarchicalSpline<f32>) -> Mesh {
     let frame = Frame::over(&field.lattice().world_box(), [96; 3]);
     let (mesh, _) = BlockMesh::new(field, &frame, &PolygonizeOptions::default()).unwrap();
     mesh.mesh().unwrap()
+}
+
+/// Depths that lines to the field find, one for each pixel.
+fn lines(field: &HierarchicalSpline<f32>, look: &Look, center: DVec3) -> Vec<Option<f64>> {
+    let [w, h] = SIZE.map(|n| n as f64);
+    let within = field.lattice().world_box();
+    let depth = |n: usize| {
+        let (x, y) = ((n % SIZE[0]) as f64 + 0.5, (n / SIZE[0]) as f64 + 0.5);
+        let at = DVec2::new((x - 0.5 * w) / h, (0.5 * h - y) / h);
+        let (p, _) = pick(field, 0.0, &within, &look.camera.ray(at))?;
+        Some((p - center).dot(look.camera.axes()[2]))
+    };
+    (0..SIZE[0] * SIZE[1]).map(depth).collect()
+}
+
+/// The same on one side with small bumps, in finer bricks there alone.
+fn bumps() -> HierarchicalSpline<f32> {
+    let base = solid();
+    let mut levels: Vec<LevelCorrections<f32>> = vec![
+        base.corrections(0),
+        LevelCorrections::new(),
+        LevelCorrections::new(),
+    ];
+    for (level, reach) in [(1, 13.0_f64), (2, 14.0)] {
+        let scale = f64::from(1 << level);
+        let mut bricks: BTreeMap<BrickKey, DenseCorrections<f32>> = BTreeMap::new();
+        let count = 24 * (1 << level) + 3;
+        for function in
+            (0..count * count * count).map(|n| [n / (count * count), n / count % count, n % count])
+        {
+            let p = DVec3::from_array(function.map(|i| (f64::from(i) - 1.0) / scale)) - 12.0;
+            if p.x + p.z < reach - 10.0 || p.z < 2.0 {
+                continue;
+            }
+            let wave = 0.25 / scale * (2.1 * p.x * scale).sin() * (1.7 * p.y * scale).cos();
+            let key = BrickKey::of(function);
+            let slot = function.map(|i| i as usize % 8);
+            bricks
+                .entry(key)
+                .or_insert_with(DenseCorrections::empty)
+                .set(slot, wave as f32);
+        }
+        levels[level] = bricks
+            .into_iter()
+            .map(|(key, dense)| (key, Arc::new(dense.pack())))
+            .collect();
+    }
+    HierarchicalSpline::from_corrections(*base.lattice(), 1.0, levels)
+}
+
+fn cast(field: &HierarchicalSpline<f32>) -> Solid {
+    Solid {
+        field: field.clone(),
+        iso: 0.0,
+        world_from_object: DAffine3::IDENTITY,
+    }
+}
+
+fn by(mode: Mode, solid: &Solid) -> Manner<'_> {
+    Manner {
+        mode,
+        solid: Some(solid),
+        ..MESH
+    }
+}
+
+fn scene<'a>(field: &'a HierarchicalSpline<f32>, mesh: &'a Mesh) -> Scene<'a> {
+    Scene {
+        field,
+        seen: surface(mesh),
+        shading: surface(mesh),
+    }
 }
 
 fn surface(mesh: &Mesh) -> Surface<'_> {
@@ -96,25 +170,12 @@ fn the_card_the_processor_and_the_field_show_one_solid() {
     };
     let field = solid();
     let mesh = meshed(&field);
-    let scene = Scene {
-        field: &field,
-        seen: surface(&mesh),
-        shading: surface(&mesh),
-    };
+    let scene = scene(&field, &mesh);
     for view in views(&mesh) {
-        let (mut canvas, look) = easel(&card, &scene, &view);
+        let (mut canvas, look) = easel(&card, &scene, &view, MESH);
         let by_card = canvas.depths(&look, SIZE.map(|n| n as u32)).unwrap();
         let by_processor = depths(&scene.seen, &view);
-        let [w, h] = SIZE.map(|n| n as f64);
-        let within = field.lattice().world_box();
-        let by_lines: Vec<Option<f64>> = (0..SIZE[0] * SIZE[1])
-            .map(|n| {
-                let (x, y) = ((n % SIZE[0]) as f64 + 0.5, (n / SIZE[0]) as f64 + 0.5);
-                let at = glam::DVec2::new((x - 0.5 * w) / h, (0.5 * h - y) / h);
-                let (p, _) = pick(&field, 0.0, &within, &look.camera.ray(at))?;
-                Some((p - view.center).dot(look.camera.axes()[2]))
-            })
-            .collect();
+        let by_lines = lines(&field, &look, view.center);
         let count = by_card.iter().flatten().count();
         assert!(count > 5000, "only {count} pixels show anything");
         for (name, others, tolerance) in [("processor", &by_processor, 0.03), ("field", &by_lines, 0.06)] {
@@ -129,6 +190,131 @@ fn the_card_the_processor_and_the_field_show_one_solid() {
     }
 }
 
+/// Lines through the bricks on the card find what lines find that the processor follows through the field: silhouettes within a pixel,
+/// depths within a thousandth of one. Triangles leave the field by more, most where it has small bumps.
+#[test]
+fn rays_show_the_field_itself() {
+    let Some(card) = card("rays against the field") else {
+        return;
+    };
+    let count = SIZE.map(|n| n as u32);
+    for (n, field, leaves) in [(0, solid(), 0.06), (1, bumps(), 0.3)] {
+        let mesh = meshed(&field);
+        let scene = scene(&field, &mesh);
+        let view = views(&mesh)[n];
+        let solid = cast(&field);
+        let (mut canvas, look) = easel(&card, &scene, &view, by(Mode::Rays, &solid));
+        let by_rays = canvas.depths(&look, count).unwrap();
+        let by_lines = lines(&field, &look, view.center);
+        let by_mesh = canvas
+            .depths(
+                &Look {
+                    mode: Mode::Mesh,
+                    ..look
+                },
+                count,
+            )
+            .unwrap();
+        assert!(by_rays.iter().flatten().count() > 5000);
+        for (other, others, tolerance) in [("lines", &by_lines, 1e-3), ("mesh", &by_mesh, leaves)] {
+            for (a, b) in [(&by_rays, others), (others, &by_rays)] {
+                let at = unlike(a, b, tolerance);
+                assert_eq!(at.map(|n| (n, a[n], b[n])), None, "{n}: rays against {other}");
+            }
+        }
+    }
+}
+
+/// With room for a few bricks alone all of the solid is there, only coarser; with room for all it is as fine as it is.
+#[test]
+fn bricks_without_room_are_drawn_coarser() {
+    let Some(card) = card("too small a budget") else {
+        return;
+    };
+    let field = bumps();
+    let mesh = meshed(&field);
+    let scene = scene(&field, &mesh);
+    let view = views(&mesh)[0];
+    let solid = cast(&field);
+    let depths = [BUDGET, 300_000, 60_000].map(|bricks| {
+        let manner = Manner {
+            bricks,
+            ..by(Mode::Rays, &solid)
+        };
+        let (mut canvas, look) = easel(&card, &scene, &view, manner);
+        let depths = canvas.depths(&look, SIZE.map(|n| n as u32)).unwrap();
+        assert_eq!(canvas.is_whole(), bricks == BUDGET, "{bricks} bytes");
+        depths
+    });
+    let missing = |some: &[Option<f64>], others: &[Option<f64>]| {
+        let all = some.iter().zip(others);
+        all.filter(|(a, b)| a.is_some() != b.is_some()).count()
+    };
+    let count = depths[0].iter().flatten().count();
+    let misses = [1, 2].map(|n| missing(&depths[0], &depths[n]));
+    assert!(
+        misses[0] < count / 100 && misses[0] < misses[1] && misses[1] < count / 8,
+        "{misses:?} of {count}"
+    );
+    let at = unlike(&depths[1], &depths[0], 1e-3);
+    assert!(at.is_some(), "coarser bricks show the same");
+}
+
+/// The card and the processor find as much light taken from lines through the density, by many small steps.
+#[test]
+fn volumes_take_the_light_that_their_density_takes() {
+    let Some(card) = card("volume against the field") else {
+        return;
+    };
+    let field = solid();
+    let mesh = meshed(&field);
+    let scene = scene(&field, &mesh);
+    let view = views(&mesh)[0];
+    let solid = cast(&field);
+    let manner = Manner {
+        density: [0.0, 40.0],
+        ..by(Mode::Volume, &solid)
+    };
+    let (mut canvas, look) = easel(&card, &scene, &view, manner);
+    let size = SIZE.map(|n| n as u32);
+    let seen = canvas.pixels(&look, size, false).unwrap();
+    let empty = canvas
+        .pixels(
+            &Look {
+                density: [50.0, 60.0],
+                ..look
+            },
+            size,
+            false,
+        )
+        .unwrap();
+    let by_mesh = canvas
+        .depths(
+            &Look {
+                mode: Mode::Mesh,
+                ..look
+            },
+            size,
+        )
+        .unwrap();
+    let differs = |n: usize| {
+        (0..3)
+            .map(|c| seen[3 * n + c].abs_diff(empty[3 * n + c]))
+            .max()
+            .unwrap()
+    };
+    // Beside the solid nothing is above black; in its middle something is.
+    let beside = (0..by_mesh.len()).filter(|n| round(&by_mesh, *n).all(|d| d.is_none()));
+    assert!(beside.into_iter().all(|n| differs(n) == 0));
+    let within: Vec<usize> = (0..by_mesh.len()).filter(|n| by_mesh[*n].is_some()).collect();
+    let seen_within = within.iter().filter(|n| differs(**n) > 4).count();
+    assert!(
+        seen_within * 10 > within.len() * 8,
+        "{seen_within} of {}",
+        within.len()
+    );
+}
+
 /// Light, shadows and paper are those of `isoclay picture`: its pixels have two samples a side, and its edges another curve of grey.
 #[test]
 fn the_card_and_the_processor_have_one_look() {
@@ -137,13 +323,9 @@ fn the_card_and_the_processor_have_one_look() {
     };
     let field = solid();
     let mesh = meshed(&field);
-    let scene = Scene {
-        field: &field,
-        seen: surface(&mesh),
-        shading: surface(&mesh),
-    };
+    let scene = scene(&field, &mesh);
     for view in views(&mesh) {
-        let by_card = still(&card, &scene, &view).unwrap();
+        let by_card = still(&card, &scene, &view, MESH).unwrap();
         let by_processor = Drawing::new(&scene, &view).pixels(&clay);
         let (mean, far) = difference(&by_card, &by_processor);
         assert!(mean < 4.0 && far < 0.02, "mean {mean}, far {far}");
@@ -174,26 +356,35 @@ fn the_viewport_looks_as_it_did() {
     let bounds: Aabb = shape.bounding_box().unwrap();
     let origin = bounds.center();
     let radius = 0.5 * bounds.size().length();
-    let mut canvas = Canvas::new(&card.device, &card.queue, SKY);
+    let mut canvas = Canvas::new(&card.device, &card.queue, SKY, BUDGET);
     canvas.begin(origin, radius);
     shape
         .all("solid", origin)
         .iter()
         .for_each(|patch| canvas.put(patch));
+    canvas.put_solid("solid", Solid::of(&object, 0.0, DAffine3::IDENTITY).unwrap());
     let whole = Look {
         camera: Camera::onto(origin, radius, DVec3::Y),
         cut: None,
         paint: true,
+        mode: Mode::Mesh,
+        density: [0.0, 3.0],
         paper: Paper::Dark,
     };
     let cut = Look {
         cut: Some((origin, whole.camera.axes()[2])),
         ..whole
     };
+    let by = |mode, look: Look| Look { mode, ..look };
     for (name, look, is_rough) in [
         ("whole", whole, false),
         ("rough", whole, true),
         ("cut", cut, false),
+        ("rays", by(Mode::Rays, whole), false),
+        ("rays_rough", by(Mode::Rays, whole), true),
+        ("rays_cut", by(Mode::Rays, cut), false),
+        ("volume", by(Mode::Volume, whole), false),
+        ("volume_rough", by(Mode::Volume, whole), true),
     ] {
         let seen = canvas.pixels(&look, SIZE.map(|n| n as u32), is_rough).unwrap();
         let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(format!("src/view/snapshots/{name}.png"));

@@ -10,11 +10,12 @@ use egui::Modifiers;
 use fitting::Cancel;
 use glam::DVec3;
 
+use super::measure::{Mark, Measure};
 use super::orders::{Order, Sheet};
 use super::tool::{Kind, Tool};
 use super::touch::{Held, Seen};
 use crate::panels;
-use crate::view::{Camera, Look};
+use crate::view::{Camera, Histogram, Look, Mode, leave};
 
 /// Time for which a message stays.
 const READ: Duration = Duration::from_secs(8);
@@ -45,8 +46,14 @@ pub struct Bench {
     pub scratch: Option<tempfile::TempDir>,
     /// How often which density is in the chosen object.
     pub densities: Option<panels::Densities>,
+    /// Whether the card draws without triangles.
+    pub can_cast: bool,
+    /// Of which object the densities are that show black and white.
+    pub density_of: Option<String>,
     /// Whether all that was told is shown.
     pub shows_log: bool,
+    /// What is measured, if clicks do that.
+    pub measure: Option<Measure>,
     /// Whether clicks pin the surface.
     pub pins: bool,
     /// How a device is to be held, if that panel is shown.
@@ -113,6 +120,24 @@ impl Bench {
         self.order(Order::Do(Box::new(stroke.expect("a finite place can be held"))));
     }
 
+    /// Marks a place of the chosen object's surface to be measured from.
+    pub(super) fn mark(&mut self, p: DVec3, normal: DVec3) {
+        let thing = self
+            .sheet
+            .as_ref()
+            .and_then(|sheet| sheet.objects.get(sheet.chosen));
+        let wall = thing.and_then(|thing| {
+            let own = thing.world_from_object.inverse();
+            let inward = own.transform_vector3(-normal).try_normalize()?;
+            let from = own.transform_point3(p);
+            let beyond = leave(&*thing.field, thing.iso, &thing.own_box, from, inward)?;
+            Some(thing.world_from_object.transform_point3(beyond).distance(p))
+        });
+        if let Some(measure) = &mut self.measure {
+            measure.marks.push(Mark { at: p, wall });
+        }
+    }
+
     /// Tells what holds the tool when another one is chosen, or it is set otherwise.
     pub(super) fn tell_tool(&mut self) {
         let tool = self.tool_in_hand(Modifiers::NONE);
@@ -120,6 +145,24 @@ impl Bench {
             self.order(Order::Tool(tool));
         }
         self.told_tool = self.held.is_some().then_some(tool);
+    }
+
+    /// Shows the densities of the chosen object from its surface to the highest, once they are shown at all.
+    pub(super) fn know_density(&mut self) {
+        let Some(thing) = self
+            .sheet
+            .as_ref()
+            .and_then(|sheet| sheet.objects.get(sheet.chosen))
+        else {
+            return;
+        };
+        let has_density = self.look.mode != Mode::Mesh;
+        if !has_density || self.density_of.as_ref() == Some(&thing.name) {
+            return;
+        }
+        let histogram = Histogram::new(&*thing.field, &thing.own_box);
+        self.look.density = histogram.shown(thing.iso);
+        self.density_of = Some(thing.name.clone());
     }
 
     /// Looks at the whole scene.

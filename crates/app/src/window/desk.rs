@@ -18,7 +18,7 @@ use super::preview;
 use super::tool::Tool;
 use super::touch::Wanted;
 use crate::cli::desk_files;
-use crate::view::{Ray, Shape, pick};
+use crate::view::{Ray, Shape, Solid, pick};
 
 /// What lies on the desk.
 pub struct Desk {
@@ -137,6 +137,13 @@ impl Desk {
             Order::Drop => self.drop_stroke(),
             Order::Undo(count) => self.turn_back(|d| d.undo(count).map(drop)),
             Order::Redo(count) => self.turn_back(|d| d.redo(count).map(drop)),
+            Order::Weigh(name) => {
+                let shape = self.open.as_ref().and_then(|open| open.shapes.get(&name));
+                if let Some(shape) = shape {
+                    self.tell(News::Size(name, shape.area_and_volume()));
+                }
+                Ok(())
+            }
             Order::Do(stroke) => self.apply(*stroke),
             Order::Take(wanted) => {
                 self.wanted = Some(wanted);
@@ -570,11 +577,14 @@ impl Desk {
                     all
                 }),
             };
+            let solid = Solid::of(object, iso, placed);
+            let solid = solid.map(|solid| News::Solid(name.clone(), Box::new(solid)));
             match followed {
                 Ok(patches) if patches.is_empty() => {}
                 Ok(patches) => told.push(News::Patches(patches)),
                 Err(why) => told.push(News::Failed(format!("{name} cannot be shown: {why}"))),
             }
+            told.extend(solid);
         }
         let scene = is_new.then(|| open.scene());
         scene.into_iter().chain(told).for_each(|news| self.tell(news));

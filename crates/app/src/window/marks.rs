@@ -32,6 +32,28 @@ impl Modeler {
         }
     }
 
+    /// Draws the places that are measured from, with their numbers.
+    pub(super) fn draw_marks(&self, ui: &egui::Ui, rect: Rect) {
+        let Some(measure) = &self.bench.measure else {
+            return;
+        };
+        let painter = ui.painter().with_clip_rect(rect);
+        let color = Color32::from_rgb(255, 235, 120);
+        let places: Vec<Pos2> = measure.marks.iter().map(|m| self.on_screen(rect, m.at)).collect();
+        painter.line(places.clone(), Stroke::new(3.0, Color32::from_black_alpha(90)));
+        painter.line(places.clone(), Stroke::new(1.5, color));
+        for (n, place) in places.into_iter().enumerate() {
+            painter.circle(place, 3.5, color, Stroke::new(1.0, Color32::BLACK));
+            painter.text(
+                place + egui::vec2(7.0, -7.0),
+                egui::Align2::LEFT_BOTTOM,
+                n + 1,
+                egui::FontId::proportional(13.0),
+                color,
+            );
+        }
+    }
+
     /// A circle on the surface as large as the tool.
     pub(super) fn ring(&self, ui: &egui::Ui, rect: Rect, p: DVec3, normal: DVec3, tool: &Tool) {
         let right = normal.any_orthonormal_vector();

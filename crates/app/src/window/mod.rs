@@ -5,7 +5,9 @@ mod bench;
 mod desk;
 mod gesture;
 mod hand;
+mod kept;
 mod marks;
+pub mod measure;
 mod modeler;
 pub mod orders;
 mod preview;
@@ -83,12 +85,19 @@ pub fn run(mut files: Vec<PathBuf>) -> Result<(), String> {
     }
 }
 
+/// What desktops show for the window.
+fn icon() -> egui::IconData {
+    let picture = include_bytes!("../../desktop/isoclay-64.png");
+    eframe::icon_data::from_png_bytes(picture).expect("the picture is a PNG")
+}
+
 /// One window, with what is left of the one before.
 fn once(files: Vec<PathBuf>, shared: &Shared) -> Result<(), String> {
     let options = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
             .with_title("isoclay")
             .with_app_id("isoclay")
+            .with_icon(icon())
             .with_inner_size([1280.0, 800.0])
             .with_min_inner_size([640.0, 400.0]),
         renderer: eframe::Renderer::Wgpu,

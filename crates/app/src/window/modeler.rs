@@ -2,11 +2,13 @@
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use egui::layers::ShapeIdx;
 use egui::{Key, Modifiers, PointerButton, Pos2, Rect, Sense};
 use fitting::Cancel;
 use glam::{DVec2, DVec3};
@@ -15,6 +17,7 @@ use super::adjust::Adjust;
 use super::bench::Bench;
 use super::desk::Desk;
 use super::gesture::{Gesture, Way};
+use super::kept::Kept;
 use super::orders::{News, Order};
 use super::tool::{Kind, Tool};
 use crate::cli::{desk_files, interrupt};
@@ -23,14 +26,17 @@ use crate::view::{Camera, Look, Paper, Ray, Screen, pick, scale_bar};
 
 /// Time after which a picture in which nothing moves is drawn whole.
 const STILL: Duration = Duration::from_millis(60);
-/// Share of the pixels of a side that are drawn while something moves.
-const ROUGH: f32 = 0.5;
+/// Longest time that a picture waits for the desk. A dab takes 7 to 14 ms, more on a busy machine; a picture without a graphics card 40.
+const MEETING: Duration = Duration::from_millis(30);
+
 /// The window.
 pub struct Modeler {
     pub(super) bench: Bench,
     news: Receiver<News>,
     /// What the desk wakes.
     context: Arc<Mutex<egui::Context>>,
+    /// Whether the window waits for news, so that nobody has to wake it.
+    is_listening: Arc<AtomicBool>,
     screen: Option<Screen>,
     gesture: Option<Gesture>,
     /// What the mouse sets.
@@ -38,6 +44,9 @@ pub struct Modeler {
     /// When something moved last.
     moved: Instant,
     desk: Option<JoinHandle<()>>,
+    /// How things are looked at, as it is written in a directory.
+    kept: Kept,
+    home: PathBuf,
 }
 
 impl Modeler {
@@ -54,6 +63,7 @@ impl Modeler {
 
     /// Goes on in another window, on a card that is not lost.
     pub(super) fn resume(&mut self, context: &egui::Context, screen: Option<Screen>) {
+        style(context);
         *self.context.lock().unwrap_or_else(PoisonError::into_inner) = context.clone();
         self.end_gesture();
         self.screen = screen;
@@ -81,15 +91,19 @@ impl Modeler {
 
     /// With nothing open.
     pub(super) fn on(context: &egui::Context, screen: Option<Screen>, home: PathBuf) -> Self {
+        style(context);
         let context = Arc::new(Mutex::new(context.clone()));
         let (orders, received) = channel();
         let (told, news) = channel();
         let cancel = Arc::new(Mutex::new(Cancel::new()));
-        let desk = Desk::new(told, wake(context.clone()), cancel.clone(), home.clone());
+        let is_listening = Arc::<AtomicBool>::default();
+        let wake = wake(context.clone(), is_listening.clone());
+        let desk = Desk::new(told, wake, cancel.clone(), home.clone());
         let desk = std::thread::Builder::new()
             .name("desk".into())
             .spawn(move || desk.work(&received))
             .expect("the system has threads enough");
+        let kept = Kept::read(&home);
         Self {
             bench: Bench {
                 sheet: None,
@@ -103,6 +117,8 @@ impl Modeler {
                     camera: Camera::onto(DVec3::ZERO, 1.0, DVec3::Y),
                     cut: None,
                     paint: true,
+                    mode: kept.mode,
+                    density: [0.0, 1.0],
                     paper: Paper::Dark,
                 },
                 scene: (DVec3::ZERO, 1.0),
@@ -114,7 +130,10 @@ impl Modeler {
                 kept: desk_files::kept(&home),
                 scratch: None,
                 densities: None,
+                can_cast: true,
+                density_of: None,
                 shows_log: false,
+                measure: None,
                 pins: false,
                 touch: None,
                 held: None,
@@ -125,72 +144,112 @@ impl Modeler {
             },
             news,
             context,
+            is_listening,
             screen,
             gesture: None,
             adjust: None,
             moved: Instant::now(),
             desk: Some(desk),
+            kept,
+            home,
         }
     }
 
     /// Takes what the desk told.
     fn hear(&mut self) {
         while let Ok(news) = self.news.try_recv() {
-            match news {
-                News::Sheet(sheet) => self.bench.sheet = Some(sheet),
-                News::Scene {
-                    origin,
-                    center,
-                    radius,
-                    up,
-                    is_finer,
-                } => {
-                    self.bench.scene = (center, radius);
-                    if !is_finer {
-                        self.bench.look.cut = None;
-                        self.bench.look.camera.up = up;
-                        self.bench.frame_all();
-                    }
-                    if let Some(Screen { canvas, .. }) = &mut self.screen {
-                        canvas.begin(origin, center.distance(origin) + radius);
-                    }
-                }
-                News::Patches(patches) => {
-                    self.moved = Instant::now();
-                    if let Some(Screen { canvas, .. }) = &mut self.screen {
-                        patches.iter().for_each(|patch| canvas.put(patch));
-                    }
-                }
-                News::Gone(object) => {
-                    if let Some(Screen { canvas, .. }) = &mut self.screen {
-                        canvas.forget(&object);
-                    }
-                }
-                News::Empty => self.bench.sheet = None,
-                News::Busy(busy) => self.bench.busy = busy,
-                News::Held(held) => {
-                    self.bench.held = held;
-                    self.bench.seen = None;
-                }
-                News::Seen(seen) => self.bench.seen = Some(seen),
-                News::Note(text) => self.bench.tell(text, false),
-                News::Failed(text) => self.bench.tell(text, true),
-            }
+            self.take(news);
         }
         self.bench.triangles = self.screen.as_ref().map_or(0, |s| s.canvas.triangles());
+    }
+
+    fn take(&mut self, news: News) {
+        match news {
+            News::Sheet(sheet) => self.bench.sheet = Some(sheet),
+            News::Scene {
+                origin,
+                center,
+                radius,
+                up,
+                is_finer,
+            } => {
+                self.bench.scene = (center, radius);
+                if !is_finer {
+                    self.bench.look.cut = None;
+                    self.bench.look.camera.up = up;
+                    self.bench.frame_all();
+                }
+                if let Some(Screen { canvas, .. }) = &mut self.screen {
+                    canvas.begin(origin, center.distance(origin) + radius);
+                }
+            }
+            News::Patches(patches) => {
+                self.moved = Instant::now();
+                if let Some(Screen { canvas, .. }) = &mut self.screen {
+                    patches.iter().for_each(|patch| canvas.put(patch));
+                }
+            }
+            News::Solid(object, solid) => {
+                if let Some(Screen { canvas, .. }) = &mut self.screen {
+                    canvas.put_solid(&object, *solid);
+                }
+            }
+            News::Gone(object) => {
+                if let Some(Screen { canvas, .. }) = &mut self.screen {
+                    canvas.forget(&object);
+                }
+            }
+            News::Empty => self.bench.sheet = None,
+            News::Busy(busy) => self.bench.busy = busy,
+            News::Size(name, size) => {
+                if let Some(measure) = &mut self.bench.measure {
+                    measure.size = Some((name, size));
+                }
+            }
+            News::Held(held) => {
+                self.bench.held = held;
+                self.bench.seen = None;
+            }
+            News::Seen(seen) => self.bench.seen = Some(seen),
+            News::Note(text) => self.bench.tell(text, false),
+            News::Failed(text) => self.bench.tell(text, true),
+        }
+    }
+
+    /// Waits a little for what the desk makes of a stroke: else the next picture would show it, not this one.
+    fn meet_desk(&mut self) {
+        self.is_listening.store(true, Ordering::SeqCst);
+        let until = Instant::now() + MEETING;
+        loop {
+            let rest = until.saturating_duration_since(Instant::now());
+            let Ok(news) = self.news.recv_timeout(rest) else {
+                break;
+            };
+            let is_shown = matches!(news, News::Patches(_));
+            self.take(news);
+            if is_shown {
+                break;
+            }
+        }
+        self.is_listening.store(false, Ordering::SeqCst);
+        // What was told meanwhile has woken nobody.
+        self.hear();
     }
 
     /// The scene, and what the mouse does in it.
     fn viewport(&mut self, ui: &mut egui::Ui) {
         let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
+        // What the mouse does now shows in this picture, which is painted below what is drawn over it.
+        let below = ui.painter().add(egui::Shape::Noop);
+        let over = response.hover_pos().or(response.interact_pointer_pos());
+        if let Some(over) = over {
+            self.pointer(ui, rect, &response, over);
+        }
         let is_still = self.moved.elapsed() > STILL && self.gesture.is_none();
-        if let Some(screen) = &mut self.screen {
-            let share = if is_still { 1.0 } else { ROUGH };
-            let pixels = (rect.size() * ui.ctx().pixels_per_point() * share).round();
-            let size = [pixels.x as u32, pixels.y as u32];
-            let picture = screen.draw(&self.bench.look, size, !is_still);
-            let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
-            ui.painter().image(picture, rect, whole, egui::Color32::WHITE);
+        self.bench.know_density();
+        let is_done = self.draw(ui, below, rect, is_still);
+        if !is_done {
+            ui.ctx().request_repaint();
         }
         if !is_still {
             ui.ctx().request_repaint_after(STILL);
@@ -199,15 +258,48 @@ impl Modeler {
             let length_of_point = self.bench.look.camera.height / f64::from(rect.height());
             scale_bar(ui.painter(), rect, length_of_point, thing.unit);
         }
-        let over = response.hover_pos().or(response.interact_pointer_pos());
-        if let Some(over) = over {
-            self.pointer(ui, rect, &response, over);
-        }
         self.draw_holds(ui, rect);
+        self.draw_marks(ui, rect);
         self.draw_hand(ui, rect);
         if response.drag_stopped() || !ui.input(|i| i.pointer.any_down()) {
             self.end_gesture();
         }
+    }
+
+    /// Draws the scene in place of a shape, or as much of it as there is time for; whether that is all.
+    fn draw(&mut self, ui: &egui::Ui, below: ShapeIdx, rect: Rect, is_still: bool) -> bool {
+        let Some(screen) = &mut self.screen else {
+            return true;
+        };
+        let look = &self.bench.look;
+        let pixels = rect.size() * ui.ctx().pixels_per_point();
+        let rough = screen
+            .canvas
+            .rough_share(look.mode, f64::from(pixels.x * pixels.y));
+        let mut draw = |is_rough: bool| {
+            let pixels = if is_rough { pixels * rough } else { pixels }.round();
+            screen.draw(look, [pixels.x as u32, pixels.y as u32], is_rough)
+        };
+        let whole = is_still.then(|| draw(false));
+        // Until all rows are drawn the rough picture shows below them.
+        let shown = match &whole {
+            Some(whole) if whole.rows >= 1.0 => None,
+            _ => Some(draw(true)),
+        };
+        let is_done = whole
+            .as_ref()
+            .or(shown.as_ref())
+            .is_none_or(|drawn| drawn.is_done);
+        let shown = shown.map(|drawn| (drawn.picture, 1.0));
+        let whole = whole.map(|drawn| (drawn.picture, drawn.rows));
+        let pictures = shown.into_iter().chain(whole).map(|(picture, rows)| {
+            let corner = rect.min + egui::vec2(rect.width(), rows * rect.height());
+            let part = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, rows));
+            let rect = Rect::from_min_max(rect.min, corner);
+            egui::Shape::image(picture, rect, part, egui::Color32::WHITE)
+        });
+        ui.painter().set(below, egui::Shape::Vec(pictures.collect()));
+        is_done
     }
 
     fn end_gesture(&mut self) {
@@ -240,9 +332,15 @@ impl Modeler {
         let is_free = self.bench.busy.is_none() && self.gesture.is_none();
         let under = is_free.then(|| self.under(rect, over)).flatten();
         if let Some(button) = pressed.filter(|_| response.hovered() && self.gesture.is_none()) {
-            if let (PointerButton::Primary, true, Some((p, _))) = (button, self.bench.pins, under) {
-                self.bench.pin(p);
-                return;
+            if let (PointerButton::Primary, Some((p, normal))) = (button, under) {
+                if self.bench.measure.is_some() {
+                    self.bench.mark(p, normal);
+                    return;
+                }
+                if self.bench.pins {
+                    self.bench.pin(p);
+                    return;
+                }
             }
             self.gesture = Some(match (button, keys.shift, keys.alt) {
                 (PointerButton::Primary, _, false) if self.leads_by_mouse() && under.is_some() => {
@@ -273,8 +371,11 @@ impl Modeler {
         match &mut self.gesture {
             Some(Gesture::Stroke(path)) => {
                 let steps: Vec<Pos2> = moves.into_iter().flat_map(|to| path.to(to)).collect();
-                for step in steps {
-                    self.bench.order(Order::Along(self.ray(rect, step)));
+                for step in &steps {
+                    self.bench.order(Order::Along(self.ray(rect, *step)));
+                }
+                if !steps.is_empty() {
+                    self.meet_desk();
                 }
             }
             Some(Gesture::Orbit) if way != DVec2::ZERO => {
@@ -366,8 +467,17 @@ impl Modeler {
             self.bench.tool.radius = (self.bench.tool.radius * 1.15).min(panels::RADII[1]);
         }
         self.adjust_by_keys(ui);
+        if pressed(Modifiers::NONE, Key::V) && self.bench.can_cast {
+            self.bench.look.mode = panels::next_mode(self.bench.look.mode);
+        }
         if pressed(Modifiers::NONE, Key::N) {
             self.bench.pins ^= true;
+        }
+        if pressed(Modifiers::NONE, Key::M) {
+            self.bench.measure = match self.bench.measure {
+                Some(_) => None,
+                None => Some(Default::default()),
+            };
         }
         for kind in Kind::ALL {
             if pressed(Modifiers::NONE, kind.key()) {
@@ -393,6 +503,11 @@ impl Modeler {
     }
 }
 
+/// Hints are read too: egui's own are too faint for that.
+fn style(context: &egui::Context) {
+    context.all_styles_mut(|style| style.visuals.weak_text_alpha = 0.85);
+}
+
 /// Where a point of the screen is in the picture, in heights of it.
 fn at(rect: Rect, p: Pos2) -> DVec2 {
     let way = p - rect.center();
@@ -412,12 +527,12 @@ fn close_when_asked(context: Arc<Mutex<egui::Context>>) {
     });
 }
 
-fn wake(context: Arc<Mutex<egui::Context>>) -> Arc<dyn Fn() + Send + Sync> {
+fn wake(context: Arc<Mutex<egui::Context>>, is_listening: Arc<AtomicBool>) -> Arc<dyn Fn() + Send + Sync> {
     Arc::new(move || {
-        context
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .request_repaint();
+        if !is_listening.load(Ordering::SeqCst) {
+            let context = context.lock().unwrap_or_else(PoisonError::into_inner);
+            context.request_repaint();
+        }
     })
 }
 
@@ -437,6 +552,7 @@ impl Modeler {
             return;
         }
         self.hear();
+        self.bench.can_cast = self.screen.as_ref().is_none_or(|screen| screen.canvas.can_cast());
         self.keys(ui);
         let dropped: Vec<PathBuf> = ui.input(|i| {
             let files = i.raw.dropped_files.iter();
@@ -462,8 +578,12 @@ impl Modeler {
         panels::slices(ui.ctx(), &mut self.bench);
         panels::path_box(ui.ctx(), &mut self.bench);
         panels::touch(ui.ctx(), &mut self.bench);
+        panels::measure(ui.ctx(), &mut self.bench);
         panels::log(ui.ctx(), &mut self.bench);
         self.bench.tell_tool();
+        if let Err(why) = self.kept.keep(self.bench.look.mode, &self.home) {
+            self.bench.tell(why, true);
+        }
         if self.bench.message().is_some() {
             ui.ctx().request_repaint_after(Duration::from_secs(1));
         }

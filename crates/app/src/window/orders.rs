@@ -13,7 +13,7 @@ use tools::session::Stroke;
 
 use super::tool::Tool;
 use super::touch::{self, Seen, Wanted};
-use crate::view::{Patch, Ray};
+use crate::view::{Patch, Ray, Solid};
 
 /// What the window asks. Lines are those under the mouse, in the world.
 #[derive(Clone, Debug)]
@@ -52,6 +52,8 @@ pub enum Order {
     Undo(usize),
     /// Does edits again.
     Redo(usize),
+    /// Asks for area and volume of an object.
+    Weigh(String),
     /// One stroke that needs no hand.
     Do(Box<Stroke>),
     /// Takes a device in the hand, or another one.
@@ -82,12 +84,16 @@ pub enum News {
     },
     /// Triangles in place of those that there were.
     Patches(Vec<Patch>),
+    /// The spline of an object, in place of the one that there was.
+    Solid(String, Box<Solid>),
     /// An object is no more.
     Gone(String),
     /// Nothing is open any more.
     Empty,
     /// What takes a while, and the share done; none when it is done.
     Busy(Option<(String, f64)>),
+    /// Area and volume of an object, of the world's lengths.
+    Size(String, [f64; 2]),
     /// What is in the hand now.
     Held(Option<touch::Held>),
     /// What it does and feels.

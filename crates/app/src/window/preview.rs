@@ -6,7 +6,7 @@ use std::sync::Arc;
 use document::{Object, State};
 
 use super::orders::{News, Sheet, Thing};
-use crate::view::Shape;
+use crate::view::{Shape, Solid};
 
 /// What is told of an object that is only looked at.
 ///
@@ -19,6 +19,7 @@ pub fn news(scan: &Path, name: &str, object: Object) -> Result<Vec<News>, String
     let mut shape = Shape::new(object, thing.iso, thing.world_from_object).map_err(|e| e.to_string())?;
     let origin = thing.own_box.center();
     let scene = News::scene(origin, shape.bounding_box(), thing.is_volume, false);
+    let (thing_iso, placed) = (thing.iso, thing.world_from_object);
     let sheet = Sheet {
         path: scan.into(),
         is_untitled: true,
@@ -28,5 +29,7 @@ pub fn news(scan: &Path, name: &str, object: Object) -> Result<Vec<News>, String
         done: 0,
     };
     let patches = News::Patches(shape.all(name, origin));
-    Ok(vec![scene, patches, News::Sheet(Arc::new(sheet))])
+    let solid = Solid::of(object, thing_iso, placed).map(|solid| News::Solid(name.into(), Box::new(solid)));
+    let all = [scene, patches].into_iter().chain(solid);
+    Ok(all.chain([News::Sheet(Arc::new(sheet))]).collect())
 }

@@ -10,6 +10,8 @@ use egui_kittest::kittest::Queryable;
 use fitting::{Cancel, Control};
 use glam::DVec3;
 
+mod panels;
+
 use super::desk::Desk;
 use super::modeler::Modeler;
 use super::orders::{News, Order, Sheet};
@@ -47,20 +49,25 @@ impl Bare {
 
     /// The first news from now on that are looked for.
     fn wait<T>(&mut self, what: impl Fn(&News) -> Option<T>) -> T {
-        loop {
-            let news = self
-                .news
-                .recv_timeout(Duration::from_secs(60))
-                .expect("it is told");
+        let found = self.wait_for(Duration::from_secs(60), what);
+        found.unwrap_or_else(|| panic!("nothing of the kind is told, but last {:?}", self.told.last()))
+    }
+
+    /// The same, if they come in time.
+    fn wait_for<T>(&mut self, time: Duration, what: impl Fn(&News) -> Option<T>) -> Option<T> {
+        let start = Instant::now();
+        while let Some(rest) = time.checked_sub(start.elapsed()) {
+            let news = self.news.recv_timeout(rest).ok()?;
             let found = what(&news);
             if let News::Failed(why) = &news {
                 panic!("{why}");
             }
             self.told.push(news);
-            if let Some(found) = found {
+            if found.is_some() {
                 return found;
             }
         }
+        None
     }
 
     /// The sheet of so many edits, so many of them done.
@@ -79,12 +86,33 @@ impl Bare {
         })
     }
 
-    /// What the hand does when it is as it should be.
-    fn seen(&mut self, is: impl Fn(&Seen) -> bool) -> Seen {
-        self.wait(|news| match news {
-            News::Seen(seen) if is(seen) => Some(*seen),
-            _ => None,
-        })
+    /// The hand comes down from `above` to `pressed` and feels so much. After a stall, of a busy machine too, it feels nothing until it has
+    /// been clear of the solid, so it is lifted and tries again.
+    fn press(&mut self, put: impl Fn(DVec3), [above, pressed]: [DVec3; 2], force: f64) -> Seen {
+        let seen = |is: fn(&Seen, f64) -> bool| {
+            move |news: &News| match news {
+                News::Seen(seen) if is(seen, force) => Some(*seen),
+                _ => None,
+            }
+        };
+        for _ in 0..20 {
+            put(above);
+            self.wait(seen(|seen, _| seen.contact == Contact::Free));
+            put(pressed);
+            let felt = self.wait_for(
+                Duration::from_secs(5),
+                seen(|seen, force| seen.force > 0.98 * force),
+            );
+            if let Some(felt) = felt {
+                return felt;
+            }
+        }
+        panic!("{force} N is not felt, but last {:?}", self.told.last());
+    }
+
+    /// Until the simulation has shown what the hand made.
+    fn patches(&mut self) {
+        self.wait(|news| matches!(news, News::Patches(_)).then_some(()));
     }
 
     /// What is still told, and the end.
@@ -264,6 +292,8 @@ fn a_hand_feels_works_and_loses_nothing() {
         let at = (top + over - held.workspace.shift) / held.workspace.scale;
         held.mouse.as_ref().unwrap().lock().unwrap().put(at, is_down);
     };
+    // To a millimetre deeper than where the ball rests.
+    let down = [8.0 * DVec3::Z, 3.0 * DVec3::Z];
     desk.order(Order::Take(Wanted {
         device: None,
         stiffness: 500.0,
@@ -271,18 +301,15 @@ fn a_hand_feels_works_and_loses_nothing() {
         tool,
     }));
     let held = desk.held();
-    put(&held, 8.0 * DVec3::Z, false);
-    desk.seen(|seen| seen.contact == Contact::Free);
-    // A millimetre deeper than where the ball rests.
-    put(&held, 3.0 * DVec3::Z, false);
     let force = 0.5 / held.workspace.scale;
-    let seen = desk.seen(|seen| seen.force > 0.98 * force);
+    let seen = desk.press(|at| put(&held, at, false), down, force);
     assert!(seen.force < 1.02 * force, "{seen:?}, {force}");
     assert!((seen.proxy.z - top.z - 4.0).abs() < 0.02, "{seen:?}");
     for step in 0..10 {
         put(&held, DVec3::new(0.2 * f64::from(step), 0.0, 3.0), true);
         std::thread::sleep(Duration::from_millis(30));
     }
+    desk.patches();
     put(&held, DVec3::new(2.0, 0.0, 8.0), false);
     let sheet = desk.sheet(1, 1);
     assert!(
@@ -293,10 +320,9 @@ fn a_hand_feels_works_and_loses_nothing() {
     desk.order(Order::Undo(1));
     desk.sheet(1, 0);
     let held = desk.held();
-    put(&held, 3.0 * DVec3::Z, false);
-    desk.seen(|seen| seen.force > 0.98 * force);
-    put(&held, 3.0 * DVec3::Z, true);
-    std::thread::sleep(Duration::from_millis(300));
+    desk.press(|at| put(&held, at, false), down, force);
+    put(&held, down[1], true);
+    desk.patches();
     let told = desk.end();
     assert!(
         !told.iter().any(|news| matches!(news, News::Failed(_))),
@@ -325,7 +351,8 @@ fn a_device_that_is_not_there_is_refused_and_the_desk_goes_on() {
         })
     };
     let failed = |desk: &mut Bare| loop {
-        if let Ok(News::Failed(why)) = desk.news.recv_timeout(Duration::from_secs(60)) {
+        let news = desk.news.recv_timeout(Duration::from_secs(60));
+        if let News::Failed(why) = news.expect("it is told") {
             break why;
         }
     };
@@ -602,6 +629,7 @@ fn a_coarse_solid_is_seen_under_the_name_of_its_scan() {
     let [
         News::Scene { radius, is_finer, .. },
         News::Patches(patches),
+        News::Solid(..),
         News::Sheet(sheet),
     ] = &told[..]
     else {

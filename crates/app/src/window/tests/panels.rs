@@ -1,0 +1,214 @@
+//! Panels: what they do to a document is what a command does, and what they only show is no edit.
+
+use egui::accesskit::Role;
+
+use super::*;
+
+/// A menu and what is in it.
+fn choose(window: &mut Harness<'_, Modeler>, menu: &str, item: &str) {
+    window.get_by_label(menu).click();
+    window.step();
+    window.step();
+    window.get_by_label_contains(item).click();
+    window.step();
+    window.step();
+}
+
+/// Writes into a field by its label, in place of what is there.
+fn write(window: &mut Harness<'_, Modeler>, role: Role, label: &str, text: &str) {
+    let field = window.get_by_role_and_label(role, label);
+    field.focus();
+    field.click();
+    window.step();
+    window.step();
+    window.key_press_modifiers(egui::Modifiers::COMMAND, egui::Key::A);
+    window.step();
+    window.get_by_role_and_label(role, label).type_text(text);
+    window.step();
+}
+
+/// Steps until the desk has made something so.
+fn until(window: &mut Harness<'_, Modeler>, what: &str, is: impl Fn(&Sheet) -> bool) -> Arc<Sheet> {
+    let start = Instant::now();
+    loop {
+        let bench = window.state().bench();
+        if let Some(sheet) = bench.sheet.as_ref().filter(|sheet| is(sheet)) {
+            return sheet.clone();
+        }
+        assert!(
+            start.elapsed() < Duration::from_secs(60),
+            "not {what}: {:?}",
+            bench.messages
+        );
+        std::thread::sleep(Duration::from_millis(10));
+        window.step();
+    }
+}
+
+fn drag(window: &mut Harness<'_, Modeler>) {
+    window.hover_at(egui::pos2(620.0, 400.0));
+    window.step();
+    window.drag_at(egui::pos2(620.0, 400.0));
+    window.step();
+    for x in 1..12 {
+        window.hover_at(egui::pos2(620.0 + 6.0 * x as f32, 400.0));
+        window.step();
+    }
+    window.drop_at(egui::pos2(690.0, 400.0));
+    window.step();
+}
+
+/// The state that the journal of a document in use has on the disk.
+fn on_disk(sheet: &Sheet, scratch: &Path) -> Document {
+    let copy = scratch.join("copy.isoclay");
+    let _ = std::fs::remove_file(&copy);
+    std::fs::copy(&sheet.path, &copy).unwrap();
+    opened(&copy)
+}
+
+/// A stroke has the tool, the radius and the strength of the panel, and the journal repeats it to the bit.
+#[test]
+fn the_panel_of_tools_sets_what_a_stroke_is_made_with() {
+    let (home, scratch) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let mut window = window_with_clay(home.path());
+    window.get_by_label_contains("Inflate").click();
+    window.step();
+    let size = window.state().bench().scene.1;
+    write(&mut window, Role::SpinButton, "Radius  F", "5");
+    window.key_press(egui::Key::Enter);
+    window.step();
+    write(&mut window, Role::SpinButton, "Strength", "0.25");
+    window.key_press(egui::Key::Enter);
+    window.step();
+    let tool = window.state().bench().tool;
+    assert_eq!((tool.kind, tool.strength), (Kind::Inflate, 0.25));
+    assert!((tool.radius * size - 5.0).abs() < 1e-9, "{}", tool.radius * size);
+    drag(&mut window);
+    let sheet = edits(&mut window, 1);
+    let mut document = on_disk(&sheet, scratch.path());
+    let command = document.command(0).unwrap().to_string();
+    assert!(
+        command.contains("inflate") && command.contains("5.0"),
+        "{command}"
+    );
+    assert_eq!(again(&mut document).sha256(), document.state().sha256());
+}
+
+/// The density that is typed into the panel is that of a stroke in a script.
+#[test]
+fn the_density_of_the_panel_is_that_of_a_script() {
+    let (home, scratch) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let mut window = window_with_clay(home.path());
+    window.get_by_label("Surface density").click();
+    window.run_steps(20);
+    write(&mut window, Role::SpinButton, "Surface at", "1.5");
+    window.key_press(egui::Key::Enter);
+    window.step();
+    let sheet = edits(&mut window, 1);
+    assert_eq!(sheet.objects[0].iso, 1.5);
+    let by_panel = on_disk(&sheet, scratch.path()).state().sha256();
+    let other = tempfile::tempdir().unwrap();
+    let mut desk = Bare::new(other.path());
+    desk.order(Order::Clay);
+    desk.sheet(0, 0);
+    let surface = serde_json::from_value(serde_json::json!({ "surface": { "iso": 1.5 } })).unwrap();
+    desk.order(Order::Do(Box::new(surface)));
+    let by_script = on_disk(&desk.sheet(1, 1), scratch.path()).state().sha256();
+    desk.end();
+    assert_eq!(by_panel, by_script);
+}
+
+/// Menus undo, redo, save and open; the files have what the document has.
+#[test]
+fn menus_and_boxes_for_paths_do_what_commands_do() {
+    let (home, scratch) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let mut window = window_with_clay(home.path());
+    drag(&mut window);
+    edits(&mut window, 1);
+    choose(&mut window, "Edit", "Undo");
+    until(&mut window, "undone", |sheet| sheet.done == 0);
+    choose(&mut window, "Edit", "Redo");
+    let sheet = until(&mut window, "redone", |sheet| sheet.done == 1);
+    let state = on_disk(&sheet, scratch.path()).state().sha256();
+
+    choose(&mut window, "File", "Save as");
+    let saved = scratch.path().join("named");
+    write(&mut window, Role::TextInput, "File", saved.to_str().unwrap());
+    window.get_by_role_and_label(Role::Button, "Save as").click();
+    let named = until(&mut window, "saved", |sheet| !sheet.is_untitled);
+    assert_eq!(named.path, saved.with_extension("isoclay"));
+    assert_eq!(on_disk(&named, scratch.path()).state().sha256(), state);
+
+    // Another document, and the first again.
+    choose(&mut window, "File", "New block");
+    until(&mut window, "new", |sheet| sheet.is_untitled);
+    choose(&mut window, "File", "Open");
+    write(&mut window, Role::TextInput, "File", named.path.to_str().unwrap());
+    window.get_by_role_and_label(Role::Button, "Open").click();
+    let again = until(&mut window, "opened", |sheet| !sheet.is_untitled);
+    assert_eq!((again.history.len(), again.done), (1, 1));
+    assert_eq!(on_disk(&again, scratch.path()).state().sha256(), state);
+}
+
+/// Slices, the clipping plane, views and the log show, and edit nothing.
+#[test]
+fn what_is_only_seen_is_no_edit() {
+    let (home, scratch) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let mut window = window_with_clay(home.path());
+    drag(&mut window);
+    let before = on_disk(&edits(&mut window, 1), scratch.path()).state().sha256();
+    for item in ["Slices", "Clipping plane", "Log", "Top", "Light", "All"] {
+        choose(&mut window, "View", item);
+        window.key_press(egui::Key::Escape);
+        window.run_steps(3);
+    }
+    let bench = window.state().bench();
+    assert!(bench.slices.is_some() && bench.look.cut.is_some() && bench.shows_log);
+    write(&mut window, Role::SpinButton, "Clipping plane", "3");
+    window.key_press(egui::Key::Enter);
+    window.run_steps(3);
+    let bench = window.state().bench();
+    let (at, normal) = bench.look.cut.unwrap();
+    assert!(((at - bench.scene.0).dot(normal) - 3.0).abs() < 1e-9, "{at}");
+    let sheet = bench.sheet.clone().unwrap();
+    assert_eq!((sheet.history.len(), sheet.done), (1, 1));
+    assert_eq!(on_disk(&sheet, scratch.path()).state().sha256(), before);
+}
+
+/// Clicks measure where they are told to, and edit nothing.
+#[test]
+fn places_walls_area_and_volume_are_measured() {
+    let home = tempfile::tempdir().unwrap();
+    let mut window = window_with_clay(home.path());
+    window.key_press(egui::Key::M);
+    window.step();
+    for x in [600.0, 640.0, 660.0] {
+        click(&mut window, egui::pos2(x, 400.0));
+    }
+    window.run_steps(2);
+    window.get_by_label("Area and volume").click();
+    let start = Instant::now();
+    while window.state().bench().measure.as_ref().unwrap().size.is_none() {
+        assert!(start.elapsed() < Duration::from_secs(60));
+        std::thread::sleep(Duration::from_millis(10));
+        window.step();
+    }
+    let bench = window.state().bench();
+    let measure = bench.measure.clone().unwrap();
+    let ways: Vec<f64> = measure.distances().collect();
+    assert!((ways[0] / ways[1] - 2.0).abs() < 0.2, "{ways:?}");
+    // The block is 40 mm on each side, its edges rounded.
+    assert!(
+        measure.marks.iter().all(|m| (m.wall.unwrap() - 40.0).abs() < 1.0),
+        "{measure:?}"
+    );
+    let [area, volume] = measure.size.unwrap().1;
+    assert!(
+        (8500.0..9600.0).contains(&area) && (58e3..64e3).contains(&volume),
+        "{area} {volume}"
+    );
+    assert!(bench.sheet.as_ref().unwrap().history.is_empty());
+    window.get_by_label("Clear").click();
+    window.run_steps(2);
+    assert_eq!(window.state().bench().measure, Some(Default::default()));
+}
