@@ -577,14 +577,15 @@ impl Desk {
                     all
                 }),
             };
-            let solid = Solid::of(object, iso, placed);
-            let solid = solid.map(|solid| News::Solid(name.clone(), Box::new(solid)));
             match followed {
                 Ok(patches) if patches.is_empty() => {}
-                Ok(patches) => told.push(News::Patches(patches)),
+                Ok(patches) => {
+                    told.push(News::Patches(patches));
+                    let solid = Solid::of(object, iso, placed).map(Box::new);
+                    told.extend(solid.map(|solid| News::Solid(name.clone(), solid)));
+                }
                 Err(why) => told.push(News::Failed(format!("{name} cannot be shown: {why}"))),
             }
-            told.extend(solid);
         }
         let scene = is_new.then(|| open.scene());
         scene.into_iter().chain(told).for_each(|news| self.tell(news));
