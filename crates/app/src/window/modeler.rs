@@ -330,7 +330,10 @@ impl Modeler {
         let tool = self.bench.tool_in_hand(keys);
         // While a scan is read or a file is written strokes would have to wait.
         let is_free = self.bench.busy.is_none() && self.gesture.is_none();
-        let under = is_free.then(|| self.under(rect, over)).flatten();
+        // A slow picture may hold a press, its way and even the release.
+        let (start, moves) = ui.input(|i| since_press(&i.events));
+        let start = start.unwrap_or(over);
+        let under = is_free.then(|| self.under(rect, start)).flatten();
         if let Some(button) = pressed.filter(|_| response.hovered() && self.gesture.is_none()) {
             if let (PointerButton::Primary, Some((p, normal))) = (button, under) {
                 if self.bench.measure.is_some() {
@@ -350,22 +353,17 @@ impl Modeler {
                     let reach = self.pixels_of(rect, tool.radius);
                     self.bench.order(Order::Begin {
                         tool,
-                        ray: self.ray(rect, over),
+                        ray: self.ray(rect, start),
                     });
-                    Gesture::Stroke(Way::new(over, (0.2 * reach).clamp(2.0, 24.0)))
+                    Gesture::Stroke(Way::new(start, (0.2 * reach).clamp(2.0, 24.0)))
                 }
                 (PointerButton::Middle, true, _) | (PointerButton::Secondary, ..) => Gesture::Pan,
                 _ => Gesture::Orbit,
             });
-            return;
+            if !matches!(self.gesture, Some(Gesture::Stroke(_))) {
+                return;
+            }
         }
-        let moves: Vec<Pos2> = ui.input(|i| {
-            let moves = i.events.iter().filter_map(|event| match event {
-                egui::Event::PointerMoved(to) => Some(*to),
-                _ => None,
-            });
-            moves.collect()
-        });
         let way = ui.input(|i| i.pointer.delta());
         let way = DVec2::new(f64::from(way.x), -f64::from(way.y)) / f64::from(rect.height());
         match &mut self.gesture {
@@ -506,6 +504,29 @@ impl Modeler {
 /// Hints are read too: egui's own are too faint for that.
 fn style(context: &egui::Context) {
     context.all_styles_mut(|style| style.visuals.weak_text_alpha = 0.85);
+}
+
+/// Where a button went down last among the events of a picture, if one did, and the way from there, or from the beginning, until one
+/// came up.
+fn since_press(events: &[egui::Event]) -> (Option<Pos2>, Vec<Pos2>) {
+    let pressed = events
+        .iter()
+        .enumerate()
+        .rev()
+        .find_map(|(n, event)| match event {
+            egui::Event::PointerButton {
+                pos, pressed: true, ..
+            } => Some((n + 1, *pos)),
+            _ => None,
+        });
+    let way = &events[pressed.map_or(0, |(n, _)| n)..];
+    let is_release = |event: &egui::Event| matches!(event, egui::Event::PointerButton { pressed: false, .. });
+    let until = way.iter().position(is_release).unwrap_or(way.len());
+    let moves = way[..until].iter().filter_map(|event| match event {
+        egui::Event::PointerMoved(to) => Some(*to),
+        _ => None,
+    });
+    (pressed.map(|(_, at)| at), moves.collect())
 }
 
 /// Where a point of the screen is in the picture, in heights of it.

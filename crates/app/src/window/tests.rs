@@ -481,6 +481,41 @@ fn a_drag_is_a_stroke_and_the_history_undoes_it() {
     }
 }
 
+/// On a slow machine a picture holds a whole drag, from the press to the release: it is the same stroke.
+#[test]
+fn a_drag_within_one_picture_is_the_same_stroke() {
+    let scratch = tempfile::tempdir().unwrap();
+    let digests = [1, 40].map(|pictures| {
+        let home = tempfile::tempdir().unwrap();
+        let mut window = window_with_clay(home.path());
+        let at = |n: usize| egui::pos2(620.0 + 2.0 * n as f32, 400.0);
+        window.hover_at(at(0));
+        window.step();
+        let button = |at, pressed| egui::Event::PointerButton {
+            pos: at,
+            button: egui::PointerButton::Primary,
+            pressed,
+            modifiers: egui::Modifiers::NONE,
+        };
+        let moves = (1..=40).map(|n| egui::Event::PointerMoved(at(n)));
+        let events = [button(at(0), true)]
+            .into_iter()
+            .chain(moves)
+            .chain([button(at(40), false)]);
+        for (n, event) in events.enumerate() {
+            window.input_mut().events.push(event);
+            if pictures > 1 || n == 41 {
+                window.step();
+            }
+        }
+        let sheet = edits(&mut window, 1);
+        let copy = scratch.path().join(format!("{pictures}.isoclay"));
+        std::fs::copy(&sheet.path, &copy).unwrap();
+        opened(&copy).state().sha256()
+    });
+    assert_eq!(digests[0], digests[1]);
+}
+
 fn edits(window: &mut Harness<'_, Modeler>, count: usize) -> Arc<Sheet> {
     let start = Instant::now();
     loop {
