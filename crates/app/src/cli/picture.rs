@@ -100,6 +100,10 @@ fn point(s: &str) -> Result<DVec3, String> {
 }
 
 /// What is to be drawn.
+#[cfg_attr(
+    not(feature = "window"),
+    expect(dead_code, reason = "rays and volumes alone look beyond the triangles")
+)]
 pub struct Asked<'a> {
     /// Its field.
     pub open: &'a OpenField,
