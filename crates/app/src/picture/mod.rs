@@ -51,7 +51,7 @@ pub struct View {
 const SAMPLES: usize = 2;
 /// Directions of the sky, and pixels of the longest side of a picture for each where there are fewer.
 const SKY: usize = 64;
-const SKY_PIXELS: usize = 10;
+const SKY_PIXELS: usize = 15;
 /// Cosine between the triangles of a pixel's samples above which one colour will do for them all.
 const SMOOTH: f64 = 0.95;
 /// The same for their depths: the most that they differ, in sides of a sample.
