@@ -516,22 +516,26 @@ fn a_drag_within_one_picture_is_the_same_stroke() {
     assert_eq!(digests[0], digests[1]);
 }
 
-fn edits(window: &mut Harness<'_, Modeler>, count: usize) -> Arc<Sheet> {
+/// Steps until the desk has made something so.
+fn until(window: &mut Harness<'_, Modeler>, what: &str, is: impl Fn(&Sheet) -> bool) -> Arc<Sheet> {
     let start = Instant::now();
     loop {
-        if let Some(sheet) = &window.state().bench().sheet
-            && sheet.history.len() == count
-        {
+        let bench = window.state().bench();
+        if let Some(sheet) = bench.sheet.as_ref().filter(|sheet| is(sheet)) {
             return sheet.clone();
         }
         assert!(
             start.elapsed() < Duration::from_secs(60),
-            "{:?}",
-            window.state().bench().messages
+            "not {what}: {:?}",
+            bench.messages
         );
         std::thread::sleep(Duration::from_millis(10));
         window.step();
     }
+}
+
+fn edits(window: &mut Harness<'_, Modeler>, count: usize) -> Arc<Sheet> {
+    until(window, "edited", |sheet| sheet.history.len() == count)
 }
 
 fn click(window: &mut Harness<'_, Modeler>, at: egui::Pos2) {

@@ -27,24 +27,6 @@ fn write(window: &mut Harness<'_, Modeler>, role: Role, label: &str, text: &str)
     window.step();
 }
 
-/// Steps until the desk has made something so.
-fn until(window: &mut Harness<'_, Modeler>, what: &str, is: impl Fn(&Sheet) -> bool) -> Arc<Sheet> {
-    let start = Instant::now();
-    loop {
-        let bench = window.state().bench();
-        if let Some(sheet) = bench.sheet.as_ref().filter(|sheet| is(sheet)) {
-            return sheet.clone();
-        }
-        assert!(
-            start.elapsed() < Duration::from_secs(60),
-            "not {what}: {:?}",
-            bench.messages
-        );
-        std::thread::sleep(Duration::from_millis(10));
-        window.step();
-    }
-}
-
 fn drag(window: &mut Harness<'_, Modeler>) {
     window.hover_at(egui::pos2(620.0, 400.0));
     window.step();
