@@ -1,4 +1,4 @@
-"""Volumes in blocks: how they are cut, what is seen of them before, and what a worker does with a block.
+"""What a worker does with a block of a volume.
 
 A fit of a block gives up what it knows of the halo and keeps the functions and leaves of its own block, its part; parts add up. So
 what a worker holds is a block with its halo, and the functions of the blocks round it.
@@ -6,226 +6,20 @@ what a worker holds is a block with its halo, and the functions of the blocks ro
 
 from __future__ import annotations
 
-import hashlib
-import itertools
-import os
-import uuid
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _isoclay
+from ._block_plan import ALIGN, FORGOTTEN, Block, Doubles, Job, Plan, Ticket, Voxel
 from ._field import Field
 from ._fit import fit_volume
 
-Doubles: TypeAlias = npt.NDArray[np.float64]
-Ticket: TypeAlias = bytes | str
-"""Bytes, or the file that has them."""
-Voxel: TypeAlias = tuple[int, int, int]
-
 LEAF = 4
 """Voxels along the cell that errors are told of."""
-ALIGN = 32
-"""Voxels along a brick of the coarsest level: blocks begin there."""
-FORGOTTEN = 16
-"""Voxels after which a prefilter has forgotten a voxel."""
-BINS = 1 << 16
 REACH = 2
 """Voxels round a leaf whose functions reach well into it."""
-
-
-@dataclass(frozen=True)
-class Plan:
-    """A volume and how it is cut."""
-
-    volume: Any
-    affine: Doubles
-    order: str
-    method: str
-    block: int
-    halo: int
-    unit: str | None
-    threads: int
-
-    def __post_init__(self) -> None:
-        if len(self.volume.shape) != 3:
-            raise ValueError(f"a volume has three axes, this has the shape {tuple(self.volume.shape)}")
-        if self.order not in ("xyz", "zyx"):
-            raise ValueError(f"order is {self.order!r}; write 'xyz' for [i, j, k], or 'zyx' for [k, j, i]")
-        if self.method not in ("adaptive", "interpolate"):
-            raise ValueError(f"method is {self.method!r}; write 'adaptive' or 'interpolate'")
-        if self.block < ALIGN or self.block % ALIGN:
-            raise ValueError(f"block is {self.block}; it has to be a multiple of 32, 32 or more")
-        step = FORGOTTEN if self.method == "interpolate" else ALIGN
-        if self.halo < step or self.halo % step:
-            raise ValueError(f"halo is {self.halo}; to fit by {self.method!r} it has to be a multiple of {step}")
-
-    @property
-    def shape(self) -> Voxel:
-        """Voxels along x, y, z."""
-        shape = tuple(int(n) for n in self.volume.shape)
-        return shape[::-1] if self.order == "zyx" else shape  # type: ignore[return-value]
-
-    @property
-    def rows(self) -> list[list[float]]:
-        """The affine as the Rust side takes it."""
-        rows: list[list[float]] = self.affine[:3].tolist()
-        return rows
-
-    def cuts(self) -> list[list[tuple[int, int]]]:
-        """First voxel of the blocks, and that behind their last, on each axis."""
-        cuts = []
-        for n in self.shape:
-            starts = list(range(0, n, self.block))
-            # A remainder that a halo would swallow goes with the block before.
-            if len(starts) > 1 and n - starts[-1] < ALIGN:
-                starts.pop()
-            cuts.append([*zip(starts, [*starts[1:], n], strict=True)])
-        return cuts
-
-    def blocks(self) -> list[Block]:
-        """All blocks, in a fixed order: z fastest."""
-        products = itertools.product(*self.cuts())
-        return [Block(*zip(*spans, strict=True)) for spans in products]
-
-    def wide(self, block: Block, halo: int) -> Block:
-        """A block with a halo, as far as there are voxels."""
-        low = tuple(max(0, v - halo) for v in block.low)
-        high = tuple(min(n, v + halo) for v, n in zip(block.high, self.shape, strict=True))
-        return Block(low, high)  # type: ignore[arg-type]
-
-    def read(self, block: Block) -> npt.NDArray[Any]:
-        """Voxels ``[i, j, k]`` of a block."""
-        places = tuple(slice(a, b) for a, b in zip(block.low, block.high, strict=True))
-        if self.order == "zyx":
-            places = places[::-1]
-        part = self.volume[places]
-        if hasattr(part, "compute"):
-            part = part.compute(scheduler="synchronous")
-        array = np.asarray(part)
-        return array.transpose(2, 1, 0) if self.order == "zyx" else array
-
-    def affine_at(self, origin: Voxel) -> Doubles:
-        """The affine of a part that begins at a voxel."""
-        moved = self.affine.copy()
-        moved[:3, 3] = self.affine[:3, :3] @ origin + self.affine[:3, 3]
-        return moved
-
-
-@dataclass(frozen=True)
-class Block:
-    """Voxels from ``low`` to before ``high``."""
-
-    low: Voxel
-    high: Voxel
-
-
-@dataclass(frozen=True)
-class Shelf:
-    """Where parts are kept: in the memory of the workers, or in files of a directory that all of them see."""
-
-    directory: str | None
-    name: str
-    """What the files' names begin with; it tells fits apart that share a directory."""
-
-    def find(self, part: str) -> str | None:
-        """The file of a part that is there already, as after a fit that was cut off."""
-        path = self._path(part)
-        return path if path is not None and os.path.exists(path) else None
-
-    def put(self, part: str, content: bytes) -> Ticket:
-        """Keeps a part. A file is whole or not there; two workers that write one write the same."""
-        path = self._path(part)
-        if path is None:
-            return content
-        passing = f"{path}.{uuid.uuid4().hex}.tmp"
-        try:
-            with open(passing, "wb") as file:
-                file.write(content)
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(passing, path)
-        except OSError:
-            Path(passing).unlink(missing_ok=True)
-            raise
-        return path
-
-    def _path(self, part: str) -> str | None:
-        return None if self.directory is None else os.path.join(self.directory, f"{self.name}-{part}")
-
-
-@dataclass(frozen=True)
-class Job:
-    """What all tasks of a fit share."""
-
-    plan: Plan
-    tolerance: float
-    shelf: Shelf
-
-
-# What is seen of a volume before it is fitted
-
-
-@dataclass(frozen=True)
-class Look:
-    """How often numbers occur in a block, by the first 16 bits of their floats, ordered, those that occur; how many are not
-    finite; and a digest of the voxels."""
-
-    bins: npt.NDArray[np.uint16]
-    counts: npt.NDArray[np.int64]
-    odd: int
-    digest: bytes
-
-
-def looked_at(plan: Plan, block: Block) -> Look:
-    """A first look at a block."""
-    array = np.ascontiguousarray(plan.read(block))
-    digest = hashlib.sha256(array.data).digest()
-    values = array.astype(np.float32, copy=False).reshape(-1)
-    bits = values.view(np.uint32)
-    ordered = np.where(bits >> 31 == 1, ~bits, bits | np.uint32(1 << 31))
-    counts = np.bincount(ordered >> 16, minlength=BINS)
-    bins = np.nonzero(counts)[0]
-    return Look(bins.astype(np.uint16), counts[bins], int(np.count_nonzero(~np.isfinite(values))), digest)
-
-
-def _middles(bins: npt.NDArray[np.intp]) -> Doubles:
-    """The middles of the bins of a :class:`Look`."""
-    ordered = (bins.astype(np.uint32) << 16) | np.uint32(1 << 15)
-    bits = np.where(ordered >> 31 == 1, ordered & np.uint32(0x7FFFFFFF), ~ordered)
-    return bits.astype(np.uint32).view(np.float32).astype(np.float64)
-
-
-def overview(counts: npt.NDArray[np.int64]) -> tuple[float, float | None]:
-    """The range between the 1st and the 99th percentile, and the density that parts two classes best [Otsu79]."""
-    present = np.nonzero(counts)[0]
-    values, weights = _middles(present), counts[present]
-    rank = np.cumsum(weights)
-    low, high = (values[np.searchsorted(rank, q * (rank[-1] - 1), side="right")] for q in (0.01, 0.99))
-    if high <= low:
-        return float(values[-1] - values[0]), None
-    bins = np.clip((values - low) / (high - low) * 256, 0, 255).astype(int)
-    heaps = np.bincount(bins, weights, minlength=256)
-    below, moment = np.cumsum(heaps)[:-1], np.cumsum(heaps * np.arange(256))
-    above = heaps.sum() - below
-    with np.errstate(divide="ignore", invalid="ignore"):
-        apart = moment[:-1] / below - (moment[-1] - moment[:-1]) / above
-        between = np.where((below > 0) & (above > 0), below * above * apart**2, 0)
-    best = np.nonzero(between == between.max())[0]
-    return float(high - low), float(low + (high - low) / 256 * ((best[0] + best[-1]) / 2 + 1))
-
-
-def noise(plan: Plan, block: Block) -> float:
-    """Standard deviation of the noise of a block."""
-    wide = plan.wide(block, plan.halo)
-    field = fit_volume(plan.read(wide), plan.affine_at(wide.low), threads=plan.threads)
-    return float(field.report["noise"] or 0.0)
-
-
-# What is done with a block
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from . import _blocks, _isoclay
-from ._blocks import Finished, Job, Plan, Shelf
+from . import _blocks, _first_look, _isoclay
+from ._block_plan import Job, Plan, Shelf
+from ._blocks import Finished
 from ._field import Field
 from ._wishes import Progress, tolerance as parsed, wishes
 
@@ -160,14 +161,14 @@ def _near(plan: Plan) -> list[list[int]]:
 
 def _looked_at(plan: Plan, shared: Any, runner: Runner) -> tuple[float, float | None, str]:
     """Range of the densities, that of the surface, and a digest of all voxels."""
-    counts, odd, content = np.zeros(_blocks.BINS, np.int64), 0, hashlib.sha256()
-    for look in runner.each([runner.submit(_blocks.looked_at, shared, block) for block in plan.blocks()]):
+    counts, odd, content = np.zeros(_first_look.BINS, np.int64), 0, hashlib.sha256()
+    for look in runner.each([runner.submit(_first_look.looked_at, shared, block) for block in plan.blocks()]):
         counts[look.bins] += look.counts
         odd += look.odd
         content.update(look.digest)
     if odd:
         raise ValueError(f"{odd} voxels are not finite; replace them, for example by the value of air, before fitting")
-    return *_blocks.overview(counts), content.hexdigest()
+    return *_first_look.overview(counts), content.hexdigest()
 
 
 def _tolerance(plan: Plan, shared: Any, asked: float | str | None, span: float, runner: Runner) -> float:
@@ -184,6 +185,6 @@ def _tolerance(plan: Plan, shared: Any, asked: float | str | None, span: float, 
         return number * span / 100 if kind == "%" else number
     blocks = plan.blocks()
     step = -(-len(blocks) // NOISE_BLOCKS)
-    found = list(runner.each([runner.submit(_blocks.noise, shared, block) for block in blocks[::step]]))
+    found = list(runner.each([runner.submit(_first_look.noise, shared, block) for block in blocks[::step]]))
     # As in one piece: the rms of a leaf of noise alone stays below 1.25 of it, and clean data is met to 0.5 %.
     return max(1.25 * float(np.median(found)), 0.005 * span)

@@ -15,7 +15,7 @@ from typing import Any, Literal, overload
 
 import numpy as np
 
-from ._blocks import Plan
+from ._block_plan import Plan
 from ._blocks_run import FieldFile, run
 from ._field import Field
 from ._fit import fit
