@@ -1,6 +1,7 @@
 //! Distances to a mesh, winding numbers, and the fit of its signed distance.
 
-#[path = "../tests/common/meshes.rs"]
+#[allow(dead_code, reason = "the tests use the rest")]
+#[path = "../tests/suite/common/meshes.rs"]
 mod meshes;
 
 use std::hint::black_box;

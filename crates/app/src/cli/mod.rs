@@ -301,7 +301,7 @@ fn set_threads(threads: Option<NonZeroUsize>) -> Outcome<usize> {
 }
 
 #[cfg(test)]
-#[path = "../../tests/common/wrong_values.rs"]
+#[path = "../../tests/suite/common/wrong_values.rs"]
 #[allow(dead_code, reason = "the rows alone are looked at here")]
 mod wrong_values;
 
@@ -324,7 +324,7 @@ mod tests {
         }
     }
 
-    /// A new option needs a row in `tests/common/wrong_values.rs`, which the test
+    /// A new option needs a row in `tests/suite/common/wrong_values.rs`, which the test
     /// `a_wrong_value_is_named_with_its_option_and_its_remedy` types in.
     #[test]
     fn every_option_has_a_wrong_value_in_the_table() {

@@ -2,7 +2,7 @@
 
   python make_fixtures.py        (nibabel 5.4, trimesh 5.2, open3d 0.20, pymeshlab)
 
-The same numbers stand in tests/other_writers.rs."""
+The same numbers stand in tests/suite/other_writers.rs."""
 import gzip
 import nibabel as nib
 import numpy as np
