@@ -22,10 +22,12 @@ use super::desk::Desk;
 use super::gesture::Gesture;
 use super::kept::Kept;
 use super::orders::{News, Order};
+use super::shot::Shot;
+use super::show::{Beside, Shown};
 use super::tool::{Kind, Tool};
 use crate::cli::{desk_files, interrupt};
 use crate::panels;
-use crate::view::{Camera, Look, Paper, Screen};
+use crate::view::{Camera, LINE, Look, Paper, Screen};
 
 /// The window.
 pub struct Modeler {
@@ -35,7 +37,7 @@ pub struct Modeler {
     context: Arc<Mutex<egui::Context>>,
     /// Whether the window waits for news, so that nobody has to wake it.
     is_listening: Arc<AtomicBool>,
-    screen: Option<Screen>,
+    pub(super) screen: Option<Screen>,
     gesture: Option<Gesture>,
     /// What the mouse sets.
     pub(super) adjust: Option<Adjust>,
@@ -45,6 +47,10 @@ pub struct Modeler {
     /// How things are looked at, as it is written in a directory.
     kept: Kept,
     home: PathBuf,
+    /// What is shown beside the solids.
+    pub(super) beside: Beside,
+    /// Pictures that become files.
+    pub(super) shot: Option<Shot>,
 }
 
 impl Modeler {
@@ -65,6 +71,7 @@ impl Modeler {
         *self.context.lock().unwrap_or_else(PoisonError::into_inner) = context.clone();
         self.end_gesture();
         self.screen = screen;
+        self.beside = Beside::default();
         // Its pictures were the old window's.
         self.bench.slices = self.bench.slices.take().map(|_| panels::Slices::new());
         self.moved = Instant::now();
@@ -118,6 +125,8 @@ impl Modeler {
                     mode: kept.mode,
                     density: [0.0, 1.0],
                     paper: Paper::Dark,
+                    show: kept.show,
+                    line: LINE,
                 },
                 scene: (DVec3::ZERO, 1.0),
                 busy: None,
@@ -137,6 +146,8 @@ impl Modeler {
                 held: None,
                 seen: None,
                 told_tool: None,
+                shown: Shown::default(),
+                shot: panels::Shots::default(),
                 orders,
                 cancel,
             },
@@ -150,6 +161,8 @@ impl Modeler {
             desk: Some(desk),
             kept,
             home,
+            beside: Beside::default(),
+            shot: None,
         }
     }
 
@@ -188,7 +201,7 @@ impl Modeler {
                 .show(ui, |ui| panels::document(ui, &mut self.bench));
         }
         egui::CentralPanel::no_frame().show(ui, |ui| match &self.bench.sheet {
-            Some(_) => self.viewport(ui),
+            Some(_) => self.views(ui),
             None => panels::start(ui, &mut self.bench),
         });
         panels::slices(ui.ctx(), &mut self.bench);
@@ -196,8 +209,10 @@ impl Modeler {
         panels::touch(ui.ctx(), &mut self.bench);
         panels::measure(ui.ctx(), &mut self.bench);
         panels::log(ui.ctx(), &mut self.bench);
+        panels::picture(ui.ctx(), &mut self.bench);
         self.bench.tell_tool();
-        if let Err(why) = self.kept.keep(self.bench.look.mode, &self.home) {
+        let Look { mode, show, .. } = self.bench.look;
+        if let Err(why) = self.kept.keep(Kept { mode, show }, &self.home) {
             self.bench.tell(why, true);
         }
         if self.bench.message().is_some() {

@@ -8,7 +8,7 @@ use tools::session::Stroke;
 
 use super::{Desk, InHand};
 use crate::view::Ray;
-use crate::window::orders::News;
+use crate::window::orders::{Acting, News};
 use crate::window::tool::Tool;
 
 impl Desk {
@@ -46,10 +46,15 @@ impl Desk {
         let Some(open) = &mut self.open else { return Ok(()) };
         let Some(hand) = &mut open.live else { return Ok(()) };
         let done = hand.live.step(Pose::at(at), &mut Control::default());
-        let seen = done.and_then(|_| hand.live.look());
+        let seen = done.and_then(|force| Ok((hand.live.look()?.0, force)));
         match seen {
-            Ok((state, _)) => {
+            Ok((state, force)) => {
+                let placed = state.placement(&open.chosen).unwrap_or_default();
+                let acting = Acting::of(&hand.live, at, force, placed);
                 open.shown = state;
+                if acting.is_some() {
+                    self.tell(News::Acting(acting));
+                }
                 Ok(())
             }
             Err(why) => {
@@ -65,8 +70,12 @@ impl Desk {
         let (Some(hand), Some(document)) = (open.live.take(), &mut open.document) else {
             return;
         };
+        let acted = hand.live.moving().is_some();
         let ended = hand.live.end(document, &mut Control::default());
         open.shown = document.state().clone();
+        if acted {
+            self.tell(News::Acting(None));
+        }
         match ended {
             Ok((_, notes)) => notes.into_iter().for_each(|note| self.tell(News::Note(note))),
             Err(CommandError::Document(why)) => {
@@ -82,6 +91,7 @@ impl Desk {
             open.live = None;
             open.shown = open.state().clone();
         }
+        self.tell(News::Acting(None));
         Ok(())
     }
 

@@ -67,6 +67,7 @@ impl Modeler {
                 self.bench.seen = None;
             }
             News::Seen(seen) => self.bench.seen = Some(seen),
+            News::Acting(acting) => self.bench.shown.acts(acting),
             News::Note(text) => self.bench.tell(text, false),
             News::Failed(text) => self.bench.tell(text, true),
         }

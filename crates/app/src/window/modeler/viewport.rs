@@ -7,14 +7,14 @@ use egui::{Pos2, Rect, Sense};
 use glam::{DVec2, DVec3};
 
 use super::Modeler;
-use crate::view::{Ray, pick, scale_bar};
+use crate::view::{Legend, Ray, pick, scale_bar};
 
 /// Time after which a picture in which nothing moves is drawn whole.
 const STILL: Duration = Duration::from_millis(60);
 
 impl Modeler {
     /// The scene, and what the mouse does in it.
-    pub(super) fn viewport(&mut self, ui: &mut egui::Ui) {
+    pub(in crate::window) fn viewport(&mut self, ui: &mut egui::Ui) {
         let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
         // What the mouse does now shows in this picture, which is painted below what is drawn over it.
         let below = ui.painter().add(egui::Shape::Noop);
@@ -24,20 +24,30 @@ impl Modeler {
         }
         let is_still = self.moved.elapsed() > STILL && self.gesture.is_none();
         self.bench.know_density();
-        let is_done = self.draw(ui, below, rect, is_still);
+        self.bench.look.line = 1.25 / rect.height();
+        self.beside(ui.ctx());
+        let pixels = (rect.size() * ui.ctx().pixels_per_point()).round();
+        // The card draws one whole picture at a time.
+        let is_shot = self.shoot([pixels.x as u32, pixels.y as u32]);
+        let is_done = self.draw(ui, below, rect, is_still && !is_shot) && !is_shot;
         if !is_done {
             ui.ctx().request_repaint();
         }
         if !is_still {
             ui.ctx().request_repaint_after(STILL);
         }
-        if let Some(thing) = self.bench.sheet.as_ref().and_then(|s| s.objects.get(s.chosen)) {
+        if let Some(thing) = self.bench.sheet.as_ref().and_then(|s| s.objects.get(s.chosen))
+            && self.bench.look.show.scale_bar
+        {
             let length_of_point = self.bench.look.camera.height / f64::from(rect.height());
             scale_bar(ui.painter(), rect, length_of_point, thing.unit);
         }
+        Legend::draw(&self.bench.legends(), ui.painter(), rect);
+        self.draw_cursor(ui, rect);
         self.draw_holds(ui, rect);
         self.draw_marks(ui, rect);
         self.draw_hand(ui, rect);
+        self.draw_acting(ui, rect);
         if response.drag_stopped() || !ui.input(|i| i.pointer.any_down()) {
             self.end_gesture();
         }
@@ -96,6 +106,9 @@ impl Modeler {
     pub(in crate::window) fn under(&self, rect: Rect, over: Pos2) -> Option<(DVec3, DVec3)> {
         let sheet = self.bench.sheet.as_ref()?;
         let thing = sheet.objects.get(sheet.chosen)?;
+        if self.bench.shown.hidden.contains(&thing.name) {
+            return None;
+        }
         let ray = self.ray(rect, over);
         let own = thing.world_from_object.inverse();
         let ray = Ray {
