@@ -51,6 +51,8 @@ const BRICK: u32 = 1589u;
 @group(3) @binding(0) var ground: texture_2d<f32>;
 @group(3) @binding(1) var ground_depth: texture_depth_2d;
 @group(3) @binding(2) var before: texture_2d<f32>;
+// Colours of paint on the triangles, clear where there are none.
+@group(3) @binding(3) var paints: texture_2d<f32>;
 
 // Cubic B-splines on a cell, and their derivatives.
 fn weights(t: f32) -> vec4<f32> {
@@ -435,10 +437,6 @@ fn shape_at(n: u32, line: Line, t: f32, by: u32, bent: bool) -> Shape {
   return shape;
 }
 
-// What a cut through the clay shows: dark where it is thin, light where it is dense.
-const THIN = vec3(0.045, 0.04, 0.04);
-const DENSE = vec3(0.86, 0.80, 0.70);
-
 struct Dot {
   @location(0) color: vec4<f32>,
   @builtin(frag_depth) depth: f32,
@@ -467,6 +465,25 @@ fn cut_color(shape: Shape) -> vec4<f32> {
   return vec4(mix(THIN, DENSE, shape.shade * shape.shade), 1.0);
 }
 
+// What is painted on the triangles in a pixel, or beside it: their silhouettes are the surface's within one.
+fn paint_under(pixel: vec2<f32>) -> vec3<f32> {
+  if (scene.shows.x < 0.5) {
+    return CLAY;
+  }
+  let size = vec2<i32>(textureDimensions(paints)) - 1;
+  if (size.x == 0) {
+    return CLAY;
+  }
+  var near = array<vec2<i32>, 5>(vec2(0), vec2(1, 0), vec2(-1, 0), vec2(0, 1), vec2(0, -1));
+  for (var n = 0; n < 5; n += 1) {
+    let paint = textureLoad(paints, clamp(vec2<i32>(pixel) + near[n], vec2(0), size), 0);
+    if (paint.a > 0.5) {
+      return paint.rgb;
+    }
+  }
+  return CLAY;
+}
+
 // Colour and depth in one pixel: in light and shadow if `lit`, else in all light.
 fn pixel_of(pixel: vec2<f32>, lit: bool) -> Dot {
   let line = line_under(pixel);
@@ -488,7 +505,7 @@ fn pixel_of(pixel: vec2<f32>, lit: bool) -> Dot {
     let hollow = 1.0 + 0.45 * clamp(shape.ridge, -1.0, 0.0);
     light += (0.55 + 0.30 * dot(shape.normal, scene.axes[1].xyz)) * hollow + 0.95 * facing;
   }
-  return Dot(colored(seen, true, light), depth);
+  return Dot(vec4(paint_under(pixel) * light, 1.0), depth);
 }
 
 @fragment

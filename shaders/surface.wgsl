@@ -8,10 +8,14 @@ struct Scene {
   // A point of the clipping plane and, in the last number of the next one, whether there is one.
   cut_at: vec4<f32>,
   cut_normal: vec4<f32>,
-  // Whether paint is shown; how many lights the sky has; the radius that their maps show; nothing.
+  // What paint is: nothing, stiffness, a share of a scale; how many lights the sky has; the radius that their maps show; nothing.
   shows: vec4<f32>,
   // Linear light of the paper, above and below.
   paper: array<vec4<f32>, 2>,
+  // Pixels across and down; width of a line; length of a pixel at the centre.
+  picture: vec4<f32>,
+  // Densities that are black and white; nothing.
+  density: vec4<f32>,
 };
 
 // The sun comes after the most lights that the sky can have.
@@ -66,6 +70,9 @@ const CLAY = vec3(0.612, 0.279, 0.148);
 const INSIDE = vec3(0.30, 0.10, 0.07);
 const STIFF = vec3(0.05, 0.20, 0.55);
 const SOFT = vec3(0.80, 0.42, 0.05);
+// What a cut through the clay shows: dark where it is thin, light where it is dense.
+const THIN = vec3(0.045, 0.04, 0.04);
+const DENSE = vec3(0.86, 0.80, 0.70);
 
 // Where a place some pixels off the surface is in a map of so many pixels a side: column, row, depth.
 fn in_map(light: u32, at: vec3<f32>, n: vec3<f32>, pixels: f32, side: u32) -> vec3<f32> {
@@ -105,43 +112,58 @@ fn from_sun(at: vec3<f32>, n: vec3<f32>) -> f32 {
   return seen / 25.0;
 }
 
-// Colour of a place in a light, as the cut and the paint have it.
-fn colored(in: Seen, is_front: bool, light: f32) -> vec4<f32> {
+// What painted stiffness makes of clay.
+fn painted(paint: f32) -> vec3<f32> {
+  let share = clamp(paint / 4.0, -1.0, 1.0);
+  return mix(CLAY, select(SOFT, STIFF, share > 0.0), sqrt(abs(share)) * 0.85);
+}
+
+// Colour of a place in a light, as the cut has it.
+fn colored(in: Seen, is_front: bool, color: vec3<f32>, light: f32) -> vec4<f32> {
   if (!is_front) {
     return vec4(INSIDE * (0.55 + 0.3 * abs(dot(normalize(in.normal), scene.axes[2].xyz))), 1.0);
   }
-  var color = CLAY;
-  if (scene.shows.x > 0.5) {
-    let share = clamp(in.paint / 4.0, -1.0, 1.0);
-    color = mix(color, select(SOFT, STIFF, share > 0.0), sqrt(abs(share)) * 0.85);
-  }
   return vec4(color * light, 1.0);
+}
+
+fn clay_or_paint(paint: f32) -> vec3<f32> {
+  if (scene.shows.x > 0.5) {
+    return painted(paint);
+  }
+  return CLAY;
 }
 
 fn is_cut(at: vec3<f32>) -> bool {
   return scene.cut_normal.w > 0.5 && dot(at - scene.cut_at.xyz, scene.cut_normal.xyz) > 0.0;
 }
 
+// The light that reaches a place, and all of the light, darker in hollows.
+fn light_at(in: Seen) -> f32 {
+  let n = normalize(in.normal);
+  let facing = max(dot(n, lights.way[SUN].xyz), 0.0);
+  return 0.05 + from_sky(in.at, n) + 0.95 * facing * from_sun(in.at, n);
+}
+
+fn all_light(in: Seen) -> f32 {
+  let n = normalize(in.normal);
+  let facing = max(dot(n, lights.way[SUN].xyz), 0.0);
+  let hollow = 1.0 + 0.45 * clamp(in.ridge, -1.0, 0.0);
+  return 0.05 + (0.55 + 0.30 * dot(n, scene.axes[1].xyz)) * hollow + 0.95 * facing;
+}
+
 // In the light that reaches a place. Of its own, not a branch: processors that stand in for graphics cards take both sides of those.
 @fragment
 fn shade_lit(in: Seen, @builtin(front_facing) is_front: bool) -> @location(0) vec4<f32> {
-  let n = normalize(in.normal);
-  let facing = max(dot(n, lights.way[SUN].xyz), 0.0);
-  let light = 0.05 + from_sky(in.at, n) + 0.95 * facing * from_sun(in.at, n);
-  return colored(in, is_front, light);
+  return colored(in, is_front, clay_or_paint(in.paint), light_at(in));
 }
 
-// In all of the light, darker in hollows.
+// In all of the light.
 @fragment
 fn shade(in: Seen, @builtin(front_facing) is_front: bool) -> @location(0) vec4<f32> {
   if (is_cut(in.at)) {
     discard;
   }
-  let n = normalize(in.normal);
-  let facing = max(dot(n, lights.way[SUN].xyz), 0.0);
-  let hollow = 1.0 + 0.45 * clamp(in.ridge, -1.0, 0.0);
-  let light = 0.05 + (0.55 + 0.30 * dot(n, scene.axes[1].xyz)) * hollow + 0.95 * facing;
-  return colored(in, is_front, light);
+  return colored(in, is_front, clay_or_paint(in.paint), all_light(in));
 }
 
 struct Paper {

@@ -54,6 +54,11 @@ impl Live {
         self.stroke.grip()
     }
 
+    /// Of a force tool the box that moves, see [`LiveStroke::moving`].
+    pub fn moving(&self) -> Option<[DVec3; 8]> {
+        self.stroke.moving()
+    }
+
     /// Lays paint on while a force tool works, see [`LiveStroke::paint`].
     ///
     /// # Errors

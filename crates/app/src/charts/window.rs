@@ -14,7 +14,7 @@ use tools::live::Pose;
 
 use super::ball::{Ball, median, middle};
 use super::{Chart, Series};
-use crate::view::{BUDGET, Camera, Canvas, Card, Look, Mode, Paper, Patch, SKY, Shape, Solid};
+use crate::view::{BUDGET, Camera, Canvas, Card, LINE, Look, Mode, Paper, Patch, SKY, Shape, Show, Solid};
 use crate::window::tool::{Kind, Tool};
 
 /// Finest levels of the balls.
@@ -90,6 +90,8 @@ fn measure(card: &Card, ball: &Ball) -> Result<WindowCosts, String> {
         mode: Mode::Mesh,
         density: [0.0, 1.0],
         paper: Paper::Dark,
+        show: Show::default(),
+        line: LINE,
     };
     let mut by = |mode: Mode, canvas: &mut Canvas, is_rough: bool| {
         look.camera.orbit(DVec2::new(0.01, 0.0));

@@ -1,10 +1,11 @@
 use std::cell::LazyCell;
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use bspline::polygonize::{Mesh, Placement, PolygonizeOptions};
 use clap::ValueEnum;
-use fitting::LeafIndex;
+use fitting::{Cancel, LeafIndex};
+use formats::FormatError;
 use glam::DVec3;
 
 use super::cost::Cost;
@@ -14,6 +15,7 @@ use super::mesh::Mesher;
 use super::output::Output;
 use super::progress::Bar;
 use super::quantity::{between, finite, human_number, positive, threads};
+use super::staged::StagedFiles;
 use super::summary::Summary;
 use super::{interrupt, set_threads};
 use crate::check::viridis;
@@ -118,15 +120,18 @@ pub type Draw<'a> = &'a dyn Fn(&Asked, &View) -> Outcome<Option<Vec<u8>>>;
 
 /// Draws a field file.
 pub fn run(args: &Args) -> Outcome {
-    draw(args, &|_, _| Ok(None))
+    draw(args, &|_, _| Ok(None), None)
 }
 
-/// Draws a field file another way, and as ever where that cannot.
-pub fn draw(args: &Args, another: Draw) -> Outcome {
+/// Draws a field file another way, and as ever where that cannot; from so many sides, if a number is given.
+pub fn draw(args: &Args, another: Draw, turns: Option<usize>) -> Outcome {
     let cost = Cost::start();
     let cancel = interrupt::cancel();
     let source = args.field.source(&cancel)?;
-    let output = Output::check("-o", &args.output, &["png"], None, &[&source])?;
+    let out = match turns {
+        None => Out::Picture(Output::check("-o", &args.output, &["png"], None, &[&source])?),
+        Some(_) => Out::Pictures(StagedFiles::new("-o", &args.output)?),
+    };
     let errors = (args.errors.as_ref())
         .map(|path| Output::check("--errors", path, &["png"], None, &[&source]))
         .transpose()?;
@@ -163,7 +168,8 @@ pub fn draw(args: &Args, another: Draw) -> Outcome {
     let cells = args.resolution.unwrap_or_else(|| cells_for(&open, &view));
     let frame = open.frame_of_resolution(cells);
     let part = Part::new(&view, &whole, frame.world_from_grid.matrix3.x_axis.length());
-    let (mesh, _, frame) = if args.zoom == 1.0 && args.at.is_none() {
+    let is_whole = args.zoom == 1.0 && args.at.is_none() || turns.is_some();
+    let (mesh, _, frame) = if is_whole {
         mesher.on(frame)?
     } else {
         let frame = part.within(&frame).ok_or_else(|| args.nothing_there(&whole))?;
@@ -186,6 +192,23 @@ pub fn draw(args: &Args, another: Draw) -> Outcome {
             shading: surface_of(&whole),
         },
         open: &open,
+    };
+    let output = match out {
+        Out::Picture(output) => output,
+        Out::Pictures(staged) => {
+            let turned = args.turned(&whole, view, turns.unwrap_or(1));
+            turn(&asked, &turned, another, staged, (&bar, &cancel))?;
+            bar.clear();
+            return Summary {
+                vertices: Some(mesh.positions.len()),
+                triangles: Some(mesh.triangles.len()),
+                cells: Some(frame.cells),
+                field_sha256: Some(open.sha256()),
+                ..Default::default()
+            }
+            .with_cost(&cost)
+            .print_of(args.output.display().to_string(), args.json);
+        }
     };
     let drawing = LazyCell::new(|| Drawing::new(&asked.scene, &view));
     let (pixels, of_errors) = match (another(&asked, &view)?, errors) {
@@ -218,15 +241,51 @@ pub fn draw(args: &Args, another: Draw) -> Outcome {
     .print_after(&output, args.json)
 }
 
+/// What is written.
+enum Out {
+    Picture(Output),
+    Pictures(StagedFiles),
+}
+
+/// Share of a picture that a solid fills at most while it turns.
+const FILLED: f64 = 0.94;
+
+/// Draws a scene from several sides, into files that appear together.
+fn turn(
+    asked: &Asked,
+    views: &[View],
+    another: Draw,
+    mut staged: StagedFiles,
+    (bar, cancel): (&Bar, &Cancel),
+) -> Outcome {
+    for (n, view) in views.iter().enumerate() {
+        bar.show("drawing", n as f64 / views.len() as f64);
+        let pixels = match another(asked, view)? {
+            Some(pixels) => pixels,
+            None => Drawing::new(&asked.scene, view).pixels(&clay),
+        };
+        interrupt::check(cancel)?;
+        staged.write(&format!("{n:04}.png"), |path| png_file(path, view.size, &pixels))?;
+    }
+    staged.publish().map(drop)
+}
+
 fn write(output: &Output, size: [usize; 2], pixels: &[u8]) -> Outcome {
+    png_file(output.path(), size, pixels).map_err(|e| output.writing(e))
+}
+
+/// Writes RGB bytes, rows from the top.
+///
+/// # Errors
+/// That the file cannot be written.
+pub fn png_file(path: &Path, size: [usize; 2], pixels: &[u8]) -> Result<(), FormatError> {
     let [width, height] = size.map(|n| n as u32);
-    formats::atomic::replace(output.path(), |out| {
+    formats::atomic::replace(path, |out| {
         let mut encoder = png::Encoder::new(out, width, height);
         encoder.set_color(png::ColorType::Rgb);
         let mut writer = encoder.write_header()?;
         Ok(writer.write_image_data(pixels)?)
     })
-    .map_err(|e| output.writing(e))
 }
 
 /// Colours by the rms residual of the leaf that holds a point; grey where there is none.
@@ -255,13 +314,38 @@ fn error_color(open: &OpenField) -> impl Fn(DVec3) -> DVec3 + Sync {
 const NO_DATA: DVec3 = DVec3::splat(0.6);
 
 impl Args {
+    /// The same view from so many sides, evenly round the upright axis: all of one scale, that all of them fit.
+    fn turned(&self, whole: &Mesh, first: View, count: usize) -> Vec<View> {
+        let middle = whole.bounding_box().map_or(first.center, |b| b.center());
+        let center = self.at.unwrap_or(middle);
+        let side = |n: usize| self.view_turned(whole, 360.0 * n as f64 / count as f64);
+        let views: Vec<View> = (0..count).map(side).collect();
+        let reach = |view: &View| {
+            let ways = whole.positions.iter().map(|p| (view.axes * (p - middle)).abs());
+            let most = ways.fold(DVec3::splat(f64::MIN_POSITIVE), DVec3::max);
+            let [w, h] = view.size.map(|n| 0.5 * FILLED * n as f64);
+            f64::min(w / most.x, h / most.y)
+        };
+        let scale = views.iter().map(reach).fold(f64::INFINITY, f64::min);
+        let turned = views.into_iter().map(|view| View {
+            center,
+            pixels_per_length: scale * self.zoom,
+            ..view
+        });
+        turned.collect()
+    }
+
     fn view(&self, whole: &Mesh) -> View {
+        self.view_turned(whole, 0.0)
+    }
+
+    fn view_turned(&self, whole: &Mesh, degrees: f64) -> View {
         let (up, front, side) = match self.up {
             Axis::X => (DVec3::X, DVec3::Y, DVec3::Z),
             Axis::Y => (DVec3::Y, DVec3::Z, DVec3::X),
             Axis::Z => (DVec3::Z, DVec3::X, DVec3::Y),
         };
-        let (a, e) = (self.azimuth.to_radians(), self.elevation.to_radians());
+        let (a, e) = ((self.azimuth + degrees).to_radians(), self.elevation.to_radians());
         let toward_eye = (front * a.cos() + side * a.sin()) * e.cos() + up * e.sin();
         let fitting = View::of(&surface_of(whole), self.size, toward_eye, up);
         View {

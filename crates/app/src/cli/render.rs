@@ -1,3 +1,5 @@
+use std::cell::OnceCell;
+
 use glam::DAffine3;
 
 use super::ceiling::of_bricks;
@@ -20,6 +22,15 @@ pub struct Args {
     /// Densities that are black and white with --mode volume [default: from that of the surface to the highest]
     #[arg(long, value_name = "BLACK,WHITE", value_parser = density, allow_hyphen_values = true)]
     density: Option<[f64; 2]>,
+    /// Draw so many pictures from all sides, evenly round the upright axis, into the directory of -o: 0000.png and on
+    #[arg(long, value_name = "N", value_parser = turns, conflicts_with = "errors")]
+    turntable: Option<usize>,
+}
+
+/// Sides that a turntable has.
+fn turns(s: &str) -> Result<usize, String> {
+    let count = s.parse().ok().filter(|n| (2..=3600).contains(n));
+    count.ok_or_else(|| "write a whole number from 2 to 3600".into())
 }
 
 fn density(s: &str) -> Result<[f64; 2], String> {
@@ -59,16 +70,19 @@ pub fn run(args: &Args) -> Outcome {
             "--density: only --mode volume shows densities; add that, or leave it out",
         ));
     }
+    // The same for all pictures of a turntable.
+    let card = OnceCell::new();
     let on_card = |asked: &Asked, view: &View| {
         let solid = args.solid(asked)?;
-        let drawn = Card::open().and_then(|card| {
+        let card = card.get_or_init(Card::open).as_ref().map_err(Clone::clone);
+        let drawn = card.and_then(|card| {
             let manner = Manner {
                 mode: args.mode,
                 solid: solid.as_ref(),
                 density: args.density(asked),
                 bricks: of_bricks(),
             };
-            still(&card, &asked.scene, view, manner)
+            still(card, &asked.scene, view, manner)
         });
         match drawn {
             Ok(pixels) => Ok(Some(pixels)),
@@ -79,5 +93,5 @@ pub fn run(args: &Args) -> Outcome {
             }
         }
     };
-    picture::draw(&args.picture, &on_card)
+    picture::draw(&args.picture, &on_card, args.turntable)
 }

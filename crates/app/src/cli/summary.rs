@@ -163,6 +163,12 @@ impl Summary {
         print(&self.text(json), output.is_stdout())
     }
 
+    /// Writes the object or the table of what lies under a name already.
+    pub fn print_of(mut self, output: String, json: bool) -> Outcome {
+        self.output = Some(output);
+        print(&self.text(json), false)
+    }
+
     fn text(&self, json: bool) -> String {
         if json { self.json() } else { self.table() }
     }

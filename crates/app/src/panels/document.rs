@@ -28,6 +28,7 @@ pub fn document(ui: &mut egui::Ui, bench: &mut Bench) {
     }
     ui.add_space(10.0);
     super::surface(ui, bench);
+    super::show(ui, bench);
     super::constraints(ui, bench);
     ui.heading("History");
     egui::ScrollArea::vertical()

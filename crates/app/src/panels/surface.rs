@@ -49,7 +49,7 @@ pub fn surface(ui: &mut egui::Ui, bench: &mut Bench) {
                 return;
             };
             let chosen = show(ui, densities, thing);
-            if bench.look.mode != Mode::Mesh {
+            if bench.look.mode != Mode::Mesh || bench.look.cut.is_some() {
                 let range = densities.histogram.range;
                 shades(ui, &mut bench.look.density, range);
             }

@@ -15,7 +15,8 @@ pub struct Brush {
     pub paper: wgpu::RenderPipeline,
 }
 
-const VERTEX: wgpu::VertexBufferLayout<'_> = wgpu::VertexBufferLayout {
+/// As shaders read corners.
+pub const VERTEX: wgpu::VertexBufferLayout<'_> = wgpu::VertexBufferLayout {
     array_stride: size_of::<Vertex>() as u64,
     step_mode: wgpu::VertexStepMode::Vertex,
     attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32, 3 => Float32],

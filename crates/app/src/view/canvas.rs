@@ -1,21 +1,24 @@
 //! The graphics card: triangles in, a picture out.
 
-use std::collections::BTreeMap;
+use std::cell::OnceCell;
+use std::collections::{BTreeMap, BTreeSet};
 
 use bytemuck::{Pod, Zeroable};
 use eframe::egui_wgpu::wgpu::{self, util::DeviceExt};
 use glam::{DMat4, DVec3};
 
-use super::Camera;
+use super::beside::Tinted;
 use super::brush::{Brush, shadow};
 use super::cast::Cast;
 use super::lights::{self, Axes, Lights};
+use super::overlay::{Lines, Overlay, edges};
 use super::rays::Solid;
 use super::read;
 use super::shape::Patch;
+use super::{Camera, Show, Tint};
 
 /// Samples of a pixel in a picture that stays.
-const SAMPLES: u32 = 4;
+pub const SAMPLES: u32 = 4;
 /// Share of the pixels of a side that are drawn of triangles while something moves.
 const ROUGH: f32 = 0.5;
 /// Of all depths.
@@ -38,7 +41,14 @@ pub struct Look {
     pub density: [f64; 2],
     /// What is behind all.
     pub paper: Paper,
+    /// What is shown beside the solids.
+    pub show: Show,
+    /// Width of lines, as a share of the picture's height.
+    pub line: f32,
 }
+
+/// Width of lines in pictures without a window, as a share of the height.
+pub const LINE: f32 = 1.25 / 800.0;
 
 /// How solids become pixels.
 #[derive(
@@ -84,13 +94,26 @@ struct Scene {
     cut_normal: [f32; 4],
     shows: [f32; 4],
     paper: [[f32; 4]; 2],
+    picture: [f32; 4],
+    density: [f32; 4],
 }
 
 /// Triangles on the card.
-struct Held {
+pub struct Held {
     vertices: wgpu::Buffer,
     indices: wgpu::Buffer,
     count: u32,
+    /// The same, to be coloured otherwise and for their sides.
+    pub(super) patch: Patch,
+    pub(super) is_painted: bool,
+    wires: OnceCell<Lines>,
+}
+
+impl Held {
+    /// Sides of the triangles.
+    pub fn wires(&self, device: &wgpu::Device) -> &Lines {
+        self.wires.get_or_init(|| Lines::new(device, &edges(&self.patch)))
+    }
 }
 
 /// Where a picture is drawn to.
@@ -128,7 +151,16 @@ pub struct Canvas {
     shadow: wgpu::RenderPipeline,
     /// For one sample, and for [`SAMPLES`].
     brushes: [Brush; 2],
-    held: BTreeMap<(String, [i32; 3]), Held>,
+    pub(super) held: BTreeMap<(String, [i32; 3]), Held>,
+    /// What is drawn besides.
+    pub(super) overlay: Overlay,
+    /// What colours tell in place of paint.
+    pub(super) tinted: Option<Tinted>,
+    /// Objects that are not drawn, and what they are without triangles.
+    pub(super) hidden: BTreeSet<String>,
+    pub(super) aside: BTreeMap<String, Solid>,
+    /// How many scenes there were.
+    pub(super) scenes: u64,
     /// What throws shadows in place of these.
     shades: Option<Held>,
     /// The same.
@@ -183,6 +215,11 @@ impl Canvas {
         Self {
             cast: can_cast.then(|| Box::new(Cast::new(device, queue, layouts, bricks))),
             brushes: [1, SAMPLES].map(|n| Brush::new(device, &shader, [&layout, &looked_up], n)),
+            overlay: Overlay::new(device, [layout.clone(), looked_up.clone()]),
+            tinted: None,
+            hidden: BTreeSet::new(),
+            aside: BTreeMap::new(),
+            scenes: 0,
             shadow: shadow(device, &shader, &layout),
             lights: Lights::new(device, &looked_up, sky),
             sky: None,
@@ -200,8 +237,13 @@ impl Canvas {
     }
 
     /// What was drawn is old.
-    fn renew(&mut self) {
+    pub(super) fn renew(&mut self) {
         self.sky = None;
+        self.redraw();
+    }
+
+    /// The same, but light falls as before.
+    pub(super) fn redraw(&mut self) {
         self.targets.iter_mut().flatten().for_each(|t| t.drawn = None);
         self.cast.iter_mut().for_each(|cast| cast.renew());
     }
@@ -227,10 +269,17 @@ impl Canvas {
 
     /// Puts a spline in place of the one that an object was, to be drawn without triangles.
     pub fn put_solid(&mut self, object: &str, solid: Solid) {
+        if self.hidden.contains(object) {
+            self.aside.insert(object.into(), solid);
+            return;
+        }
         if let Some(cast) = &mut self.cast
             && cast.rays.put(object, solid)
         {
             cast.renew();
+            if self.overlay.caps.forget(object) {
+                self.redraw();
+            }
         }
     }
 
@@ -238,6 +287,9 @@ impl Canvas {
     pub fn begin(&mut self, origin: DVec3, radius: f64) {
         (self.origin, self.radius) = (origin, radius);
         self.held.clear();
+        self.overlay.clear();
+        self.aside.clear();
+        self.scenes += 1;
         self.cast.iter_mut().for_each(|cast| cast.rays.clear());
         self.renew();
     }
@@ -245,6 +297,8 @@ impl Canvas {
     /// Forgets those of an object.
     pub fn forget(&mut self, object: &str) {
         self.held.retain(|(name, _), _| name != object);
+        self.aside.remove(object);
+        self.overlay.caps.forget(object);
         self.cast.iter_mut().for_each(|cast| cast.rays.forget(object));
         self.renew();
     }
@@ -265,7 +319,12 @@ impl Canvas {
         self.renew();
     }
 
-    fn hold(&self, patch: &Patch) -> Held {
+    pub(super) fn hold(&self, patch: &Patch) -> Held {
+        let tinted = self
+            .tinted
+            .as_ref()
+            .map(|tinted| tinted.patch(patch, self.origin));
+        let shown = tinted.as_ref().unwrap_or(patch);
         let buffer = |label, contents: &[u8], usage| {
             let contents = wgpu::util::BufferInitDescriptor {
                 label: Some(label),
@@ -277,7 +336,7 @@ impl Canvas {
         Held {
             vertices: buffer(
                 "vertices",
-                bytemuck::cast_slice(&patch.vertices),
+                bytemuck::cast_slice(&shown.vertices),
                 wgpu::BufferUsages::VERTEX,
             ),
             indices: buffer(
@@ -286,6 +345,9 @@ impl Canvas {
                 wgpu::BufferUsages::INDEX,
             ),
             count: patch.indices.len() as u32,
+            is_painted: shown.vertices.iter().any(|v| v.paint != 0.0),
+            patch: patch.clone(),
+            wires: OnceCell::new(),
         }
     }
 
@@ -310,6 +372,7 @@ impl Canvas {
             _ => self.new_target(size, if is_rough { 1 } else { SAMPLES }),
         };
         if target.drawn != Some(*look) {
+            self.prepare_caps(look, is_rough);
             // What is cut off would still throw its shadow.
             let is_lit = !is_rough && look.cut.is_none();
             self.paint(&target, look, which, is_lit, |_| true);
@@ -327,8 +390,7 @@ impl Canvas {
 
     /// Tells the card of a look, and where its lights stand.
     pub(super) fn tell(&self, look: &Look, size: [u32; 2]) {
-        let aspect = f64::from(size[0]) / f64::from(size[1]);
-        let scene = self.scene_of(look, aspect);
+        let scene = self.scene_of(look, size);
         self.queue
             .write_buffer(&self.scene, 0, bytemuck::bytes_of(&scene));
         let axes = look.camera.axes();
@@ -350,6 +412,9 @@ impl Canvas {
     ) {
         let brush = &self.brushes[which];
         self.tell(look, target.size);
+        let is_shared = self.paint_of(look) > 1.0;
+        let is_besides = is_shared || self.overlay.is_shown(look);
+        let besides = is_besides.then(|| self.overlay.brushes(which, [1, SAMPLES][which]));
         let is_sky_old = self.sky.is_none();
         let mut encoder = self
             .device
@@ -360,7 +425,7 @@ impl Canvas {
                 pass.set_bind_group(0, &self.bindings, &[]);
                 match &self.shades {
                     Some(shades) => draw([shades], pass, light),
-                    None => draw(self.held.values(), pass, light),
+                    None => draw(self.visible().map(|(_, held)| held), pass, light),
                 }
             });
         }
@@ -396,14 +461,27 @@ impl Canvas {
             pass.set_bind_group(0, &self.bindings, &[]);
             pass.set_pipeline(&brush.paper);
             pass.draw(0..3, 0..1);
+            let [plain, lit] = match besides.filter(|_| is_shared) {
+                Some(brushes) => brushes.shared.each_ref(),
+                None => [&brush.surface, &brush.lit],
+            };
+            pass.set_pipeline(if is_lit { lit } else { plain });
             if is_lit {
-                pass.set_pipeline(&brush.lit);
                 pass.set_bind_group(1, &self.lights.bindings, &[]);
-            } else {
-                pass.set_pipeline(&brush.surface);
             }
-            let shown = self.held.iter().filter(|((name, _), _)| shown(name));
-            draw(shown.map(|(_, held)| held), &mut pass, 0);
+            let shown = || {
+                self.visible()
+                    .filter(|(name, _)| shown(name))
+                    .map(|(_, held)| held)
+            };
+            draw(shown(), &mut pass, 0);
+            if let Some(brushes) = besides {
+                self.overlay.draw(&mut pass, brushes, look, shown());
+                // Lines come before it, and hide it.
+                if self.overlay.has_veil(look) && look.mode != Mode::Rays {
+                    self.overlay.draw_veil(&mut pass, brushes);
+                }
+            }
         }
         self.queue.submit([encoder.finish()]);
         if is_lit {
@@ -411,7 +489,8 @@ impl Canvas {
         }
     }
 
-    fn scene_of(&self, look: &Look, aspect: f64) -> Scene {
+    fn scene_of(&self, look: &Look, size: [u32; 2]) -> Scene {
+        let aspect = f64::from(size[0]) / f64::from(size[1]);
         let camera = &look.camera;
         let reach = self.radius + camera.center.distance(self.origin);
         let columns = |m: DMat4| m.as_mat4().to_cols_array_2d();
@@ -424,12 +503,29 @@ impl Canvas {
             cut_at: (cut_at - self.origin).extend(0.0).as_vec4().to_array(),
             cut_normal: cut_normal.extend(has_cut).as_vec4().to_array(),
             shows: [
-                f32::from(u8::from(look.paint)),
+                self.paint_of(look),
                 self.lights.count as f32,
                 self.radius as f32,
                 0.0,
             ],
             paper: look.paper.light(),
+            picture: [
+                size[0] as f32,
+                size[1] as f32,
+                (look.line * size[1] as f32).max(1.0),
+                (camera.height / f64::from(size[1])) as f32,
+            ],
+            density: [look.density[0] as f32, look.density[1] as f32, 0.0, 0.0],
+        }
+    }
+
+    /// What paint is to shaders.
+    pub(super) fn paint_of(&self, look: &Look) -> f32 {
+        match look.show.tint {
+            Tint::Off if look.paint => 1.0,
+            Tint::Off => 0.0,
+            _ if self.tinted.is_some() => 2.0,
+            _ => 0.0,
         }
     }
 
@@ -524,7 +620,8 @@ impl Canvas {
     }
 }
 
-fn draw<'a>(all: impl IntoIterator<Item = &'a Held>, pass: &mut wgpu::RenderPass<'_>, instance: u32) {
+/// Draws triangles as a light, or whoever looks, sees them.
+pub fn draw<'a>(all: impl IntoIterator<Item = &'a Held>, pass: &mut wgpu::RenderPass<'_>, instance: u32) {
     for held in all {
         pass.set_vertex_buffer(0, held.vertices.slice(..));
         pass.set_index_buffer(held.indices.slice(..), wgpu::IndexFormat::Uint32);

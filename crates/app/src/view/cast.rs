@@ -40,6 +40,8 @@ struct Sheet {
     ground: Target,
     first: Target,
     last: Target,
+    /// What is painted on triangles, if anything is.
+    paints: Option<Target>,
     /// For the first look and the second.
     bindings: [wgpu::BindGroup; 2],
     look: Option<Look>,
@@ -158,8 +160,10 @@ impl Canvas {
         let is_lit = !is_rough && look.cut.is_none() && look.mode == Mode::Rays;
         if sheet.look != Some(*look) {
             self.paint(&sheet.ground, look, 0, is_lit, |name| !cast.rays.holds(name));
+            self.paint_sheet(passes, &mut sheet, look);
             (sheet.look, sheet.stage) = (Some(*look), Stage::First(0));
         }
+        let was_done = sheet.stage == Stage::Done;
         // A whole picture waits until all is there.
         let is_ready = is_rough || prepared != Prepared::Begun;
         if is_ready && sheet.stage != Stage::Done {
@@ -182,6 +186,10 @@ impl Canvas {
                 None => {}
             }
         }
+        if !was_done && sheet.stage == Stage::Done {
+            let drawn = if is_rough { &sheet.first } else { &sheet.last };
+            self.veil_over([&drawn.picture, &sheet.first.depth], look);
+        }
         let rows = match sheet.stage {
             Stage::First(rows) => rows as f32 / size[1] as f32,
             _ => 1.0,
@@ -199,15 +207,33 @@ impl Canvas {
 
     fn new_sheet(&self, passes: &Passes, size: [u32; 2]) -> Sheet {
         let [ground, first, last] = std::array::from_fn(|_| self.new_target(size, 1));
-        let bindings = [&ground, &first]
-            .map(|before: &Target| passes.ground(&ground.picture, &ground.depth, &before.picture));
+        let bindings = bindings(passes, [&ground, &first], None);
         Sheet {
             ground,
             first,
             last,
+            paints: None,
             bindings,
             look: None,
             stage: Stage::First(0),
+        }
+    }
+
+    /// Has lines find the paint of triangles, if a look shows any.
+    fn paint_sheet(&self, passes: &Passes, sheet: &mut Sheet, look: &Look) {
+        if look.mode != Mode::Rays || !self.is_painted(look) {
+            if sheet.paints.take().is_some() {
+                sheet.bindings = bindings(passes, [&sheet.ground, &sheet.first], None);
+            }
+            return;
+        }
+        if sheet.paints.is_none() {
+            let paints = self.new_target(sheet.first.size, 1);
+            sheet.bindings = bindings(passes, [&sheet.ground, &sheet.first], Some(&paints));
+            sheet.paints = Some(paints);
+        }
+        if let Some(paints) = &sheet.paints {
+            self.paint_alone(paints, look);
         }
     }
 
@@ -277,6 +303,12 @@ impl Canvas {
             (false, _) => Stage::First(end),
         };
     }
+}
+
+/// What is drawn before the first look and before the second, with paint, if there is some.
+fn bindings(passes: &Passes, [ground, first]: [&Target; 2], paints: Option<&Target>) -> [wgpu::BindGroup; 2] {
+    let paints = paints.map_or(passes.nothing(), |paints| &paints.picture);
+    [ground, first].map(|before| passes.ground([&ground.picture, &ground.depth, &before.picture, paints]))
 }
 
 const KEPT: wgpu::Operations<wgpu::Color> = wgpu::Operations {

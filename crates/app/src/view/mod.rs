@@ -1,5 +1,6 @@
 //! What is seen: where the eye is, the triangles on the graphics card, and what lies under the mouse.
 
+mod beside;
 mod brush;
 mod camera;
 mod canvas;
@@ -7,26 +8,32 @@ mod card;
 mod cast;
 mod histogram;
 mod lights;
+mod overlay;
 mod pick;
 mod rays;
 mod read;
 mod scale_bar;
 mod screen;
 mod shape;
+mod show;
 mod slice;
 mod still;
 #[cfg(test)]
 mod tests;
 
+pub use beside::Tinted;
 pub use camera::{Camera, Ray};
-pub use canvas::{Canvas, Look, Mode, Paper};
+pub use canvas::{Canvas, LINE, Look, Mode, Paper};
 pub use card::Card;
 pub use histogram::Histogram;
+pub use overlay::legend::Legend;
+pub use overlay::{Ink, Stretch, cells, floor};
 pub use pick::{leave, pick};
 pub use rays::{BUDGET, Solid};
 pub use scale_bar::scale_bar;
 pub use screen::{SKY, Screen};
-pub use shape::{Patch, Shape};
+pub use shape::{Patch, Shape, second};
+pub use show::{Cells, Show, Tint};
 pub use slice::{Slice, sides};
 #[cfg(test)]
 use still::MESH;

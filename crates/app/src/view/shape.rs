@@ -74,11 +74,20 @@ impl Shape {
     /// # Errors
     /// That the surface cannot be followed, such as for its size.
     pub fn new(object: &Object, iso: f64, world_from_object: DAffine3) -> Result<Self, PolygonizeError> {
+        Self::of_depth(object, iso, world_from_object, depth(object))
+    }
+
+    /// The same with so many halvings of the first cells, at most.
+    fn of_depth(
+        object: &Object,
+        iso: f64,
+        world_from_object: DAffine3,
+        depth: usize,
+    ) -> Result<Self, PolygonizeError> {
         let world_box = object.field.world_box();
         let size = world_box.size();
         let edge = size.max_element() / CELLS;
         let cells = (size / edge).ceil().max(DVec3::ONE).to_array().map(|n| n as u32);
-        let depth = depth(object);
         let options = AdaptiveOptions {
             iso,
             depth,
@@ -238,6 +247,35 @@ impl Shape {
         let indices = triangles.into_iter().flatten().collect();
         (vertices.collect(), indices)
     }
+}
+
+/// Triangles of another density of an object, about as fine as those that are shown of it, but no more than `most`, unless the coarsest
+/// are.
+///
+/// # Errors
+/// As [`Shape::new`].
+pub fn second(
+    object: &Object,
+    iso: f64,
+    world_from_object: DAffine3,
+    origin: DVec3,
+    most: usize,
+) -> Result<Vec<Patch>, PolygonizeError> {
+    let finest = depth(object);
+    let mut patches = Vec::new();
+    // The coarser ones take a third of the time of the last.
+    for depth in finest.saturating_sub(2).max(1)..=finest {
+        let finer = Shape::of_depth(object, iso, world_from_object, depth)?.all("", origin);
+        let count: usize = finer.iter().map(|patch| patch.indices.len() / 3).sum();
+        if count > most && !patches.is_empty() {
+            break;
+        }
+        patches = finer;
+        if 3 * count > most {
+            break;
+        }
+    }
+    Ok(patches)
 }
 
 /// Halvings of the first cells that show what an object is shaped to.

@@ -92,6 +92,22 @@ impl Slice {
     }
 }
 
+impl Slice {
+    /// The share of the picture at which a place is, or the one that it is over.
+    pub fn share_of(&self, p: DVec3) -> [f64; 2] {
+        let [corner, right, down] = self.place;
+        let pixel = [right, down].map(|way| (p - corner).dot(way) / way.length_squared());
+        std::array::from_fn(|a| (pixel[a] + 0.5) / self.size[a] as f64)
+    }
+
+    /// The place of a share of the picture, between pixels too.
+    pub fn place_at(&self, share: [f64; 2]) -> DVec3 {
+        let [corner, right, down] = self.place;
+        let pixel: [f64; 2] = std::array::from_fn(|a| share[a] * self.size[a] as f64 - 0.5);
+        corner + pixel[0] * right + pixel[1] * down
+    }
+}
+
 /// Of the surface in the picture: told from all greys by all eyes.
 const LINE: egui::Color32 = egui::Color32::from_rgb(255, 170, 60);
 
@@ -140,6 +156,12 @@ mod tests {
                         p.cmpge(within.min).all() && p.cmple(within.max + pixel).all(),
                         "{p}"
                     );
+                }
+                for share in [[0.0, 0.0], [0.3, 0.8], [1.0, 1.0]] {
+                    let again = slice.share_of(slice.place_at(share));
+                    assert!((0..2).all(|a| (again[a] - share[a]).abs() < 1e-9), "{again:?}");
+                    let pixel = 2.0 * within.size().max_element() / PIXELS;
+                    assert!(slice.place_at(share).distance(slice.at(share).0) < pixel);
                 }
                 // Up in the picture is up in the world.
                 let (above, below) = (slice.at([0.5, 0.1]).0, slice.at([0.5, 0.9]).0);

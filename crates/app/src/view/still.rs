@@ -3,13 +3,13 @@
 use bspline::Jet;
 use glam::DVec3;
 
-use super::canvas::{Canvas, Look, Paper};
+use super::canvas::{Canvas, LINE, Look, Paper};
 use super::lights::MOST;
 #[cfg(test)]
 use super::rays::BUDGET;
 use super::rays::Solid;
 use super::shape::{NOTHING, Vertex};
-use super::{Camera, Card, Mode, Patch};
+use super::{Camera, Card, Mode, Patch, Show};
 use crate::picture::{Scene, Surface, View};
 
 /// How a picture without a window is drawn.
@@ -70,6 +70,8 @@ pub fn easel(card: &Card, scene: &Scene, view: &View, manner: Manner) -> (Canvas
         mode: manner.mode,
         density: manner.density,
         paper: Paper::Light,
+        show: Show::default(),
+        line: LINE,
     };
     (canvas, look)
 }

@@ -1,5 +1,7 @@
 //! The graphics card against the processor, against the field itself, and against how it drew before.
 
+mod beside;
+
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -12,7 +14,9 @@ use formats::field::FieldMeta;
 use glam::{DAffine3, DVec2, DVec3};
 
 use super::still::easel;
-use super::{BUDGET, Camera, Canvas, Card, Look, MESH, Manner, Mode, Paper, SKY, Shape, Solid, pick, still};
+use super::{
+    BUDGET, Camera, Canvas, Card, Look, MESH, Manner, Mode, Paper, SKY, Shape, Show, Solid, pick, still,
+};
 use crate::picture::{Drawing, Scene, Surface, View, clay, depths};
 
 const SIZE: [usize; 2] = [240, 180];
@@ -341,6 +345,32 @@ fn difference(a: &[u8], b: &[u8]) -> (f64, f64) {
     (mean, far)
 }
 
+/// An object on the canvas of a window, and a look at it.
+fn on_canvas(card: &Card, object: &Object) -> (Canvas, Look) {
+    let mut shape = Shape::new(object, 0.0, DAffine3::IDENTITY).unwrap();
+    let bounds: Aabb = shape.bounding_box().unwrap();
+    let origin = bounds.center();
+    let radius = 0.5 * bounds.size().length();
+    let mut canvas = Canvas::new(&card.device, &card.queue, SKY, BUDGET);
+    canvas.begin(origin, radius);
+    shape
+        .all("solid", origin)
+        .iter()
+        .for_each(|patch| canvas.put(patch));
+    canvas.put_solid("solid", Solid::of(object, 0.0, DAffine3::IDENTITY).unwrap());
+    let look = Look {
+        camera: Camera::onto(origin, radius, DVec3::Y),
+        cut: None,
+        paint: true,
+        mode: Mode::Mesh,
+        density: [0.0, 3.0],
+        paper: Paper::Dark,
+        show: Show::default(),
+        line: 1.0 / 120.0,
+    };
+    (canvas, look)
+}
+
 /// The viewport as it was looked at and found good. `UPDATE_SNAPSHOTS=1` draws it anew.
 #[test]
 fn the_viewport_looks_as_it_did() {
@@ -352,25 +382,8 @@ fn the_viewport_looks_as_it_did() {
         ..FieldMeta::default()
     };
     let object = Object::of(solid().into(), meta);
-    let mut shape = Shape::new(&object, 0.0, DAffine3::IDENTITY).unwrap();
-    let bounds: Aabb = shape.bounding_box().unwrap();
-    let origin = bounds.center();
-    let radius = 0.5 * bounds.size().length();
-    let mut canvas = Canvas::new(&card.device, &card.queue, SKY, BUDGET);
-    canvas.begin(origin, radius);
-    shape
-        .all("solid", origin)
-        .iter()
-        .for_each(|patch| canvas.put(patch));
-    canvas.put_solid("solid", Solid::of(&object, 0.0, DAffine3::IDENTITY).unwrap());
-    let whole = Look {
-        camera: Camera::onto(origin, radius, DVec3::Y),
-        cut: None,
-        paint: true,
-        mode: Mode::Mesh,
-        density: [0.0, 3.0],
-        paper: Paper::Dark,
-    };
+    let (mut canvas, whole) = on_canvas(&card, &object);
+    let origin = canvas.origin();
     let cut = Look {
         cut: Some((origin, whole.camera.axes()[2])),
         ..whole

@@ -12,6 +12,7 @@ use glam::DVec3;
 
 use super::measure::{Mark, Measure};
 use super::orders::{Order, Sheet};
+use super::show::Shown;
 use super::tool::{Kind, Tool};
 use super::touch::{Held, Seen};
 use crate::panels;
@@ -62,6 +63,10 @@ pub struct Bench {
     pub held: Option<Held>,
     /// What it does and feels.
     pub seen: Option<Seen>,
+    /// What is known of what is shown beside the solids.
+    pub shown: Shown,
+    /// Pictures of the scene as files.
+    pub shot: panels::Shots,
     /// The tool that it was told of.
     pub(super) told_tool: Option<Tool>,
     pub(super) orders: Sender<Order>,
@@ -71,6 +76,7 @@ pub struct Bench {
 impl Bench {
     /// Gives the desk an order.
     pub fn order(&self, order: Order) {
+        self.shown.remember(&order);
         // A desk that has fallen is told of when the window closes.
         let _ = self.orders.send(order);
     }
@@ -156,7 +162,7 @@ impl Bench {
         else {
             return;
         };
-        let has_density = self.look.mode != Mode::Mesh;
+        let has_density = self.look.mode != Mode::Mesh || self.look.cut.is_some();
         if !has_density || self.density_of.as_ref() == Some(&thing.name) {
             return;
         }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::view::Mode;
+use crate::view::{Mode, Show};
 
 /// What is kept.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -12,6 +12,8 @@ use crate::view::Mode;
 pub struct Kept {
     /// How solids become pixels.
     pub mode: Mode,
+    /// What is shown beside them.
+    pub show: Show,
 }
 
 fn file(home: &Path) -> PathBuf {
@@ -29,8 +31,7 @@ impl Kept {
     ///
     /// # Errors
     /// Why it cannot be written.
-    pub fn keep(&mut self, mode: Mode, home: &Path) -> Result<(), String> {
-        let now = Self { mode };
+    pub fn keep(&mut self, now: Self, home: &Path) -> Result<(), String> {
         if now == *self {
             return Ok(());
         }
@@ -59,9 +60,21 @@ mod tests {
         let within = home.path().join("isoclay");
         let mut kept = Kept::read(&within);
         assert_eq!(kept.mode, Mode::Mesh);
-        kept.keep(Mode::Volume, &within).unwrap();
+        let now = Kept {
+            mode: Mode::Volume,
+            show: Show {
+                wireframe: true,
+                scale_bar: false,
+                ..Show::default()
+            },
+        };
+        kept.keep(now, &within).unwrap();
+        assert_eq!(kept, now);
         assert_eq!(Kept::read(&within), kept);
         std::fs::write(file(&within), "{").unwrap();
         assert_eq!(Kept::read(&within), Kept::default());
+        // What older windows kept says nothing of what is shown.
+        std::fs::write(file(&within), "{\"mode\":\"rays\"}").unwrap();
+        assert_eq!(Kept::read(&within).show, Show::default());
     }
 }

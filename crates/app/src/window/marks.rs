@@ -6,9 +6,27 @@ use tools::number::Point;
 
 use super::modeler::Modeler;
 use super::tool::{Kind, Tool};
+use crate::cli::quantity::human_number;
 
 /// Sides of the ring that shows the tool.
 const RING: usize = 48;
+/// Length of the arrow of the largest force of a stroke, in radii of the scene.
+const LARGEST: f64 = 0.3;
+/// Sides of a box whose corners have the numbers `4x + 2y + z`.
+const SIDES: [[usize; 2]; 12] = [
+    [0, 1],
+    [2, 3],
+    [4, 5],
+    [6, 7],
+    [0, 2],
+    [1, 3],
+    [4, 6],
+    [5, 7],
+    [0, 4],
+    [1, 5],
+    [2, 6],
+    [3, 7],
+];
 /// Length of the arrow of a newton, in radii of the scene.
 const ARROW: f64 = 0.12;
 
@@ -77,6 +95,37 @@ impl Modeler {
         painter.circle_filled(self.on_screen(rect, p), 2.0, color);
     }
 
+    /// Draws the force of a stroke and the box that moves. The first arrow is as long as the largest of the stroke so far.
+    pub(super) fn draw_acting(&self, ui: &egui::Ui, rect: Rect) {
+        let Some((acting, most)) = self.bench.shown.acting.filter(|_| self.bench.look.show.forces) else {
+            return;
+        };
+        let painter = ui.painter().with_clip_rect(rect);
+        let corners = acting.region.map(|p| self.on_screen(rect, p));
+        let side = Stroke::new(1.0, Color32::from_rgba_unmultiplied(120, 200, 255, 110));
+        for [a, b] in SIDES {
+            painter.line_segment([corners[a], corners[b]], side);
+        }
+        let size = acting.force.length();
+        if size > 0.0 && most > 0.0 {
+            let way = LARGEST * self.bench.scene.1 / most * acting.force;
+            let from = self.on_screen(rect, acting.at);
+            let told = format!("force {} (of density)", human_number(size));
+            self.arrow(&painter, from, self.on_screen(rect, acting.at + way), told);
+        }
+    }
+
+    fn arrow(&self, painter: &egui::Painter, from: Pos2, tip: Pos2, told: String) {
+        let color = Color32::from_rgb(230, 90, 80);
+        painter.arrow(from, tip - from, Stroke::new(4.5, Color32::from_black_alpha(90)));
+        painter.arrow(from, tip - from, Stroke::new(2.5, color));
+        let font = egui::FontId::proportional(13.0);
+        for (aside, color) in [(1.0, Color32::from_black_alpha(170)), (0.0, color)] {
+            let at = tip + egui::vec2(8.0 + aside, aside);
+            painter.text(at, egui::Align2::LEFT_CENTER, &told, font.clone(), color);
+        }
+    }
+
     /// Draws the tool, the hand that draws at it, and the force.
     pub(super) fn draw_hand(&self, ui: &egui::Ui, rect: Rect) {
         let (Some(held), Some(seen)) = (&self.bench.held, &self.bench.seen) else {
@@ -91,17 +140,13 @@ impl Modeler {
         painter.line_segment([tool, hand], Stroke::new(1.0, Color32::from_white_alpha(120)));
         painter.circle_filled(hand, 3.0, Color32::from_white_alpha(160));
         let way = (seen.proxy - seen.hand).normalize_or_zero();
-        if seen.force > 0.01 && way != DVec3::ZERO {
-            let force = Color32::from_rgb(230, 90, 80);
+        if self.bench.look.show.forces && seen.force > 0.01 && way != DVec3::ZERO {
             let tip = seen.proxy + ARROW * self.bench.scene.1 * seen.force * way;
-            let tip = self.on_screen(rect, tip);
-            painter.arrow(tool, tip - tool, Stroke::new(2.5, force));
-            painter.text(
-                tip + egui::vec2(8.0, 0.0),
-                egui::Align2::LEFT_CENTER,
+            self.arrow(
+                &painter,
+                tool,
+                self.on_screen(rect, tip),
                 format!("{:.2} N", seen.force),
-                egui::FontId::proportional(13.0),
-                force,
             );
         }
     }

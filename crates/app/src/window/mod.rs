@@ -3,6 +3,7 @@
 mod adjust;
 mod bench;
 mod desk;
+mod four;
 mod gesture;
 mod hand;
 mod kept;
@@ -12,6 +13,8 @@ mod modeler;
 pub mod orders;
 mod preview;
 pub mod samples;
+pub mod shot;
+pub mod show;
 pub mod tool;
 pub mod touch;
 

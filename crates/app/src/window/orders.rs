@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use bspline::{Aabb, Field};
-use document::State;
+use document::{Live, Object, State};
 use formats::Unit;
 use formats::field::SourceKind;
 use glam::{DAffine3, DVec3};
@@ -98,10 +98,35 @@ pub enum News {
     Held(Option<touch::Held>),
     /// What it does and feels.
     Seen(Seen),
+    /// The force of the stroke in the hand; none when it has ended.
+    Acting(Option<Acting>),
     /// Something to tell.
     Note(String),
     /// Something that could not be done.
     Failed(String),
+}
+
+/// What a force tool does to the solid, in the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Acting {
+    /// Where the tool is.
+    pub at: DVec3,
+    /// The force, in the units of density that the springs have.
+    pub force: DVec3,
+    /// Corners of the box that moves, number `4x + 2y + z`.
+    pub region: [DVec3; 8],
+}
+
+impl Acting {
+    /// Of a stroke whose tool is at a place of its object's world, and pushes so there; none where no forces are at work.
+    pub fn of(live: &Live, at: DVec3, force: DVec3, world_from_object: DAffine3) -> Option<Self> {
+        let place = |p: DVec3| world_from_object.transform_point3(p);
+        Some(Self {
+            at: place(at),
+            force: world_from_object.transform_vector3(force),
+            region: live.moving()?.map(place),
+        })
+    }
 }
 
 impl News {
@@ -155,6 +180,8 @@ pub struct Thing {
     pub coefficients: usize,
     /// Its constraints, in its own world.
     pub holds: Vec<Held>,
+    /// All of it.
+    pub object: Object,
 }
 
 impl Thing {
@@ -174,6 +201,7 @@ impl Thing {
             },
             coefficients: object.field.coefficient_count(),
             holds: object.properties.holds.clone(),
+            object: object.clone(),
         })
     }
 }

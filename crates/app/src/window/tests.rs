@@ -11,6 +11,7 @@ use fitting::{Cancel, Control};
 use glam::DVec3;
 
 mod panels;
+mod show;
 
 use super::desk::Desk;
 use super::modeler::Modeler;

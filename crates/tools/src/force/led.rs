@@ -169,6 +169,22 @@ impl<T: Real> ForceStroke<T> {
         each.sum()
     }
 
+    /// Corners of the box of cells that move now, number `4x + 2y + z`, in the world.
+    pub fn moving(&self) -> [DVec3; 8] {
+        let cells = self.region.cells();
+        let scale = (-(cells.level as f64)).exp2();
+        std::array::from_fn(|n| {
+            let at = DVec3::from_array(std::array::from_fn(|a| {
+                let corner = (n >> (2 - a) & 1) as u32;
+                f64::from(cells.first[a] + corner * cells.count[a])
+            }));
+            self.field
+                .lattice()
+                .world_from_lattice
+                .transform_point3(scale * at)
+        })
+    }
+
     /// How much more force all paths together ask for when their ends go on by one world length, to first order, and how much they would in
     /// unpainted matter; 0 before the first step.
     ///

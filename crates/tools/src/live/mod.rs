@@ -233,6 +233,11 @@ impl LiveStroke {
         })
     }
 
+    /// Of a force tool the box that moves: see [`ForceStroke::moving`](crate::force::ForceStroke::moving).
+    pub fn moving(&self) -> Option<[DVec3; 8]> {
+        self.work.moving()
+    }
+
     /// Lays paint on, here and now, while a force tool works.
     ///
     /// # Errors

@@ -123,6 +123,11 @@ impl Work {
         Some((self.force.as_ref()?, self.last?.at))
     }
 
+    /// Of a force tool the box that moves.
+    pub fn moving(&self) -> Option<[DVec3; 8]> {
+        Some(self.force.as_ref()?.moving())
+    }
+
     /// The motion of a stroke from the canvas as it was.
     pub fn carry(&mut self, stroke: &Stroke, stays: bool, control: &mut Control) -> Result<(), ToolError> {
         self.steps += 1;

@@ -103,6 +103,18 @@ impl Rays {
         is_other
     }
 
+    /// Takes one away.
+    pub fn take(&mut self, name: &str) -> Option<Solid> {
+        let solid = self.solids.remove(name);
+        self.forget(name);
+        solid
+    }
+
+    /// All of them, by their names.
+    pub fn solids(&self) -> impl Iterator<Item = (&String, &Solid)> {
+        self.solids.iter()
+    }
+
     /// Whether it draws an object.
     pub fn holds(&self, name: &str) -> bool {
         self.solids.contains_key(name)

@@ -45,6 +45,8 @@ pub struct Passes {
     shader: wgpu::ShaderModule,
     layouts: [wgpu::BindGroupLayout; 4],
     eye: wgpu::Buffer,
+    /// A picture of one clear pixel.
+    nothing: wgpu::Texture,
     /// Made when they are needed first: that takes a while.
     pipelines: [OnceCell<wgpu::RenderPipeline>; Pass::ALL.len()],
 }
@@ -101,6 +103,7 @@ impl Passes {
                 texture(0, color),
                 texture(1, wgpu::TextureSampleType::Depth),
                 texture(2, color),
+                texture(3, color),
             ],
         );
         Self {
@@ -114,10 +117,26 @@ impl Passes {
                 usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
                 mapped_at_creation: false,
             }),
+            // Pictures begin clear.
+            nothing: device.create_texture(&wgpu::TextureDescriptor {
+                label: Some("nothing"),
+                size: wgpu::Extent3d::default(),
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: COLOR,
+                usage: wgpu::TextureUsages::TEXTURE_BINDING,
+                view_formats: &[],
+            }),
             layouts: [scene, lights, solids, ground],
             pipelines: Default::default(),
             device: device.clone(),
         }
+    }
+
+    /// A picture of one clear pixel.
+    pub fn nothing(&self) -> &wgpu::Texture {
+        &self.nothing
     }
 
     /// Tells the next passes of the eye.
@@ -131,14 +150,9 @@ impl Passes {
         self.group(2, &all.map(|buffer| buffer.as_entire_binding()))
     }
 
-    /// What passes know of what was drawn before: behind the solids, with its depths, and at the first look.
-    pub fn ground(
-        &self,
-        color: &wgpu::Texture,
-        depth: &wgpu::Texture,
-        first: &wgpu::Texture,
-    ) -> wgpu::BindGroup {
-        let views = [color, depth, first].map(|t| t.create_view(&wgpu::TextureViewDescriptor::default()));
+    /// What passes know of what was drawn before: behind the solids, with its depths, at the first look, and the paint of triangles.
+    pub fn ground(&self, drawn: [&wgpu::Texture; 4]) -> wgpu::BindGroup {
+        let views = drawn.map(|t| t.create_view(&wgpu::TextureViewDescriptor::default()));
         self.group(3, &views.each_ref().map(wgpu::BindingResource::TextureView))
     }
 

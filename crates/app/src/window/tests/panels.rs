@@ -15,7 +15,7 @@ fn choose(window: &mut Harness<'_, Modeler>, menu: &str, item: &str) {
 }
 
 /// Writes into a field by its label, in place of what is there.
-fn write(window: &mut Harness<'_, Modeler>, role: Role, label: &str, text: &str) {
+pub fn write(window: &mut Harness<'_, Modeler>, role: Role, label: &str, text: &str) {
     let field = window.get_by_role_and_label(role, label);
     field.focus();
     field.click();

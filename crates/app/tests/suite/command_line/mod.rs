@@ -8,6 +8,7 @@ mod feel;
 mod gallery;
 mod meshes;
 mod strokes;
+mod turntable;
 
 use std::io::{Read, Write};
 use std::process::Stdio;

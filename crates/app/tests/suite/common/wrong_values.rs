@@ -212,6 +212,7 @@ pub const ROWS: &[Row] = &[
     ("mesh", "--axes", "@cloud --axes *xyz", "lps"),
     ("picture render", "--size", "@cloud --size *8", "1200x900"),
     ("render", "--mode", "@cloud --mode *points", "volume"),
+    ("render", "--turntable", "@cloud --turntable *1", "2 to 3600"),
     ("render", "--density", "@cloud --mode volume --density *9,1", "lower one first"),
     ("picture render", "--azimuth", "@cloud --azimuth *east", "number"),
     ("picture render", "--elevation", "@cloud --elevation *inf", "finite"),

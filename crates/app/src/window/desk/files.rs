@@ -1,0 +1,62 @@
+//! What the desk writes.
+
+use std::path::Path;
+
+use super::Desk;
+use crate::cli::desk_files;
+use crate::window::orders::News;
+
+impl Desk {
+    /// Goes on in a copy under another name.
+    pub(super) fn save(&mut self, path: &Path) -> Result<(), String> {
+        self.end();
+        let Some(open) = &mut self.open else { return Ok(()) };
+        let (from, was_untitled) = (open.path.clone(), open.is_untitled);
+        if from == path {
+            return Ok(());
+        }
+        // Every edit is in its file already.
+        open.document = None;
+        let copied = formats::atomic::replace(path, |out| {
+            std::io::copy(&mut std::fs::File::open(&from)?, out).map(drop)
+        });
+        if copied.is_ok() {
+            (open.path, open.is_untitled) = (path.to_path_buf(), false);
+        }
+        self.reopen()?;
+        if was_untitled && copied.is_ok() {
+            // It has a name now. What cannot be removed is only in the way.
+            let _ = std::fs::remove_file(&from);
+        }
+        copied.map_err(|e| format!("{}: {e}", path.display()))
+    }
+
+    /// Opens the file anew whose document was closed; what is seen of it stays.
+    pub(super) fn reopen(&mut self) -> Result<(), String> {
+        let Some(open) = &mut self.open else { return Ok(()) };
+        match desk_files::open(&open.path, &mut Vec::new()) {
+            Ok(document) => self.take_back(document),
+            Err(why) => {
+                self.open = None;
+                self.tell(News::Empty);
+                return Err(why);
+            }
+        }
+        Ok(())
+    }
+
+    pub(super) fn export(&mut self, out: &Path, scan: Option<&Path>) -> Result<(), String> {
+        self.end();
+        let Some(open) = &mut self.open else { return Ok(()) };
+        // The command opens it for itself alone.
+        open.document = None;
+        let (path, chosen) = (open.path.clone(), open.chosen.clone());
+        let file = out.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let show = |stage: &str, share: f64| self.tell(News::Busy(Some((format!("{file}: {stage}"), share))));
+        show("writing", 0.0);
+        let written = desk_files::export(&path, &chosen, out, scan, &self.begin_long(), &show);
+        self.tell(News::Busy(None));
+        self.reopen()?;
+        written.map(|()| self.tell(News::Note(format!("{} is written", out.display()))))
+    }
+}

@@ -1,0 +1,135 @@
+//! What the mouse does in the scene.
+
+use std::time::Instant;
+
+use egui::{PointerButton, Pos2, Rect};
+use glam::DVec2;
+
+use super::Modeler;
+use super::viewport::at;
+use crate::window::gesture::{Gesture, Way};
+use crate::window::orders::Order;
+
+impl Modeler {
+    pub(super) fn end_gesture(&mut self) {
+        if let Some(Gesture::Stroke(_)) = self.gesture.take() {
+            self.bench.order(Order::End);
+        }
+    }
+
+    pub(super) fn pointer(&mut self, ui: &egui::Ui, rect: Rect, response: &egui::Response, over: Pos2) {
+        if self.adjust(ui, rect, over) {
+            return;
+        }
+        let (keys, scroll, pressed) = ui.input(|i| {
+            let pressed = [
+                PointerButton::Primary,
+                PointerButton::Secondary,
+                PointerButton::Middle,
+            ]
+            .into_iter()
+            .find(|b| i.pointer.button_pressed(*b));
+            (i.modifiers, i.smooth_scroll_delta().y, pressed)
+        });
+        if response.hovered() && scroll != 0.0 {
+            let factor = (-0.003 * f64::from(scroll)).exp();
+            self.bench.look.camera.zoom(factor, at(rect, over));
+            self.moved = Instant::now();
+        }
+        let tool = self.bench.tool_in_hand(keys);
+        // While a scan is read or a file is written strokes would have to wait.
+        let is_free = self.bench.busy.is_none() && self.gesture.is_none();
+        // A slow picture may hold a press, its way and even the release.
+        let (start, moves) = ui.input(|i| since_press(&i.events));
+        let start = start.unwrap_or(over);
+        let under = is_free.then(|| self.under(rect, start)).flatten();
+        if let Some(button) = pressed.filter(|_| response.hovered() && self.gesture.is_none()) {
+            if let (PointerButton::Primary, Some((p, normal))) = (button, under) {
+                if self.bench.measure.is_some() {
+                    self.bench.mark(p, normal);
+                    return;
+                }
+                if self.bench.pins {
+                    self.bench.pin(p);
+                    return;
+                }
+            }
+            self.gesture = Some(match (button, keys.shift, keys.alt) {
+                (PointerButton::Primary, _, false) if self.leads_by_mouse() && under.is_some() => {
+                    Gesture::Hand
+                }
+                (PointerButton::Primary, _, false) if under.is_some() && self.bench.held.is_none() => {
+                    let reach = self.pixels_of(rect, tool.radius);
+                    self.bench.order(Order::Begin {
+                        tool,
+                        ray: self.ray(rect, start),
+                    });
+                    Gesture::Stroke(Way::new(start, (0.2 * reach).clamp(2.0, 24.0)))
+                }
+                (PointerButton::Middle, true, _) | (PointerButton::Secondary, ..) => Gesture::Pan,
+                _ => Gesture::Orbit,
+            });
+            if !matches!(self.gesture, Some(Gesture::Stroke(_))) {
+                return;
+            }
+        }
+        let way = ui.input(|i| i.pointer.delta());
+        let way = DVec2::new(f64::from(way.x), -f64::from(way.y)) / f64::from(rect.height());
+        match &mut self.gesture {
+            Some(Gesture::Stroke(path)) => {
+                let steps: Vec<Pos2> = moves.into_iter().flat_map(|to| path.to(to)).collect();
+                for step in &steps {
+                    self.bench.order(Order::Along(self.ray(rect, *step)));
+                }
+                if !steps.is_empty() {
+                    self.meet_desk();
+                }
+            }
+            Some(Gesture::Orbit) if way != DVec2::ZERO => {
+                self.bench.look.camera.orbit(way);
+                self.moved = Instant::now();
+            }
+            Some(Gesture::Pan) if way != DVec2::ZERO => {
+                self.bench.look.camera.pan(way);
+                self.moved = Instant::now();
+            }
+            _ => {}
+        }
+        self.lead(rect, over);
+        if let (Some((p, normal)), None, None) = (under, self.gesture, &self.bench.held) {
+            self.ring(ui, rect, p, normal, &tool);
+        }
+    }
+
+    fn leads_by_mouse(&self) -> bool {
+        self.bench.held.as_ref().is_some_and(|held| held.mouse.is_some())
+    }
+
+    /// What a button that is down does.
+    pub(in crate::window) fn gesture(&self) -> Option<Gesture> {
+        self.gesture
+    }
+}
+
+/// Where a button went down last among the events of a picture, if one did, and the way from there, or from the beginning, until one
+/// came up.
+fn since_press(events: &[egui::Event]) -> (Option<Pos2>, Vec<Pos2>) {
+    let pressed = events
+        .iter()
+        .enumerate()
+        .rev()
+        .find_map(|(n, event)| match event {
+            egui::Event::PointerButton {
+                pos, pressed: true, ..
+            } => Some((n + 1, *pos)),
+            _ => None,
+        });
+    let way = &events[pressed.map_or(0, |(n, _)| n)..];
+    let is_release = |event: &egui::Event| matches!(event, egui::Event::PointerButton { pressed: false, .. });
+    let until = way.iter().position(is_release).unwrap_or(way.len());
+    let moves = way[..until].iter().filter_map(|event| match event {
+        egui::Event::PointerMoved(to) => Some(*to),
+        _ => None,
+    });
+    (pressed.map(|(_, at)| at), moves.collect())
+}

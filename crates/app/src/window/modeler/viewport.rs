@@ -1,0 +1,131 @@
+//! The scene in the middle, and where things are in it.
+
+use std::time::Duration;
+
+use egui::layers::ShapeIdx;
+use egui::{Pos2, Rect, Sense};
+use glam::{DVec2, DVec3};
+
+use super::Modeler;
+use crate::view::{Legend, Ray, pick, scale_bar};
+
+/// Time after which a picture in which nothing moves is drawn whole.
+const STILL: Duration = Duration::from_millis(60);
+
+impl Modeler {
+    /// The scene, and what the mouse does in it.
+    pub(in crate::window) fn viewport(&mut self, ui: &mut egui::Ui) {
+        let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
+        // What the mouse does now shows in this picture, which is painted below what is drawn over it.
+        let below = ui.painter().add(egui::Shape::Noop);
+        let over = response.hover_pos().or(response.interact_pointer_pos());
+        if let Some(over) = over {
+            self.pointer(ui, rect, &response, over);
+        }
+        let is_still = self.moved.elapsed() > STILL && self.gesture.is_none();
+        self.bench.know_density();
+        self.bench.look.line = 1.25 / rect.height();
+        self.beside(ui.ctx());
+        let pixels = (rect.size() * ui.ctx().pixels_per_point()).round();
+        // The card draws one whole picture at a time.
+        let is_shot = self.shoot([pixels.x as u32, pixels.y as u32]);
+        let is_done = self.draw(ui, below, rect, is_still && !is_shot) && !is_shot;
+        if !is_done {
+            ui.ctx().request_repaint();
+        }
+        if !is_still {
+            ui.ctx().request_repaint_after(STILL);
+        }
+        if let Some(thing) = self.bench.sheet.as_ref().and_then(|s| s.objects.get(s.chosen))
+            && self.bench.look.show.scale_bar
+        {
+            let length_of_point = self.bench.look.camera.height / f64::from(rect.height());
+            scale_bar(ui.painter(), rect, length_of_point, thing.unit);
+        }
+        Legend::draw(&self.bench.legends(), ui.painter(), rect);
+        self.draw_cursor(ui, rect);
+        self.draw_holds(ui, rect);
+        self.draw_marks(ui, rect);
+        self.draw_hand(ui, rect);
+        self.draw_acting(ui, rect);
+        if response.drag_stopped() || !ui.input(|i| i.pointer.any_down()) {
+            self.end_gesture();
+        }
+    }
+
+    /// Draws the scene in place of a shape, or as much of it as there is time for; whether that is all.
+    fn draw(&mut self, ui: &egui::Ui, below: ShapeIdx, rect: Rect, is_still: bool) -> bool {
+        let Some(screen) = &mut self.screen else {
+            return true;
+        };
+        let look = &self.bench.look;
+        let pixels = rect.size() * ui.ctx().pixels_per_point();
+        let rough = screen
+            .canvas
+            .rough_share(look.mode, f64::from(pixels.x * pixels.y));
+        let mut draw = |is_rough: bool| {
+            let pixels = if is_rough { pixels * rough } else { pixels }.round();
+            screen.draw(look, [pixels.x as u32, pixels.y as u32], is_rough)
+        };
+        let whole = is_still.then(|| draw(false));
+        // Until all rows are drawn the rough picture shows below them.
+        let shown = match &whole {
+            Some(whole) if whole.rows >= 1.0 => None,
+            _ => Some(draw(true)),
+        };
+        let is_done = whole
+            .as_ref()
+            .or(shown.as_ref())
+            .is_none_or(|drawn| drawn.is_done);
+        let shown = shown.map(|drawn| (drawn.picture, 1.0));
+        let whole = whole.map(|drawn| (drawn.picture, drawn.rows));
+        let pictures = shown.into_iter().chain(whole).map(|(picture, rows)| {
+            let corner = rect.min + egui::vec2(rect.width(), rows * rect.height());
+            let part = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, rows));
+            let rect = Rect::from_min_max(rect.min, corner);
+            egui::Shape::image(picture, rect, part, egui::Color32::WHITE)
+        });
+        ui.painter().set(below, egui::Shape::Vec(pictures.collect()));
+        is_done
+    }
+
+    pub(in crate::window) fn ray(&self, rect: Rect, over: Pos2) -> Ray {
+        self.bench.look.camera.ray(at(rect, over))
+    }
+
+    pub(in crate::window) fn on_screen(&self, rect: Rect, p: DVec3) -> Pos2 {
+        let place = self.bench.look.camera.place(p) * f64::from(rect.height());
+        rect.center() + egui::vec2(place.x as f32, -place.y as f32)
+    }
+
+    pub(in crate::window) fn pixels_of(&self, rect: Rect, length: f64) -> f32 {
+        (length / self.bench.look.camera.height) as f32 * rect.height()
+    }
+
+    /// Where the mouse is over the chosen object, and the normal there, in the world.
+    pub(in crate::window) fn under(&self, rect: Rect, over: Pos2) -> Option<(DVec3, DVec3)> {
+        let sheet = self.bench.sheet.as_ref()?;
+        let thing = sheet.objects.get(sheet.chosen)?;
+        if self.bench.shown.hidden.contains(&thing.name) {
+            return None;
+        }
+        let ray = self.ray(rect, over);
+        let own = thing.world_from_object.inverse();
+        let ray = Ray {
+            from: own.transform_point3(ray.from),
+            along: own.transform_vector3(ray.along).try_normalize()?,
+        };
+        let (p, normal) = pick(&*thing.field, thing.iso, &thing.own_box, &ray)?;
+        let turned = own.matrix3.transpose() * normal;
+        Some((
+            thing.world_from_object.transform_point3(p),
+            turned.normalize_or_zero(),
+        ))
+    }
+}
+
+/// Where a point of the screen is in the picture, in heights of it.
+pub(super) fn at(rect: Rect, p: Pos2) -> DVec2 {
+    let way = p - rect.center();
+    DVec2::new(f64::from(way.x), -f64::from(way.y)) / f64::from(rect.height())
+}
