@@ -16,7 +16,7 @@ fn linear(color: vec3<f32>) -> vec3<f32> {
 }
 
 // Colour of a share of the scale.
-fn shared(share: f32) -> vec3<f32> {
+fn of_scale(share: f32) -> vec3<f32> {
   let at = clamp(share, 0.0, 1.0) * 8.0;
   let n = min(u32(at), 7u);
   var scale = SCALE;
@@ -26,16 +26,16 @@ fn shared(share: f32) -> vec3<f32> {
 
 // Surfaces whose colours tell shares of a scale in place of paint.
 @fragment
-fn shade_shared_lit(in: Seen, @builtin(front_facing) is_front: bool) -> @location(0) vec4<f32> {
-  return colored(in, is_front, shared(in.paint), light_at(in));
+fn shade_scale_lit(in: Seen, @builtin(front_facing) is_front: bool) -> @location(0) vec4<f32> {
+  return colored(in, is_front, of_scale(in.paint), light_at(in));
 }
 
 @fragment
-fn shade_shared(in: Seen, @builtin(front_facing) is_front: bool) -> @location(0) vec4<f32> {
+fn shade_scale(in: Seen, @builtin(front_facing) is_front: bool) -> @location(0) vec4<f32> {
   if (is_cut(in.at)) {
     discard;
   }
-  return colored(in, is_front, shared(in.paint), all_light(in));
+  return colored(in, is_front, of_scale(in.paint), all_light(in));
 }
 
 // A line, or a dot where both ends are one; its colour as the screen has it.
@@ -125,7 +125,7 @@ fn paint_alone(in: Seen) -> @location(0) vec4<f32> {
   if (is_cut(in.at)) {
     discard;
   }
-  return vec4(select(painted(in.paint), shared(in.paint), scene.shows.x > 1.5), 1.0);
+  return vec4(select(painted(in.paint), of_scale(in.paint), scene.shows.x > 1.5), 1.0);
 }
 
 // A sheet of the clipping plane through a solid.

@@ -12,6 +12,7 @@ use tools::session::{Session, Stroke};
 use tools::tool::{Tool, ToolError};
 
 use crate::canvas::{canvas, left};
+use crate::family::{removed, renamed};
 use crate::{DocumentError, State};
 
 /// What makes an edit. The journal keeps it beside the difference that it made.
@@ -32,6 +33,24 @@ pub enum Command {
         /// The stroke.
         stroke: Box<Stroke>,
     },
+    /// Takes an object out of the document; what hangs on it hangs on its parent then, and stays where it is.
+    Remove {
+        /// Which.
+        object: String,
+    },
+    /// Gives an object another name.
+    Rename {
+        /// Which.
+        object: String,
+        /// Its new name.
+        to: String,
+    },
+}
+
+/// A line of a script in JSON: a stroke, or a whole command as the journal has it.
+enum Line {
+    Stroke(Box<Stroke>),
+    Command(Command),
 }
 
 /// Why a command cannot be done. The state is as it was.
@@ -65,7 +84,7 @@ pub enum CommandError {
 
 impl Command {
     /// What a script asks for, in its order: a scene is one command, of a session every stroke is one. `object` names the
-    /// object where a script names none. A text whose first sign is a brace is a session in JSON, one stroke a line; any other
+    /// object where a script names none. A text whose first sign is a brace is a session in JSON, one stroke or command a line; any other
     /// is TOML.
     ///
     /// # Errors
@@ -75,7 +94,7 @@ impl Command {
         object: impl Fn(Option<&str>) -> Result<String, E>,
     ) -> Result<Vec<Self>, E> {
         if text.trim_start().starts_with('{') {
-            return Self::of_strokes(strokes_of_lines(text)?, object);
+            return Self::of_lines(lines_of(text)?, object);
         }
         let table: toml::Table = parsed(text)?;
         if !table.contains_key("stroke") {
@@ -87,39 +106,57 @@ impl Command {
             }]);
         }
         let session: Session = parsed(text)?;
-        Self::of_strokes(session.stroke, object)
+        let strokes = session.stroke.into_iter().map(Box::new);
+        Self::of_lines(strokes.map(Line::Stroke).collect(), object)
     }
 
-    fn of_strokes<E: From<CommandError>>(
-        strokes: Vec<Stroke>,
+    fn of_lines<E: From<CommandError>>(
+        lines: Vec<Line>,
         object: impl Fn(Option<&str>) -> Result<String, E>,
     ) -> Result<Vec<Self>, E> {
         let mut made = BTreeSet::new();
-        let commands = strokes.into_iter().enumerate().map(|(n, stroke)| {
+        let commands = lines.into_iter().enumerate().map(|(n, line)| {
+            // Objects that are made on the way are not known yet.
+            let named = |own: Option<&str>, made: &BTreeSet<String>| match own {
+                Some(name) if made.contains(name) => Ok(name.to_string()),
+                own => object(own),
+            };
+            let command = match line {
+                Line::Stroke(stroke) => Self::Stroke {
+                    object: named(stroke.object.as_deref(), &made)?,
+                    stroke,
+                },
+                Line::Command(command) => {
+                    named(Some(command.object()), &made)?;
+                    command
+                }
+            };
             let wrong = |why| CommandError::Script(format!("stroke {}: {why}", n + 1));
-            let copy = match stroke.tool().map_err(wrong)? {
+            made.extend(command.makes().map_err(wrong)?);
+            Ok(command)
+        });
+        commands.collect()
+    }
+
+    /// The name of an object that it puts in, if it does.
+    fn makes(&self) -> Result<Option<String>, String> {
+        Ok(match self {
+            Self::Stroke { stroke, .. } => match stroke.tool()? {
                 Tool::Copy(copy) => Some(copy.to.clone()),
                 Tool::Cut(cut) => cut.to.clone(),
                 _ => None,
-            };
-            // Objects that are made on the way are not known yet.
-            let object = match &stroke.object {
-                Some(name) if made.contains(name) => name.clone(),
-                own => object(own.as_deref())?,
-            };
-            made.extend(copy);
-            Ok(Self::Stroke {
-                object,
-                stroke: Box::new(stroke),
-            })
-        });
-        commands.collect()
+            },
+            Self::Rename { to, .. } => Some(to.clone()),
+            Self::Scene { .. } | Self::Remove { .. } => None,
+        })
     }
 
     /// What it does, in a few words.
     pub fn title(&self) -> String {
         match self {
             Self::Scene { object, .. } => format!("scene on {object}"),
+            Self::Remove { object } => format!("remove {object}"),
+            Self::Rename { object, to } => format!("rename {object} to {to}"),
             Self::Stroke { object, stroke } => {
                 let name = stroke.tool().map_or("stroke", |tool| tool.name());
                 match stroke.step_count() {
@@ -134,7 +171,10 @@ impl Command {
     /// The object that it works on.
     pub fn object(&self) -> &str {
         match self {
-            Self::Scene { object, .. } | Self::Stroke { object, .. } => object,
+            Self::Scene { object, .. }
+            | Self::Stroke { object, .. }
+            | Self::Remove { object }
+            | Self::Rename { object, .. } => object,
         }
     }
 
@@ -163,6 +203,8 @@ impl Command {
                 let (canvas, notes) = stroke.applied(canvas(state, name)?, control)?;
                 Ok((left(state, name, canvas)?, notes))
             }
+            Self::Remove { .. } => Ok((removed(state, name)?, Vec::new())),
+            Self::Rename { to, .. } => Ok((renamed(state, name, to)?, Vec::new())),
         }
     }
 }
@@ -176,20 +218,26 @@ impl From<ToolError> for CommandError {
     }
 }
 
-/// Strokes in JSON, one a line; empty lines count for the numbers alone.
-fn strokes_of_lines(text: &str) -> Result<Vec<Stroke>, CommandError> {
+/// Strokes and commands in JSON, one a line; empty lines count for the numbers alone. Commands are told by their `tool`.
+fn lines_of(text: &str) -> Result<Vec<Line>, CommandError> {
     let lines = text
         .lines()
         .enumerate()
         .filter(|(_, line)| !line.trim().is_empty());
-    let stroke = |(n, line): (usize, &str)| {
-        serde_json::from_str(line).map_err(|e| {
+    let read = |(n, text): (usize, &str)| {
+        let is_command =
+            serde_json::from_str::<serde_json::Value>(text).is_ok_and(|all| all.get("tool").is_some());
+        let line = match is_command {
+            true => serde_json::from_str(text).map(Line::Command),
+            false => serde_json::from_str(text).map(Line::Stroke),
+        };
+        line.map_err(|e| {
             let (told, column) = (e.to_string(), e.column());
             let why = told.rsplit_once(" at line ").map_or(&told[..], |(why, _)| why);
             CommandError::Script(format!("line {}, column {column}: {why}", n + 1))
         })
     };
-    lines.map(stroke).collect()
+    lines.map(read).collect()
 }
 
 fn parsed<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, CommandError> {

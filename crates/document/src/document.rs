@@ -178,6 +178,20 @@ impl Document {
         Ok(self.read_text::<EditHead>(&edit)?.command)
     }
 
+    /// What was asked for by all edits that are done, one a line, as [`Command::of_script`](crate::Command::of_script) reads it: done on
+    /// [`first_state`](Self::first_state) it leads to the state that there is now, to the bit.
+    ///
+    /// # Errors
+    /// Of reading.
+    pub fn script(&mut self) -> Result<String, DocumentError> {
+        let mut lines = String::new();
+        for n in 0..self.counts()?.done {
+            lines.push_str(&self.command(n)?.to_string());
+            lines.push('\n');
+        }
+        Ok(lines)
+    }
+
     /// The objects before the first edit of the history.
     ///
     /// # Errors

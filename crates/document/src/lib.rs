@@ -18,6 +18,7 @@ mod command;
 mod document;
 mod entry;
 mod error;
+mod family;
 mod fineness;
 mod journal;
 mod layers;

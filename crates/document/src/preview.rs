@@ -41,8 +41,9 @@ impl Preview {
         let mut command = self.command.clone();
         match &mut command {
             Command::Stroke { stroke, .. } => stroke.put(pose)?,
-            Command::Scene { .. } => {
-                return Err(CommandError::Script("a scene has no place to be put to".into()));
+            Command::Scene { .. } | Command::Remove { .. } | Command::Rename { .. } => {
+                let why = format!("{} has no place to be put to", command.title());
+                return Err(CommandError::Script(why));
             }
         }
         *self = Self::of(&self.before, command, control)?;

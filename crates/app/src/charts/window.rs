@@ -15,7 +15,7 @@ use tools::live::Pose;
 use super::ball::{Ball, median, middle};
 use super::{Chart, Series};
 use crate::view::{BUDGET, Camera, Canvas, Card, LINE, Look, Mode, Paper, Patch, SKY, Shape, Show, Solid};
-use crate::window::tool::{Kind, Tool};
+use crate::window::tool::{Kind, Settings, Start, Tool};
 
 /// Finest levels of the balls.
 const DEPTHS: [u32; 3] = [2, 3, 4];
@@ -237,8 +237,9 @@ impl Stroke {
             radius: RADIUS * Ball::diagonal(),
             strength: 0.5,
             inverted: false,
+            settings: Settings::default(),
         };
-        let live = Live::begin(state, "ball", tool.stroke(at)).map_err(|e| e.to_string())?;
+        let live = Live::begin(state, "ball", tool.stroke(&Start::at(at))).map_err(|e| e.to_string())?;
         Ok(Self {
             live,
             tool,

@@ -174,6 +174,12 @@ pub fn home() -> PathBuf {
     usual.unwrap_or_else(|_| std::env::temp_dir()).join("isoclay")
 }
 
+/// Where settings are kept.
+pub fn settings() -> PathBuf {
+    let usual = etcetera::choose_base_strategy().map(|kept| kept.config_dir());
+    usual.unwrap_or_else(|_| std::env::temp_dir()).join("isoclay")
+}
+
 /// Documents in a directory, the newest first.
 pub fn kept(directory: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(directory).into_iter().flatten().flatten();

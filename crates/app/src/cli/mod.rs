@@ -22,7 +22,7 @@ mod check;
 mod coarse;
 mod compare;
 mod convert;
-mod cost;
+pub mod cost;
 #[cfg(feature = "window")]
 pub mod desk_files;
 mod devices;
@@ -274,7 +274,7 @@ impl Command {
             Self::Simulate(a) => (a.json, is_stdout(&a.output)),
             Self::New(a) => (a.json, false),
             Self::Sculpt(a) => (a.json, a.preview.as_deref().is_some_and(is_stdout)),
-            Self::History(a) => (a.json, false),
+            Self::History(a) => (a.json, a.script.as_deref().is_some_and(is_stdout)),
             Self::Undo(a) | Self::Redo(a) => (a.json, false),
             Self::Replay(a) => (a.json, false),
             Self::Export(a) => (a.json, is_stdout(&a.output)),

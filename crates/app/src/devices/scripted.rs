@@ -102,7 +102,8 @@ impl Trajectory {
         };
         let share = (time - from.at) / (to.at - from.at);
         let pose = Pose {
-            at: from.pose.at.lerp(to.pose.at, share),
+            // Not `lerp`, by which a hand at rest would tremble in its last digit.
+            at: from.pose.at + share * (to.pose.at - from.pose.at),
             turn: between(from.pose.turn, to.pose.turn, share),
         };
         (pose, from.buttons)

@@ -1,14 +1,14 @@
-//! What force tools have to keep: points that are pinned by a click.
+//! What force tools have to keep: points that are pinned by a click, lines that are drawn.
 
 use serde_json::json;
 
 use crate::window::Bench;
-use crate::window::orders::{Order, Thing};
+use crate::window::orders::Thing;
+use crate::window::tool::Kind;
 
 /// The constraints of the chosen object, and whether clicks pin.
 pub fn constraints(ui: &mut egui::Ui, bench: &mut Bench) {
-    let Some(sheet) = bench.sheet.clone() else { return };
-    let Some(thing) = sheet.objects.get(sheet.chosen) else {
+    let Some(thing) = bench.chosen().cloned() else {
         return;
     };
     egui::CollapsingHeader::new("Constraints")
@@ -16,24 +16,34 @@ pub fn constraints(ui: &mut egui::Ui, bench: &mut Bench) {
         .show(ui, |ui| {
             ui.toggle_value(&mut bench.pins, "Pin points (N)")
                 .on_hover_text("A click on the solid holds the surface there, whatever force tools do");
+            ui.horizontal(|ui| {
+                for kind in [Kind::PinLine, Kind::PinOutline] {
+                    let label = ui.selectable_label(bench.tool.kind == kind, kind.name());
+                    if label.on_hover_text(kind.hint()).clicked() {
+                        bench.take(kind);
+                    }
+                }
+            });
             for held in &thing.holds {
                 ui.horizontal(|ui| {
-                    ui.label(&held.name);
+                    let about = match (&held.spring, &held.lines[..]) {
+                        (Some(spring), _) => {
+                            format!("By springs of {} times the solid's stiffness", spring.0)
+                        }
+                        (None, [line]) if line.len() == 1 => "A point that does not move".into(),
+                        (None, _) => "A line that does not move".into(),
+                    };
+                    ui.label(&held.name).on_hover_text(about);
                     if ui.small_button("Free").clicked() {
-                        free(bench, json!({ "name": held.name }));
+                        bench.stroke(json!({ "free": { "name": held.name } }));
                     }
                 });
             }
             if thing.holds.len() > 1 && ui.small_button("Free all").clicked() {
-                free(bench, json!({}));
+                bench.stroke(json!({ "free": {} }));
             }
         });
     ui.add_space(10.0);
-}
-
-fn free(bench: &Bench, which: serde_json::Value) {
-    let stroke = serde_json::from_value(json!({ "free": which }));
-    bench.order(Order::Do(Box::new(stroke.expect("it is a stroke"))));
 }
 
 /// A name that no constraint of an object has.

@@ -1,103 +1,103 @@
-//! Along the top: files, edits, views.
+//! Along the top: files, edits, views. Every entry is an action, with its keys.
 
-use glam::DVec3;
-
-use super::PathBox;
 use crate::window::Bench;
-use crate::window::orders::Order;
+use crate::window::actions::{Action, Name};
+
+const FILE: &[&[Name]] = &[
+    &[Name::Open, Name::Preview, Name::NewClay],
+    &[Name::Save, Name::Export],
+    &[Name::RunScript, Name::SaveScript],
+    &[Name::Quit],
+];
+const EDIT: &[&[Name]] = &[
+    &[Name::Undo, Name::Redo],
+    &[Name::Arrange, Name::Shift, Name::Turn, Name::Scale],
+    &[Name::Duplicate, Name::Remove],
+    &[Name::Commands, Name::Shortcuts],
+];
+const VIEW: &[&[Name]] = &[
+    &[Name::Front, Name::Right, Name::Top, Name::All],
+    &[Name::Perspective, Name::Paint, Name::Wireframe, Name::Floor],
+    &[Name::Hide, Name::Alone, Name::ShowAll],
+    &[
+        Name::Slices,
+        Name::Clip,
+        Name::Touch,
+        Name::Measure,
+        Name::Simulation,
+        Name::Performance,
+        Name::Log,
+        Name::Picture,
+    ],
+    &[Name::Panels, Name::Sides],
+];
 
 /// Along the top.
 pub fn menu(ui: &mut egui::Ui, bench: &mut Bench) {
     egui::MenuBar::new().ui(ui, |ui| {
-        let sheet = bench.sheet.clone();
-        ui.menu_button("File", |ui| {
-            if ui.add(item("Open…", "Ctrl+O")).clicked() {
-                bench.asks = Some(PathBox::open());
-            }
-            if ui.button("New block of clay").clicked() {
-                bench.order(Order::Clay);
-            }
+        ui.menu_button("File", |ui| entries(ui, bench, FILE));
+        ui.menu_button("Edit", |ui| entries(ui, bench, EDIT));
+        ui.menu_button("View", |ui| {
+            entries(ui, bench, VIEW);
             ui.separator();
-            let is_open = sheet.is_some();
-            if ui.add_enabled(is_open, item("Save as…", "Ctrl+S")).clicked() {
-                bench.asks = sheet.as_ref().map(|s| PathBox::save(s));
-            }
-            if ui.add_enabled(is_open, egui::Button::new("Export…")).clicked() {
-                bench.asks = sheet.as_ref().map(|s| PathBox::export(s));
-            }
-            ui.separator();
-            if ui.button("Quit").clicked() {
-                ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
-            }
+            theme(ui);
         });
-        let (done, all) = sheet.as_ref().map_or((0, 0), |s| (s.done, s.history.len()));
-        ui.menu_button("Edit", |ui| {
-            if ui.add_enabled(done > 0, item("Undo", "Ctrl+Z")).clicked() {
-                bench.order(Order::Undo(1));
-            }
-            if ui.add_enabled(done < all, item("Redo", "Ctrl+Shift+Z")).clicked() {
-                bench.order(Order::Redo(1));
-            }
-        });
-        ui.menu_button("View", |ui| views(ui, bench));
         ui.separator();
-        if let Some(sheet) = sheet {
-            let name = sheet
-                .path
-                .file_stem()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned();
-            let name = if sheet.is_untitled {
-                format!("{name} (not saved yet)")
-            } else {
-                name
-            };
-            ui.label(egui::RichText::new(name).strong())
-                .on_hover_text(sheet.path.display().to_string());
-            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                super::modes(ui, bench);
-            });
+        let Some(sheet) = bench.sheet.clone() else { return };
+        let name = sheet
+            .path
+            .file_stem()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned();
+        let name = if sheet.is_untitled {
+            format!("{name} (not saved yet)")
+        } else {
+            name
+        };
+        ui.label(egui::RichText::new(name).strong())
+            .on_hover_text(sheet.path.display().to_string());
+        if bench.arranging {
+            ui.separator();
+            ui.colored_label(ui.visuals().warn_fg_color, "Arranging objects");
         }
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            super::modes(ui, bench);
+        });
     });
 }
 
-fn views(ui: &mut egui::Ui, bench: &mut Bench) {
-    let up = bench.look.camera.up;
-    let front = if up == DVec3::Z { -DVec3::Y } else { DVec3::Z };
-    for (name, key, axis) in [("Front", "1", front), ("Right", "3", DVec3::X), ("Top", "7", up)] {
-        if ui.add(item(name, key)).clicked() {
-            bench.look.camera.look_from(axis);
+fn entries(ui: &mut egui::Ui, bench: &mut Bench, groups: &[&[Name]]) {
+    for (n, names) in groups.iter().enumerate() {
+        if n > 0 {
+            ui.separator();
+        }
+        for action in names.iter().map(|name| Action::Do(*name)) {
+            let is_possible = action.is_possible(bench);
+            let keys = bench.keys.text(action);
+            match action.is_on(bench) {
+                Some(mut is_on) => {
+                    let text = match keys.is_empty() {
+                        true => action.text().to_string(),
+                        false => format!("{} ({keys})", action.text()),
+                    };
+                    let switch = egui::Checkbox::new(&mut is_on, text);
+                    if ui.add_enabled(is_possible, switch).changed() {
+                        action.run(bench, ui.ctx());
+                    }
+                }
+                None => {
+                    let button = egui::Button::new(action.text()).shortcut_text(keys);
+                    if ui.add_enabled(is_possible, button).clicked() {
+                        action.run(bench, ui.ctx());
+                    }
+                }
+            }
         }
     }
-    if ui.add(item("All", "Home")).clicked() {
-        bench.frame_all();
-    }
-    ui.separator();
-    ui.checkbox(&mut bench.look.camera.perspective, "Perspective (5)");
-    ui.checkbox(&mut bench.look.paint, "Painted stiffness");
-    let mut has_slices = bench.slices.is_some();
-    if ui.checkbox(&mut has_slices, "Slices").changed() {
-        bench.slices = has_slices.then(super::Slices::new);
-    }
-    let mut is_cut = bench.look.cut.is_some();
-    if ui.checkbox(&mut is_cut, "Clipping plane").changed() {
-        let toward_eye = bench.look.camera.axes()[2];
-        bench.look.cut = is_cut.then_some((bench.scene.0, toward_eye));
-    }
-    let mut has_touch = bench.touch.is_some();
-    if ui.checkbox(&mut has_touch, "Touch").changed() {
-        bench.touch = has_touch.then(super::TouchWish::new);
-        if bench.held.is_some() {
-            bench.order(Order::LetGo);
-        }
-    }
-    let mut measures = bench.measure.is_some();
-    if ui.checkbox(&mut measures, "Measure (M)").changed() {
-        bench.measure = measures.then(Default::default);
-    }
-    ui.checkbox(&mut bench.shows_log, "Log");
-    ui.separator();
+}
+
+fn theme(ui: &mut egui::Ui) {
     let mut theme = ui.options(|o| o.theme_preference);
     ui.horizontal(|ui| {
         for (is, name) in [
@@ -109,8 +109,4 @@ fn views(ui: &mut egui::Ui, bench: &mut Bench) {
         }
     });
     ui.ctx().set_theme(theme);
-}
-
-fn item<'a>(text: &'a str, keys: &'a str) -> egui::Button<'a> {
-    egui::Button::new(text).shortcut_text(keys)
 }

@@ -1,15 +1,22 @@
 //! Panels round the scene: one file each.
 
+mod commands;
 mod constraints;
 mod document;
+mod limits;
 mod log;
+mod matter;
 mod measure;
 mod menu;
 mod modes;
+mod part;
 mod path_box;
+mod performance;
 mod picture;
 mod profile;
+mod shortcuts;
 mod show;
+mod simulation;
 mod slices;
 mod start;
 mod status;
@@ -17,15 +24,22 @@ mod surface;
 mod tools;
 mod touch;
 
+pub use commands::{Commands, commands};
 pub use constraints::{constraints, next_pin};
 pub use document::document;
+pub use limits::limits;
 pub use log::log;
+pub use matter::{Fill, matter};
 pub use measure::measure;
 pub use menu::menu;
 pub use modes::{modes, next_mode};
+pub use part::{Part, is_large, part};
 pub use path_box::{PathBox, path_box};
+pub use performance::{Performance, performance};
 pub use picture::{Shots, picture};
+pub use shortcuts::{Shortcuts, shortcuts};
 pub use show::show;
+pub use simulation::{Simulation, simulation};
 pub use slices::{Slices, slice_beside, slices};
 pub use start::start;
 pub use status::status;

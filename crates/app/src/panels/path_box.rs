@@ -10,6 +10,9 @@ use crate::window::orders::{Order, Sheet};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Purpose {
     Open,
+    OpenPart,
+    RunScript,
+    SaveScript,
     Save,
     Export,
 }
@@ -28,6 +31,22 @@ impl PathBox {
     /// For one to open.
     pub fn open() -> Self {
         Self::new(Purpose::Open, String::new())
+    }
+
+    /// For a volume of which a part is opened.
+    pub fn open_part() -> Self {
+        Self::new(Purpose::OpenPart, String::new())
+    }
+
+    /// For a script that is done.
+    pub fn run_script() -> Self {
+        Self::new(Purpose::RunScript, String::new())
+    }
+
+    /// For the script of all edits that are done.
+    pub fn save_script(sheet: &Sheet) -> Self {
+        let name = sheet.path.file_stem().unwrap_or_default().to_string_lossy();
+        Self::new(Purpose::SaveScript, format!("{name}.jsonl"))
     }
 
     /// For the name of a document.
@@ -58,6 +77,9 @@ impl PathBox {
     fn title(&self) -> &'static str {
         match self.purpose {
             Purpose::Open => "Open",
+            Purpose::OpenPart => "Open a part",
+            Purpose::RunScript => "Run script",
+            Purpose::SaveScript => "Save script",
             Purpose::Save => "Save as",
             Purpose::Export => "Export",
         }
@@ -67,6 +89,15 @@ impl PathBox {
         match self.purpose {
             Purpose::Open => {
                 "A document .isoclay, a field .iclay, a cloud or mesh .ply .obj .pcd .las .xyz …, a volume .nii .nrrd .mha …"
+            }
+            Purpose::OpenPart => {
+                "A volume .nii .nrrd .mha …, or a DICOM series: what is asked next is how much of it"
+            }
+            Purpose::RunScript => {
+                "Strokes or a scene .toml, or strokes .jsonl, as isoclay sculpt does them on the chosen object"
+            }
+            Purpose::SaveScript => {
+                "All edits that are done, one a line, .jsonl: isoclay sculpt does them again"
             }
             Purpose::Save => "A document .isoclay. From then on every edit goes there",
             Purpose::Export => {
@@ -83,8 +114,10 @@ impl PathBox {
         std::thread::spawn(move || {
             let dialog = rfd::FileDialog::new();
             let path = match purpose {
-                Purpose::Open => dialog.pick_file(),
-                Purpose::Save | Purpose::Export => dialog.set_file_name(name).save_file(),
+                Purpose::Open | Purpose::OpenPart | Purpose::RunScript => dialog.pick_file(),
+                Purpose::Save | Purpose::SaveScript | Purpose::Export => {
+                    dialog.set_file_name(name).save_file()
+                }
             };
             let _ = tell.send(path);
             context.request_repaint();
@@ -141,7 +174,11 @@ pub fn path_box(context: &egui::Context, bench: &mut Bench) {
     });
     goes_on &= !modal.should_close();
     if is_given && !asks.text.trim().is_empty() {
-        bench.order(order(&asks));
+        match asks.purpose {
+            Purpose::Open => bench.open(asks.text.trim().into()),
+            Purpose::OpenPart => bench.part = Some(super::Part::of(asks.text.trim().into())),
+            _ => bench.order(order(&asks)),
+        }
     } else if goes_on {
         bench.asks = Some(asks);
     }
@@ -150,7 +187,12 @@ pub fn path_box(context: &egui::Context, bench: &mut Bench) {
 fn order(asks: &PathBox) -> Order {
     let path = PathBuf::from(asks.text.trim());
     match asks.purpose {
-        Purpose::Open => Order::Open(path),
+        Purpose::Open | Purpose::OpenPart => Order::Open(path),
+        Purpose::RunScript => Order::RunScript(path),
+        Purpose::SaveScript => Order::SaveScript(match path.extension() {
+            Some(_) => path,
+            None => path.with_extension("jsonl"),
+        }),
         Purpose::Save => Order::Save(match path.extension() {
             Some(_) => path,
             None => path.with_extension("isoclay"),

@@ -1,16 +1,15 @@
 //! What is shown beside the solids themselves.
 
 use crate::cli::quantity::human_number;
-use crate::view::{Cells, Histogram, Tint};
+use crate::view::{Cells, Tint};
 use crate::window::Bench;
-use crate::window::orders::Thing;
 use crate::window::show::Layer;
 
 /// What colours may tell.
 const TINTS: [(Tint, &str); 4] = [
-    (Tint::Off, "clay, and painted stiffness"),
-    (Tint::Errors, "errors of the fit"),
-    (Tint::Touch, "stiffness to the touch"),
+    (Tint::Off, "clay and paint"),
+    (Tint::Errors, "errors of fit"),
+    (Tint::Touch, "touch stiffness"),
     (Tint::Friction, "friction"),
 ];
 /// How cells of the fit may be coloured.
@@ -22,22 +21,22 @@ const CELLS: [(Cells, &str); 3] = [
 
 /// Boxes for all that may be shown beside the solids.
 pub fn show(ui: &mut egui::Ui, bench: &mut Bench) {
-    let Some(sheet) = bench.sheet.clone() else { return };
+    if bench.sheet.is_none() {
+        return;
+    }
     egui::CollapsingHeader::new("Show").show(ui, |ui| {
         let show = &mut bench.look.show;
         ui.checkbox(&mut show.wireframe, "Wireframe")
             .on_hover_text("Sides of the triangles that are shown, in the mode Mesh");
         ui.checkbox(&mut show.second, "Second surface")
             .on_hover_text("A surface of another density, looked through: skin over bone");
-        if show.second
-            && let Some(thing) = sheet.objects.get(sheet.chosen)
-        {
-            second(ui, bench, thing);
+        if show.second {
+            second(ui, bench);
         }
         let show = &mut bench.look.show;
-        egui::ComboBox::new("tint", "colours")
+        egui::ComboBox::new("tint", "Colours")
             .selected_text(name(&TINTS, show.tint))
-            .width(110.0)
+            .width(112.0)
             .show_ui(ui, |ui| {
                 for (tint, name) in TINTS {
                     ui.selectable_value(&mut show.tint, tint, name);
@@ -45,9 +44,9 @@ pub fn show(ui: &mut egui::Ui, bench: &mut Bench) {
             });
         word(ui, bench, Layer::Tint);
         let show = &mut bench.look.show;
-        egui::ComboBox::new("cells", "octree")
+        egui::ComboBox::new("cells", "Octree")
             .selected_text(name(&CELLS, show.cells))
-            .width(110.0)
+            .width(112.0)
             .show_ui(ui, |ui| {
                 for (cells, name) in CELLS {
                     ui.selectable_value(&mut show.cells, cells, name);
@@ -65,9 +64,6 @@ pub fn show(ui: &mut egui::Ui, bench: &mut Bench) {
             .on_hover_text("Arrows of forces at the tool, in newtons");
         if ui.button("Picture…").clicked() {
             bench.shot.is_open = true;
-        }
-        if sheet.objects.len() > 1 {
-            objects(ui, bench, &sheet.objects, sheet.chosen);
         }
     });
     ui.add_space(10.0);
@@ -93,13 +89,7 @@ fn word(ui: &mut egui::Ui, bench: &Bench, layer: Layer) {
 }
 
 /// Which density the second surface has.
-fn second(ui: &mut egui::Ui, bench: &mut Bench, thing: &Thing) {
-    let is_known = matches!(&bench.shown.second, Some((name, _)) if *name == thing.name);
-    if !is_known || bench.shown.second_range.is_none() {
-        let histogram = Histogram::new(&*thing.field, &thing.own_box);
-        bench.shown.second_range = Some(histogram.range);
-        bench.shown.second = Some((thing.name.clone(), beside(histogram.range, thing.iso)));
-    }
+fn second(ui: &mut egui::Ui, bench: &mut Bench) {
     let (Some((_, density)), Some([low, high])) = (&mut bench.shown.second, bench.shown.second_range) else {
         return;
     };
@@ -116,35 +106,4 @@ fn second(ui: &mut egui::Ui, bench: &mut Bench, thing: &Thing) {
         *density = wished;
     }
     word(ui, bench, Layer::Second);
-}
-
-/// A first density for the second surface: between that of the first and the end that is farther from it.
-fn beside([low, high]: [f64; 2], iso: f64) -> f64 {
-    match iso - low < high - iso {
-        true => iso + 0.35 * (high - iso),
-        false => iso - 0.35 * (iso - low),
-    }
-}
-
-/// Which objects are drawn.
-fn objects(ui: &mut egui::Ui, bench: &mut Bench, things: &[Thing], chosen: usize) {
-    ui.separator();
-    for thing in things {
-        let mut is_shown = !bench.shown.hidden.contains(&thing.name);
-        if ui.checkbox(&mut is_shown, &thing.name).changed() {
-            match is_shown {
-                true => bench.shown.hidden.remove(&thing.name),
-                false => bench.shown.hidden.insert(thing.name.clone()),
-            };
-        }
-    }
-    ui.horizontal(|ui| {
-        if ui.button("Only the chosen").clicked() {
-            let others = things.iter().enumerate().filter(|(n, _)| *n != chosen);
-            bench.shown.hidden = others.map(|(_, thing)| thing.name.clone()).collect();
-        }
-        if ui.button("All").clicked() {
-            bench.shown.hidden.clear();
-        }
-    });
 }

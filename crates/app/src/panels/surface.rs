@@ -68,7 +68,9 @@ fn shades(ui: &mut egui::Ui, [black, white]: &mut [f64; 2], [low, high]: [f64; 2
     ui.horizontal(|ui| {
         for (name, density) in [("Black", black), ("White", white)] {
             let label = ui.label(name);
-            let value = egui::DragValue::new(density).speed((high - low) / 300.0);
+            let value = egui::DragValue::new(density)
+                .speed((high - low) / 300.0)
+                .custom_formatter(|n, _| human_number(n));
             ui.add(value).labelled_by(label.id);
         }
     });

@@ -72,10 +72,12 @@ impl Canvas {
         self.redraw();
     }
 
-    /// Puts a surface that is looked through in place of the one that there was.
-    pub fn put_veil(&mut self, patches: &[Patch]) {
+    /// Puts a second surface of an object in place of the one that there was: what is looked through, or what is seen within an object.
+    /// By rays it is always looked through.
+    pub fn put_veil(&mut self, patches: &[Patch], within: Option<&str>) {
         let tinted = self.tinted.take();
         self.overlay.veil = patches.iter().map(|patch| self.hold(patch)).collect();
+        self.overlay.within = within.map(str::to_owned);
         self.tinted = tinted;
         self.redraw();
     }
@@ -165,7 +167,8 @@ impl Canvas {
         {
             let load = wgpu::LoadOp::Load;
             let mut pass = self.pass(&mut encoder, [picture, depth], load, wgpu::LoadOp::Load);
-            self.overlay.draw_veil(&mut pass, self.overlay.brushes(0, 1));
+            self.overlay
+                .draw_veil(&mut pass, self.overlay.brushes(0, 1), self.overlay.veil.iter());
         }
         self.queue.submit([encoder.finish()]);
     }

@@ -413,6 +413,9 @@ impl Canvas {
         let brush = &self.brushes[which];
         self.tell(look, target.size);
         let is_shared = self.paint_of(look) > 1.0;
+        let around = self.overlay.around(look);
+        // What is looked through would still throw its shadow.
+        let is_lit = is_lit && around.is_none();
         let is_besides = is_shared || self.overlay.is_shown(look);
         let besides = is_besides.then(|| self.overlay.brushes(which, [1, SAMPLES][which]));
         let is_sky_old = self.sky.is_none();
@@ -474,12 +477,19 @@ impl Canvas {
                     .filter(|(name, _)| shown(name))
                     .map(|(_, held)| held)
             };
-            draw(shown(), &mut pass, 0);
+            let (veiled, bare): (Vec<&Held>, Vec<&Held>) =
+                shown().partition(|held| around == Some(&held.patch.object));
+            draw(bare, &mut pass, 0);
+            if around.is_some() {
+                draw(&self.overlay.veil, &mut pass, 0);
+            }
             if let Some(brushes) = besides {
                 self.overlay.draw(&mut pass, brushes, look, shown());
                 // Lines come before it, and hide it.
                 if self.overlay.has_veil(look) && look.mode != Mode::Rays {
-                    self.overlay.draw_veil(&mut pass, brushes);
+                    let own = self.overlay.veil.iter().filter(|_| around.is_none());
+                    let veil = own.chain(veiled.iter().copied());
+                    self.overlay.draw_veil(&mut pass, brushes, veil);
                 }
             }
         }

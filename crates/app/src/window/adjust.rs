@@ -18,28 +18,29 @@ pub struct Adjust {
     before: f64,
 }
 
+/// What the mouse sets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum What {
+pub enum What {
+    /// Of the tool.
     Radius,
+    /// Of the tool.
     Strength,
 }
 
 impl Modeler {
-    /// Begins with the keys that are pressed.
-    pub(super) fn adjust_by_keys(&mut self, ui: &egui::Ui) {
+    /// Begins what was asked for.
+    pub(super) fn begin_adjust(&mut self, ui: &egui::Ui) {
         let Some(from) = ui.input(|i| i.pointer.hover_pos()) else {
             return;
         };
-        let tool = &self.bench.tool;
-        let pressed = |keys, key| ui.input_mut(|i| i.consume_key(keys, key));
-        let (what, before) = if pressed(Modifiers::SHIFT, Key::F) {
-            (What::Strength, tool.strength)
-        } else if pressed(Modifiers::NONE, Key::F) {
-            (What::Radius, tool.radius)
-        } else {
-            return;
-        };
-        self.adjust = Some(Adjust { what, from, before });
+        if let Some(what) = self.bench.adjusts.take() {
+            let tool = &self.bench.tool;
+            let before = match what {
+                What::Radius => tool.radius,
+                What::Strength => tool.strength,
+            };
+            self.adjust = Some(Adjust { what, from, before });
+        }
     }
 
     /// Goes on, and shows it; whether the mouse is taken by it.

@@ -1,17 +1,23 @@
 //! What panels show and change.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::path::PathBuf;
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use document::Command;
 use egui::Modifiers;
 use fitting::Cancel;
 use glam::DVec3;
 
+use super::adjust::What;
+use super::arrange::Change;
+use super::kept::Sides;
+use super::keys::Keys;
+use super::limits::Limits;
 use super::measure::{Mark, Measure};
-use super::orders::{Order, Sheet};
+use super::orders::{Order, Sheet, Thing};
 use super::show::Shown;
 use super::tool::{Kind, Tool};
 use super::touch::{Held, Seen};
@@ -41,6 +47,8 @@ pub struct Bench {
     pub slices: Option<panels::Slices>,
     /// The path that is being asked for.
     pub asks: Option<panels::PathBox>,
+    /// The volume of which a part is to be opened.
+    pub part: Option<panels::Part>,
     /// Documents without a name that were left, the newest first.
     pub kept: Vec<PathBuf>,
     /// Where sample scans are written.
@@ -57,6 +65,32 @@ pub struct Bench {
     pub measure: Option<Measure>,
     /// Whether clicks pin the surface.
     pub pins: bool,
+    /// Whether keys and mouse arrange objects, not sculpt them.
+    pub arranging: bool,
+    /// How the chosen object is to be arranged, as soon as the mouse is over the scene.
+    pub(super) arranges: Option<Change>,
+    /// What is to be set by the mouse, as soon as it is over the scene.
+    pub(super) adjusts: Option<What>,
+    /// Where strokes act.
+    pub limits: Limits,
+    /// Objects that are not to be seen.
+    pub hidden: BTreeSet<String>,
+    /// The object that gets another name, and that as far as it is written.
+    pub renames: Option<(String, String)>,
+    /// Which keys do what.
+    pub keys: Keys,
+    /// The command palette, if it is shown.
+    pub commands: Option<panels::Commands>,
+    /// The table of shortcuts, if it is shown.
+    pub shortcuts: Option<panels::Shortcuts>,
+    /// The scene that is to be played.
+    pub simulation: panels::Simulation,
+    /// What the work costs.
+    pub performance: panels::Performance,
+    /// What is laid on all over.
+    pub fill: panels::Fill,
+    /// Where the panels beside the scene are.
+    pub sides: Sides,
     /// How a device is to be held, if that panel is shown.
     pub touch: Option<panels::TouchWish>,
     /// What is in the hand.
@@ -69,6 +103,11 @@ pub struct Bench {
     pub shot: panels::Shots,
     /// The tool that it was told of.
     pub(super) told_tool: Option<Tool>,
+    /// The tool that the palette showed.
+    pub(super) shown_tool: Option<Kind>,
+    pub(super) told_limits: Limits,
+    /// The object that they are of.
+    pub(super) limits_of: Option<String>,
     pub(super) orders: Sender<Order>,
     pub(super) cancel: Arc<Mutex<Cancel>>,
 }
@@ -79,6 +118,14 @@ impl Bench {
         self.shown.remember(&order);
         // A desk that has fallen is told of when the window closes.
         let _ = self.orders.send(order);
+    }
+
+    /// Opens a file; of a large volume it is asked first how much.
+    pub fn open(&mut self, path: PathBuf) {
+        match panels::is_large(&path) {
+            true => self.part = Some(panels::Part::of(path)),
+            false => self.order(Order::Open(path)),
+        }
     }
 
     /// Ends what takes a while.
@@ -105,13 +152,84 @@ impl Bench {
 
     /// The tool with its radius in lengths, doing what the keys held make of it.
     pub fn tool_in_hand(&self, keys: Modifiers) -> Tool {
-        let kind = if keys.shift { Kind::Smooth } else { self.tool.kind };
+        let kind = match keys.shift {
+            true if !self.tool.acts_at_once() => Kind::Smooth,
+            _ => self.tool.kind,
+        };
         Tool {
             kind,
             radius: self.tool.radius * self.scene.1,
             inverted: keys.command || keys.ctrl,
             ..self.tool
         }
+    }
+
+    /// Takes a tool of the palette.
+    pub fn take(&mut self, kind: Kind) {
+        self.tool.kind = kind;
+        self.arranging = false;
+        self.order(Order::Untry);
+    }
+
+    /// Whether another tool was taken since this was asked last.
+    pub fn tool_changed(&mut self) -> bool {
+        self.shown_tool.replace(self.tool.kind) != Some(self.tool.kind)
+    }
+
+    /// The chosen object.
+    pub fn chosen(&self) -> Option<&Thing> {
+        let sheet = self.sheet.as_ref()?;
+        sheet.objects.get(sheet.chosen)
+    }
+
+    /// Asks for a stroke on the chosen object.
+    ///
+    /// # Panics
+    /// If that is none that a script could have.
+    pub fn stroke(&self, stroke: serde_json::Value) {
+        let stroke = serde_json::from_value(stroke).expect("it is a stroke");
+        self.order(Order::Do(Box::new(stroke)));
+    }
+
+    /// Asks for a copy of the chosen object, which is then moved.
+    pub(super) fn duplicate(&mut self) {
+        let Some(name) = self.chosen().map(|thing| thing.name.clone()) else {
+            return;
+        };
+        let stem = name.trim_end_matches(|c: char| c.is_ascii_digit()).trim_end();
+        let is_free = |name: &String| {
+            let sheet = self.sheet.as_ref();
+            sheet.is_none_or(|sheet| sheet.objects.iter().all(|thing| thing.name != *name))
+        };
+        let names = (2..).map(|n| format!("{stem} {n}"));
+        let copy = names.into_iter().find(is_free).expect("numbers do not end");
+        self.stroke(serde_json::json!({ "copy": { "to": copy } }));
+        self.order(Order::Choose(copy));
+        self.arranging = true;
+        self.arranges = Some(Change::Shift);
+    }
+
+    /// Asks for the chosen object to go.
+    pub(super) fn remove(&self) {
+        if let Some(thing) = self.chosen() {
+            let object = thing.name.clone();
+            self.order(Order::Command(Box::new(Command::Remove { object })));
+        }
+    }
+
+    pub(super) fn hide_chosen(&mut self) {
+        let name = self.chosen().map(|thing| thing.name.clone());
+        self.hidden.extend(name);
+    }
+
+    pub(super) fn hide_others(&mut self) {
+        let Some(sheet) = &self.sheet else { return };
+        let others = sheet
+            .objects
+            .iter()
+            .enumerate()
+            .filter(|(n, _)| *n != sheet.chosen);
+        self.hidden = others.map(|(_, thing)| thing.name.clone()).collect();
     }
 
     /// Pins the surface of the chosen object at a place of the world.
@@ -141,6 +259,20 @@ impl Bench {
         });
         if let Some(measure) = &mut self.measure {
             measure.marks.push(Mark { at: p, wall });
+        }
+    }
+
+    /// Tells the desk where strokes act.
+    pub(super) fn tell_changes(&mut self) {
+        // Their places are those of the object that was chosen.
+        let chosen = self.chosen().map(|thing| thing.name.clone());
+        if self.limits_of != chosen {
+            self.limits = Limits::default();
+            self.limits_of = chosen;
+        }
+        if self.told_limits != self.limits {
+            self.order(Order::Limit(self.limits.clone()));
+            self.told_limits = self.limits.clone();
         }
     }
 

@@ -1,6 +1,7 @@
 //! The thread that works: a document, the stroke in the hand, and the triangles that show both. It does one order after the other,
 //! and the window never waits for it.
 
+mod drawing;
 mod files;
 mod lent;
 mod opening;
@@ -12,15 +13,17 @@ use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use bspline::Aabb;
 use document::{Document, Live, State};
 use fitting::Cancel;
 use glam::DVec3;
 
+use super::limits::Limits;
 use super::orders::{News, Order};
-use super::tool::Tool;
+use super::tool::{Drawn, Tool};
 use super::touch::Wanted;
 use crate::cli::desk_files;
-use crate::view::Shape;
+use crate::view::{Ray, Shape};
 
 /// What lies on the desk.
 pub struct Desk {
@@ -32,6 +35,10 @@ pub struct Desk {
     open: Option<Open>,
     /// What is to be in the hand.
     wanted: Option<Wanted>,
+    /// Where strokes of the palette may act.
+    limits: Limits,
+    /// What is to be shown before it is done.
+    tried: Option<(Tool, Ray)>,
 }
 
 /// An open document.
@@ -42,6 +49,12 @@ struct Open {
     is_untitled: bool,
     chosen: String,
     live: Option<InHand>,
+    /// What is drawn for a tool that acts at once.
+    drawn: Option<(Tool, Drawn)>,
+    /// What was copied or cut out.
+    clip: Option<Clip>,
+    /// Whether what is shown is what a click would leave.
+    is_tried: bool,
     shown: State,
     shapes: BTreeMap<String, Shape>,
     origin: DVec3,
@@ -49,6 +62,13 @@ struct Open {
     history: (Vec<String>, usize),
     /// Whether the eye is on it.
     is_seen: bool,
+}
+
+/// A box of an object, to be pasted.
+struct Clip {
+    from: String,
+    /// In the world of that object.
+    region: Aabb,
 }
 
 /// A stroke.
@@ -74,6 +94,8 @@ impl Desk {
             home,
             open: None,
             wanted: None,
+            limits: Limits::default(),
+            tried: None,
         }
     }
 
@@ -91,6 +113,7 @@ impl Desk {
                 self.obey(order);
                 next = orders.try_recv().ok();
             }
+            self.show_tried();
             self.show();
         }
         // A stroke in the hand becomes an edit: closing loses nothing.
@@ -106,7 +129,7 @@ impl Desk {
 
     fn obey(&mut self, order: Order) {
         let done = match order {
-            Order::Open(path) => self.open(&path),
+            Order::Open(path) => self.open(&path, Vec::new()),
             Order::Clay => {
                 desk_files::clay_block().and_then(|(name, object)| self.start(&name, object, false))
             }
@@ -121,8 +144,24 @@ impl Desk {
             Order::Along(ray) => self.along(&ray),
             Order::End => {
                 self.end();
+                self.end_drawing()
+            }
+            Order::Try(tool, ray) => {
+                self.tried = Some((tool, ray));
                 Ok(())
             }
+            Order::Untry => {
+                self.untry();
+                Ok(())
+            }
+            Order::Limit(limits) => {
+                self.limits = limits;
+                Ok(())
+            }
+            Order::SaveScript(path) => self.save_script(&path),
+            Order::RunScript(path) => self.run_script(&path),
+            Order::OpenPart(path, options) => self.open(&path, options),
+            Order::Command(command) => self.apply_all(vec![*command]),
             Order::Drop => self.drop_stroke(),
             Order::Undo(count) => self.turn_back(|d| d.undo(count).map(drop)),
             Order::Redo(count) => self.turn_back(|d| d.redo(count).map(drop)),

@@ -14,6 +14,27 @@ pub struct Kept {
     pub mode: Mode,
     /// What is shown beside them.
     pub show: Show,
+    /// Where the panels are.
+    pub sides: Sides,
+}
+
+/// Where the panels beside the scene are.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Sides {
+    /// Whether they are there at all.
+    pub are_shown: bool,
+    /// Whether the tools are on the right, and the objects on the left.
+    pub are_swapped: bool,
+}
+
+impl Default for Sides {
+    fn default() -> Self {
+        Self {
+            are_shown: true,
+            are_swapped: false,
+        }
+    }
 }
 
 fn file(home: &Path) -> PathBuf {
@@ -67,6 +88,7 @@ mod tests {
                 scale_bar: false,
                 ..Show::default()
             },
+            ..kept
         };
         kept.keep(now, &within).unwrap();
         assert_eq!(kept, now);

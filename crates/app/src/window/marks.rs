@@ -5,7 +5,7 @@ use glam::DVec3;
 use tools::number::Point;
 
 use super::modeler::Modeler;
-use super::tool::{Kind, Tool};
+use super::tool::{Kind, Tool, Use};
 use crate::cli::quantity::human_number;
 
 /// Sides of the ring that shows the tool.
@@ -47,6 +47,75 @@ impl Modeler {
             } else {
                 painter.line(places, Stroke::new(2.0, color));
             }
+        }
+    }
+
+    /// Draws the line of a tool that acts when the button comes up.
+    pub(super) fn draw_line_so_far(&self, ui: &egui::Ui, rect: Rect) {
+        let painter = ui.painter().with_clip_rect(rect);
+        let color = Color32::from_rgb(255, 210, 150);
+        let lasso = self.lasso_so_far().iter().map(|(at, _)| *at);
+        let line = self.line_so_far().iter().map(|p| self.on_screen(rect, *p));
+        let mut places: Vec<Pos2> = match self.lasso_so_far() {
+            [] => line.collect(),
+            _ => lasso.collect(),
+        };
+        if places.len() < 2 {
+            return;
+        }
+        match self.bench.tool.kind.by() {
+            Use::Arrow => {
+                painter.arrow(
+                    places[0],
+                    places[1] - places[0],
+                    Stroke::new(4.0, Color32::from_black_alpha(90)),
+                );
+                painter.arrow(places[0], places[1] - places[0], Stroke::new(2.0, color));
+            }
+            by => {
+                if by == Use::Outline {
+                    places.push(places[0]);
+                }
+                painter.line(places.clone(), Stroke::new(4.0, Color32::from_black_alpha(90)));
+                painter.line(places, Stroke::new(2.0, color));
+            }
+        }
+    }
+
+    /// Draws the boxes and the plane that strokes keep to.
+    pub(super) fn draw_boxes(&self, ui: &egui::Ui, rect: Rect) {
+        let Some(thing) = self.bench.chosen() else { return };
+        let painter = ui.painter().with_clip_rect(rect);
+        let limits = &self.bench.limits;
+        let color = match limits.keeps {
+            true => Color32::from_rgb(230, 120, 110),
+            false => Color32::from_rgb(120, 220, 160),
+        };
+        let world = |p: DVec3| self.on_screen(rect, thing.world_from_object.transform_point3(p));
+        for b in &limits.boxes {
+            let corner = |n: usize| {
+                let share = DVec3::new((n & 1) as f64, (n >> 1 & 1) as f64, (n >> 2) as f64);
+                world(b.min + share * b.size())
+            };
+            for from in 0..8_usize {
+                for to in [1, 2, 4]
+                    .map(|bit| from | bit)
+                    .into_iter()
+                    .filter(|to| *to != from)
+                {
+                    painter.line_segment([corner(from), corner(to)], Stroke::new(1.5, color));
+                }
+            }
+        }
+        if let Some((at, normal)) = limits.symmetry {
+            let (u, v) = normal.any_orthonormal_pair();
+            let reach = 0.5 * thing.own_box.size().max_element();
+            let corners = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0), (1.0, 1.0)];
+            let corners = corners.map(|(x, y): (f64, f64)| world(at + reach * (x * u + y * v)));
+            painter.line(
+                corners.to_vec(),
+                Stroke::new(1.0, Color32::from_rgb(170, 150, 230)),
+            );
         }
     }
 

@@ -1,12 +1,17 @@
 //! The program that people open: what is seen in the middle, panels round it, and a desk that does the work on a thread of its own.
 
+pub mod actions;
 mod adjust;
+pub mod arrange;
 mod bench;
 mod desk;
 mod four;
 mod gesture;
 mod hand;
 mod kept;
+pub mod keys;
+mod lasso;
+pub mod limits;
 mod marks;
 pub mod measure;
 mod modeler;

@@ -5,7 +5,7 @@ mod news;
 mod pointer;
 mod viewport;
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, channel};
@@ -17,17 +17,20 @@ use fitting::Cancel;
 use glam::DVec3;
 
 use super::adjust::Adjust;
+use super::arrange::Arrange;
 use super::bench::Bench;
 use super::desk::Desk;
 use super::gesture::Gesture;
 use super::kept::Kept;
+use super::keys::Keys;
+use super::limits::Limits;
 use super::orders::{News, Order};
 use super::shot::Shot;
 use super::show::{Beside, Shown};
-use super::tool::{Kind, Tool};
+use super::tool::{Kind, Settings, Tool};
 use crate::cli::{desk_files, interrupt};
 use crate::panels;
-use crate::view::{Camera, LINE, Look, Paper, Screen};
+use crate::view::{Camera, LINE, Look, Paper, Ray, Screen};
 
 /// The window.
 pub struct Modeler {
@@ -41,6 +44,14 @@ pub struct Modeler {
     gesture: Option<Gesture>,
     /// What the mouse sets.
     pub(super) adjust: Option<Adjust>,
+    /// The object that is being arranged.
+    pub(super) arrange: Option<Arrange>,
+    /// The line that is drawn for a tool that acts at once, in the world.
+    drawn: Vec<DVec3>,
+    /// Points of a lasso, with their lines of sight in the world of the chosen object, and whether it spares what is within.
+    lassoed: (Vec<(egui::Pos2, Ray)>, bool),
+    /// Where the desk was asked to show what a click would leave, and with which tool.
+    tried: Option<(egui::Pos2, Tool)>,
     /// When something moved last.
     moved: Instant,
     desk: Option<JoinHandle<()>>,
@@ -57,7 +68,8 @@ impl Modeler {
     /// Begins the desk, with files to open.
     pub fn new(context: &eframe::CreationContext<'_>, files: Vec<PathBuf>) -> Self {
         let screen = context.wgpu_render_state.clone().map(Screen::new);
-        let modeler = Self::on(&context.egui_ctx, screen, desk_files::home());
+        let mut modeler = Self::on(&context.egui_ctx, screen, desk_files::home());
+        modeler.bench.keys = Keys::read(&desk_files::settings());
         close_when_asked(modeler.context.clone());
         for file in files {
             modeler.bench.order(Order::Open(file));
@@ -117,6 +129,7 @@ impl Modeler {
                     radius: 0.08,
                     strength: 0.5,
                     inverted: false,
+                    settings: Settings::default(),
                 },
                 look: Look {
                     camera: Camera::onto(DVec3::ZERO, 1.0, DVec3::Y),
@@ -134,6 +147,7 @@ impl Modeler {
                 triangles: 0,
                 slices: None,
                 asks: None,
+                part: None,
                 kept: desk_files::kept(&home),
                 scratch: None,
                 densities: None,
@@ -142,12 +156,28 @@ impl Modeler {
                 shows_log: false,
                 measure: None,
                 pins: false,
+                arranging: false,
+                arranges: None,
+                adjusts: None,
+                limits: Limits::default(),
+                hidden: BTreeSet::new(),
+                renames: None,
+                keys: Keys::read(&home),
+                commands: None,
+                shortcuts: None,
+                simulation: panels::Simulation::default(),
+                performance: panels::Performance::default(),
+                fill: panels::Fill::default(),
+                sides: kept.sides,
                 touch: None,
                 held: None,
                 seen: None,
                 told_tool: None,
                 shown: Shown::default(),
                 shot: panels::Shots::default(),
+                shown_tool: None,
+                told_limits: Limits::default(),
+                limits_of: None,
                 orders,
                 cancel,
             },
@@ -157,6 +187,10 @@ impl Modeler {
             screen,
             gesture: None,
             adjust: None,
+            arrange: None,
+            drawn: Vec::new(),
+            lassoed: (Vec::new(), false),
+            tried: None,
             moved: Instant::now(),
             desk: Some(desk),
             kept,
@@ -170,6 +204,31 @@ impl Modeler {
     #[cfg(test)]
     pub fn bench(&self) -> &Bench {
         &self.bench
+    }
+
+    /// The line that is drawn for a tool that acts at once, in the world.
+    pub(super) fn line_so_far(&self) -> &[DVec3] {
+        &self.drawn
+    }
+
+    /// The points of a lasso that is drawn.
+    pub(super) fn lasso_so_far(&self) -> &[(egui::Pos2, Ray)] {
+        &self.lassoed.0
+    }
+
+    /// The panels beside the scene.
+    fn sides(&mut self, ui: &mut egui::Ui) {
+        let is_swapped = self.bench.sides.are_swapped;
+        let beside = |is_left: bool, id: &'static str| match is_left {
+            true => egui::Panel::left(id),
+            false => egui::Panel::right(id),
+        };
+        beside(!is_swapped, "tools")
+            .exact_size(196.0)
+            .show(ui, |ui| panels::tools(ui, &mut self.bench));
+        beside(is_swapped, "document")
+            .default_size(210.0)
+            .show(ui, |ui| panels::document(ui, &mut self.bench));
     }
 
     /// All of the window.
@@ -188,31 +247,38 @@ impl Modeler {
             files.map(|file| file.path().to_path_buf()).collect()
         });
         for path in dropped {
-            self.bench.order(Order::Open(path));
+            self.bench.open(path);
         }
         egui::Panel::top("menu").show(ui, |ui| panels::menu(ui, &mut self.bench));
         egui::Panel::bottom("status").show(ui, |ui| panels::status(ui, &self.bench));
-        if self.bench.sheet.is_some() {
-            egui::Panel::left("tools")
-                .exact_size(196.0)
-                .show(ui, |ui| panels::tools(ui, &mut self.bench));
-            egui::Panel::right("document")
-                .default_size(210.0)
-                .show(ui, |ui| panels::document(ui, &mut self.bench));
+        if self.bench.sheet.is_some() && self.bench.sides.are_shown {
+            self.sides(ui);
         }
+        self.begin_adjust(ui);
+        self.begin_arranging(ui);
         egui::CentralPanel::no_frame().show(ui, |ui| match &self.bench.sheet {
             Some(_) => self.views(ui),
             None => panels::start(ui, &mut self.bench),
         });
         panels::slices(ui.ctx(), &mut self.bench);
         panels::path_box(ui.ctx(), &mut self.bench);
+        panels::part(ui.ctx(), &mut self.bench);
         panels::touch(ui.ctx(), &mut self.bench);
         panels::measure(ui.ctx(), &mut self.bench);
+        panels::simulation(ui.ctx(), &mut self.bench);
+        panels::performance(ui.ctx(), &mut self.bench);
         panels::log(ui.ctx(), &mut self.bench);
         panels::picture(ui.ctx(), &mut self.bench);
+        panels::shortcuts(ui.ctx(), &mut self.bench);
+        panels::commands(ui.ctx(), &mut self.bench);
         self.bench.tell_tool();
-        let Look { mode, show, .. } = self.bench.look;
-        if let Err(why) = self.kept.keep(Kept { mode, show }, &self.home) {
+        self.bench.tell_changes();
+        let now = Kept {
+            mode: self.bench.look.mode,
+            show: self.bench.look.show,
+            sides: self.bench.sides,
+        };
+        if let Err(why) = self.kept.keep(now, &self.home) {
             self.bench.tell(why, true);
         }
         if self.bench.message().is_some() {

@@ -1,19 +1,23 @@
 //! What the window asks of the desk, and what the desk tells it.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use bspline::{Aabb, Field};
-use document::{Live, Object, State};
+use document::{Command, Live, Object, State};
 use formats::Unit;
 use formats::field::SourceKind;
 use glam::{DAffine3, DVec3};
+use tools::force::Solid as Solidity;
 use tools::hold::Held;
+use tools::paint::Substance;
 use tools::session::Stroke;
 
+use super::limits::Limits;
 use super::tool::Tool;
 use super::touch::{self, Seen, Wanted};
-use crate::view::{Patch, Ray, Solid};
+use crate::view::{Patch, Ray, Solid, pick};
 
 /// What the window asks. Lines are those under the mouse, in the world.
 #[derive(Clone, Debug)]
@@ -48,6 +52,20 @@ pub enum Order {
     End,
     /// It leaves nothing.
     Drop,
+    /// What a click with this tool would leave there is shown.
+    Try(Tool, Ray),
+    /// It is no longer shown.
+    Untry,
+    /// Strokes of the palette act within these limits from now on.
+    Limit(Limits),
+    /// Writes the edits that are done as a script.
+    SaveScript(PathBuf),
+    /// Does a script on the chosen object.
+    RunScript(PathBuf),
+    /// Opens a scan by these options of `fit`.
+    OpenPart(PathBuf, Vec<OsString>),
+    /// Any command.
+    Command(Box<Command>),
     /// Undoes the last edits.
     Undo(usize),
     /// Does edits again.
@@ -100,6 +118,12 @@ pub enum News {
     Seen(Seen),
     /// The force of the stroke in the hand; none when it has ended.
     Acting(Option<Acting>),
+    /// Forces that a device was given, a second.
+    Touched(f64),
+    /// What a step of a stroke took, seconds.
+    Step(f64),
+    /// An object is not to be seen for now.
+    Hide(String),
     /// Something to tell.
     Note(String),
     /// Something that could not be done.
@@ -172,6 +196,14 @@ pub struct Thing {
     pub own_box: Aabb,
     /// Where it stands.
     pub world_from_object: DAffine3,
+    /// Where its parent stands, or the world itself.
+    pub world_from_parent: DAffine3,
+    /// The object that it moves with.
+    pub parent: Option<String>,
+    /// Whether it springs back when force tools let go.
+    pub is_elastic: bool,
+    /// What is painted on it.
+    pub layers: Vec<Substance>,
     /// Whether it was fitted to a volume: then its world is a patient's.
     pub is_volume: bool,
     /// Of its lengths, as people write it.
@@ -188,7 +220,17 @@ impl Thing {
     /// An object of a state; none where it has no surface or no place.
     pub fn of(state: &State, name: &str) -> Option<Self> {
         let object = state.object(name).ok()?;
+        let parent = object.properties.parent.clone();
+        let world_from_parent = match &parent {
+            Some(parent) => state.placement(parent).ok()?,
+            None => DAffine3::IDENTITY,
+        };
+        let painted = object.layers.iter().filter(|(_, layer)| !layer.is_empty());
         Some(Self {
+            world_from_parent,
+            parent,
+            is_elastic: object.properties.material.solid == Solidity::Elastic,
+            layers: painted.map(|(substance, _)| *substance).collect(),
             name: name.into(),
             field: object.field.shared(),
             iso: object.iso()?,
@@ -203,6 +245,23 @@ impl Thing {
             holds: object.properties.holds.clone(),
             object: object.clone(),
         })
+    }
+}
+
+impl Thing {
+    /// Where a line of the world meets it, and the outward normal there, in the world.
+    pub fn under(&self, ray: &Ray) -> Option<(DVec3, DVec3)> {
+        let own = self.world_from_object.inverse();
+        let ray = Ray {
+            from: own.transform_point3(ray.from),
+            along: own.transform_vector3(ray.along).try_normalize()?,
+        };
+        let (p, normal) = pick(&*self.field, self.iso, &self.own_box, &ray)?;
+        let turned = own.matrix3.transpose() * normal;
+        Some((
+            self.world_from_object.transform_point3(p),
+            turned.normalize_or_zero(),
+        ))
     }
 }
 

@@ -4,7 +4,7 @@ mod make;
 mod points;
 
 use std::cell::RefCell;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, channel};
 
@@ -15,7 +15,7 @@ use self::make::{Done, Made, Wish, stiffness_legend};
 use super::Bench;
 use super::modeler::Modeler;
 use super::orders::{Acting, Order};
-use crate::view::{Cells, Ink, Legend, Screen, Tint, floor};
+use crate::view::{Cells, Histogram, Ink, Legend, Screen, Tint, floor};
 
 /// What is made there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -43,8 +43,6 @@ pub struct Shown {
     pub second_range: Option<[f64; 2]>,
     /// While it is dragged.
     pub second_dragged: Option<f64>,
-    /// Objects that are not drawn.
-    pub hidden: BTreeSet<String>,
     /// What was made, in words, or why it was not.
     pub words: BTreeMap<Layer, Result<String, String>>,
     legends: BTreeMap<Layer, Legend>,
@@ -97,6 +95,27 @@ impl Beside {
 }
 
 impl Bench {
+    /// Chooses a density for the second surface of the chosen object, if it has none yet: between that of the first and the end of all
+    /// densities that is farther from it.
+    fn know_second(&mut self) {
+        let sheet = self.sheet.as_ref();
+        let Some(thing) = sheet.and_then(|sheet| sheet.objects.get(sheet.chosen)) else {
+            return;
+        };
+        let is_known = matches!(&self.shown.second, Some((name, _)) if *name == thing.name);
+        if !is_known {
+            let [low, high] = Histogram::new(&*thing.field, &thing.own_box).range;
+            let end = if thing.iso - low < high - thing.iso {
+                high
+            } else {
+                low
+            };
+            let density = thing.iso + 0.35 * (end - thing.iso);
+            self.shown.second = Some((thing.name.clone(), density));
+            self.shown.second_range = Some([low, high]);
+        }
+    }
+
     /// What is wished of a layer, if it is shown.
     fn wish(&self, layer: Layer, (scene, origin): (u64, DVec3)) -> Option<Wish> {
         let sheet = self.sheet.as_ref()?;
@@ -133,8 +152,7 @@ impl Bench {
     pub(super) fn legends(&self) -> Vec<Legend> {
         let is_stiff = |sheet: &super::orders::Sheet| {
             let painted = |thing: &super::orders::Thing| {
-                thing.object.layers.contains_key(&Substance::Stiffness)
-                    && !self.shown.hidden.contains(&thing.name)
+                thing.object.layers.contains_key(&Substance::Stiffness) && !self.hidden.contains(&thing.name)
             };
             sheet.objects.iter().any(painted)
         };
@@ -156,7 +174,7 @@ impl Modeler {
             .as_ref()
             .map_or((0, DVec3::ZERO), |c| (c.scenes(), c.origin()));
         if let Some(canvas) = canvas {
-            canvas.hide(&self.bench.shown.hidden);
+            canvas.hide(&self.bench.hidden);
             let (center, radius) = self.bench.scene;
             let of = (scene.0, center, radius);
             if self.bench.look.show.floor && self.beside.floor != Some(of) {
@@ -164,6 +182,9 @@ impl Modeler {
                 canvas.put_lines(Ink::Floor, &lines);
                 self.beside.floor = Some(of);
             }
+        }
+        if self.bench.look.show.second {
+            self.bench.know_second();
         }
         for layer in Layer::ALL {
             match self.bench.wish(layer, scene) {
@@ -220,8 +241,8 @@ impl Modeler {
             return;
         };
         match (layer, made) {
-            (Layer::Second, Made::Patches(patches)) => canvas.put_veil(patches),
-            (Layer::Second, _) => canvas.put_veil(&[]),
+            (Layer::Second, Made::Patches(patches, within)) => canvas.put_veil(patches, within.as_deref()),
+            (Layer::Second, _) => canvas.put_veil(&[], None),
             (Layer::Tint, Made::Tinted(tinted)) => canvas.tint_by(Some(tinted.clone())),
             (Layer::Tint, _) => canvas.tint_by(None),
             (Layer::Cells | Layer::Points, made) => {

@@ -16,7 +16,7 @@ mod show;
 use super::desk::Desk;
 use super::modeler::Modeler;
 use super::orders::{News, Order, Sheet};
-use super::tool::{Kind, Tool};
+use super::tool::{Kind, Settings, Tool, Use};
 use super::touch::{Held, Seen, Wanted};
 use tools::haptics::Contact;
 
@@ -124,10 +124,17 @@ impl Bare {
     }
 }
 
-/// A stroke over the front of the block, seen from +z: so many lines of sight.
+/// A stroke over the front of the block, seen from +z: so many lines of sight, in a row, or of an outline round about.
 fn stroke(tool: Tool, count: usize) -> Vec<Order> {
+    let place = |n: usize| match tool.kind.by() {
+        Use::Outline => {
+            let (sine, cosine) = (std::f64::consts::TAU * n as f64 / count as f64).sin_cos();
+            DVec3::new(9.0 * cosine, 9.0 * sine, 200.0)
+        }
+        _ => DVec3::new(-8.0 + 0.8 * n as f64, 2.0, 200.0),
+    };
     let ray = |n: usize| Ray {
-        from: DVec3::new(-8.0 + 0.8 * n as f64, 2.0, 200.0),
+        from: place(n),
         along: -DVec3::Z,
     };
     let begin = Order::Begin { tool, ray: ray(0) };
@@ -141,6 +148,7 @@ fn tool(kind: Kind) -> Tool {
         radius: 4.0,
         strength: 0.5,
         inverted: false,
+        settings: Settings::default(),
     }
 }
 
@@ -157,19 +165,53 @@ fn again(document: &mut Document) -> State {
     })
 }
 
+/// Copying is no edit, a lasso neither; the block has no air to bridge, and nothing in it is too fine; to bend all of it by forces takes
+/// minutes.
+const NOT_HERE: [Kind; 5] = [Kind::Copy, Kind::Lasso, Kind::Join, Kind::Simplify, Kind::Flex];
+
+/// The state that the journal of a document in use has on the disk.
+fn on_disk(sheet: &Sheet, scratch: &Path) -> Document {
+    let copy = scratch.join("copy.isoclay");
+    let _ = std::fs::remove_file(&copy);
+    std::fs::copy(&sheet.path, &copy).unwrap();
+    opened(&copy)
+}
+
 #[test]
 fn every_tool_leaves_an_edit_that_a_script_repeats_to_the_bit() {
-    let home = tempfile::tempdir().unwrap();
+    let (home, scratch) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let mut desk = Bare::new(home.path());
     desk.order(Order::Clay);
     let sheet = desk.sheet(0, 0);
-    let mut kinds = 0;
-    for kind in Kind::ALL {
-        stroke(tool(kind), 4)
-            .into_iter()
-            .for_each(|order| desk.order(order));
-        kinds += 1;
-        desk.sheet(kinds, kinds);
+    // A dent, which can be smoothed.
+    for order in stroke(tool(Kind::Carve), 3) {
+        desk.order(order);
+    }
+    desk.sheet(1, 1);
+    for kind in Kind::ALL.iter().copied().filter(|kind| !NOT_HERE.contains(kind)) {
+        eprintln!("{kind:?}");
+        if kind == Kind::Paste {
+            let ray = Ray {
+                from: DVec3::new(6.0, 9.0, 200.0),
+                along: -DVec3::Z,
+            };
+            let tool = tool(Kind::Copy);
+            desk.order(Order::Begin { tool, ray });
+            desk.order(Order::End);
+        }
+        let count = if kind.by() == Use::Outline { 12 } else { 4 };
+        for order in stroke(tool(kind), count) {
+            desk.order(order);
+        }
+        desk.sheet(2, 2);
+        let mut document = on_disk(&sheet, scratch.path());
+        assert_eq!(
+            again(&mut document).sha256(),
+            document.state().sha256(),
+            "{kind:?}"
+        );
+        desk.order(Order::Undo(1));
+        desk.sheet(2, 1);
     }
     // One that is dropped leaves nothing, and one that was not ended becomes an edit when the window closes.
     let mut dropped = stroke(tool(Kind::Carve), 3);
@@ -184,7 +226,7 @@ fn every_tool_leaves_an_edit_that_a_script_repeats_to_the_bit() {
         "{told:?}"
     );
     let mut document = opened(&sheet.path);
-    assert_eq!(document.counts().unwrap().done, kinds + 1);
+    assert_eq!(document.counts().unwrap().done, 2);
     assert_eq!(again(&mut document).sha256(), document.state().sha256());
 }
 

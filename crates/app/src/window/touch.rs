@@ -1,6 +1,6 @@
 //! A device in the hand: three threads have the document, and the desk shows what they do until an order needs it back.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::sync::mpsc::{Receiver, TryRecvError};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -14,7 +14,7 @@ use tools::session::Stroke;
 
 use super::desk::Desk;
 use super::orders::{News, Order};
-use super::tool::Tool;
+use super::tool::{Kind, Start, Tool};
 use crate::devices::{self, Force, Mouse};
 use crate::threads::Session;
 use crate::threads::grip::{ContactMode, Grip, STEP, TICK, workspace};
@@ -24,6 +24,8 @@ use crate::threads::sculpting::Sculpting;
 const LOOK: Duration = Duration::from_millis(33);
 /// Time from one word of the hand to the next.
 const WORD: Duration = Duration::from_millis(15);
+/// Time over which forces are counted.
+const COUNTED: Duration = Duration::from_millis(500);
 /// Radii that a solid goes into the matter in a second, with the least and the largest strength.
 const RATES: [f64; 2] = [0.25, 2.0];
 
@@ -84,9 +86,20 @@ impl Seen {
     }
 }
 
+/// Refuses tools that a hand does not lead step by step.
+fn by_hand(tool: &Tool) -> Result<(), String> {
+    match tool.acts_at_once() || tool.kind == Kind::Drill {
+        true => Err(format!(
+            "{} is a tool for the mouse alone; choose another one to touch with",
+            tool.kind.name()
+        )),
+        false => Ok(()),
+    }
+}
+
 /// What a button begins by a tool of the palette.
 fn stroke(tool: &Tool) -> Stroke {
-    let mut stroke = tool.stroke(DVec3::ZERO);
+    let mut stroke = tool.stroke(&Start::at(DVec3::ZERO));
     if let Some(pull) = &mut stroke.pull {
         // It takes hold where the hand is.
         pull.along = Along::default();
@@ -98,7 +111,7 @@ impl Desk {
     /// Lets the hand have the document until an order needs it, which is given back; nothing when no more orders come.
     pub(super) fn touch(&mut self, wanted: &Wanted, orders: &Receiver<Order>) -> Option<Order> {
         self.end();
-        let begun = self.take(wanted);
+        let begun = by_hand(&wanted.tool).and_then(|()| self.take(wanted));
         let felt = begun.and_then(|(held, device)| self.feel(wanted, &held, device, orders));
         felt.unwrap_or_else(|why| {
             self.tell(News::Failed(why));
@@ -168,6 +181,8 @@ impl Desk {
         let Some(document) = self.lend() else {
             return Ok(None);
         };
+        let limits = self.limits().clone();
+        let stroke = move |tool: &Tool| limits.on(stroke(tool));
         let sculpting = Sculpting::new(document, chosen, Some(stroke(&wanted.tool)))
             .touching(held.radius)
             .embedding(
@@ -187,6 +202,7 @@ impl Desk {
             step: Duration::from_secs_f64(STEP),
         };
         let last = RefCell::new(None);
+        let (ticks, mut counted) = (Cell::new(0_u32), Instant::now());
         let mut next = None;
         let (mut looked, mut told) = (Instant::now(), Instant::now());
         let mut is_over = false;
@@ -211,6 +227,11 @@ impl Desk {
             if !edits.is_empty() {
                 self.hear_edits(edits);
             }
+            if counted.elapsed() >= COUNTED {
+                let rate = f64::from(ticks.replace(0)) / counted.elapsed().as_secs_f64();
+                counted = Instant::now();
+                self.tell(News::Touched(rate));
+            }
             if told.elapsed() >= WORD
                 && let Some(seen) = last.take()
             {
@@ -219,7 +240,10 @@ impl Desk {
             }
             !is_over && next.is_none()
         };
-        let ran = session.run(goes_on, |record| *last.borrow_mut() = Some(Seen::of(record)));
+        let ran = session.run(goes_on, |record| {
+            ticks.set(ticks.get() + 1);
+            *last.borrow_mut() = Some(Seen::of(record));
+        });
         self.tell(News::Held(None));
         let (sculpting, _) = match ran {
             Ok(ran) => ran,

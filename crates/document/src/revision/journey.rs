@@ -22,8 +22,19 @@ struct Leg {
 impl Journey {
     /// The moves among commands in their order, of the object `name`, which lies in a box.
     pub fn new(commands: &[Command], name: &str, within: &Aabb) -> Self {
+        // What its name was when each was done.
+        let mut name = name;
+        let mut names: Vec<&str> = Vec::with_capacity(commands.len());
+        for command in commands.iter().rev() {
+            if let Command::Rename { object, to } = command
+                && to == name
+            {
+                name = object;
+            }
+            names.push(name);
+        }
         let mut legs = Vec::new();
-        for command in commands {
+        for (command, name) in commands.iter().zip(names.into_iter().rev()) {
             let Command::Stroke { object, stroke } = command else {
                 continue;
             };

@@ -94,7 +94,7 @@ impl Brushes {
                     ..opaque
                 },
             ),
-            shared: [(&plain, "shade_shared"), (&lit, "shade_shared_lit")].map(|(layout, color)| {
+            shared: [(&plain, "shade_scale"), (&lit, "shade_scale_lit")].map(|(layout, color)| {
                 made(
                     layout,
                     Way {

@@ -66,7 +66,7 @@ pub fn cells(
     let legend = match by_error {
         true => scale.legend("Rms error of cells", unit),
         false => {
-            let side = |level: u8| human_number(lattice.spacing(level.into()).max_element());
+            let side = |level: u8| short(lattice.spacing(level.into()).max_element());
             Legend {
                 title: titled("Side of cells", unit),
                 colors: band(),
@@ -90,6 +90,19 @@ pub fn titled(name: &str, unit: &str) -> String {
     match unit {
         "" => name.into(),
         unit => format!("{name}, {unit}"),
+    }
+}
+
+/// A number of three digits at most, as there is room for under a band of colours.
+pub fn short(x: f64) -> String {
+    if x == 0.0 || !x.is_finite() {
+        return human_number(x);
+    }
+    let digits = (2.0 - x.abs().log10().floor()).clamp(0.0, 9.0) as usize;
+    let text = format!("{x:.digits$}");
+    match text.contains('.') {
+        true => text.trim_end_matches('0').trim_end_matches('.').into(),
+        false => text,
     }
 }
 
@@ -127,10 +140,10 @@ impl ErrorScale {
 
     /// What its colours mean.
     pub fn legend(self, what: &str, unit: &str) -> Legend {
-        let most = format!("{} or more", human_number(2.0 * self.middle));
+        let most = format!("> {}", short(2.0 * self.middle));
         let mut marks = vec![(0.0, "0".to_string()), (1.0, most)];
         if self.has_tolerance {
-            marks.insert(1, (0.5, human_number(self.middle)));
+            marks.insert(1, (0.5, short(self.middle)));
         }
         Legend {
             title: titled(what, unit),
@@ -191,5 +204,13 @@ mod tests {
         }
         assert_eq!(legend.marks[1], (0.5, "0.5".into()));
         assert_eq!(legend.title, "Rms error of cells, mm");
+        for (x, text) in [
+            (0.000_157_64, "0.000158"),
+            (1234.5, "1234"),
+            (20.0, "20"),
+            (0.5, "0.5"),
+        ] {
+            assert_eq!(short(x), text);
+        }
     }
 }

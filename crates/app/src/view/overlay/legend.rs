@@ -3,7 +3,7 @@
 use egui::{Align2, Color32, CornerRadius, FontId, Painter, Rect, Stroke, pos2, vec2};
 
 /// Size of the band, and its distance from the corner, points.
-const BAND: [f32; 2] = [150.0, 10.0];
+const BAND: [f32; 2] = [200.0, 10.0];
 const ASIDE: f32 = 16.0;
 /// Height of a legend with its text, points.
 const HIGH: f32 = 52.0;

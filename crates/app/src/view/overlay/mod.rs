@@ -50,6 +50,8 @@ pub struct Overlay {
     inks: BTreeMap<Ink, Lines>,
     /// What is looked through.
     pub veil: Vec<Held>,
+    /// Within which object it lies, if it does: then that one's surface is what is looked through.
+    pub within: Option<String>,
     /// The density on the cut.
     pub caps: Caps,
 }
@@ -63,6 +65,7 @@ impl Overlay {
             brushes: Default::default(),
             inks: BTreeMap::new(),
             veil: Vec::new(),
+            within: None,
             caps: Caps::new(device),
         }
     }
@@ -122,11 +125,22 @@ impl Overlay {
         shown.for_each(|(_, lines)| lines.draw(pass));
     }
 
+    /// The object whose second surface a look shows within the first, by triangles.
+    pub fn around(&self, look: &Look) -> Option<&str> {
+        let is_shown = look.mode == Mode::Mesh && self.has_veil(look);
+        self.within.as_deref().filter(|_| is_shown)
+    }
+
     /// Draws what is looked through: what of it is farther away first.
-    pub fn draw_veil(&self, pass: &mut wgpu::RenderPass<'_>, brushes: &Brushes) {
+    pub fn draw_veil<'a>(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        brushes: &Brushes,
+        veil: impl Iterator<Item = &'a Held> + Clone,
+    ) {
         for side in &brushes.veil {
             pass.set_pipeline(side);
-            draw(&self.veil, pass, 0);
+            draw(veil.clone(), pass, 0);
         }
     }
 }

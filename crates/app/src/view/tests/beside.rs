@@ -159,10 +159,10 @@ fn a_second_surface_is_looked_through() {
     };
     for mode in [Mode::Mesh, Mode::Rays] {
         let [bare, shown] = [look, shown].map(|look| Look { mode, ..look });
-        canvas.put_veil(&[]);
+        canvas.put_veil(&[], None);
         let first = pixels(&mut canvas, &bare);
         assert_eq!(pixels(&mut canvas, &shown), first);
-        canvas.put_veil(&outer);
+        canvas.put_veil(&outer, None);
         let veiled = pixels(&mut canvas, &shown);
         assert_eq!(pixels(&mut canvas, &bare), first, "{mode:?}: it is not wished");
         let differs = differing(&first, &veiled);
@@ -177,6 +177,14 @@ fn a_second_surface_is_looked_through() {
         let corner = [0, SIZE[0] - 1, SIZE[0] * SIZE[1] - 1];
         assert!(corner.iter().all(|n| !differs.contains(n)));
     }
+    // One within the first is seen through that.
+    let inner = second(&object, 1.0, DAffine3::IDENTITY, origin, 100_000).unwrap();
+    canvas.put_veil(&inner, Some("solid"));
+    let first = pixels(&mut canvas, &look);
+    let around = pixels(&mut canvas, &shown);
+    let at = pixel(&shown, DVec3::new(1.5, 2.5, 8.0));
+    let ([r0, _, b0], [r, _, b]) = (color(&first, at), color(&around, at));
+    assert!(b > b0 && r > b, "{r0} {b0} became {r} {b}");
 }
 
 /// As fine as the first surface, but never of more triangles than it may have.
@@ -187,8 +195,15 @@ fn a_second_surface_has_no_more_triangles_than_it_may() {
         let patches = second(&object, 0.5, DAffine3::IDENTITY, DVec3::ZERO, most).unwrap();
         patches.iter().map(|p: &Patch| p.indices.len() / 3).sum::<usize>()
     };
-    let all = count(usize::MAX);
-    assert!(count(all / 2) <= all / 2 && count(all) <= all);
+    let (coarsest, all) = (count(0), count(usize::MAX));
+    assert!(coarsest < all, "{coarsest} of {all}");
+    for most in [all / 2, all - 1, all] {
+        let found = count(most);
+        assert!(
+            found <= most.max(coarsest),
+            "{found} of {most}, {coarsest} at the least"
+        );
+    }
 }
 
 /// Colours tell the share at a place, by triangles and by rays; without one they tell that nothing is known.

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use document::{Command, CommandError};
+
 use super::Desk;
 use crate::cli::desk_files;
 use crate::window::orders::News;
@@ -58,5 +60,35 @@ impl Desk {
         self.tell(News::Busy(None));
         self.reopen()?;
         written.map(|()| self.tell(News::Note(format!("{} is written", out.display()))))
+    }
+
+    /// Writes the edits that are done as a script.
+    pub(super) fn save_script(&mut self, path: &Path) -> Result<(), String> {
+        self.end();
+        let document = self.open.as_mut().and_then(|open| open.document.as_mut());
+        let Some(document) = document else { return Ok(()) };
+        let text = document.script().map_err(|e| e.to_string())?;
+        formats::atomic::replace(path, |out| out.write_all(text.as_bytes()))
+            .map_err(|e| format!("{}: {e}", path.display()))?;
+        let count = text.lines().count();
+        self.tell(News::Note(format!(
+            "{} has {count} edits; isoclay sculpt does them again",
+            path.display()
+        )));
+        Ok(())
+    }
+
+    /// Does a script on the chosen object, where it names no other.
+    pub(super) fn run_script(&mut self, path: &Path) -> Result<(), String> {
+        self.end();
+        let Some(open) = &self.open else { return Ok(()) };
+        let about = |why: String| format!("{}: {why}", path.display());
+        let text = std::fs::read_to_string(path).map_err(|e| about(format!("cannot be read ({e})")))?;
+        let named = |own: Option<&str>| -> Result<String, CommandError> {
+            let name = own.unwrap_or(&open.chosen);
+            Ok(open.state().object(name).map(|_| name.to_string())?)
+        };
+        let commands = Command::of_script(&text, named).map_err(|e| about(e.to_string()))?;
+        self.apply_all(commands).map_err(about)
     }
 }

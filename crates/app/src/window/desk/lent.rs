@@ -3,12 +3,18 @@
 use document::{Document, State};
 
 use super::{Desk, Open};
+use crate::window::limits::Limits;
 
 impl Desk {
     /// What is open, and the name of the chosen object.
     pub(in crate::window) fn chosen(&self) -> Option<(&State, &str)> {
         let open = self.open.as_ref()?;
         Some((open.state(), &open.chosen))
+    }
+
+    /// Where strokes of the palette may act.
+    pub(in crate::window) fn limits(&self) -> &Limits {
+        &self.limits
     }
 
     /// Lends the document to a device.

@@ -26,8 +26,8 @@ impl Desk {
         }
     }
 
-    /// Opens a document, or makes one of a field or a scan.
-    pub(super) fn open(&mut self, path: &Path) -> Result<(), String> {
+    /// Opens a document, or makes one of a field or a scan, by options of `fit`.
+    pub(super) fn open(&mut self, path: &Path, options: Vec<OsString>) -> Result<(), String> {
         self.end();
         if desk_files::is_document(path) {
             let mut notes = Vec::new();
@@ -40,7 +40,7 @@ impl Desk {
         let ((name, object), is_seen) = match desk_files::field(path) {
             Some(object) => (object?, false),
             None => {
-                let fitted = self.fit(path);
+                let fitted = self.fit(path, options);
                 self.tell(News::Busy(None));
                 fitted?
             }
@@ -53,7 +53,7 @@ impl Desk {
     }
 
     /// The object that a scan becomes, and whether a coarse one is seen meanwhile.
-    fn fit(&mut self, scan: &Path) -> Result<((String, Object), bool), String> {
+    fn fit(&mut self, scan: &Path, mut options: Vec<OsString>) -> Result<((String, Object), bool), String> {
         let file = scan.file_name().unwrap_or_default().to_string_lossy();
         let (memory, most) = desk_files::memory();
         let show = |stage: &str, share: f64| {
@@ -62,7 +62,7 @@ impl Desk {
         show("reading", 0.0);
         let cancel = self.begin_long();
         let fit = |options: &[OsString]| desk_files::fit(scan, options, memory, &cancel, &show);
-        let mut options: Vec<OsString> = vec!["--coarse".into()];
+        options.insert(0, "--coarse".into());
         let mut coarse = fit(&options);
         if let Err(why) = &coarse
             && let Some(remedy) = desk_files::remedy(why)
@@ -134,6 +134,9 @@ impl Desk {
             is_untitled,
             chosen,
             live: None,
+            drawn: None,
+            clip: None,
+            is_tried: false,
             shown: state,
             shapes: BTreeMap::new(),
             origin: all.center(),

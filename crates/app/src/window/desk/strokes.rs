@@ -1,5 +1,7 @@
 //! What is done to the document: strokes of a hand, strokes at once, steps back and forth.
 
+use std::time::Instant;
+
 use document::{Command, CommandError, Document, Live};
 use fitting::Control;
 use glam::DVec3;
@@ -9,31 +11,33 @@ use tools::session::Stroke;
 use super::{Desk, InHand};
 use crate::view::Ray;
 use crate::window::orders::{Acting, News};
-use crate::window::tool::Tool;
+use crate::window::tool::{Tool, Use};
 
 impl Desk {
     pub(super) fn begin(&mut self, tool: Tool, ray: &Ray) -> Result<(), String> {
         self.end();
+        if tool.acts_at_once() {
+            return self.begin_drawing(tool, ray);
+        }
+        let limits = self.limits.clone();
         let Some(open) = &mut self.open else { return Ok(()) };
-        let Some((at, normal, own)) = open.under(ray) else {
+        let Some((start, _)) = open.start(ray) else {
             return Ok(());
         };
-        let stroke = tool.stroke(at);
+        let tool = open.own_tool(tool);
+        let stroke = limits.on(tool.stroke(&start));
         let live = Live::begin(open.state(), &open.chosen, stroke).map_err(|e| e.to_string())?;
-        let hold = tool.takes_hold().then_some([at, -own.along]);
+        let hold = (tool.kind.by() == Use::Grip).then_some([start.at, -start.along]);
         open.live = Some(InHand { live, tool, hold });
-        self.step(tool.middle(at, normal))
+        self.step(tool.middle(start.at, start.normal))
     }
 
     pub(super) fn along(&mut self, ray: &Ray) -> Result<(), String> {
+        self.draw_on(ray);
         let Some(open) = &self.open else { return Ok(()) };
         let Some(hand) = &open.live else { return Ok(()) };
         let at = match hand.hold {
-            Some([at, toward_eye]) => open.own_ray(ray).and_then(|own| {
-                let fall = own.along.dot(toward_eye);
-                let far = (at - own.from).dot(toward_eye) / fall;
-                (fall.abs() > 1e-6 && far > 0.0).then(|| own.from + far * own.along)
-            }),
+            Some(plane) => open.own_ray(ray).and_then(|own| in_plane(&own, plane)),
             None => open
                 .under(ray)
                 .map(|(at, normal, _)| hand.tool.middle(at, normal)),
@@ -45,8 +49,10 @@ impl Desk {
     fn step(&mut self, at: DVec3) -> Result<(), String> {
         let Some(open) = &mut self.open else { return Ok(()) };
         let Some(hand) = &mut open.live else { return Ok(()) };
+        let start = Instant::now();
         let done = hand.live.step(Pose::at(at), &mut Control::default());
         let seen = done.and_then(|force| Ok((hand.live.look()?.0, force)));
+        let _ = self.news.send(News::Step(start.elapsed().as_secs_f64()));
         match seen {
             Ok((state, force)) => {
                 let placed = state.placement(&open.chosen).unwrap_or_default();
@@ -66,6 +72,7 @@ impl Desk {
     }
 
     pub(in crate::window) fn end(&mut self) {
+        self.untry();
         let Some(open) = &mut self.open else { return };
         let (Some(hand), Some(document)) = (open.live.take(), &mut open.document) else {
             return;
@@ -89,21 +96,36 @@ impl Desk {
     pub(super) fn drop_stroke(&mut self) -> Result<(), String> {
         if let Some(open) = &mut self.open {
             open.live = None;
+            open.drawn = None;
             open.shown = open.state().clone();
         }
         self.tell(News::Acting(None));
         Ok(())
     }
 
-    /// Does a stroke that needs no hand.
+    /// Does a stroke on the chosen object that needs no hand.
     pub(super) fn apply(&mut self, stroke: Stroke) -> Result<(), String> {
-        self.end();
-        let Some(open) = &self.open else { return Ok(()) };
-        let (state, object) = (open.state().clone(), open.chosen.clone());
-        let command = Command::Stroke {
+        let Some(object) = self.open.as_ref().map(|open| open.chosen.clone()) else {
+            return Ok(());
+        };
+        self.apply_all(vec![Command::Stroke {
             object,
             stroke: Box::new(stroke),
-        };
+        }])
+    }
+
+    /// Does commands in their order, each an edit, until one cannot be done.
+    pub(super) fn apply_all(&mut self, commands: Vec<Command>) -> Result<(), String> {
+        self.end();
+        for command in commands {
+            self.apply_one(&command)?;
+        }
+        Ok(())
+    }
+
+    fn apply_one(&mut self, command: &Command) -> Result<(), String> {
+        let Some(open) = &self.open else { return Ok(()) };
+        let state = open.state().clone();
         let title = command.title();
         let (what, news, wake) = (title.clone(), self.news.clone(), self.wake.clone());
         let mut control = Control {
@@ -117,6 +139,11 @@ impl Desk {
         let done = command.apply(&state, &mut control);
         self.tell(News::Busy(None));
         let (next, notes) = done.map_err(|e| e.to_string())?;
+        if let (Some(open), Command::Rename { object, to }) = (&mut self.open, command)
+            && open.chosen == *object
+        {
+            open.chosen.clone_from(to);
+        }
         self.turn_back(|document| document.commit(&title, command.to_value(), next).map(drop))?;
         notes.into_iter().for_each(|note| self.tell(News::Note(note)));
         Ok(())
@@ -133,7 +160,15 @@ impl Desk {
         };
         let turned = turn(document).map_err(|e| e.to_string());
         open.shown = document.state().clone();
+        open.choose_what_is_there();
         self.lay_sheet();
         turned
     }
+}
+
+/// Where a line meets the plane through a place across a direction, in front of its eye.
+pub(super) fn in_plane(ray: &Ray, [at, toward_eye]: [DVec3; 2]) -> Option<DVec3> {
+    let fall = ray.along.dot(toward_eye);
+    let far = (at - ray.from).dot(toward_eye) / fall;
+    (fall.abs() > 1e-6 && far > 0.0).then(|| ray.from + far * ray.along)
 }

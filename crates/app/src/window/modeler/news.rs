@@ -68,6 +68,9 @@ impl Modeler {
             }
             News::Seen(seen) => self.bench.seen = Some(seen),
             News::Acting(acting) => self.bench.shown.acts(acting),
+            News::Hide(name) => drop(self.bench.hidden.insert(name)),
+            News::Touched(rate) => self.bench.performance.touched(rate),
+            News::Step(seconds) => self.bench.performance.step(seconds),
             News::Note(text) => self.bench.tell(text, false),
             News::Failed(text) => self.bench.tell(text, true),
         }

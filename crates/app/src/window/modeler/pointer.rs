@@ -7,18 +7,27 @@ use glam::DVec2;
 
 use super::Modeler;
 use super::viewport::at;
+use crate::view::Ray;
 use crate::window::gesture::{Gesture, Way};
+use crate::window::lasso;
 use crate::window::orders::Order;
+use crate::window::tool::{Kind, Tool, Use};
 
 impl Modeler {
     pub(super) fn end_gesture(&mut self) {
+        self.drawn.clear();
+        let (lasso, keeps) = std::mem::take(&mut self.lassoed);
+        if let Some(formula) = lasso::formula(&lasso) {
+            self.bench.limits.lasso = Some(formula);
+            self.bench.limits.keeps = keeps;
+        }
         if let Some(Gesture::Stroke(_)) = self.gesture.take() {
             self.bench.order(Order::End);
         }
     }
 
     pub(super) fn pointer(&mut self, ui: &egui::Ui, rect: Rect, response: &egui::Response, over: Pos2) {
-        if self.adjust(ui, rect, over) {
+        if self.adjust(ui, rect, over) || self.arrange(ui, rect, over) {
             return;
         }
         let (keys, scroll, pressed) = ui.input(|i| {
@@ -45,6 +54,10 @@ impl Modeler {
         let under = is_free.then(|| self.under(rect, start)).flatten();
         if let Some(button) = pressed.filter(|_| response.hovered() && self.gesture.is_none()) {
             if let (PointerButton::Primary, Some((p, normal))) = (button, under) {
+                if self.bench.arranging {
+                    self.choose(rect, start);
+                    return;
+                }
                 if self.bench.measure.is_some() {
                     self.bench.mark(p, normal);
                     return;
@@ -58,13 +71,21 @@ impl Modeler {
                 (PointerButton::Primary, _, false) if self.leads_by_mouse() && under.is_some() => {
                     Gesture::Hand
                 }
-                (PointerButton::Primary, _, false) if under.is_some() && self.bench.held.is_none() => {
+                (PointerButton::Primary, _, false)
+                    if (under.is_some() || tool.kind == Kind::Lasso) && self.bench.held.is_none() =>
+                {
                     let reach = self.pixels_of(rect, tool.radius);
+                    let step = (tool.settings.spacing as f32 * reach).clamp(2.0, 24.0);
+                    self.drawn = under
+                        .iter()
+                        .filter(|_| tool.acts_at_once())
+                        .map(|(p, _)| *p)
+                        .collect();
                     self.bench.order(Order::Begin {
                         tool,
                         ray: self.ray(rect, start),
                     });
-                    Gesture::Stroke(Way::new(start, (0.2 * reach).clamp(2.0, 24.0)))
+                    Gesture::Stroke(Way::new(start, step))
                 }
                 (PointerButton::Middle, true, _) | (PointerButton::Secondary, ..) => Gesture::Pan,
                 _ => Gesture::Orbit,
@@ -81,7 +102,9 @@ impl Modeler {
                 for step in &steps {
                     self.bench.order(Order::Along(self.ray(rect, *step)));
                 }
-                if !steps.is_empty() {
+                if tool.acts_at_once() {
+                    self.draw_line(rect, &tool, &steps);
+                } else if !steps.is_empty() {
                     self.meet_desk();
                 }
             }
@@ -96,8 +119,72 @@ impl Modeler {
             _ => {}
         }
         self.lead(rect, over);
-        if let (Some((p, normal)), None, None) = (under, self.gesture, &self.bench.held) {
+        let is_sculpting = !self.bench.arranging && self.bench.held.is_none();
+        let over_solid = under.filter(|_| is_sculpting && self.gesture.is_none());
+        if let Some((p, normal)) = over_solid {
             self.ring(ui, rect, p, normal, &tool);
+        }
+        self.try_out(rect, over_solid.is_some().then_some(over), &tool);
+    }
+
+    /// The nearest object under the mouse is chosen.
+    fn choose(&mut self, rect: Rect, over: Pos2) {
+        let Some(sheet) = self.bench.sheet.clone() else {
+            return;
+        };
+        let ray = self.ray(rect, over);
+        let seen = sheet
+            .objects
+            .iter()
+            .filter(|thing| !self.bench.hidden.contains(&thing.name));
+        let met = seen.filter_map(|thing| Some((thing.under(&ray)?.0.distance(ray.from), &thing.name)));
+        if let Some((_, name)) = met.min_by(|a, b| a.0.total_cmp(&b.0)) {
+            self.bench.order(Order::Choose(name.clone()));
+        }
+    }
+
+    /// Has the desk show what a click would leave.
+    fn try_out(&mut self, rect: Rect, over: Option<Pos2>, tool: &Tool) {
+        let now = over
+            .filter(|_| tool.kind.by() == Use::Click)
+            .map(|over| (over, *tool));
+        if now == self.tried {
+            return;
+        }
+        self.bench.order(match now {
+            Some((over, tool)) => Order::Try(tool, self.ray(rect, over)),
+            None => Order::Untry,
+        });
+        self.tried = now;
+    }
+
+    /// The line of a tool that acts at once goes on.
+    fn draw_line(&mut self, rect: Rect, tool: &Tool, steps: &[Pos2]) {
+        let own = self.bench.chosen().map(|thing| thing.world_from_object.inverse());
+        for step in steps {
+            if let (Kind::Lasso, Some(own)) = (tool.kind, own) {
+                let ray = self.ray(rect, *step);
+                let ray = Ray {
+                    from: own.transform_point3(ray.from),
+                    along: own.transform_vector3(ray.along).normalize_or_zero(),
+                };
+                self.lassoed.0.push((*step, ray));
+                self.lassoed.1 = tool.inverted;
+            }
+            let under = self.under(rect, *step).map(|(p, _)| p);
+            match tool.kind.by() {
+                Use::Arrow => {
+                    let Some(from) = self.drawn.first().copied() else {
+                        return;
+                    };
+                    let ray = self.ray(rect, *step);
+                    // As far from the eye as where it began.
+                    let across = ray.from + (from - ray.from).dot(ray.along) * ray.along;
+                    self.drawn = vec![from, under.unwrap_or(across)];
+                }
+                Use::Click => {}
+                _ => self.drawn.extend(under),
+            }
         }
     }
 

@@ -7,10 +7,10 @@ use egui::{Pos2, Rect, Sense};
 use glam::{DVec2, DVec3};
 
 use super::Modeler;
-use crate::view::{Legend, Ray, pick, scale_bar};
+use crate::view::{Legend, Ray, scale_bar};
 
 /// Time after which a picture in which nothing moves is drawn whole.
-const STILL: Duration = Duration::from_millis(60);
+const STILL: Duration = Duration::from_millis(45);
 
 impl Modeler {
     /// The scene, and what the mouse does in it.
@@ -45,6 +45,8 @@ impl Modeler {
         Legend::draw(&self.bench.legends(), ui.painter(), rect);
         self.draw_cursor(ui, rect);
         self.draw_holds(ui, rect);
+        self.draw_line_so_far(ui, rect);
+        self.draw_boxes(ui, rect);
         self.draw_marks(ui, rect);
         self.draw_hand(ui, rect);
         self.draw_acting(ui, rect);
@@ -104,23 +106,11 @@ impl Modeler {
 
     /// Where the mouse is over the chosen object, and the normal there, in the world.
     pub(in crate::window) fn under(&self, rect: Rect, over: Pos2) -> Option<(DVec3, DVec3)> {
-        let sheet = self.bench.sheet.as_ref()?;
-        let thing = sheet.objects.get(sheet.chosen)?;
-        if self.bench.shown.hidden.contains(&thing.name) {
-            return None;
-        }
-        let ray = self.ray(rect, over);
-        let own = thing.world_from_object.inverse();
-        let ray = Ray {
-            from: own.transform_point3(ray.from),
-            along: own.transform_vector3(ray.along).try_normalize()?,
-        };
-        let (p, normal) = pick(&*thing.field, thing.iso, &thing.own_box, &ray)?;
-        let turned = own.matrix3.transpose() * normal;
-        Some((
-            thing.world_from_object.transform_point3(p),
-            turned.normalize_or_zero(),
-        ))
+        let thing = self
+            .bench
+            .chosen()
+            .filter(|thing| !self.bench.hidden.contains(&thing.name))?;
+        thing.under(&self.ray(rect, over))
     }
 }
 

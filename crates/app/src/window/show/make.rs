@@ -5,16 +5,18 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender};
 
+use bspline::hierarchical::Lattice;
 use document::read_report;
-use fitting::{FitReport, LeafIndex};
+use fitting::FitReport;
 use formats::field::SourceKind;
 use glam::DVec3;
 use rayon::prelude::*;
+use rustc_hash::FxHashMap;
 use tools::paint::{Substance, values};
 
 use super::{Layer, points};
-use crate::cli::quantity::{human_count, human_number};
-use crate::view::cells::{ErrorScale, band, cells, titled};
+use crate::cli::quantity::human_count;
+use crate::view::cells::{ErrorScale, band, cells, short, titled};
 use crate::view::{Legend, Patch, Stretch, Tint, Tinted, second};
 use crate::window::orders::Thing;
 
@@ -30,7 +32,7 @@ pub struct Wish {
     pub things: Vec<Thing>,
     /// Which kind of it.
     pub kind: u8,
-    /// Of a second surface.
+    /// Of a second surface, and within which object it lies, if it does.
     pub density: f64,
     /// Triangles of the first.
     pub most: usize,
@@ -64,7 +66,7 @@ pub enum Made {
     /// Nothing, or it is shown no more.
     Nothing,
     /// Triangles.
-    Patches(Vec<Patch>),
+    Patches(Vec<Patch>, Option<String>),
     /// Colours.
     Tinted(Tinted),
     /// Lines or dots.
@@ -146,7 +148,8 @@ fn veil(wish: &Wish, thing: &Thing) -> Result<Answer, String> {
         0 => Err("nowhere is the density so; choose another one".into()),
         count => {
             let told = format!("{} triangles", human_count(count));
-            Ok((Made::Patches(patches), None, told))
+            let within = (wish.density > thing.iso).then(|| thing.name.clone());
+            Ok((Made::Patches(patches, within), None, told))
         }
     }
 }
@@ -182,34 +185,75 @@ fn errors(things: &[Thing]) -> Result<Answer, String> {
         let Ok(report) = report(thing) else { continue };
         let scale = ErrorScale::of(&report);
         first.get_or_insert((scale, residual_unit(thing), report.rms));
-        let index = LeafIndex::new(&thing.object.field.lattice(), &report.leaves);
-        let shares: Vec<f32> = (report.leaves.iter())
-            .map(|leaf| match leaf.sample_count {
-                0 => -1.0,
-                _ => scale.share(leaf.rms) as f32,
-            })
-            .collect();
+        let known = Known::of(&thing.object.field.lattice(), &report);
         fits.insert(
             thing.name.clone(),
-            (thing.world_from_object.inverse(), index, shares),
+            (thing.world_from_object.inverse(), known, scale),
         );
     }
     let Some((scale, unit, rms)) = first else {
         return Err("no object knows of its errors, as what was fitted does".into());
     };
-    let told = format!(
-        "Of the fit, before edits: rms {} {unit} in all",
-        human_number(rms)
-    );
+    let told = format!("Of the fit, before edits: rms {} {unit} in all", short(rms));
     let shares = move |name: &str, places: &[DVec3]| match fits.get(name) {
-        Some((own, index, shares)) => {
-            let share = |p: &DVec3| index.find(own.transform_point3(*p)).map_or(-1.0, |n| shares[n]);
+        Some((own, known, scale)) => {
+            let share = |p: &DVec3| {
+                let rms = known.rms(own.transform_point3(*p));
+                rms.map_or(-1.0, |rms| scale.share(rms as f32) as f32)
+            };
             places.par_iter().map(share).collect()
         }
         None => vec![-1.0; places.len()],
     };
     let legend = scale.legend("Rms error of the fit", unit);
     Ok((Made::Tinted(Tinted(Arc::new(shares))), Some(legend), told))
+}
+
+/// Doublings of the finest cells up to which samples still speak for a place.
+const NEAR: u32 = 4;
+
+/// Errors of the samples in cells of a fit, and in cells that are made of several: sparse scans leave most of the finest ones empty.
+struct Known {
+    lattice: Lattice,
+    finest: u8,
+    /// Of each cell, by its doublings and its place among those, the sum of all squares, and samples.
+    of_cell: FxHashMap<(u32, [u32; 3]), [f64; 2]>,
+}
+
+impl Known {
+    fn of(lattice: &Lattice, report: &FitReport) -> Self {
+        let mut of_cell: FxHashMap<_, [f64; 2]> = FxHashMap::default();
+        let with_samples = report.leaves.iter().filter(|leaf| leaf.sample_count > 0);
+        let finest = with_samples.clone().map(|leaf| leaf.level).max().unwrap_or(0);
+        for leaf in with_samples {
+            let count = f64::from(leaf.sample_count);
+            let own = u32::from(finest - leaf.level);
+            for doublings in own..=own.max(NEAR) {
+                let cell = leaf.cell.map(|n| n >> (doublings - own));
+                let [squares, samples] = of_cell.entry((doublings, cell)).or_default();
+                *squares += count * f64::from(leaf.rms).powi(2);
+                *samples += count;
+            }
+        }
+        Self {
+            lattice: *lattice,
+            finest,
+            of_cell,
+        }
+    }
+
+    /// Of the smallest cell round a place that has samples.
+    fn rms(&self, p: DVec3) -> Option<f64> {
+        let q = self.lattice.world_from_lattice.inverse().transform_point3(p);
+        let cell = (q * f64::from(self.finest).exp2()).floor();
+        // Negative numbers become 0: places beside the lattice are as those at its side.
+        let cell = cell.to_array().map(|n| n as u32);
+        (0..=NEAR.max(self.finest.into())).find_map(|doublings| {
+            let key = (doublings, cell.map(|n| n >> doublings));
+            let [squares, samples] = self.of_cell.get(&key)?;
+            Some((squares / samples).sqrt())
+        })
+    }
 }
 
 /// Something painted as colours, from 0 to the most that there is at corners of a coarse grid.
@@ -246,7 +290,7 @@ fn painted(things: &[Thing], substance: Substance, name: &str, unit: &str) -> Re
     let legend = Legend {
         title: titled(name, unit),
         colors: band(),
-        marks: vec![(0.0, "0".into()), (1.0, human_number(most))],
+        marks: vec![(0.0, "0".into()), (1.0, short(most))],
     };
     Ok((
         Made::Tinted(Tinted(Arc::new(shares))),
@@ -361,7 +405,7 @@ mod tests {
             panic!("no colours")
         };
         let places = [at(middle), at([0.0; 3]), at([1.0, 0.0, 0.0]), at([2.0, 0.0, 0.0])];
-        assert_eq!(shares(&thing.name, &places), [0.5, 1.0, -1.0, -1.0]);
+        assert_eq!(shares(&thing.name, &places), [0.5, 1.0, 1.0, 1.0]);
         assert_eq!(shares("another", &places[..1]), [-1.0]);
         let legend = legend.unwrap();
         assert_eq!(legend.title, "Rms error of the fit, mm");

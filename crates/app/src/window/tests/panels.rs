@@ -3,6 +3,7 @@
 use egui::accesskit::Role;
 
 use super::*;
+use crate::window::actions::Action;
 
 /// A menu and what is in it.
 fn choose(window: &mut Harness<'_, Modeler>, menu: &str, item: &str) {
@@ -38,14 +39,6 @@ fn drag(window: &mut Harness<'_, Modeler>) {
     }
     window.drop_at(egui::pos2(690.0, 400.0));
     window.step();
-}
-
-/// The state that the journal of a document in use has on the disk.
-fn on_disk(sheet: &Sheet, scratch: &Path) -> Document {
-    let copy = scratch.join("copy.isoclay");
-    let _ = std::fs::remove_file(&copy);
-    std::fs::copy(&sheet.path, &copy).unwrap();
-    opened(&copy)
 }
 
 /// A stroke has the tool, the radius and the strength of the panel, and the journal repeats it to the bit.
@@ -193,4 +186,154 @@ fn places_walls_area_and_volume_are_measured() {
     window.get_by_label("Clear").click();
     window.run_steps(2);
     assert_eq!(window.state().bench().measure, Some(Default::default()));
+}
+
+/// Commands of the line `sculpt` on a block of clay as the window makes it: the hash that they leave.
+fn by_script(script: &str) -> [u8; 32] {
+    let (name, object) = crate::cli::desk_files::clay_block().unwrap();
+    let state = State::new().with(&name, object).unwrap();
+    let named = |own: Option<&str>| Ok::<_, document::CommandError>(own.unwrap_or(&name).to_string());
+    let commands = Command::of_script(script, named).unwrap();
+    let all = commands.iter().try_fold(state, |state, command| {
+        command
+            .apply(&state, &mut Control::default())
+            .map(|(next, _)| next)
+    });
+    all.unwrap().sha256()
+}
+
+/// Objects are duplicated, renamed, moved by typed numbers and removed, as a script does it.
+#[test]
+fn objects_are_arranged_as_by_a_script() {
+    let (home, scratch) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let mut window = window_with_clay(home.path());
+    choose(&mut window, "Edit", "Duplicate");
+    until(&mut window, "duplicated", |sheet| sheet.objects.len() == 2);
+    // The copy is in the hand: 50 along X, then Enter.
+    let middle = egui::pos2(640.0, 400.0);
+    window.hover_at(middle);
+    window.run_steps(3);
+    window.key_press(egui::Key::X);
+    window.step();
+    for text in ["5", "0"] {
+        window.event(egui::Event::Text(text.into()));
+        window.step();
+    }
+    window.key_press(egui::Key::Enter);
+    window.run_steps(2);
+    let sheet = edits(&mut window, 2);
+    assert_eq!(sheet.objects[sheet.chosen].name, "clay 2");
+    let script =
+        "{\"copy\": {\"to\": \"clay 2\"}}\n{\"object\": \"clay 2\", \"place\": {\"by\": [50, 0, 0]}}\n";
+    assert_eq!(
+        on_disk(&sheet, scratch.path()).state().sha256(),
+        by_script(script)
+    );
+
+    // Another name, by the tree.
+    window.get_by_label("clay 2").click_secondary();
+    window.run_steps(3);
+    window.get_by_label("Rename").click();
+    window.run_steps(3);
+    write(&mut window, Role::TextInput, "Name", "twin");
+    window.key_press(egui::Key::Enter);
+    window.run_steps(2);
+    let sheet = edits(&mut window, 3);
+    assert_eq!(sheet.objects[sheet.chosen].name, "twin");
+    choose(&mut window, "Edit", "Remove");
+    let sheet = edits(&mut window, 4);
+    let all = format!(
+        "{script}{}\n{}",
+        r#"{"tool": "rename", "object": "clay 2", "to": "twin"}"#, r#"{"tool": "remove", "object": "twin"}"#
+    );
+    assert_eq!(on_disk(&sheet, scratch.path()).state().sha256(), by_script(&all));
+    assert_eq!(sheet.objects.len(), 1);
+}
+
+/// A scene that the panel plays is the scene of a script.
+#[test]
+fn a_scene_is_played_as_by_a_script() {
+    let (home, scratch) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let mut window = window_with_clay(home.path());
+    choose(&mut window, "View", "Simulation");
+    window.key_press(egui::Key::Escape);
+    window.run_steps(3);
+    window.get_by_label("Swelling clay").click();
+    window.run_steps(2);
+    let bench = window.state().bench();
+    let script = bench.simulation.script(bench.chosen().unwrap());
+    window.get_by_label("Play").click();
+    let sheet = edits(&mut window, 1);
+    assert!(sheet.history[0].contains("scene"));
+    assert_eq!(
+        on_disk(&sheet, scratch.path()).state().sha256(),
+        by_script(&script)
+    );
+}
+
+/// What the window did, saved as a script, is done again to the same state.
+#[test]
+fn a_saved_script_does_it_again() {
+    let (home, scratch) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let mut window = window_with_clay(home.path());
+    drag(&mut window);
+    edits(&mut window, 1);
+    window.get_by_label("Material").click();
+    window.run_steps(20);
+    window.get_by_label("Elastic").click();
+    let sheet = edits(&mut window, 2);
+    choose(&mut window, "File", "Save script");
+    let file = scratch.path().join("done.jsonl");
+    write(&mut window, Role::TextInput, "File", file.to_str().unwrap());
+    window.get_by_role_and_label(Role::Button, "Save script").click();
+    let start = Instant::now();
+    while !file.exists() {
+        assert!(start.elapsed() < Duration::from_secs(60));
+        std::thread::sleep(Duration::from_millis(10));
+        window.step();
+    }
+    let script = std::fs::read_to_string(&file).unwrap();
+    assert_eq!(
+        by_script(&script),
+        on_disk(&sheet, scratch.path()).state().sha256()
+    );
+}
+
+/// The command palette finds and does; the table of keys is shown.
+#[test]
+fn the_palette_of_commands_finds_and_does() {
+    let home = tempfile::tempdir().unwrap();
+    let mut window = window_with_clay(home.path());
+    window.key_press(egui::Key::F3);
+    window.run_steps(3);
+    window.event(egui::Event::Text("chis".into()));
+    window.run_steps(2);
+    window.key_press(egui::Key::Enter);
+    window.run_steps(2);
+    assert_eq!(window.state().bench().tool.kind, Kind::Chisel);
+    assert!(window.state().bench().commands.is_none());
+    assert!(window.state().bench().keys.text(Action::Take(Kind::Chisel)) == "H");
+    choose(&mut window, "Edit", "Shortcuts");
+    assert!(window.query_by_label("All as usual").is_some());
+}
+
+/// Symmetry, a box and a wall of the panel are those of the stroke in the journal.
+#[test]
+fn strokes_keep_to_the_limits_that_are_set() {
+    let (home, scratch) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let mut window = window_with_clay(home.path());
+    window.get_by_label("Where it acts").click();
+    window.run_steps(20);
+    window.get_by_role_and_label(Role::Button, "X").click();
+    window.run_steps(2);
+    drag(&mut window);
+    let sheet = edits(&mut window, 1);
+    let mut document = on_disk(&sheet, scratch.path());
+    let command = document.command(0).unwrap();
+    assert_eq!(
+        command["stroke"]["symmetry"]["normal"],
+        serde_json::json!([1.0, 0.0, 0.0]),
+        "{command}"
+    );
+    assert_eq!(again(&mut document).sha256(), document.state().sha256());
 }

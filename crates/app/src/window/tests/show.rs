@@ -91,7 +91,7 @@ fn slices_share_a_cursor_and_stand_beside_the_scene() {
     assert!(after.x != before.x && after.y != before.y, "{before} {after}");
     assert_eq!(after.z, before.z);
     tick(&mut window, "Four views");
-    for plane in ["Axial", "Coronal", "Sagittal", "Carve"] {
+    for plane in ["Axial", "Coronal", "Sagittal", "Carve C"] {
         assert!(window.query_by_label_contains(plane).is_some(), "{plane}");
     }
     assert!(window.state().bench().sheet.as_ref().unwrap().history.is_empty());

@@ -101,6 +101,7 @@ pub const ROWS: &[Row] = &[
     ("sculpt", "--script", "clay.isoclay --script *notes.docx", "line 1"),
     ("sculpt", "--object", "clay.isoclay --script scene.toml --object *cow", "field"),
     ("sculpt", "--preview", "clay.isoclay --script scene.toml --preview *out.ply", ".iclay"),
+    ("history", "--script", "clay.isoclay --script *out.ply", ".jsonl"),
     ("export", "--object", "clay.isoclay -o out.iclay --object *cow", "field"),
     ("mesh picture render info", "--object", "clay.isoclay --object *cow @out", "field"),
     ("check", "--object", "clay.isoclay cloud.ply --object *cow", "field"),

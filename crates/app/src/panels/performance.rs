@@ -1,0 +1,187 @@
+//! What the work costs: pictures, steps, touch and memory over the last time.
+
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+use egui_plot::{Plot, PlotPoints, Points};
+
+use crate::cli::cost::rss_bytes;
+use crate::cli::quantity::{human_bytes, human_count};
+use crate::window::Bench;
+
+/// How long figures are kept.
+const KEPT: Duration = Duration::from_secs(30);
+/// Time from one look at the memory to the next.
+const LOOK: Duration = Duration::from_millis(500);
+
+/// Figures with the time at which each was found.
+#[derive(Default)]
+struct Row(VecDeque<(Instant, f64)>);
+
+impl Row {
+    fn push(&mut self, figure: f64) {
+        let now = Instant::now();
+        self.0.push_back((now, figure));
+        while self.0.front().is_some_and(|(when, _)| now - *when > KEPT) {
+            self.0.pop_front();
+        }
+    }
+
+    /// Seconds ago, negative, and the figure.
+    fn points(&self) -> Vec<[f64; 2]> {
+        let at = |(when, figure): &(Instant, f64)| [-when.elapsed().as_secs_f64(), *figure];
+        self.0.iter().map(at).collect()
+    }
+
+    /// The middle one of the last second; none if there is none.
+    fn lately(&self) -> Option<f64> {
+        let new = self
+            .0
+            .iter()
+            .rev()
+            .take_while(|(when, _)| when.elapsed() < Duration::from_secs(1));
+        let mut new: Vec<f64> = new.map(|(_, figure)| *figure).collect();
+        new.sort_by(f64::total_cmp);
+        new.get(new.len() / 2).copied()
+    }
+}
+
+/// What the work costs.
+#[derive(Default)]
+pub struct Performance {
+    /// Whether its window is shown.
+    pub is_open: bool,
+    /// Of pictures, ms.
+    pictures: Row,
+    /// Of steps of strokes, ms.
+    steps: Row,
+    /// Forces of a device a second.
+    touch: Row,
+    /// MiB.
+    memory: Row,
+    /// When a picture began last.
+    last: Option<Instant>,
+    /// The figures of the scene that was played last, in a sentence.
+    pub played: Option<String>,
+}
+
+impl Performance {
+    /// A step of a stroke took so many seconds.
+    pub fn step(&mut self, seconds: f64) {
+        self.steps.push(1e3 * seconds);
+    }
+
+    /// A device was given so many forces a second.
+    pub fn touched(&mut self, rate: f64) {
+        self.touch.push(rate);
+    }
+
+    /// A picture begins; pictures that nobody asked for, long after the last, do not count.
+    pub fn picture(&mut self) {
+        let now = Instant::now();
+        if let Some(last) = self.last.replace(now)
+            && now - last < Duration::from_millis(400)
+        {
+            self.pictures.push(1e3 * (now - last).as_secs_f64());
+        }
+    }
+}
+
+/// In a window of its own.
+pub fn performance(context: &egui::Context, bench: &mut Bench) {
+    bench.performance.picture();
+    if !bench.performance.is_open {
+        return;
+    }
+    let is_new = bench
+        .performance
+        .memory
+        .0
+        .back()
+        .is_none_or(|(when, _)| when.elapsed() > LOOK);
+    if let Some(bytes) = rss_bytes().filter(|_| is_new) {
+        bench.performance.memory.push(bytes as f64 / f64::from(1 << 20));
+    }
+    let mut is_open = true;
+    egui::Window::new("Performance")
+        .open(&mut is_open)
+        .default_pos(egui::pos2(700.0, 60.0))
+        .default_width(300.0)
+        .show(context, |ui| show(ui, bench));
+    bench.performance.is_open = is_open;
+    context.request_repaint_after(LOOK);
+}
+
+fn show(ui: &mut egui::Ui, bench: &Bench) {
+    let costs = &bench.performance;
+    let pictures = costs
+        .pictures
+        .lately()
+        .map(|ms| format!("{:.0} a second", 1e3 / ms.max(1e-3)));
+    let steps = costs
+        .steps
+        .lately()
+        .map(|ms| format!("{ms:.1} ms a step, {:.0} a second", 1e3 / ms.max(1e-3)));
+    let touch = costs.touch.lately().map(|rate| format!("{rate:.0} a second"));
+    let memory = costs
+        .memory
+        .lately()
+        .map(|mib| human_bytes((mib * f64::from(1 << 20)) as u64));
+    let rows = [
+        (
+            "Pictures",
+            &costs.pictures,
+            "ms",
+            pictures.unwrap_or("nothing moves".into()),
+        ),
+        (
+            "Strokes",
+            &costs.steps,
+            "ms",
+            steps.unwrap_or("none lately".into()),
+        ),
+        (
+            "Forces of a device",
+            &costs.touch,
+            "/s",
+            touch.unwrap_or("none in the hand".into()),
+        ),
+        (
+            "Memory",
+            &costs.memory,
+            "MiB",
+            memory.unwrap_or("the system does not tell".into()),
+        ),
+    ];
+    for (name, row, unit, text) in rows {
+        ui.horizontal(|ui| {
+            ui.strong(name);
+            ui.label(text);
+        });
+        if row.0.len() > 1 {
+            plot(ui, name, row, unit);
+        }
+    }
+    ui.label(format!("{} triangles", human_count(bench.triangles)));
+    if let Some(played) = &costs.played {
+        ui.label(played);
+    }
+}
+
+fn plot(ui: &mut egui::Ui, name: &str, row: &Row, unit: &str) {
+    let unit = unit.to_string();
+    Plot::new(name)
+        .height(64.0)
+        .allow_drag(false)
+        .allow_zoom(false)
+        .allow_scroll(false)
+        .include_x(-KEPT.as_secs_f64())
+        .include_x(0.0)
+        .include_y(0.0)
+        .show_x(false)
+        .y_axis_formatter(move |mark, _| format!("{} {unit}", mark.value))
+        .x_axis_formatter(|mark, _| format!("{} s", mark.value))
+        .show(ui, |plot| {
+            plot.points(Points::new(name, PlotPoints::from(row.points())).radius(1.5))
+        });
+}
