@@ -5,6 +5,7 @@ use std::time::Instant;
 use egui::{Key, Modifiers};
 
 use super::Modeler;
+use crate::window::actions::{Action, Name};
 use crate::window::gesture::Gesture;
 use crate::window::orders::Order;
 
@@ -21,7 +22,12 @@ impl Modeler {
             self.gesture = None;
             self.bench.order(Order::Drop);
         }
-        let pressed = self.bench.keys.pressed(ui.ctx(), self.bench.arranging);
+        let mut pressed = self.bench.keys.pressed(ui.ctx(), self.bench.arranging);
+        // What is typed in the same slow picture is meant for the palette of commands.
+        let palette = Action::Do(Name::Commands);
+        if pressed.contains(&palette) {
+            pressed = vec![palette];
+        }
         if !pressed.is_empty() {
             self.moved = Instant::now();
         }
