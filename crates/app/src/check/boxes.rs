@@ -4,7 +4,7 @@ use formats::FormatError;
 use glam::DVec3;
 
 /// Edges of a box between corners numbered `4x + 2y + z`.
-const EDGES: [[u32; 2]; 12] = [
+pub const EDGES: [[usize; 2]; 12] = [
     [0, 1],
     [2, 3],
     [4, 5],
@@ -49,7 +49,7 @@ pub fn write_boxes(
         for (i, (_, color)) in boxes.iter().enumerate() {
             for edge in EDGES {
                 for v in edge {
-                    out.write_all(&(8 * i as u32 + v).to_le_bytes())?;
+                    out.write_all(&((8 * i + v) as u32).to_le_bytes())?;
                 }
                 out.write_all(color)?;
             }

@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 use super::modeler::Modeler;
 use super::orders::Thing;
 use super::tool::turned;
+use crate::check::EDGES;
 
 /// What happens to the object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -194,17 +195,11 @@ impl Modeler {
         let map = gets.map_or(DAffine3::IDENTITY, |gets| gets.map(center)) * thing.world_from_object;
         let (min, size) = (thing.own_box.min, thing.own_box.size());
         let corner = |n: usize| {
-            let share = DVec3::new((n & 1) as f64, (n >> 1 & 1) as f64, (n >> 2) as f64);
+            let share = DVec3::new((n >> 2) as f64, (n >> 1 & 1) as f64, (n & 1) as f64);
             self.on_screen(rect, map.transform_point3(min + share * size))
         };
-        for from in 0..8_usize {
-            for to in [1, 2, 4]
-                .map(|bit| from | bit)
-                .into_iter()
-                .filter(|to| *to != from)
-            {
-                painter.line_segment([corner(from), corner(to)], Stroke::new(1.5, color));
-            }
+        for [from, to] in EDGES {
+            painter.line_segment([corner(from), corner(to)], Stroke::new(1.5, color));
         }
         if let Some(axis) = arrange.axis {
             let way = self.bench.scene.1 * DVec3::AXES[axis];

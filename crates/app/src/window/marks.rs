@@ -6,27 +6,13 @@ use tools::number::Point;
 
 use super::modeler::Modeler;
 use super::tool::{Kind, Tool, Use};
+use crate::check::EDGES;
 use crate::cli::quantity::human_number;
 
 /// Sides of the ring that shows the tool.
 const RING: usize = 48;
 /// Length of the arrow of the largest force of a stroke, in radii of the scene.
 const LARGEST: f64 = 0.3;
-/// Sides of a box whose corners have the numbers `4x + 2y + z`.
-const SIDES: [[usize; 2]; 12] = [
-    [0, 1],
-    [2, 3],
-    [4, 5],
-    [6, 7],
-    [0, 2],
-    [1, 3],
-    [4, 6],
-    [5, 7],
-    [0, 4],
-    [1, 5],
-    [2, 6],
-    [3, 7],
-];
 /// Length of the arrow of a newton, in radii of the scene.
 const ARROW: f64 = 0.12;
 
@@ -93,18 +79,10 @@ impl Modeler {
         };
         let world = |p: DVec3| self.on_screen(rect, thing.world_from_object.transform_point3(p));
         for b in &limits.boxes {
-            let corner = |n: usize| {
-                let share = DVec3::new((n & 1) as f64, (n >> 1 & 1) as f64, (n >> 2) as f64);
-                world(b.min + share * b.size())
-            };
-            for from in 0..8_usize {
-                for to in [1, 2, 4]
-                    .map(|bit| from | bit)
-                    .into_iter()
-                    .filter(|to| *to != from)
-                {
-                    painter.line_segment([corner(from), corner(to)], Stroke::new(1.5, color));
-                }
+            let share = |n: usize| DVec3::new((n >> 2) as f64, (n >> 1 & 1) as f64, (n & 1) as f64);
+            let corner = |n: usize| world(b.min + share(n) * b.size());
+            for [from, to] in EDGES {
+                painter.line_segment([corner(from), corner(to)], Stroke::new(1.5, color));
             }
         }
         if let Some((at, normal)) = limits.symmetry {
@@ -172,7 +150,7 @@ impl Modeler {
         let painter = ui.painter().with_clip_rect(rect);
         let corners = acting.region.map(|p| self.on_screen(rect, p));
         let side = Stroke::new(1.0, Color32::from_rgba_unmultiplied(120, 200, 255, 110));
-        for [a, b] in SIDES {
+        for [a, b] in EDGES {
             painter.line_segment([corners[a], corners[b]], side);
         }
         let size = acting.force.length();
