@@ -8,7 +8,9 @@ mod projection;
 mod residual;
 
 pub use against_mesh::{AgainstMesh, against_mesh};
-pub use boxes::{EDGES, write_boxes};
+#[cfg(feature = "window")]
+pub use boxes::EDGES;
+pub use boxes::write_boxes;
 pub use color::viridis;
 pub use leaves::{LeafAudit, audit_leaves, centers, corners};
 pub use residual::{ErrorStatistics, voxel_residuals};
