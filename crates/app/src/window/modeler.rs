@@ -147,6 +147,7 @@ impl Modeler {
                 triangles: 0,
                 slices: None,
                 asks: None,
+                written: None,
                 part: None,
                 kept: desk_files::kept(&home),
                 scratch: None,
@@ -262,6 +263,7 @@ impl Modeler {
         });
         panels::slices(ui.ctx(), &mut self.bench);
         panels::path_box(ui.ctx(), &mut self.bench);
+        panels::written(ui.ctx(), &mut self.bench);
         panels::part(ui.ctx(), &mut self.bench);
         panels::touch(ui.ctx(), &mut self.bench);
         panels::measure(ui.ctx(), &mut self.bench);
