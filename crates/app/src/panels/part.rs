@@ -159,13 +159,16 @@ fn show(ui: &mut Ui, part: &mut Part, (preview, volume, stride): &(Preview, Volu
             slice(ui, part, volume, *stride, dims, axis);
         }
     });
-    egui::Grid::new("part").num_columns(4).show(ui, |ui| {
+    egui::Grid::new("part").num_columns(5).show(ui, |ui| {
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
             let [from, to] = &mut part.region[axis];
-            ui.label(format!("{name}, of {}", dims[axis]));
-            ui.add(DragValue::new(from).range(0..=*to - 1));
-            ui.label("to");
-            ui.add(DragValue::new(to).range(*from + 1..=dims[axis]));
+            let label = ui.label(format!("{name} from"));
+            ui.add(DragValue::new(from).range(0..=*to - 1))
+                .labelled_by(label.id);
+            let label = ui.label(format!("{name} to"));
+            ui.add(DragValue::new(to).range(*from + 1..=dims[axis]))
+                .labelled_by(label.id);
+            ui.label(format!("of {}", dims[axis]));
             ui.end_row();
         }
     });

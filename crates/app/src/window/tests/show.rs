@@ -105,7 +105,7 @@ fn pictures_replace_nothing_unasked() {
     tick(&mut window, "Picture…");
     let there = home.path().join("there.png");
     std::fs::write(&there, "mine").unwrap();
-    panels::write(
+    write(
         &mut window,
         egui::accesskit::Role::TextInput,
         "File",
