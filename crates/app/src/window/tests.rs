@@ -17,6 +17,7 @@ mod files;
 mod limits;
 mod matter;
 mod panels;
+mod performance;
 mod planes;
 mod scans;
 mod shortcuts;

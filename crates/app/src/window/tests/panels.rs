@@ -96,8 +96,15 @@ fn what_is_only_seen_is_no_edit() {
     let mut window = window_with_clay(home.path());
     drag(&mut window);
     let before = on_disk(&edits(&mut window, 1), scratch.path()).state().sha256();
-    for item in ["Slices", "Clipping plane", "Log", "Top", "Light", "All"] {
-        choose(&mut window, "View", item);
+    for (menus, item) in [
+        ("View/Windows", "Slices"),
+        ("View", "Clipping plane"),
+        ("View/Windows", "Log"),
+        ("View/Look from", "Top"),
+        ("View", "Light"),
+        ("View/Look from", "All"),
+    ] {
+        choose(&mut window, menus, item);
         window.key_press(egui::Key::Escape);
         window.run_steps(3);
     }
@@ -202,7 +209,7 @@ fn objects_are_arranged_as_by_a_script() {
 fn a_scene_is_played_as_by_a_script() {
     let (home, scratch) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let mut window = window_with_clay(home.path());
-    choose(&mut window, "View", "Simulation");
+    choose(&mut window, "View/Windows", "Simulation");
     window.key_press(egui::Key::Escape);
     window.run_steps(3);
     window.get_by_label("Swelling clay").click();

@@ -55,7 +55,7 @@ fn a_line_in_a_plane_has_the_densities_under_it() {
     assert!(is_as_the_field(&window));
     assert!(bench.sheet.as_ref().unwrap().history.is_empty());
 
-    let carve = serde_json::json!({ "carve": { "shape": { "ball": { "radius": 6.0 } }, "along": [[0, from.y, from.z]] } });
+    let carve = serde_json::json!({ "carve": { "shape": { "sphere": { "radius": 6.0 } }, "along": [[0, from.y, from.z]] } });
     bench.stroke(carve);
     edits(&mut window, 1);
     window.run_steps(2);

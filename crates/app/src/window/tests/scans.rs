@@ -1,5 +1,6 @@
 //! Scans that are opened, and what panels offer for them, are what `fit`, `new` and `sculpt` make of the same.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 use egui::accesskit::Role;
@@ -20,7 +21,8 @@ fn head(directory: &Path) -> PathBuf {
 /// The document that the command line makes of a scan by options of `fit`, and of strokes.
 fn by_command_line(scan: &Path, options: &[&str], strokes: &[serde_json::Value]) -> [u8; 32] {
     let scratch = tempfile::tempdir().unwrap();
-    let stem = scan.file_stem().unwrap().to_str().unwrap();
+    let name = scan.file_name().unwrap().to_str().unwrap();
+    let stem = name.split('.').next().unwrap();
     let field = scratch.path().join(format!("{stem}.iclay"));
     let document = scratch.path().join("made.isoclay");
     let mut fit: Vec<&dyn AsRef<std::ffi::OsStr>> = vec![&scan, &"-o", &field];
@@ -86,10 +88,12 @@ fn a_part_of_a_volume_is_what_fit_makes_of_it() {
 #[test]
 fn presets_of_a_scan_are_strokes_of_a_script() {
     let (home, scratch) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    let scan = head(scratch.path());
+    let scan = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/head.nii.gz"));
+    let options = ["--stride", "4"];
     let mut window = window_of(home.path(), TALL);
     window.step();
-    window.state().bench().order(Order::Open(scan.clone()));
+    let part = options.map(OsString::from).to_vec();
+    window.state().bench().order(Order::OpenPart(scan.clone(), part));
     let sheet = until(&mut window, "fitted", |sheet| sheet.is_untitled);
     assert_ne!(sheet.objects[0].iso, 300.0);
     window.run_steps(20);
@@ -116,6 +120,6 @@ fn presets_of_a_scan_are_strokes_of_a_script() {
     ];
     assert_eq!(
         on_disk(&sheet, scratch.path()).state().sha256(),
-        by_command_line(&scan, &[], &strokes)
+        by_command_line(&scan, &options, &strokes)
     );
 }

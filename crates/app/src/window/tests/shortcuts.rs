@@ -30,6 +30,9 @@ fn keys_are_changed_and_taken_from_others_if_that_is_wished() {
     window.key_press_modifiers(Modifiers::ALT, Key::T);
     window.run_steps(2);
     assert!(window.state().bench().slices.is_some());
+    window.key_press_modifiers(Modifiers::ALT, Key::T);
+    window.run_steps(2);
+    assert!(window.state().bench().slices.is_none());
 
     // Escape leaves it, and closes nothing.
     waits(&mut window, "log", "none");

@@ -31,8 +31,10 @@ fn below(window: &mut Window, object: &str, entry: &str, item: &str) {
     window.run_steps(3);
     window.get_by_label_contains(entry).click();
     window.run_steps(3);
-    // The tree has names too; what opened last comes last.
-    window.get_all_by_label(item).last().unwrap().click();
+    // The tree has names too, on the right of the window; menus open on the left of that.
+    let left = |node: &egui_kittest::Node<'_>| node.rect().left();
+    let all = window.get_all_by_label(item);
+    all.min_by(|a, b| left(a).total_cmp(&left(b))).unwrap().click();
     window.run_steps(3);
 }
 

@@ -51,10 +51,14 @@ pub fn middle(window: &Window) -> Pos2 {
 pub fn steps_until(window: &mut Window, what: &str, is: impl Fn(&Window) -> bool) {
     let start = Instant::now();
     while !is(window) {
-        let messages = &window.state().bench().messages;
+        let bench = window.state().bench();
         assert!(
             start.elapsed() < Duration::from_secs(60),
-            "not {what}: {messages:?}"
+            "not {what}: {:?} {:?}, {:?} in the hand, {:?}",
+            bench.sheet,
+            bench.busy,
+            bench.tool.kind,
+            bench.messages
         );
         std::thread::sleep(Duration::from_millis(10));
         window.step();
@@ -104,10 +108,12 @@ pub fn drag(window: &mut Window) {
     draw(window, &way);
 }
 
-/// A menu and what is in it.
-pub fn choose(window: &mut Window, menu: &str, item: &str) {
-    window.get_by_label(menu).click();
-    window.run_steps(2);
+/// A menu, those below it after a stroke, and what is in it.
+pub fn choose(window: &mut Window, menus: &str, item: &str) {
+    for menu in menus.split('/') {
+        window.get_by_label_contains(menu).click();
+        window.run_steps(4);
+    }
     window.get_by_label_contains(item).click();
     window.run_steps(2);
 }
