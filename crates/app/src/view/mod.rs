@@ -31,7 +31,7 @@ pub use overlay::legend::Legend;
 pub use overlay::{Ink, Stretch, cells, floor};
 pub use pick::{leave, pick};
 pub use rays::{BUDGET, Solid};
-pub use scale_bar::scale_bar;
+pub use scale_bar::{WIDE as SCALE_BAR, scale_bar};
 pub use screen::{SKY, Screen};
 pub use shape::{Patch, Shape, second};
 pub use show::{Cells, Show, Tint};

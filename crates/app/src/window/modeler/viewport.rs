@@ -7,7 +7,7 @@ use egui::{Pos2, Rect, Sense};
 use glam::{DVec2, DVec3};
 
 use super::Modeler;
-use crate::view::{Legend, Ray, scale_bar};
+use crate::view::{Legend, Ray, SCALE_BAR, scale_bar};
 
 /// Time after which a picture in which nothing moves is drawn whole.
 const STILL: Duration = Duration::from_millis(45);
@@ -39,13 +39,15 @@ impl Modeler {
         if !is_still {
             ui.ctx().request_repaint_after(STILL);
         }
+        let legends = self.bench.legends();
         if let Some(thing) = self.bench.sheet.as_ref().and_then(|s| s.objects.get(s.chosen))
             && self.bench.look.show.scale_bar
         {
             let length_of_point = self.bench.look.camera.height / f64::from(rect.height());
-            scale_bar(ui.painter(), rect, length_of_point, thing.unit);
+            let beside = Legend::beside(legends.len(), rect, SCALE_BAR);
+            scale_bar(ui.painter(), beside, length_of_point, thing.unit);
         }
-        Legend::draw(&self.bench.legends(), ui.painter(), rect);
+        Legend::draw(&legends, ui.painter(), rect);
         self.draw_cursor(ui, rect);
         self.draw_holds(ui, rect);
         self.draw_line_so_far(ui, rect);
