@@ -138,7 +138,7 @@ fn menus_fit_into_a_low_window() {
             window.run_steps(6);
         }
         let all = window.get_all_by_label_contains(last);
-        let entry = all.map(|node| node.rect()).last().unwrap();
+        let entry = all.map(|node| node.rect()).next_back().unwrap();
         assert!(
             entry.bottom() <= size[1] && entry.right() <= size[0],
             "{menus}: {last} at {entry}"
