@@ -7,6 +7,7 @@ mod canvas;
 mod card;
 mod cast;
 mod histogram;
+mod laid;
 mod lights;
 mod overlay;
 mod pick;

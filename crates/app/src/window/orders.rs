@@ -37,6 +37,8 @@ pub enum Order {
         out: PathBuf,
         /// Over which scan.
         scan: Option<PathBuf>,
+        /// Of a mesh: options of the command.
+        of_mesh: Vec<OsString>,
     },
     /// Tools work on this object from now on.
     Choose(String),
@@ -127,6 +129,8 @@ pub enum News {
     Moved(StepLine),
     /// An object is not to be seen for now.
     Hide(String),
+    /// A file was written, of which a command told this.
+    Written(PathBuf, serde_json::Map<String, serde_json::Value>),
     /// Something to tell.
     Note(String),
     /// Something that could not be done.

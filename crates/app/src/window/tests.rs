@@ -191,7 +191,7 @@ fn a_lost_card_loses_nothing() {
     let context = egui::Context::default();
     let state = screen();
     let device: wgpu::Device = state.device.clone();
-    let modeler = Modeler::on(&context, Some(Screen::new(state)), home.path().to_path_buf());
+    let modeler = Modeler::on(&context, Some(Screen::new(&state)), home.path().to_path_buf());
     let mut window = Harness::builder()
         .with_size([1280.0, 800.0])
         .build_ui_state(|ui, modeler: &mut Modeler| modeler.show(ui), modeler);
@@ -213,7 +213,7 @@ fn a_lost_card_loses_nothing() {
     window.step();
     // The window closes here; what it worked on goes on in the next.
     let next = egui::Context::default();
-    window.state_mut().resume(&next, Some(Screen::new(screen())));
+    window.state_mut().resume(&next, Some(Screen::new(&screen())));
     assert!(!window.state().is_lost(true));
     steps_until(&mut window, "seen again", |window| {
         window.query_by_label_contains("carve on clay").is_some() && window.state().bench().triangles > 0

@@ -4,6 +4,7 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use super::Modeler;
+use crate::panels;
 use crate::view::Screen;
 use crate::window::orders::News;
 
@@ -73,6 +74,7 @@ impl Modeler {
             News::Hide(name) => drop(self.bench.hidden.insert(name)),
             News::Touched(rate) => self.bench.performance.touched(rate),
             News::Step(seconds) => self.bench.performance.step(seconds),
+            News::Written(path, told) => self.bench.written = panels::Written::of(path, &told),
             News::Moved(step) => self.bench.performance.moved(step),
             News::Note(text) => self.bench.tell(text, false),
             News::Failed(text) => self.bench.tell(text, true),

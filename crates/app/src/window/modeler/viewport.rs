@@ -17,10 +17,13 @@ impl Modeler {
     pub(in crate::window) fn viewport(&mut self, ui: &mut egui::Ui) {
         let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
         // What the mouse does now shows in this picture, which is painted below what is drawn over it.
-        let below = ui.painter().add(egui::Shape::Noop);
+        let below = [(); 2].map(|()| ui.painter().add(egui::Shape::Noop));
         let over = response.hover_pos().or(response.interact_pointer_pos());
         if let Some(over) = over {
             self.pointer(ui, rect, &response, over);
+        }
+        if response.drag_stopped() || !ui.input(|i| i.pointer.any_down()) {
+            self.end_gesture();
         }
         let is_still = self.moved.elapsed() > STILL && self.gesture.is_none();
         self.bench.know_density();
@@ -52,13 +55,10 @@ impl Modeler {
         self.draw_marks(ui, rect);
         self.draw_hand(ui, rect);
         self.draw_acting(ui, rect);
-        if response.drag_stopped() || !ui.input(|i| i.pointer.any_down()) {
-            self.end_gesture();
-        }
     }
 
-    /// Draws the scene in place of a shape, or as much of it as there is time for; whether that is all.
-    fn draw(&mut self, ui: &egui::Ui, below: ShapeIdx, rect: Rect, is_still: bool) -> bool {
+    /// Draws the scene in place of two shapes, or as much of it as there is time for; whether that is all.
+    fn draw(&mut self, ui: &egui::Ui, below: [ShapeIdx; 2], rect: Rect, is_still: bool) -> bool {
         let Some(screen) = &mut self.screen else {
             return true;
         };
@@ -83,13 +83,10 @@ impl Modeler {
             .is_none_or(|drawn| drawn.is_done);
         let shown = shown.map(|drawn| (drawn.picture, 1.0));
         let whole = whole.map(|drawn| (drawn.picture, drawn.rows));
-        let pictures = shown.into_iter().chain(whole).map(|(picture, rows)| {
-            let corner = rect.min + egui::vec2(rect.width(), rows * rect.height());
-            let part = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, rows));
-            let rect = Rect::from_min_max(rect.min, corner);
-            egui::Shape::image(picture, rect, part, egui::Color32::WHITE)
-        });
-        ui.painter().set(below, egui::Shape::Vec(pictures.collect()));
+        for (shape, (picture, rows)) in below.into_iter().zip(shown.into_iter().chain(whole)) {
+            let part = rect.with_max_y(rect.min.y + rows * rect.height());
+            ui.painter().with_clip_rect(part).set(shape, picture.over(rect));
+        }
         is_done
     }
 

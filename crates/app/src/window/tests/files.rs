@@ -44,6 +44,62 @@ fn exports_are_those_of_the_command_line() {
     assert_eq!(edits(&mut window, 1).done, 1);
 }
 
+/// The dialog says what cannot be, replaces files by a button alone, and passes on how the mesh is wished; what was written is told.
+#[test]
+fn meshes_are_exported_as_they_are_wished_and_replace_nothing_unasked() {
+    let (home, scratch) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let mut window = window_with_clay(home.path());
+    let sheet = edits(&mut window, 0);
+    let document = scratch.path().join("copy.isoclay");
+    std::fs::copy(&sheet.path, &document).unwrap();
+    let [nowhere, there, by_command] =
+        ["nowhere/a.stl", "there.stl", "command.stl"].map(|name| scratch.path().join(name));
+    std::fs::write(&there, "something else").unwrap();
+    choose(&mut window, "File", "Export");
+    write(&mut window, Role::TextInput, "File", nowhere.to_str().unwrap());
+    window.run_steps(2);
+    assert!(window.query_by_label_contains("there is no directory").is_some());
+    window.key_press(egui::Key::Enter);
+    window.run_steps(2);
+    write(&mut window, Role::TextInput, "File", there.to_str().unwrap());
+    window.run_steps(2);
+    assert!(window.query_by_label_contains("is there already").is_some());
+    window.key_press(egui::Key::Enter);
+    window.run_steps(20);
+    assert_eq!(std::fs::read(&there).unwrap(), b"something else");
+    for wish in ["cm", "x and y reversed", "the largest"] {
+        window.get_by_label(wish).click();
+        window.run_steps(2);
+    }
+    window.get_by_label("Replace").click();
+    wait_for(&mut window, "Written");
+    let wished: [&dyn AsRef<std::ffi::OsStr>; 8] = [
+        &document,
+        &"-o",
+        &by_command,
+        &"--unit",
+        &"cm",
+        &"--axes",
+        &"lps",
+        &"--keep=largest",
+    ];
+    let told = command_line("mesh", &wished);
+    assert!(std::fs::read(&there).unwrap() == std::fs::read(&by_command).unwrap());
+    let written = window.state().bench().written.as_ref().unwrap();
+    let row = |what: &str| {
+        let mut rows = written.rows().iter().filter(|row| row.0 == what);
+        rows.next()
+            .map(|(_, figure, is_well)| (figure.as_str(), *is_well))
+            .unwrap()
+    };
+    let triangles = told["triangles"].as_u64().unwrap() as usize;
+    assert_eq!(row("Triangles").0, crate::cli::quantity::human_count(triangles));
+    assert_eq!(
+        [row("Closed"), row("Manifold"), row("Unit")],
+        [("yes", true), ("yes", true), ("cm", true)]
+    );
+}
+
 /// A script that is run from the menu leaves what `sculpt` leaves.
 #[test]
 fn a_script_from_the_menu_does_what_sculpt_does() {

@@ -111,7 +111,7 @@ fn pictures_replace_nothing_unasked() {
     tick(&mut window, "Save picture");
     assert!(window.query_by_label("Replace").is_some());
     assert_eq!(window.state().bench().shot.wanted, None);
-    tick(&mut window, "Not now");
+    tick(&mut window, "Cancel");
     assert_eq!(std::fs::read(&there).unwrap(), b"mine");
     // Without a graphics driver that is told.
     tick(&mut window, "Save picture");
