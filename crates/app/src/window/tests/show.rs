@@ -125,7 +125,11 @@ fn pictures_replace_nothing_unasked() {
 fn menus_fit_into_a_low_window() {
     let home = tempfile::tempdir().unwrap();
     let size = [640.0, 360.0];
-    let mut window = with_clay(window_of(home.path(), size));
+    let mut window = window_of(home.path(), size);
+    window.step();
+    window.state().bench().order(Order::Clay);
+    edits(&mut window, 0);
+    window.run_steps(3);
     for (menus, last) in [
         ("File", "Quit"),
         ("Edit", "Shortcuts…"),
