@@ -80,7 +80,7 @@ impl PathBox {
     fn title(&self) -> &'static str {
         match self.purpose {
             Purpose::Open => "Open",
-            Purpose::OpenPart => "Open a part",
+            Purpose::OpenPart => "Preview",
             Purpose::RunScript => "Run script",
             Purpose::SaveScript => "Save script",
             Purpose::Save => "Save as",
@@ -94,7 +94,7 @@ impl PathBox {
                 "A document .isoclay, a field .iclay, a cloud or mesh .ply .obj .pcd .las .xyz …, a volume .nii .nrrd .mha …"
             }
             Purpose::OpenPart => {
-                "A volume .nii .nrrd .mha …, or a DICOM series: what is asked next is how much of it"
+                "A volume .nii .nrrd .mha …, a directory of DICOM slices, a cloud or a mesh: what it is is told, and asked how much of it is wanted"
             }
             Purpose::RunScript => {
                 "Strokes or a scene .toml, or strokes .jsonl, as isoclay sculpt does them on the chosen object"
@@ -164,13 +164,14 @@ impl PathBox {
     }
 
     /// The system's dialog, on a thread of its own: some wait for it.
-    fn browse(&mut self, context: &egui::Context) {
+    fn browse(&mut self, context: &egui::Context, is_directory: bool) {
         let (tell, chosen) = channel();
         let (purpose, context) = (self.purpose, context.clone());
         let name = self.text.clone();
         std::thread::spawn(move || {
             let dialog = rfd::FileDialog::new();
             let path = match purpose {
+                _ if is_directory => dialog.pick_folder(),
                 Purpose::Open | Purpose::OpenPart | Purpose::RunScript => dialog.pick_file(),
                 Purpose::Save | Purpose::SaveScript | Purpose::Export => {
                     dialog.set_file_name(name).save_file()
@@ -209,7 +210,16 @@ pub fn path_box(context: &egui::Context, bench: &mut Bench) {
             // What is there already goes away by the button alone.
             is_given |= is_entered && !replaces;
             if ui.button("Browse…").clicked() {
-                asks.browse(context);
+                asks.browse(context, false);
+            }
+            let may_be_directory = matches!(asks.purpose, Purpose::Open | Purpose::OpenPart);
+            if may_be_directory
+                && ui
+                    .button("Folder…")
+                    .on_hover_text("Of DICOM or TIFF slices")
+                    .clicked()
+            {
+                asks.browse(context, true);
             }
         });
         if asks.purpose == Purpose::Export {

@@ -58,7 +58,7 @@ const fn ctrl_shift(key: Key) -> Option<KeyboardShortcut> {
 
 actions! {
     Open: "File", "open", "Open…", ctrl(Key::O);
-    Preview: "File", "open-part", "Part of a volume…", ctrl_shift(Key::O);
+    Preview: "File", "open-part", "Preview and open…", ctrl_shift(Key::O);
     NewClay: "File", "new-clay", "New block of clay", ctrl(Key::N);
     Save: "File", "save", "Save as…", ctrl(Key::S);
     SaveScript: "File", "save-script", "Save script…", None;

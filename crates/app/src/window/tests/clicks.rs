@@ -65,13 +65,8 @@ fn clicks_stamp_whirl_cut_and_paste_as_a_script_does() {
     );
     is_so_far(&mut window, &whirl);
 
-    let cut = used(
-        &mut window,
-        scratch.path(),
-        "cut out",
-        at - egui::vec2(60.0, 0.0),
-        3,
-    );
+    // With the ball that is on it: what is as flat as the rest would change nothing where it is pasted.
+    let cut = used(&mut window, scratch.path(), "cut out", at, 3);
     assert_eq!(cut["cut"]["to"], "part 1");
     let [min, max] = ["min", "max"].map(|end| cut["cut"]["region"][end].clone());
     let [min, max] = [min, max].map(|p| serde_json::from_value::<[f64; 3]>(p).unwrap());
@@ -101,6 +96,12 @@ fn what_is_copied_is_pasted_twice() {
     let (home, scratch) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let mut window = window_with_clay(home.path());
     let at = middle(&window);
+    // A groove: what is as flat as the rest would change nothing where it is pasted.
+    drag(&mut window);
+    let groove = on_disk(&edits(&mut window, 1), scratch.path())
+        .command(0)
+        .unwrap()["stroke"]
+        .clone();
     command(&mut window, "copy");
     assert_eq!(window.state().bench().tool.kind, Kind::Copy);
     click(&mut window, at);
@@ -108,11 +109,13 @@ fn what_is_copied_is_pasted_twice() {
         let last = window.state().bench().messages.back();
         last.is_some_and(|(_, text, _)| text.contains("copied"))
     });
-    let pasted = [1, 2].map(|n| {
+    let mut script = vec![groove];
+    for n in [2, 3] {
         let over = at + egui::vec2(60.0 * n as f32 - 90.0, 60.0);
-        used(&mut window, scratch.path(), "paste", over, n)
-    });
-    assert_eq!(pasted[0]["paste"]["from"], "clay");
-    let sheet = edits(&mut window, 2);
-    assert_is_script(&sheet, scratch.path(), &pasted);
+        let paste = used(&mut window, scratch.path(), "paste", over, n);
+        assert_eq!(paste["paste"]["from"], "clay");
+        script.push(paste);
+    }
+    let sheet = edits(&mut window, 3);
+    assert_is_script(&sheet, scratch.path(), &script);
 }

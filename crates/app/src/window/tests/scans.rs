@@ -5,11 +5,12 @@ use std::path::PathBuf;
 
 use egui::accesskit::Role;
 use egui::{Key, Modifiers};
+use formats::ReadLimits;
 use formats::volumes::{VolumeOptions, peek};
 use serde_json::json;
 
 use super::*;
-use crate::cli::quantity::{human_bytes, human_count};
+use crate::cli::quantity::{human_bytes, human_count, human_number};
 
 /// A head of 24 voxels along each axis.
 fn head(directory: &Path) -> PathBuf {
@@ -45,8 +46,12 @@ fn previewed(home: &Path, scan: &Path) -> Window {
     window.key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, Key::O);
     window.run_steps(3);
     write(&mut window, Role::TextInput, "File", scan.to_str().unwrap());
-    window.get_by_role_and_label(Role::Button, "Open a part").click();
-    wait_for(&mut window, "Every so many voxels");
+    window.get_by_role_and_label(Role::Button, "Preview").click();
+    wait_for(&mut window, "Not now");
+    steps_until(&mut window, "known", |window| {
+        window.query_by_label("Looking at it").is_none()
+    });
+    window.run_steps(2);
     window
 }
 
@@ -77,11 +82,103 @@ fn a_part_of_a_volume_is_what_fit_makes_of_it() {
     let bytes = human_bytes(read.read_bytes);
     assert!(window.query_by_label_contains(&bytes).is_some(), "{bytes}");
     window.get_by_label("Open this part").click();
-    let sheet = until(&mut window, "fitted", |sheet| sheet.is_untitled);
+    let sheet = fitted(&mut window);
     assert_eq!(
         on_disk(&sheet, scratch.path()).state().sha256(),
         by_command_line(&scan, &["--region", "2:20,0:24,4:24", "--stride", "2"], &[])
     );
+}
+
+/// The document of a scan; what is seen of it before has the path of the scan.
+fn fitted(window: &mut Window) -> Arc<Sheet> {
+    until(window, "fitted", |sheet| {
+        sheet.path.extension().is_some_and(|e| e == "isoclay")
+    })
+}
+
+/// Labels that are there.
+fn assert_told(window: &Window, all: &[&str]) {
+    for told in all {
+        assert!(window.query_by_label_contains(told).is_some(), "{told}");
+    }
+}
+
+/// What is told of points is what is in their file, and the document is that of `fit`.
+#[test]
+fn a_cloud_is_told_of_before_it_is_fitted() {
+    let (home, scratch) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let scan = scratch.path().join("ball.ply");
+    command_line("phantom", &[&"sphere", &"-o", &scan, &"--count", &"3000"]);
+    let cloud = formats::points::read(&scan, &ReadLimits::default()).unwrap();
+    let (min, max) = cloud
+        .positions
+        .iter()
+        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), p| {
+            (min.min(*p), max.max(*p))
+        });
+    let mut window = previewed(home.path(), &scan);
+    let triple = |p: DVec3, between: &str| p.to_array().map(human_number).join(between);
+    let size = format!("point cloud (PLY): {} of a unit", triple(max - min, " × "));
+    let bounds = format!("From {} to {}", triple(min, ", "), triple(max, ", "));
+    assert_told(
+        &window,
+        &["Open ball.ply?", "3 000 points, ", &size, &bounds, "With normals"],
+    );
+    window.get_by_label("Open it").click();
+    let sheet = fitted(&mut window);
+    until(&mut window, "whole", |_| true);
+    steps_until(&mut window, "done", |window| {
+        window.state().bench().busy.is_none()
+    });
+    let sheet = window.state().bench().sheet.clone().unwrap_or(sheet);
+    assert_eq!(
+        on_disk(&sheet, scratch.path()).state().sha256(),
+        by_command_line(&scan, &[], &[])
+    );
+}
+
+/// What is told of a volume that lies in a directory of slices, and the document of a part of it.
+#[test]
+fn a_dicom_series_is_told_of_before_it_is_read() {
+    let (home, scratch) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let series = concat!(env!("CARGO_MANIFEST_DIR"), "/../formats/tests/data/dicom/ct");
+    let series = PathBuf::from(series);
+    let read = peek(&series, &VolumeOptions::default()).unwrap();
+    let mut window = previewed(home.path(), &series);
+    let spacing = read.header.spacing().to_array();
+    let about = format!(
+        "DICOM, 10 × 8 voxels in 6 slices, {} mm apart: ",
+        spacing.map(human_number).join(" × ")
+    );
+    let bytes = human_bytes(read.read_bytes);
+    assert_told(
+        &window,
+        &["How much of ct?", &about, "its axes run ", "480 voxels", &bytes],
+    );
+    set(&mut window, ("z to", 0), "5");
+    assert_told(&window, &["400 voxels"]);
+    window.get_by_label("Open this part").click();
+    let sheet = fitted(&mut window);
+    assert_eq!(
+        on_disk(&sheet, scratch.path()).state().sha256(),
+        by_command_line(&series, &["--region", "0:10,0:8,0:5"], &[])
+    );
+    // Dropped on the window it is asked about too.
+    assert!(crate::panels::is_large(&series));
+}
+
+/// What cannot be read says why, and can only be left.
+#[test]
+fn a_preview_of_what_is_no_scan_says_why() {
+    let (home, scratch) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let none = scratch.path().join("none.ply");
+    std::fs::write(&none, "no cloud").unwrap();
+    let mut window = previewed(home.path(), &none);
+    assert_told(&window, &["none.ply:"]);
+    assert!(window.query_by_label_contains("Open it").is_none());
+    window.get_by_label("Not now").click();
+    window.run_steps(3);
+    assert!(window.state().bench().part.is_none() && window.state().bench().sheet.is_none());
 }
 
 /// Presets of a CT: the surface of bone, and stiffness by density.
@@ -94,7 +191,7 @@ fn presets_of_a_scan_are_strokes_of_a_script() {
     window.step();
     let part = options.map(OsString::from).to_vec();
     window.state().bench().order(Order::OpenPart(scan.clone(), part));
-    let sheet = until(&mut window, "fitted", |sheet| sheet.is_untitled);
+    let sheet = fitted(&mut window);
     assert_ne!(sheet.objects[0].iso, 300.0);
     window.run_steps(20);
     press(&mut window, "Bone");

@@ -119,3 +119,35 @@ fn pictures_replace_nothing_unasked() {
     let last = window.state().bench().messages.back().cloned();
     assert!(last.is_some_and(|(_, text, is_failure)| is_failure && text.contains("graphics driver")));
 }
+
+/// Where a window is as low as half of 1280 × 720, all that menus have is still within it.
+#[test]
+fn menus_fit_into_a_low_window() {
+    let home = tempfile::tempdir().unwrap();
+    let size = [640.0, 360.0];
+    let mut window = window_of(home.path(), size);
+    window.step();
+    window.state().bench().order(Order::Clay);
+    edits(&mut window, 0);
+    window.run_steps(3);
+    for (menus, last) in [
+        ("File", "Quit"),
+        ("Edit", "Shortcuts…"),
+        ("View", "As the system"),
+        ("View/Look from", "All"),
+        ("View/Windows", "Picture…"),
+    ] {
+        for menu in menus.split('/') {
+            window.get_by_label_contains(menu).click();
+            window.run_steps(6);
+        }
+        let all = window.get_all_by_label_contains(last);
+        let entry = all.map(|node| node.rect()).next_back().unwrap();
+        assert!(
+            entry.bottom() <= size[1] && entry.right() <= size[0],
+            "{menus}: {last} at {entry}"
+        );
+        window.key_press(egui::Key::Escape);
+        window.run_steps(4);
+    }
+}
