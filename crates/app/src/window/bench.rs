@@ -91,6 +91,10 @@ pub struct Bench {
     pub fill: panels::Fill,
     /// Where the panels beside the scene are.
     pub sides: Sides,
+    /// Whether it does not matter how hard pens are pressed.
+    pub ignores_pens: bool,
+    /// Whether there is a pen that tells it.
+    pub has_pen: bool,
     /// How a device is to be held, if that panel is shown.
     pub touch: Option<panels::TouchWish>,
     /// What is in the hand.

@@ -16,6 +16,8 @@ pub struct Kept {
     pub show: Show,
     /// Where the panels are.
     pub sides: Sides,
+    /// Whether it does not matter how hard pens are pressed.
+    pub ignores_pens: bool,
 }
 
 /// Where the panels beside the scene are.

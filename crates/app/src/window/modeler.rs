@@ -25,6 +25,7 @@ use super::kept::Kept;
 use super::keys::Keys;
 use super::limits::Limits;
 use super::orders::{News, Order};
+use super::pen::{self, Pens};
 use super::shot::Shot;
 use super::show::{Beside, Shown};
 use super::tool::{Kind, Settings, Tool};
@@ -62,6 +63,13 @@ pub struct Modeler {
     pub(super) beside: Beside,
     /// Pictures that become files.
     pub(super) shot: Option<Shot>,
+    /// How hard they are pressed.
+    pub(super) pens: Pens,
+    /// What they did in the time of this picture.
+    pen: pen::Moves,
+    /// Where the scene was drawn last.
+    #[cfg(test)]
+    pub(super) drawn_in: egui::Rect,
 }
 
 impl Modeler {
@@ -70,6 +78,7 @@ impl Modeler {
         let screen = context.wgpu_render_state.clone().map(Screen::new);
         let mut modeler = Self::on(&context.egui_ctx, screen, desk_files::home());
         modeler.bench.keys = Keys::read(&desk_files::settings());
+        modeler.pens = Pens::listen(context);
         close_when_asked(modeler.context.clone());
         for file in files {
             modeler.bench.order(Order::Open(file));
@@ -169,6 +178,8 @@ impl Modeler {
                 performance: panels::Performance::default(),
                 fill: panels::Fill::default(),
                 sides: kept.sides,
+                ignores_pens: kept.ignores_pens,
+                has_pen: false,
                 touch: None,
                 held: None,
                 seen: None,
@@ -197,6 +208,10 @@ impl Modeler {
             home,
             beside: Beside::default(),
             shot: None,
+            pens: Pens::default(),
+            pen: pen::Moves::default(),
+            #[cfg(test)]
+            drawn_in: egui::Rect::ZERO,
         }
     }
 
@@ -240,6 +255,7 @@ impl Modeler {
             return;
         }
         self.hear();
+        (self.pen, self.bench.has_pen) = (self.pens.since_last(), self.pens.are_there());
         self.bench.can_cast = self.screen.as_ref().is_none_or(|screen| screen.canvas.can_cast());
         self.keys(ui);
         let dropped: Vec<PathBuf> = ui.input(|i| {
@@ -277,6 +293,7 @@ impl Modeler {
             mode: self.bench.look.mode,
             show: self.bench.look.show,
             sides: self.bench.sides,
+            ignores_pens: self.bench.ignores_pens,
         };
         if let Err(why) = self.kept.keep(now, &self.home) {
             self.bench.tell(why, true);

@@ -11,7 +11,9 @@ use fitting::{Cancel, Control};
 use glam::DVec3;
 
 mod desk;
+mod handles;
 mod panels;
+mod pen;
 mod show;
 
 use self::desk::{Bare, again, on_disk, opened};

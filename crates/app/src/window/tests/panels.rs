@@ -189,7 +189,7 @@ fn places_walls_area_and_volume_are_measured() {
 }
 
 /// Commands of the line `sculpt` on a block of clay as the window makes it: the hash that they leave.
-fn by_script(script: &str) -> [u8; 32] {
+pub fn by_script(script: &str) -> [u8; 32] {
     let (name, object) = crate::cli::desk_files::clay_block().unwrap();
     let state = State::new().with(&name, object).unwrap();
     let named = |own: Option<&str>| Ok::<_, document::CommandError>(own.unwrap_or(&name).to_string());
