@@ -29,7 +29,13 @@ const VIEW: &[&[Name]] = &[
         Name::Log,
         Name::Picture,
     ],
-    &[Name::Panels, Name::Sides],
+    &[
+        Name::Panels,
+        Name::Tools,
+        Name::Objects,
+        Name::Sides,
+        Name::AsAtFirst,
+    ],
 ];
 
 /// Along the top.

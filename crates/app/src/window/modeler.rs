@@ -20,9 +20,11 @@ use super::adjust::Adjust;
 use super::arrange::Arrange;
 use super::bench::Bench;
 use super::desk::Desk;
+use super::docks::Docks;
 use super::gesture::Gesture;
 use super::kept::Kept;
 use super::keys::Keys;
+use super::layout::Layout;
 use super::limits::Limits;
 use super::orders::{News, Order};
 use super::pen::{self, Pens};
@@ -63,6 +65,10 @@ pub struct Modeler {
     pub(super) beside: Beside,
     /// Pictures that become files.
     pub(super) shot: Option<Shot>,
+    /// The panels round the scene.
+    pub(super) docks: Docks,
+    /// Where they are, unless that is as at first.
+    pub(super) layout: Option<Layout>,
     /// How hard they are pressed.
     pub(super) pens: Pens,
     /// What they did in the time of this picture.
@@ -179,6 +185,7 @@ impl Modeler {
                 fill: panels::Fill::default(),
                 sides: kept.sides,
                 ignores_pens: kept.ignores_pens,
+                rearranges: None,
                 has_pen: false,
                 touch: None,
                 held: None,
@@ -192,6 +199,8 @@ impl Modeler {
                 orders,
                 cancel,
             },
+            docks: Docks::new(kept.layout.as_ref()),
+            layout: kept.layout.clone(),
             news,
             context,
             is_listening,
@@ -231,21 +240,6 @@ impl Modeler {
         &self.lassoed.0
     }
 
-    /// The panels beside the scene.
-    fn sides(&mut self, ui: &mut egui::Ui) {
-        let is_swapped = self.bench.sides.are_swapped;
-        let beside = |is_left: bool, id: &'static str| match is_left {
-            true => egui::Panel::left(id),
-            false => egui::Panel::right(id),
-        };
-        beside(!is_swapped, "tools")
-            .exact_size(196.0)
-            .show(ui, |ui| panels::tools(ui, &mut self.bench));
-        beside(is_swapped, "document")
-            .default_size(210.0)
-            .show(ui, |ui| panels::document(ui, &mut self.bench));
-    }
-
     /// All of the window.
     pub fn show(&mut self, ui: &mut egui::Ui) {
         if self.is_lost(false) {
@@ -267,23 +261,15 @@ impl Modeler {
         }
         egui::Panel::top("menu").show(ui, |ui| panels::menu(ui, &mut self.bench));
         egui::Panel::bottom("status").show(ui, |ui| panels::status(ui, &self.bench));
-        if self.bench.sheet.is_some() && self.bench.sides.are_shown {
-            self.sides(ui);
-        }
         self.begin_adjust(ui);
         self.begin_arranging(ui);
-        egui::CentralPanel::no_frame().show(ui, |ui| match &self.bench.sheet {
-            Some(_) => self.views(ui),
-            None => panels::start(ui, &mut self.bench),
-        });
+        self.bench.performance.picture();
+        egui::CentralPanel::no_frame().show(ui, |ui| self.docks(ui));
         panels::slices(ui.ctx(), &mut self.bench);
         panels::path_box(ui.ctx(), &mut self.bench);
         panels::part(ui.ctx(), &mut self.bench);
         panels::touch(ui.ctx(), &mut self.bench);
         panels::measure(ui.ctx(), &mut self.bench);
-        panels::simulation(ui.ctx(), &mut self.bench);
-        panels::performance(ui.ctx(), &mut self.bench);
-        panels::log(ui.ctx(), &mut self.bench);
         panels::picture(ui.ctx(), &mut self.bench);
         panels::shortcuts(ui.ctx(), &mut self.bench);
         panels::commands(ui.ctx(), &mut self.bench);
@@ -294,6 +280,7 @@ impl Modeler {
             show: self.bench.look.show,
             sides: self.bench.sides,
             ignores_pens: self.bench.ignores_pens,
+            layout: self.layout.clone(),
         };
         if let Err(why) = self.kept.keep(now, &self.home) {
             self.bench.tell(why, true);

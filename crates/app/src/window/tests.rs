@@ -11,6 +11,7 @@ use fitting::{Cancel, Control};
 use glam::DVec3;
 
 mod desk;
+mod docks;
 mod handles;
 mod panels;
 mod pen;
