@@ -7,7 +7,7 @@ use fitting::{Control, FitError};
 use serde::{Deserialize, Serialize};
 use tools::body::Body;
 use tools::paint::Layers;
-use tools::scene::{Scene, SimulateError, Simulation};
+use tools::scene::{Scene, SimulateError, Simulation, StepLine};
 use tools::session::{Session, Stroke};
 use tools::tool::{Tool, ToolError};
 
@@ -188,6 +188,19 @@ impl Command {
     /// # Errors
     /// Any [`CommandError`].
     pub fn apply(&self, state: &State, control: &mut Control) -> Result<(State, Vec<String>), CommandError> {
+        self.apply_watched(state, control, &mut |_| ())
+    }
+
+    /// The same, and tells what each step of a scene did.
+    ///
+    /// # Errors
+    /// Any [`CommandError`].
+    pub fn apply_watched(
+        &self,
+        state: &State,
+        control: &mut Control,
+        on_step: &mut dyn FnMut(&StepLine),
+    ) -> Result<(State, Vec<String>), CommandError> {
         let name = self.object();
         match self {
             Self::Scene { script, .. } => {
@@ -195,7 +208,7 @@ impl Command {
                 let scene: Scene = parsed(script)?;
                 let iso = scene.iso.map(|i| i.0).or(object.iso());
                 let (field, told) = object.in_levels(name, control)?;
-                let (field, notes) = played(&scene, field, iso, &object.layers, control)?;
+                let (field, notes) = played(&scene, field, iso, &object.layers, control, on_step)?;
                 object.field = Body::Levels(field);
                 Ok((state.with(name, object)?, told.into_iter().chain(notes).collect()))
             }
@@ -251,13 +264,14 @@ fn played(
     iso: Option<f64>,
     layers: &Layers,
     control: &mut Control,
+    on_step: &mut dyn FnMut(&StepLine),
 ) -> Result<(HierarchicalSpline<f32>, Vec<String>), CommandError> {
     let mut simulation = Simulation::new(scene, field, iso, layers)?;
     while !simulation.is_over() {
         control
             .step("simulating", simulation.progress())
             .map_err(CommandError::Cancelled)?;
-        simulation.step()?;
+        on_step(&simulation.step()?);
     }
     Ok((simulation.baked()?, simulation.notes().to_vec()))
 }

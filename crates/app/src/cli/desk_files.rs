@@ -119,15 +119,17 @@ pub fn clay_block() -> Result<(String, Object), String> {
     Ok(("clay".into(), object))
 }
 
-/// Writes an object of a document that nobody has open: its mesh, its field, or, over a scan, that scan with its edits.
+/// Writes an object of a document that nobody has open: its mesh, by options of `mesh`, its field, or, over a scan, that scan with its
+/// edits. What the command tells of it, as `--json` prints it.
 pub fn export(
     document: &Path,
     object: &str,
     out: &Path,
     scan: Option<&Path>,
+    of_mesh: &[OsString],
     cancel: &Cancel,
     show: Show<'_>,
-) -> Result<(), String> {
+) -> Result<Map<String, Value>, String> {
     let mut arguments: Vec<OsString> = vec![
         document.into(),
         "--object".into(),
@@ -141,10 +143,14 @@ pub fn export(
             "export"
         }
         (None, true) => "export",
-        (None, false) => "mesh",
+        (None, false) => {
+            arguments.push("--check".into());
+            arguments.extend_from_slice(of_mesh);
+            "mesh"
+        }
     };
     let done = scratch("the export").and_then(|s| command(name, &arguments, cancel, s.path(), show));
-    done.map(drop).map_err(|e| e.to_string())
+    done.map_err(|e| e.to_string())
 }
 
 /// What a command prints as JSON.

@@ -66,6 +66,7 @@ mod trim;
 mod unoriented;
 mod volume_choice;
 
+use std::ffi::OsString;
 use std::num::NonZeroUsize;
 use std::path::Path;
 use std::process::ExitCode;
@@ -158,17 +159,23 @@ fn command() -> clap::Command {
 
 /// Reads the command line, does what it says, and turns the outcome into an exit code.
 pub fn main() -> ExitCode {
+    ExitCode::from(obey(&std::env::args_os().collect::<Vec<_>>()))
+}
+
+/// Does what a command line says; the exit code.
+fn obey(line: &[OsString]) -> u8 {
     own::follow();
     let cli = match command()
-        .try_get_matches()
+        .try_get_matches_from(line)
         .and_then(|m| Cli::from_arg_matches(&m))
     {
         Ok(cli) => cli,
-        Err(e) => return refuse(&e),
+        Err(e) => return refuse(&e, line),
     };
     let Some(asked) = cli.command.or_else(window) else {
         let missing = clap::error::ErrorKind::MissingSubcommand;
-        return refuse(&command().error(missing, "say what to do: isoclay --help lists the commands"));
+        let e = command().error(missing, "say what to do: isoclay --help lists the commands");
+        return refuse(&e, line);
     };
     let (json, data_on_stdout) = asked.stdout();
     end::tell_as(json, data_on_stdout);
@@ -205,11 +212,11 @@ pub fn main() -> ExitCode {
         Command::Open(a) => open::run(a),
     });
     match outcome {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(f) if f.is_broken_pipe() => ExitCode::SUCCESS,
+        Ok(()) => 0,
+        Err(f) if f.is_broken_pipe() => 0,
         Err(f) => {
             end::tell(&f);
-            ExitCode::from(f.code())
+            f.code()
         }
     }
 }
@@ -227,14 +234,12 @@ fn window() -> Option<Command> {
 }
 
 /// Prints what is wrong with the command line itself, or the help that was asked for.
-fn refuse(e: &clap::Error) -> ExitCode {
+fn refuse(e: &clap::Error, line: &[OsString]) -> u8 {
     // Help and version are no errors; a closed pipe is nobody's loss.
     let _ = e.print();
     let code = e.exit_code() as u8;
-    let json = std::env::args_os()
-        .skip(1)
-        .take_while(|a| a != "--")
-        .any(|a| a == "--json");
+    let options = line.iter().skip(1).take_while(|a| *a != "--");
+    let json = options.into_iter().any(|a| a == "--json");
     if code != 0 && json {
         let text = e.render().to_string();
         let (message, rest) = text.split_once("\n\n").unwrap_or((&text, ""));
@@ -249,7 +254,7 @@ fn refuse(e: &clap::Error) -> ExitCode {
             .find(|l| l.starts_with("tip:") || l.starts_with("Usage:"));
         end::print_quietly(&error_object(code, &message, remedy));
     }
-    ExitCode::from(code)
+    code
 }
 
 pub use ceiling::out_of_memory;
@@ -299,6 +304,9 @@ fn set_threads(threads: Option<NonZeroUsize>) -> Outcome<usize> {
     }
     Ok(rayon::current_num_threads())
 }
+
+#[cfg(test)]
+pub use own::ask as command_line;
 
 #[cfg(test)]
 #[path = "../../tests/suite/common/wrong_values.rs"]

@@ -44,7 +44,10 @@ pub fn program() -> io::Result<Command> {
     } else {
         std::env::current_exe()?
     };
-    Ok(Command::new(exe))
+    let command = Command::new(exe);
+    #[cfg(test)]
+    let command = tests::as_program(command);
+    Ok(command)
 }
 
 /// Has the run end as soon as the thread that starts it does, and print how far it has come.
@@ -178,5 +181,38 @@ pub fn follow() {
         if getppid().is_none_or(|p| p.as_raw_nonzero().get() != parent) {
             std::process::exit(4);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The file that these tests run in is the program when it is told to run the test below alone, and after that what to do.
+    pub fn as_program(mut tests: Command) -> Command {
+        let this = "cli::own::tests::this_is_the_program_too";
+        tests.args(["--quiet", "--nocapture", "--exact", this, "--"]);
+        tests
+    }
+
+    /// Among the other tests it has nothing to do.
+    #[test]
+    fn this_is_the_program_too() {
+        let line: Vec<OsString> = std::env::args_os().skip_while(|a| a != "--").collect();
+        if !line.is_empty() {
+            std::process::exit(crate::cli::obey(&line).into());
+        }
+    }
+
+    #[test]
+    fn the_program_answers_and_refuses() {
+        let scratch = tempfile::tempdir().unwrap();
+        let cloud = scratch.path().join("ball.ply");
+        let line =
+            |count: &str| ["sphere", "-o", cloud.to_str().unwrap(), "--count", count].map(OsString::from);
+        let said = ask("phantom", line("500").into_iter());
+        assert!(said.is_ok_and(|said| said.contains_key("peak_rss_bytes")));
+        let refused = ask("phantom", line("no").into_iter());
+        assert!(refused.is_err_and(|why| why.to_string().contains("--count")));
     }
 }

@@ -46,6 +46,10 @@ fn object(ui: &mut Ui, bench: &mut Bench, sheet: &Sheet, thing: &Thing, depth: u
         let eye = ui
             .checkbox(&mut is_seen, "")
             .on_hover_text("Whether it is seen; no edit");
+        eye.widget_info(|| {
+            let text = format!("{} is seen", thing.name);
+            egui::WidgetInfo::selected(egui::Role::CheckBox, true, is_seen, text)
+        });
         if eye.changed() {
             match is_seen {
                 true => drop(bench.hidden.remove(&thing.name)),

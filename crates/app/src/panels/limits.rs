@@ -141,9 +141,10 @@ fn corner(ui: &mut Ui, name: &str, p: &mut DVec3, step: f64) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
         ui.spacing_mut().interact_size.x = 42.0;
-        ui.label(name);
+        let label = ui.label(name);
         for n in 0..3 {
-            ui.add(DragValue::new(&mut p[n]).speed(step).max_decimals(2));
+            ui.add(DragValue::new(&mut p[n]).speed(step).max_decimals(2))
+                .labelled_by(label.id);
         }
     });
 }

@@ -16,26 +16,22 @@ const EDIT: &[&[Name]] = &[
     &[Name::Commands, Name::Shortcuts],
 ];
 const VIEW: &[&[Name]] = &[
-    &[Name::Front, Name::Right, Name::Top, Name::All],
-    &[Name::Perspective, Name::Paint, Name::Wireframe, Name::Floor],
-    &[Name::Hide, Name::Alone, Name::ShowAll],
     &[
-        Name::Slices,
+        Name::Perspective,
+        Name::Paint,
+        Name::Wireframe,
+        Name::Floor,
         Name::Clip,
-        Name::Touch,
-        Name::Measure,
-        Name::Simulation,
-        Name::Performance,
-        Name::Log,
-        Name::Picture,
     ],
-    &[
-        Name::Panels,
-        Name::Tools,
-        Name::Objects,
-        Name::Sides,
-        Name::AsAtFirst,
-    ],
+    &[Name::Hide, Name::Alone, Name::ShowAll],
+    &[Name::Panels, Name::Sides, Name::AsAtFirst],
+];
+/// Below entries of their own: all at once would not fit into a low window.
+const FROM: &[&[Name]] = &[&[Name::Front, Name::Right, Name::Top, Name::All]];
+const WINDOWS: &[&[Name]] = &[
+    &[Name::Slices, Name::Measure, Name::Touch, Name::Simulation],
+    &[Name::Performance, Name::Log, Name::Picture],
+    &[Name::Tools, Name::Objects],
 ];
 
 /// Along the top.
@@ -44,6 +40,9 @@ pub fn menu(ui: &mut egui::Ui, bench: &mut Bench) {
         ui.menu_button("File", |ui| entries(ui, bench, FILE));
         ui.menu_button("Edit", |ui| entries(ui, bench, EDIT));
         ui.menu_button("View", |ui| {
+            ui.menu_button("Look from", |ui| entries(ui, bench, FROM));
+            ui.menu_button("Windows", |ui| entries(ui, bench, WINDOWS));
+            ui.separator();
             entries(ui, bench, VIEW);
             ui.separator();
             theme(ui);

@@ -3,6 +3,7 @@
 mod commands;
 mod constraints;
 mod document;
+mod export;
 mod limits;
 mod log;
 mod matter;
@@ -27,6 +28,7 @@ mod touch;
 pub use commands::{Commands, commands};
 pub use constraints::{constraints, next_pin};
 pub use document::document;
+pub use export::{Wishes, Written, written};
 pub use limits::limits;
 pub use log::log;
 pub use matter::{Fill, matter};

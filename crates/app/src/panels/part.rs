@@ -159,13 +159,16 @@ fn show(ui: &mut Ui, part: &mut Part, (preview, volume, stride): &(Preview, Volu
             slice(ui, part, volume, *stride, dims, axis);
         }
     });
-    egui::Grid::new("part").num_columns(4).show(ui, |ui| {
+    egui::Grid::new("part").num_columns(5).show(ui, |ui| {
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
             let [from, to] = &mut part.region[axis];
-            ui.label(format!("{name}, of {}", dims[axis]));
-            ui.add(DragValue::new(from).range(0..=*to - 1));
-            ui.label("to");
-            ui.add(DragValue::new(to).range(*from + 1..=dims[axis]));
+            let label = ui.label(format!("{name} from"));
+            ui.add(DragValue::new(from).range(0..=*to - 1))
+                .labelled_by(label.id);
+            let label = ui.label(format!("{name} to"));
+            ui.add(DragValue::new(to).range(*from + 1..=dims[axis]))
+                .labelled_by(label.id);
+            ui.label(format!("of {}", dims[axis]));
             ui.end_row();
         }
     });
@@ -176,9 +179,12 @@ fn show(ui: &mut Ui, part: &mut Part, (preview, volume, stride): &(Preview, Volu
         ui.add(DragValue::new(&mut part.stride).range(1..=16))
             .labelled_by(label.id);
     });
-    let whole: usize = dims.iter().product();
-    let each = preview.read_bytes as f64 / whole.max(1) as f64;
-    let bytes = (each * part.voxels() as f64) as u64;
+    // Reading takes some room of its own, however much is read.
+    let each = size_of::<f32>() as u64;
+    let own = preview
+        .read_bytes
+        .saturating_sub(each * preview.header.voxel_count() as u64);
+    let bytes = own + each * part.voxels() as u64;
     let (most, _) = desk_files::memory();
     let most = most.map(|most| most.0);
     let told = format!(

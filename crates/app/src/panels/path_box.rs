@@ -3,6 +3,9 @@
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, channel};
 
+use egui::text::{CCursor, CCursorRange};
+
+use super::Wishes;
 use crate::window::Bench;
 use crate::window::orders::{Order, Sheet};
 
@@ -21,8 +24,8 @@ enum Purpose {
 pub struct PathBox {
     purpose: Purpose,
     text: String,
-    /// Of an export: the scan to write with its edits.
-    scan: String,
+    /// Of an export.
+    wishes: Wishes,
     chosen: Option<Receiver<Option<PathBuf>>>,
     is_new: bool,
 }
@@ -68,7 +71,7 @@ impl PathBox {
         Self {
             purpose,
             text,
-            scan: String::new(),
+            wishes: Wishes::default(),
             chosen: None,
             is_new: true,
         }
@@ -106,6 +109,60 @@ impl PathBox {
         }
     }
 
+    fn writes(&self) -> bool {
+        matches!(
+            self.purpose,
+            Purpose::Save | Purpose::SaveScript | Purpose::Export
+        )
+    }
+
+    /// The file that is named; `~` is the home directory, and documents and scripts get their endings.
+    fn path(&self) -> PathBuf {
+        let text = self.text.trim();
+        let path = match (text.strip_prefix("~/"), etcetera::home_dir()) {
+            (Some(rest), Ok(home)) => home.join(rest),
+            _ => text.into(),
+        };
+        match (self.purpose, path.extension()) {
+            (Purpose::Save, None) => path.with_extension("isoclay"),
+            (Purpose::SaveScript, None) => path.with_extension("jsonl"),
+            _ => path,
+        }
+    }
+
+    /// Why no such file can be had.
+    fn refusal(&self) -> Option<String> {
+        let path = self.path();
+        if self.writes() {
+            let directory = path.parent().filter(|p| !p.as_os_str().is_empty())?;
+            let is_there = directory.is_dir();
+            return (!is_there).then(|| format!("there is no directory {}", directory.display()));
+        }
+        (!path.exists()).then(|| format!("there is no file {}", path.display()))
+    }
+
+    /// The field for the path, and whether it was given by Enter.
+    fn field(&mut self, ui: &mut egui::Ui) -> bool {
+        let label = ui.label("File");
+        let field = egui::TextEdit::singleline(&mut self.text)
+            .desired_width(320.0)
+            .show(ui);
+        let response = field.response.response.clone().labelled_by(label.id);
+        if std::mem::take(&mut self.is_new) {
+            response.request_focus();
+            // What is typed replaces the name, not its ending.
+            let ending = PathBuf::from(&self.text)
+                .extension()
+                .map_or(0, |e| 1 + e.to_string_lossy().chars().count());
+            let name = self.text.chars().count() - ending;
+            let mut state = field.state;
+            let range = CCursorRange::two(CCursor::new(0), CCursor::new(name));
+            state.cursor.set_char_range(Some(range));
+            state.store(ui.ctx(), response.id);
+        }
+        response.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter))
+    }
+
     /// The system's dialog, on a thread of its own: some wait for it.
     fn browse(&mut self, context: &egui::Context) {
         let (tell, chosen) = channel();
@@ -137,71 +194,70 @@ pub fn path_box(context: &egui::Context, bench: &mut Bench) {
             asks.text = path.display().to_string();
         }
     }
-    let (mut goes_on, mut is_given) = (true, false);
+    let (mut goes_on, mut is_given, mut is_entered) = (true, false, false);
+    let is_named = !asks.text.trim().is_empty();
+    let refusal = asks.refusal().filter(|_| is_named);
+    let is_own = bench.sheet.as_ref().is_some_and(|s| s.path == asks.path());
+    let replaces = asks.writes() && asks.path().is_file() && !is_own;
     let modal = egui::Modal::new(egui::Id::unique("path")).show(context, |ui| {
         ui.set_width(460.0);
         ui.heading(asks.title());
         ui.label(asks.hint());
         ui.add_space(6.0);
         ui.horizontal(|ui| {
-            let label = ui.label("File");
-            let field = ui.add(egui::TextEdit::singleline(&mut asks.text).desired_width(320.0));
-            let field = field.labelled_by(label.id);
-            if std::mem::take(&mut asks.is_new) {
-                field.request_focus();
-            }
-            is_given |= field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
+            is_entered = asks.field(ui);
+            // What is there already goes away by the button alone.
+            is_given |= is_entered && !replaces;
             if ui.button("Browse…").clicked() {
                 asks.browse(context);
             }
         });
         if asks.purpose == Purpose::Export {
-            ui.horizontal(|ui| {
-                let label = ui.label("Scan");
-                let edit = egui::TextEdit::singleline(&mut asks.scan)
-                    .desired_width(320.0)
-                    .hint_text("none: write a mesh or a field");
-                ui.add(edit).labelled_by(label.id);
-            });
+            let unit = bench.chosen().map_or("", |thing| thing.unit);
+            asks.wishes.show(ui, unit);
+        }
+        match (&refusal, std::path::absolute(asks.path())) {
+            (Some(why), _) => drop(ui.colored_label(ui.visuals().error_fg_color, why)),
+            (None, Ok(path)) if replaces => {
+                let told = format!("{} is there already", path.display());
+                ui.colored_label(ui.visuals().warn_fg_color, told);
+            }
+            (None, Ok(path)) if is_named => drop(ui.weak(path.display().to_string())),
+            _ => drop(ui.weak(" ")),
         }
         ui.add_space(6.0);
         ui.horizontal(|ui| {
-            is_given |= ui
-                .add_enabled(!asks.text.trim().is_empty(), egui::Button::new(asks.title()))
-                .clicked();
-            goes_on &= !ui.button("Not now").clicked();
+            let word = if replaces { "Replace" } else { asks.title() };
+            let can = is_named && refusal.is_none();
+            is_given |= ui.add_enabled(can, egui::Button::new(word)).clicked();
+            goes_on &= !ui.button("Cancel").clicked();
         });
     });
     goes_on &= !modal.should_close();
-    if is_given && !asks.text.trim().is_empty() {
+    if is_given && is_named && refusal.is_none() {
         match asks.purpose {
-            Purpose::Open => bench.open(asks.text.trim().into()),
-            Purpose::OpenPart => bench.part = Some(super::Part::of(asks.text.trim().into())),
+            Purpose::Open => bench.open(asks.path()),
+            Purpose::OpenPart => bench.part = Some(super::Part::of(asks.path())),
             _ => bench.order(order(&asks)),
         }
     } else if goes_on {
+        // What cannot be is put right.
+        asks.is_new |= is_entered;
         bench.asks = Some(asks);
     }
 }
 
 fn order(asks: &PathBox) -> Order {
-    let path = PathBuf::from(asks.text.trim());
+    let path = asks.path();
     match asks.purpose {
         Purpose::Open | Purpose::OpenPart => Order::Open(path),
         Purpose::RunScript => Order::RunScript(path),
-        Purpose::SaveScript => Order::SaveScript(match path.extension() {
-            Some(_) => path,
-            None => path.with_extension("jsonl"),
-        }),
-        Purpose::Save => Order::Save(match path.extension() {
-            Some(_) => path,
-            None => path.with_extension("isoclay"),
-        }),
+        Purpose::SaveScript => Order::SaveScript(path),
+        Purpose::Save => Order::Save(path),
         Purpose::Export => Order::Export {
             out: path,
-            scan: Some(asks.scan.trim())
-                .filter(|s| !s.is_empty())
-                .map(PathBuf::from),
+            scan: asks.wishes.scan(),
+            of_mesh: asks.wishes.of_mesh(),
         },
     }
 }

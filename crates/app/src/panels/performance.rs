@@ -4,9 +4,10 @@ use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use egui_plot::{Plot, PlotPoints, Points};
+use tools::scene::StepLine;
 
 use crate::cli::cost::rss_bytes;
-use crate::cli::quantity::{human_bytes, human_count};
+use crate::cli::quantity::{human_bytes, human_count, human_number};
 use crate::window::Bench;
 
 /// How long figures are kept.
@@ -61,14 +62,21 @@ pub struct Performance {
     memory: Row,
     /// When a picture began last.
     last: Option<Instant>,
-    /// The figures of the scene that was played last, in a sentence.
-    pub played: Option<String>,
+    /// What the last step of a scene did that is played, or was.
+    step: Option<StepLine>,
+    /// Bytes of the triangles on the card.
+    pub meshes: u64,
 }
 
 impl Performance {
     /// A step of a stroke took so many seconds.
     pub fn step(&mut self, seconds: f64) {
         self.steps.push(1e3 * seconds);
+    }
+
+    /// A step of a scene did that.
+    pub fn moved(&mut self, step: StepLine) {
+        self.step = Some(step);
     }
 
     /// A device was given so many forces a second.
@@ -136,7 +144,7 @@ pub fn performance(ui: &mut egui::Ui, bench: &mut Bench) {
         ),
     ];
     for (name, row, unit, text) in rows {
-        ui.horizontal(|ui| {
+        ui.horizontal_wrapped(|ui| {
             ui.strong(name);
             ui.label(text);
         });
@@ -144,10 +152,49 @@ pub fn performance(ui: &mut egui::Ui, bench: &mut Bench) {
             plot(ui, name, row, unit);
         }
     }
-    ui.label(format!("{} triangles", human_count(bench.triangles)));
-    if let Some(played) = &costs.played {
-        ui.label(played);
+    for (name, text) in [("Simulation", simulated(costs)), ("Fields", fields(bench))] {
+        ui.horizontal_wrapped(|ui| {
+            ui.strong(name);
+            ui.label(text);
+        });
     }
+    ui.horizontal_wrapped(|ui| {
+        ui.strong("Meshes");
+        let count = human_count(bench.triangles);
+        ui.label(format!("{count} triangles, {}", human_bytes(costs.meshes)));
+    });
+}
+
+/// What the last step of a scene did.
+fn simulated(costs: &Performance) -> String {
+    let Some(step) = &costs.step else {
+        return "none was played".into();
+    };
+    let time = human_number(step.time);
+    if !step.awake {
+        return format!("asleep at {time} s");
+    }
+    format!(
+        "{} iterations, residual {:.1e}, {} samples awake at {time} s",
+        step.iterations,
+        step.residual,
+        human_count(step.awake_samples)
+    )
+}
+
+/// What the objects hold.
+fn fields(bench: &Bench) -> String {
+    let objects = bench.sheet.iter().flat_map(|sheet| &sheet.objects);
+    let (count, bytes) = objects.fold((0, 0), |(count, bytes), thing| {
+        let totals = thing
+            .object
+            .field
+            .levels()
+            .map_or(0, |levels| levels.totals_bytes());
+        let own = thing.coefficients * size_of::<f32>() + totals;
+        (count + thing.coefficients, bytes + own as u64)
+    });
+    format!("{} coefficients, {}", human_count(count), human_bytes(bytes))
 }
 
 fn plot(ui: &mut egui::Ui, name: &str, row: &Row, unit: &str) {

@@ -69,7 +69,7 @@ pub fn picture(context: &egui::Context, bench: &mut Bench) {
                     if ui.button("Replace").clicked() {
                         shots.wanted = shots.asks.take();
                     }
-                    if ui.button("Not now").clicked() {
+                    if ui.button("Cancel").clicked() {
                         shots.asks = None;
                     }
                 });

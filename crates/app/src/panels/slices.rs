@@ -67,6 +67,12 @@ impl Slices {
         thing.own_box.min + DVec3::from_array(self.shares) * thing.own_box.size()
     }
 
+    /// The line along which densities are shown.
+    #[cfg(test)]
+    pub fn line(&self) -> Option<&Profile> {
+        self.profile.as_ref()
+    }
+
     fn set_cursor(&mut self, thing: &Thing, p: DVec3, except: usize) {
         let share = (p - thing.own_box.min) / thing.own_box.size();
         for axis in (0..3).filter(|axis| *axis != except) {

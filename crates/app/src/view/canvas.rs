@@ -356,6 +356,15 @@ impl Canvas {
         self.held.values().map(|held| held.count as usize / 3).sum()
     }
 
+    /// Bytes of them.
+    pub fn mesh_bytes(&self) -> u64 {
+        let buffers = self
+            .held
+            .values()
+            .flat_map(|held| [&held.vertices, &held.indices]);
+        buffers.map(wgpu::Buffer::size).sum()
+    }
+
     /// A picture of so many pixels: rough while something moves. It is drawn anew only if it would be another. Without triangles a whole
     /// one takes several calls, each for some of its rows.
     pub fn draw(&mut self, look: &Look, size: [u32; 2], is_rough: bool) -> Drawn {

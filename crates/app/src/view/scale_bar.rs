@@ -6,6 +6,9 @@ use egui::{Align2, Color32, FontId, Painter, Rect, Stroke, vec2};
 const LONGEST: f32 = 140.0;
 const ASIDE: f32 = 18.0;
 
+/// Room that a bar takes at most, with what is left beside it, points.
+pub const WIDE: f32 = LONGEST + 2.0 * ASIDE;
+
 /// The longest length of 1, 2 or 5 times a power of ten that is no longer than `most`, and how it is written.
 fn round_length(most: f64) -> (f64, String) {
     let power = most.log10().floor();

@@ -6,35 +6,37 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use eframe::egui_wgpu::{RenderState, wgpu};
 
 use super::canvas::Drawn;
+use super::laid::{Laid, Layer};
 use super::{Canvas, Look};
 use crate::cli::ceiling::of_bricks;
 
 /// Lights in the sky: more take longer than a picture should.
 pub const SKY: usize = 16;
 
-/// A picture that egui shows: see [`Drawn`].
+/// A picture for the window: see [`Drawn`].
 pub struct Shown {
-    /// As egui knows it.
-    pub picture: egui::TextureId,
+    /// The pixels.
+    pub picture: Laid,
     /// Share of its rows, from the top, that are drawn.
     pub rows: f32,
     /// Whether it stays as it is.
     pub is_done: bool,
 }
 
-/// A canvas whose pictures egui shows.
+/// A canvas whose pictures the window shows.
 pub struct Screen {
     /// What draws them.
     pub canvas: Canvas,
-    state: RenderState,
+    device: wgpu::Device,
     is_lost: Arc<AtomicBool>,
-    /// Whole and rough pictures, as egui knows them.
-    shown: [Option<(wgpu::Texture, egui::TextureId)>; 2],
+    layer: Layer,
+    /// Whole and rough pictures.
+    shown: [Option<(wgpu::Texture, Laid)>; 2],
 }
 
 impl Screen {
     /// On the card that egui uses.
-    pub fn new(state: RenderState) -> Self {
+    pub fn new(state: &RenderState) -> Self {
         let is_lost = Arc::new(AtomicBool::new(false));
         let told = is_lost.clone();
         state.device.set_device_lost_callback(move |_, _| {
@@ -43,7 +45,8 @@ impl Screen {
         Self {
             is_lost,
             canvas: Canvas::new(&state.device, &state.queue, SKY, of_bricks()),
-            state,
+            device: state.device.clone(),
+            layer: Layer::new(&state.device, state.target_format),
             shown: [None, None],
         }
     }
@@ -55,7 +58,7 @@ impl Screen {
             false => wgpu::PollType::Poll,
         };
         // That it fails is told by the callback.
-        let _ = self.state.device.poll(poll);
+        let _ = self.device.poll(poll);
         self.is_lost.load(Ordering::Relaxed)
     }
 
@@ -66,33 +69,15 @@ impl Screen {
             rows,
             is_done,
         } = self.canvas.draw(look, size, is_rough);
-        let picture = self.known(picture, is_rough);
+        let shown = &mut self.shown[usize::from(is_rough)];
+        let laid = match shown.take() {
+            Some((texture, laid)) if texture == picture => laid,
+            _ => self.layer.laid(&self.device, &picture),
+        };
         Shown {
-            picture,
+            picture: shown.insert((picture, laid)).1.clone(),
             rows,
             is_done,
         }
-    }
-
-    /// A picture, as egui knows it.
-    fn known(&mut self, picture: wgpu::Texture, is_rough: bool) -> egui::TextureId {
-        let shown = &mut self.shown[usize::from(is_rough)];
-        if let Some((texture, id)) = shown
-            && *texture == picture
-        {
-            return *id;
-        }
-        // egui takes pictures as the screen wants them.
-        let view = picture.create_view(&wgpu::TextureViewDescriptor {
-            format: Some(wgpu::TextureFormat::Rgba8Unorm),
-            ..wgpu::TextureViewDescriptor::default()
-        });
-        let mut renderer = self.state.renderer.write();
-        if let Some((_, old)) = shown.take() {
-            renderer.free_texture(&old);
-        }
-        let id = renderer.register_native_texture(&self.state.device, &view, wgpu::FilterMode::Linear);
-        *shown = Some((picture, id));
-        id
     }
 }

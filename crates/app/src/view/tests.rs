@@ -1,6 +1,7 @@
 //! The graphics card against the processor, against the field itself, and against how it drew before.
 
 mod beside;
+mod laid;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;

@@ -49,6 +49,8 @@ pub struct Bench {
     pub slices: Option<panels::Slices>,
     /// The path that is being asked for.
     pub asks: Option<panels::PathBox>,
+    /// The mesh that was written last, while that is told.
+    pub written: Option<panels::Written>,
     /// The volume of which a part is to be opened.
     pub part: Option<panels::Part>,
     /// Documents without a name that were left, the newest first.

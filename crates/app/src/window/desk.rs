@@ -138,7 +138,7 @@ impl Desk {
                 Ok(())
             }
             Order::Save(path) => self.save(&path),
-            Order::Export { out, scan } => self.export(&out, scan.as_deref()),
+            Order::Export { out, scan, of_mesh } => self.export(&out, scan.as_deref(), &of_mesh),
             Order::Choose(name) => self.choose(name),
             Order::Begin { tool, ray, press } => self.begin(tool, &ray, press),
             Order::Along { ray, press } => self.along(&ray, press),

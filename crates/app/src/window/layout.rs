@@ -65,9 +65,9 @@ impl Default for Layout {
     /// Tools on the left, objects on the right; what is opened comes before the objects, or below the scene.
     fn default() -> Self {
         let panel = |panel| Self::Panel(panel);
-        let below = Self::Tabs(vec![panel(Panel::Performance), panel(Panel::Log)], 0);
-        let middle = Self::Column(vec![(panel(Panel::Scene), 540.0), (below, 200.0)]);
-        let right = Self::Tabs(vec![panel(Panel::Objects), panel(Panel::Simulation)], 0);
+        let middle = Self::Column(vec![(panel(Panel::Scene), 580.0), (panel(Panel::Log), 160.0)]);
+        let right = [Panel::Objects, Panel::Simulation, Panel::Performance].map(panel);
+        let right = Self::Tabs(right.to_vec(), 0);
         Self::Row(vec![
             (panel(Panel::Tools), 196.0),
             (middle, 874.0),

@@ -128,7 +128,7 @@ fn once(files: Vec<PathBuf>, shared: &Shared) -> Result<(), String> {
         Box::new(move |context| {
             match &mut *shared.borrow_mut() {
                 Some(before) => {
-                    let screen = context.wgpu_render_state.clone().map(Screen::new);
+                    let screen = context.wgpu_render_state.as_ref().map(Screen::new);
                     before.resume(&context.egui_ctx, screen);
                 }
                 none => *none = Some(Modeler::new(context, files)),

@@ -55,7 +55,7 @@ pub struct Modeler {
     lassoed: (Vec<(egui::Pos2, Ray)>, bool),
     /// Where the desk was asked to show what a click would leave, and with which tool.
     tried: Option<(egui::Pos2, Tool)>,
-    /// When something moved last.
+    /// When something moved last that no button held: a turn of the view is over as the button comes up.
     moved: Instant,
     desk: Option<JoinHandle<()>>,
     /// How things are looked at, as it is written in a directory.
@@ -81,7 +81,7 @@ pub struct Modeler {
 impl Modeler {
     /// Begins the desk, with files to open.
     pub fn new(context: &eframe::CreationContext<'_>, files: Vec<PathBuf>) -> Self {
-        let screen = context.wgpu_render_state.clone().map(Screen::new);
+        let screen = context.wgpu_render_state.as_ref().map(Screen::new);
         let mut modeler = Self::on(&context.egui_ctx, screen, desk_files::home());
         modeler.bench.keys = Keys::read(&desk_files::settings());
         modeler.pens = Pens::listen(context);
@@ -162,6 +162,7 @@ impl Modeler {
                 triangles: 0,
                 slices: None,
                 asks: None,
+                written: None,
                 part: None,
                 kept: desk_files::kept(&home),
                 scratch: None,
@@ -267,6 +268,7 @@ impl Modeler {
         egui::CentralPanel::no_frame().show(ui, |ui| self.docks(ui));
         panels::slices(ui.ctx(), &mut self.bench);
         panels::path_box(ui.ctx(), &mut self.bench);
+        panels::written(ui.ctx(), &mut self.bench);
         panels::part(ui.ctx(), &mut self.bench);
         panels::touch(ui.ctx(), &mut self.bench);
         panels::measure(ui.ctx(), &mut self.bench);

@@ -12,6 +12,7 @@ use glam::{DAffine3, DVec3};
 use tools::force::Solid as Solidity;
 use tools::hold::Held;
 use tools::paint::Substance;
+use tools::scene::StepLine;
 use tools::session::Stroke;
 
 use super::limits::Limits;
@@ -36,6 +37,8 @@ pub enum Order {
         out: PathBuf,
         /// Over which scan.
         scan: Option<PathBuf>,
+        /// Of a mesh: options of the command.
+        of_mesh: Vec<OsString>,
     },
     /// Tools work on this object from now on.
     Choose(String),
@@ -129,8 +132,12 @@ pub enum News {
     Touched(f64),
     /// What a step of a stroke took, seconds.
     Step(f64),
+    /// What a step of a scene that is played did.
+    Moved(StepLine),
     /// An object is not to be seen for now.
     Hide(String),
+    /// A file was written, of which a command told this.
+    Written(PathBuf, serde_json::Map<String, serde_json::Value>),
     /// Something to tell.
     Note(String),
     /// Something that could not be done.

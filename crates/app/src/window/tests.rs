@@ -10,14 +10,26 @@ use egui_kittest::kittest::Queryable;
 use fitting::{Cancel, Control};
 use glam::DVec3;
 
+mod arranging;
+mod clicks;
 mod desk;
 mod docks;
+mod files;
 mod handles;
+mod limits;
+mod matter;
 mod panels;
 mod pen;
+mod performance;
+mod planes;
+mod scans;
+mod shortcuts;
 mod show;
+mod tree;
+mod user;
 
 use self::desk::{Bare, again, on_disk, opened};
+use self::user::*;
 use super::desk::Desk;
 use super::modeler::Modeler;
 use super::orders::{News, Order, Sheet};
@@ -26,34 +38,6 @@ use super::touch::{Held, Seen, Wanted};
 use tools::haptics::Contact;
 
 use crate::view::{Ray, pick};
-
-fn window(home: &Path) -> Harness<'static, Modeler> {
-    let home = home.to_path_buf();
-    let made = |ui: &mut egui::Ui, modeler: &mut Modeler| modeler.show(ui);
-    let context = egui::Context::default();
-    Harness::builder()
-        .with_size([1280.0, 800.0])
-        .build_ui_state(made, Modeler::on(&context, None, home))
-}
-
-/// Steps until something is there.
-fn wait_for(window: &mut Harness<'_, Modeler>, what: &str) {
-    let start = Instant::now();
-    while window.query_by_label(what).is_none() {
-        assert!(start.elapsed() < Duration::from_secs(60), "no {what:?}");
-        std::thread::sleep(Duration::from_millis(10));
-        window.step();
-    }
-}
-
-/// One with a block of clay in it.
-fn window_with_clay(home: &Path) -> Harness<'static, Modeler> {
-    let mut window = window(home);
-    window.step();
-    window.get_by_label("A block of clay").click();
-    wait_for(&mut window, "History");
-    window
-}
 
 #[test]
 fn the_first_minute_needs_no_file() {
@@ -92,25 +76,10 @@ fn a_drag_is_a_stroke_and_the_history_undoes_it() {
     }
     window.drop_at(egui::pos2(690.0, 400.0));
     window.step();
-    let start = Instant::now();
-    while window.query_by_label_contains("carve on clay").is_none() {
-        let bench = window.state().bench();
-        assert!(
-            start.elapsed() < Duration::from_secs(10),
-            "{:?} {:?}",
-            bench.sheet,
-            bench.messages
-        );
-        std::thread::sleep(Duration::from_millis(10));
-        window.step();
-    }
+    assert!(edits(&mut window, 1).history[0].contains("carve on clay"));
+    window.step();
     window.get_by_label("as it was").click();
-    let start = Instant::now();
-    while window.state().bench().sheet.as_ref().is_some_and(|s| s.done > 0) {
-        assert!(start.elapsed() < Duration::from_secs(60));
-        std::thread::sleep(Duration::from_millis(10));
-        window.step();
-    }
+    until(&mut window, "undone", |sheet| sheet.done == 0);
 }
 
 /// On a slow machine a picture holds a whole drag, from the press to the release: it is the same stroke.
@@ -146,37 +115,6 @@ fn a_drag_within_one_picture_is_the_same_stroke() {
         opened(&copy).state().sha256()
     });
     assert_eq!(digests[0], digests[1]);
-}
-
-/// Steps until the desk has made something so.
-fn until(window: &mut Harness<'_, Modeler>, what: &str, is: impl Fn(&Sheet) -> bool) -> Arc<Sheet> {
-    let start = Instant::now();
-    loop {
-        let bench = window.state().bench();
-        if let Some(sheet) = bench.sheet.as_ref().filter(|sheet| is(sheet)) {
-            return sheet.clone();
-        }
-        assert!(
-            start.elapsed() < Duration::from_secs(60),
-            "not {what}: {:?}",
-            bench.messages
-        );
-        std::thread::sleep(Duration::from_millis(10));
-        window.step();
-    }
-}
-
-fn edits(window: &mut Harness<'_, Modeler>, count: usize) -> Arc<Sheet> {
-    until(window, "edited", |sheet| sheet.history.len() == count)
-}
-
-fn click(window: &mut Harness<'_, Modeler>, at: egui::Pos2) {
-    window.hover_at(at);
-    window.step();
-    window.drag_at(at);
-    window.step();
-    window.drop_at(at);
-    window.step();
 }
 
 /// A click pins the surface as the command would, and the panel frees it.
@@ -256,7 +194,7 @@ fn a_lost_card_loses_nothing() {
     let context = egui::Context::default();
     let state = screen();
     let device: wgpu::Device = state.device.clone();
-    let modeler = Modeler::on(&context, Some(Screen::new(state)), home.path().to_path_buf());
+    let modeler = Modeler::on(&context, Some(Screen::new(&state)), home.path().to_path_buf());
     let mut window = Harness::builder()
         .with_size([1280.0, 800.0])
         .build_ui_state(|ui, modeler: &mut Modeler| modeler.show(ui), modeler);
@@ -278,14 +216,11 @@ fn a_lost_card_loses_nothing() {
     window.step();
     // The window closes here; what it worked on goes on in the next.
     let next = egui::Context::default();
-    window.state_mut().resume(&next, Some(Screen::new(screen())));
+    window.state_mut().resume(&next, Some(Screen::new(&screen())));
     assert!(!window.state().is_lost(true));
-    let start = Instant::now();
-    while window.query_by_label_contains("carve on clay").is_none() || window.state().bench().triangles == 0 {
-        assert!(start.elapsed() < Duration::from_secs(60));
-        std::thread::sleep(Duration::from_millis(10));
-        window.step();
-    }
+    steps_until(&mut window, "seen again", |window| {
+        window.query_by_label_contains("carve on clay").is_some() && window.state().bench().triangles > 0
+    });
     let path = window.state().bench().sheet.as_ref().unwrap().path.clone();
     let kept = home.path().join("kept.isoclay");
     std::fs::copy(path, &kept).unwrap();

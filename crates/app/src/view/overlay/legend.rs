@@ -28,6 +28,13 @@ impl Legend {
         }
     }
 
+    /// What a picture has left beside so many legends for what is so wide, or above them where it is too narrow for both.
+    pub fn beside(count: usize, rect: Rect, wide: f32) -> Rect {
+        let has_room = rect.width() >= wide + 2.0 * ASIDE + BAND[0];
+        let taken = if has_room { 0.0 } else { count as f32 * HIGH };
+        Rect::from_min_max(rect.min, rect.max - vec2(0.0, taken))
+    }
+
     fn draw_at(&self, painter: &Painter, corner: egui::Pos2) {
         let font = || FontId::proportional(12.0);
         let ink = Color32::from_gray(230);
@@ -52,5 +59,19 @@ impl Legend {
             };
             painter.text(pos2(x, top + BAND[1] + 3.0), align, text, font(), ink);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_stands_beside_legends_is_above_them_in_narrow_pictures() {
+        let picture = |wide: f32| Rect::from_min_size(pos2(10.0, 20.0), vec2(wide, 300.0));
+        assert_eq!(Legend::beside(2, picture(800.0), 180.0), picture(800.0));
+        let narrow = Legend::beside(2, picture(234.0), 180.0);
+        assert_eq!(narrow.bottom(), 320.0 - 2.0 * HIGH);
+        assert_eq!(Legend::beside(0, picture(234.0), 180.0), picture(234.0));
     }
 }

@@ -1,5 +1,6 @@
 //! What the desk writes.
 
+use std::ffi::OsString;
 use std::path::Path;
 
 use document::{Command, CommandError};
@@ -30,7 +31,7 @@ impl Desk {
             // It has a name now. What cannot be removed is only in the way.
             let _ = std::fs::remove_file(&from);
         }
-        copied.map_err(|e| format!("{}: {e}", path.display()))
+        copied.map_err(|e| e.to_string())
     }
 
     /// Opens the file anew whose document was closed; what is seen of it stays.
@@ -47,7 +48,13 @@ impl Desk {
         Ok(())
     }
 
-    pub(super) fn export(&mut self, out: &Path, scan: Option<&Path>) -> Result<(), String> {
+    /// Writes the chosen object: a mesh by options of `mesh`, a field, or a scan with its edits.
+    pub(super) fn export(
+        &mut self,
+        out: &Path,
+        scan: Option<&Path>,
+        of_mesh: &[OsString],
+    ) -> Result<(), String> {
         self.end();
         let Some(open) = &mut self.open else { return Ok(()) };
         // The command opens it for itself alone.
@@ -56,10 +63,13 @@ impl Desk {
         let file = out.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let show = |stage: &str, share: f64| self.tell(News::Busy(Some((format!("{file}: {stage}"), share))));
         show("writing", 0.0);
-        let written = desk_files::export(&path, &chosen, out, scan, &self.begin_long(), &show);
+        let written = desk_files::export(&path, &chosen, out, scan, of_mesh, &self.begin_long(), &show);
         self.tell(News::Busy(None));
         self.reopen()?;
-        written.map(|()| self.tell(News::Note(format!("{} is written", out.display()))))
+        let told = written?;
+        self.tell(News::Note(format!("{} is written", out.display())));
+        self.tell(News::Written(out.to_path_buf(), told));
+        Ok(())
     }
 
     /// Writes the edits that are done as a script.
@@ -68,8 +78,7 @@ impl Desk {
         let document = self.open.as_mut().and_then(|open| open.document.as_mut());
         let Some(document) = document else { return Ok(()) };
         let text = document.script().map_err(|e| e.to_string())?;
-        formats::atomic::replace(path, |out| out.write_all(text.as_bytes()))
-            .map_err(|e| format!("{}: {e}", path.display()))?;
+        formats::atomic::replace(path, |out| out.write_all(text.as_bytes())).map_err(|e| e.to_string())?;
         let count = text.lines().count();
         self.tell(News::Note(format!(
             "{} has {count} edits; isoclay sculpt does them again",

@@ -139,7 +139,11 @@ impl Desk {
             }),
             ..Control::default()
         };
-        let done = command.apply(&state, &mut control);
+        let told = &self.news;
+        let done = command.apply_watched(&state, &mut control, &mut |step| {
+            // The progress that follows wakes the window.
+            let _ = told.send(News::Moved(*step));
+        });
         self.tell(News::Busy(None));
         let (next, notes) = done.map_err(|e| e.to_string())?;
         if let (Some(open), Command::Rename { object, to }) = (&mut self.open, command)

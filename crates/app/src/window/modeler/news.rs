@@ -4,6 +4,7 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use super::Modeler;
+use crate::panels;
 use crate::view::Screen;
 use crate::window::orders::News;
 
@@ -16,7 +17,9 @@ impl Modeler {
         while let Ok(news) = self.news.try_recv() {
             self.take(news);
         }
-        self.bench.triangles = self.screen.as_ref().map_or(0, |s| s.canvas.triangles());
+        let canvas = self.screen.as_ref().map(|s| &s.canvas);
+        self.bench.triangles = canvas.map_or(0, |canvas| canvas.triangles());
+        self.bench.performance.meshes = canvas.map_or(0, |canvas| canvas.mesh_bytes());
     }
 
     fn take(&mut self, news: News) {
@@ -71,6 +74,8 @@ impl Modeler {
             News::Hide(name) => drop(self.bench.hidden.insert(name)),
             News::Touched(rate) => self.bench.performance.touched(rate),
             News::Step(seconds) => self.bench.performance.step(seconds),
+            News::Written(path, told) => self.bench.written = panels::Written::of(path, &told),
+            News::Moved(step) => self.bench.performance.moved(step),
             News::Note(text) => self.bench.tell(text, false),
             News::Failed(text) => self.bench.tell(text, true),
         }

@@ -121,14 +121,8 @@ impl Modeler {
                     self.meet_desk();
                 }
             }
-            Some(Gesture::Orbit) if way != DVec2::ZERO => {
-                self.bench.look.camera.orbit(way);
-                self.moved = Instant::now();
-            }
-            Some(Gesture::Pan) if way != DVec2::ZERO => {
-                self.bench.look.camera.pan(way);
-                self.moved = Instant::now();
-            }
+            Some(Gesture::Orbit) => self.bench.look.camera.orbit(way),
+            Some(Gesture::Pan) => self.bench.look.camera.pan(way),
             _ => {}
         }
         self.lead(rect, over);

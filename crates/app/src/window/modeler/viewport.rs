@@ -7,7 +7,7 @@ use egui::{Pos2, Rect, Sense};
 use glam::{DVec2, DVec3};
 
 use super::Modeler;
-use crate::view::{Legend, Ray, scale_bar};
+use crate::view::{Legend, Ray, SCALE_BAR, scale_bar};
 
 /// Time after which a picture in which nothing moves is drawn whole.
 const STILL: Duration = Duration::from_millis(45);
@@ -19,10 +19,13 @@ impl Modeler {
         #[cfg(test)]
         (self.drawn_in = rect);
         // What the mouse does now shows in this picture, which is painted below what is drawn over it.
-        let below = ui.painter().add(egui::Shape::Noop);
+        let below = [(); 2].map(|()| ui.painter().add(egui::Shape::Noop));
         let over = response.hover_pos().or(response.interact_pointer_pos());
         if let Some(over) = over {
             self.pointer(ui, rect, &response, over);
+        }
+        if response.drag_stopped() || !ui.input(|i| i.pointer.any_down()) {
+            self.end_gesture();
         }
         let is_still = self.moved.elapsed() > STILL && self.gesture.is_none();
         self.bench.know_density();
@@ -38,13 +41,15 @@ impl Modeler {
         if !is_still {
             ui.ctx().request_repaint_after(STILL);
         }
+        let legends = self.bench.legends();
         if let Some(thing) = self.bench.sheet.as_ref().and_then(|s| s.objects.get(s.chosen))
             && self.bench.look.show.scale_bar
         {
             let length_of_point = self.bench.look.camera.height / f64::from(rect.height());
-            scale_bar(ui.painter(), rect, length_of_point, thing.unit);
+            let beside = Legend::beside(legends.len(), rect, SCALE_BAR);
+            scale_bar(ui.painter(), beside, length_of_point, thing.unit);
         }
-        Legend::draw(&self.bench.legends(), ui.painter(), rect);
+        Legend::draw(&legends, ui.painter(), rect);
         self.draw_cursor(ui, rect);
         self.draw_holds(ui, rect);
         self.draw_line_so_far(ui, rect);
@@ -53,13 +58,10 @@ impl Modeler {
         self.draw_handles(ui, rect);
         self.draw_hand(ui, rect);
         self.draw_acting(ui, rect);
-        if response.drag_stopped() || !ui.input(|i| i.pointer.any_down()) {
-            self.end_gesture();
-        }
     }
 
-    /// Draws the scene in place of a shape, or as much of it as there is time for; whether that is all.
-    fn draw(&mut self, ui: &egui::Ui, below: ShapeIdx, rect: Rect, is_still: bool) -> bool {
+    /// Draws the scene in place of two shapes, or as much of it as there is time for; whether that is all.
+    fn draw(&mut self, ui: &egui::Ui, below: [ShapeIdx; 2], rect: Rect, is_still: bool) -> bool {
         let Some(screen) = &mut self.screen else {
             return true;
         };
@@ -84,13 +86,10 @@ impl Modeler {
             .is_none_or(|drawn| drawn.is_done);
         let shown = shown.map(|drawn| (drawn.picture, 1.0));
         let whole = whole.map(|drawn| (drawn.picture, drawn.rows));
-        let pictures = shown.into_iter().chain(whole).map(|(picture, rows)| {
-            let corner = rect.min + egui::vec2(rect.width(), rows * rect.height());
-            let part = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, rows));
-            let rect = Rect::from_min_max(rect.min, corner);
-            egui::Shape::image(picture, rect, part, egui::Color32::WHITE)
-        });
-        ui.painter().set(below, egui::Shape::Vec(pictures.collect()));
+        for (shape, (picture, rows)) in below.into_iter().zip(shown.into_iter().chain(whole)) {
+            let part = rect.with_max_y(rect.min.y + rows * rect.height());
+            ui.painter().with_clip_rect(part).set(shape, picture.over(rect));
+        }
         is_done
     }
 

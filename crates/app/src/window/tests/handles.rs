@@ -3,7 +3,6 @@
 use egui::{Pos2, Vec2};
 use serde_json::Value;
 
-use super::panels::by_script;
 use super::*;
 use crate::window::handles::Handle;
 

@@ -5,42 +5,6 @@ use egui::accesskit::Role;
 use super::*;
 use crate::window::actions::Action;
 
-/// A menu and what is in it.
-fn choose(window: &mut Harness<'_, Modeler>, menu: &str, item: &str) {
-    window.get_by_label(menu).click();
-    window.step();
-    window.step();
-    window.get_by_label_contains(item).click();
-    window.step();
-    window.step();
-}
-
-/// Writes into a field by its label, in place of what is there.
-pub fn write(window: &mut Harness<'_, Modeler>, role: Role, label: &str, text: &str) {
-    let field = window.get_by_role_and_label(role, label);
-    field.focus();
-    field.click();
-    window.step();
-    window.step();
-    window.key_press_modifiers(egui::Modifiers::COMMAND, egui::Key::A);
-    window.step();
-    window.get_by_role_and_label(role, label).type_text(text);
-    window.step();
-}
-
-fn drag(window: &mut Harness<'_, Modeler>) {
-    window.hover_at(egui::pos2(620.0, 400.0));
-    window.step();
-    window.drag_at(egui::pos2(620.0, 400.0));
-    window.step();
-    for x in 1..12 {
-        window.hover_at(egui::pos2(620.0 + 6.0 * x as f32, 400.0));
-        window.step();
-    }
-    window.drop_at(egui::pos2(690.0, 400.0));
-    window.step();
-}
-
 /// A stroke has the tool, the radius and the strength of the panel, and the journal repeats it to the bit.
 #[test]
 fn the_panel_of_tools_sets_what_a_stroke_is_made_with() {
@@ -132,8 +96,15 @@ fn what_is_only_seen_is_no_edit() {
     let mut window = window_with_clay(home.path());
     drag(&mut window);
     let before = on_disk(&edits(&mut window, 1), scratch.path()).state().sha256();
-    for item in ["Slices", "Clipping plane", "Log", "Top", "Light", "All"] {
-        choose(&mut window, "View", item);
+    for (menus, item) in [
+        ("View/Windows", "Slices"),
+        ("View", "Clipping plane"),
+        ("View/Windows", "Log"),
+        ("View/Look from", "Top"),
+        ("View", "Light"),
+        ("View/Look from", "All"),
+    ] {
+        choose(&mut window, menus, item);
         window.key_press(egui::Key::Escape);
         window.run_steps(3);
     }
@@ -162,12 +133,9 @@ fn places_walls_area_and_volume_are_measured() {
     }
     window.run_steps(2);
     window.get_by_label("Area and volume").click();
-    let start = Instant::now();
-    while window.state().bench().measure.as_ref().unwrap().size.is_none() {
-        assert!(start.elapsed() < Duration::from_secs(60));
-        std::thread::sleep(Duration::from_millis(10));
-        window.step();
-    }
+    steps_until(&mut window, "measured", |window| {
+        window.state().bench().measure.as_ref().unwrap().size.is_some()
+    });
     let bench = window.state().bench();
     let measure = bench.measure.clone().unwrap();
     let ways: Vec<f64> = measure.distances().collect();
@@ -186,20 +154,6 @@ fn places_walls_area_and_volume_are_measured() {
     window.get_by_label("Clear").click();
     window.run_steps(2);
     assert_eq!(window.state().bench().measure, Some(Default::default()));
-}
-
-/// Commands of the line `sculpt` on a block of clay as the window makes it: the hash that they leave.
-pub fn by_script(script: &str) -> [u8; 32] {
-    let (name, object) = crate::cli::desk_files::clay_block().unwrap();
-    let state = State::new().with(&name, object).unwrap();
-    let named = |own: Option<&str>| Ok::<_, document::CommandError>(own.unwrap_or(&name).to_string());
-    let commands = Command::of_script(script, named).unwrap();
-    let all = commands.iter().try_fold(state, |state, command| {
-        command
-            .apply(&state, &mut Control::default())
-            .map(|(next, _)| next)
-    });
-    all.unwrap().sha256()
 }
 
 /// Objects are duplicated, renamed, moved by typed numbers and removed, as a script does it.
@@ -255,7 +209,7 @@ fn objects_are_arranged_as_by_a_script() {
 fn a_scene_is_played_as_by_a_script() {
     let (home, scratch) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let mut window = window_with_clay(home.path());
-    choose(&mut window, "View", "Simulation");
+    choose(&mut window, "View/Windows", "Simulation");
     window.key_press(egui::Key::Escape);
     window.run_steps(3);
     window.get_by_label("Swelling clay").click();
@@ -286,12 +240,7 @@ fn a_saved_script_does_it_again() {
     let file = scratch.path().join("done.jsonl");
     write(&mut window, Role::TextInput, "File", file.to_str().unwrap());
     window.get_by_role_and_label(Role::Button, "Save script").click();
-    let start = Instant::now();
-    while !file.exists() {
-        assert!(start.elapsed() < Duration::from_secs(60));
-        std::thread::sleep(Duration::from_millis(10));
-        window.step();
-    }
+    steps_until(&mut window, "saved", |_| file.exists());
     let script = std::fs::read_to_string(&file).unwrap();
     assert_eq!(
         by_script(&script),

@@ -73,10 +73,7 @@ fn what_cannot_be_shown_says_why() {
 fn slices_share_a_cursor_and_stand_beside_the_scene() {
     let home = tempfile::tempdir().unwrap();
     let mut window = window_with_clay(home.path());
-    window.get_by_label("View").click();
-    window.run_steps(2);
-    window.get_by_label_contains("Slices").click();
-    window.run_steps(2);
+    choose(&mut window, "View/Windows", "Slices");
     window.key_press(egui::Key::Escape);
     window.run_steps(3);
     let cursor = |window: &Harness<'_, Modeler>| {
@@ -105,7 +102,7 @@ fn pictures_replace_nothing_unasked() {
     tick(&mut window, "Picture…");
     let there = home.path().join("there.png");
     std::fs::write(&there, "mine").unwrap();
-    panels::write(
+    write(
         &mut window,
         egui::accesskit::Role::TextInput,
         "File",
@@ -114,7 +111,7 @@ fn pictures_replace_nothing_unasked() {
     tick(&mut window, "Save picture");
     assert!(window.query_by_label("Replace").is_some());
     assert_eq!(window.state().bench().shot.wanted, None);
-    tick(&mut window, "Not now");
+    tick(&mut window, "Cancel");
     assert_eq!(std::fs::read(&there).unwrap(), b"mine");
     // Without a graphics driver that is told.
     tick(&mut window, "Save picture");
