@@ -14,6 +14,11 @@ use crate::panels;
 /// Height of the rim by which a panel is taken: what panels leave empty there.
 const RIM: f32 = 8.0;
 
+/// Share of what was dropped somewhere.
+const NEW: f32 = 1.0;
+/// Width of a panel that was dropped beside the scene, points.
+const WIDTH: f32 = 210.0;
+
 /// What is to be done to the layout.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rearrange {
@@ -82,6 +87,30 @@ impl Docks {
         self.open = open;
     }
 
+    /// What was dropped between others gets a share as theirs: shares are points here, and the tiles know only that it is one of them.
+    fn give_room(&mut self) {
+        let root = self.tree.root();
+        for (id, tile) in self.tree.tiles.iter_mut() {
+            let Tile::Container(Container::Linear(line)) = tile else {
+                continue;
+            };
+            let is_new = |line: &Linear, id: TileId| line.shares[id] <= NEW;
+            let known = line.children.iter().filter(|id| !is_new(line, **id));
+            let known: Vec<f32> = known.map(|id| line.shares[*id]).collect();
+            let is_window = root == Some(*id) && line.dir == LinearDir::Horizontal;
+            let share = match known.len() {
+                _ if is_window => WIDTH,
+                0 => continue,
+                count => known.iter().sum::<f32>() / count as f32,
+            };
+            for id in line.children.clone() {
+                if is_new(line, id) {
+                    line.shares.set_share(id, share);
+                }
+            }
+        }
+    }
+
     /// In a row that is the window's, panels beside the scene stay as wide as they are, and the scene has the rest.
     fn fill(&mut self, width: f32) {
         let Some(root) = self.tree.root() else { return };
@@ -118,6 +147,7 @@ impl Modeler {
         }
         let open = Panel::ALL.into_iter().filter(|panel| self.bench.is_open(*panel));
         docks.open_and_close(open.collect());
+        docks.give_room();
         docks.fill(ui.available_width());
         let bars = docks
             .tree

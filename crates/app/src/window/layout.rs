@@ -69,8 +69,8 @@ impl Default for Layout {
         let right = [Panel::Objects, Panel::Simulation, Panel::Performance].map(panel);
         let right = Self::Tabs(right.to_vec(), 0);
         Self::Row(vec![
-            (panel(Panel::Tools), 196.0),
-            (middle, 874.0),
+            (panel(Panel::Tools), 195.0),
+            (middle, 875.0),
             (right, 210.0),
         ])
     }

@@ -39,7 +39,7 @@ fn at_first_panels_are_beside_the_scene() {
     window.run_steps(2);
     let first = scene(&window);
     assert!(
-        (first.left() - 196.0).abs() < 1.5 && (first.right() - 1070.0).abs() < 1.5,
+        (first.left() - 195.0).abs() < 1.5 && (first.right() - 1070.0).abs() < 1.5,
         "{first}"
     );
     assert_eq!(window.state().layout, None);
@@ -96,6 +96,23 @@ fn a_panel_that_is_moved_stays_there() {
         &mut window,
         "Move Objects",
         first.center_bottom() - egui::vec2(0.0, 12.0),
+    );
+    let below = scene(&window);
+    assert!(
+        below.height() < first.height() - 100.0 && below.height() > 200.0,
+        "{below}"
+    );
+    // Beside the tools it is as wide as it was.
+    drag(&mut window, "Move Objects", egui::pos2(196.0, 300.0));
+    let beside = scene(&window);
+    assert!(
+        (beside.left() - 405.0).abs() < 2.0 && (beside.right() - 1280.0).abs() < 2.0,
+        "{beside}"
+    );
+    drag(
+        &mut window,
+        "Move Objects",
+        beside.center_bottom() - egui::vec2(0.0, 12.0),
     );
     let moved = window.state().layout.clone().expect("another layout");
     assert!(moved.is_whole());
