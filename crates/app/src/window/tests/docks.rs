@@ -12,6 +12,7 @@ fn run(window: &mut Harness<'_, Modeler>, name: Name) {
     window.run_steps(3);
 }
 
+/// Where the scene is; windows under test have a margin of 8 points.
 fn scene(window: &Harness<'_, Modeler>) -> Rect {
     window.state().drawn_in
 }
@@ -39,11 +40,11 @@ fn at_first_panels_are_beside_the_scene() {
     window.run_steps(2);
     let first = scene(&window);
     assert!(
-        (first.left() - 195.0).abs() < 1.5 && (first.right() - 1070.0).abs() < 1.5,
+        (first.left() - 203.0).abs() < 1.5 && (first.right() - 1062.0).abs() < 1.5,
         "{first}"
     );
     assert_eq!(window.state().layout, None);
-    for (name, left, right) in [(Name::Tools, 0.0, 1070.0), (Name::Objects, 0.0, 1280.0)] {
+    for (name, left, right) in [(Name::Tools, 8.0, 1062.0), (Name::Objects, 8.0, 1272.0)] {
         run(&mut window, name);
         let now = scene(&window);
         assert!(
@@ -57,10 +58,10 @@ fn at_first_panels_are_beside_the_scene() {
     }
     assert_eq!(scene(&window), first);
     run(&mut window, Name::Panels);
-    assert!((scene(&window).width() - 1280.0).abs() < 1.5);
+    assert!((scene(&window).width() - 1264.0).abs() < 1.5);
     // One that is asked for comes, though all were hidden.
     run(&mut window, Name::Objects);
-    assert!((scene(&window).width() - 1070.0).abs() < 1.5);
+    assert!((scene(&window).width() - 1054.0).abs() < 1.5);
 }
 
 /// What is opened comes before the objects, or below the scene; tabs and their crosses do what they say.
@@ -103,10 +104,10 @@ fn a_panel_that_is_moved_stays_there() {
         "{below}"
     );
     // Beside the tools it is as wide as it was.
-    drag(&mut window, "Move Objects", egui::pos2(196.0, 300.0));
+    drag(&mut window, "Move Objects", egui::pos2(204.0, 300.0));
     let beside = scene(&window);
     assert!(
-        (beside.left() - 405.0).abs() < 2.0 && (beside.right() - 1280.0).abs() < 2.0,
+        (beside.left() - 413.0).abs() < 2.0 && (beside.right() - 1272.0).abs() < 2.0,
         "{beside}"
     );
     drag(
@@ -125,7 +126,7 @@ fn a_panel_that_is_moved_stays_there() {
     run(&mut next, Name::AsAtFirst);
     assert_eq!((next.state().layout.as_ref(), scene(&next)), (None, first));
     run(&mut next, Name::Sides);
-    assert!((scene(&next).left() - 210.0).abs() < 1.5, "{}", scene(&next));
+    assert!((scene(&next).left() - 218.0).abs() < 1.5, "{}", scene(&next));
     drop(next);
     // What makes no sense is as at first.
     let nonsense = Layout::Tabs(vec![Layout::Panel(Panel::Scene)], 7);
