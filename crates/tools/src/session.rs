@@ -12,7 +12,7 @@ use crate::geometric::{
 use crate::hold::{Free, Hold};
 use crate::limits::{Limits, Mask, Region};
 use crate::material::Material;
-use crate::number::Positive;
+use crate::number::{Numbers, Positive};
 use crate::paint::Paint;
 use crate::place::Place;
 use crate::room::MOST_GROWTHS;
@@ -106,6 +106,10 @@ pub struct Stroke {
     /// [`LiveStroke`](crate::live::LiveStroke).
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub paced: bool,
+    /// Part of what a brush does that it does in a step by hand, 0 to 1, one a step; all of it if missing. Of `push` and `inflate` that is the
+    /// way, of `smooth` the level, of `paint` the rate.
+    #[serde(default, skip_serializing_if = "Numbers::is_empty")]
+    pub press: Numbers,
     /// Paint laid on while a force tool works, in the order of steps.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub during: Vec<During>,
@@ -288,6 +292,10 @@ impl Stroke {
         control: &mut Control,
     ) -> Result<(Canvas, Vec<String>), ToolError> {
         let is_stepped = self.paced || !self.during.is_empty();
+        if !self.press.is_empty() && !self.paced {
+            let why = "press is that of a hand in each step; leave it out, or write paced = true";
+            return Err(ToolError::Stroke(why.into()));
+        }
         let mut once = |canvas: Canvas| match (done.take(), is_stepped) {
             (Some(done), _) => Ok(done),
             (None, true) => self.worked(tool, canvas, limits, control),

@@ -24,13 +24,14 @@ const VIEW: &[&[Name]] = &[
         Name::Clip,
     ],
     &[Name::Hide, Name::Alone, Name::ShowAll],
-    &[Name::Panels, Name::Sides],
+    &[Name::Panels, Name::Sides, Name::AsAtFirst],
 ];
 /// Below entries of their own: all at once would not fit into a low window.
 const FROM: &[&[Name]] = &[&[Name::Front, Name::Right, Name::Top, Name::All]];
 const WINDOWS: &[&[Name]] = &[
     &[Name::Slices, Name::Measure, Name::Touch, Name::Simulation],
     &[Name::Performance, Name::Log, Name::Picture],
+    &[Name::Tools, Name::Objects],
 ];
 
 /// Along the top.

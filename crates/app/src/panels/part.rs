@@ -122,7 +122,7 @@ fn answered(ui: &mut Ui, part: &Part) -> Option<Order> {
         None => button(ui, "Open all of it", &|| Order::Open(path())),
         Some(Err(_)) => {}
     }
-    button(ui, "Not now", &|| Order::Untry);
+    button(ui, "Cancel", &|| Order::Untry);
     answer
 }
 

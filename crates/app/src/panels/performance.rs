@@ -50,7 +50,7 @@ impl Row {
 /// What the work costs.
 #[derive(Default)]
 pub struct Performance {
-    /// Whether its window is shown.
+    /// Whether its panel is shown.
     pub is_open: bool,
     /// Of pictures, ms.
     pictures: Row,
@@ -95,32 +95,14 @@ impl Performance {
     }
 }
 
-/// In a window of its own.
-pub fn performance(context: &egui::Context, bench: &mut Bench) {
-    bench.performance.picture();
-    if !bench.performance.is_open {
-        return;
-    }
-    let is_new = bench
-        .performance
-        .memory
-        .0
-        .back()
-        .is_none_or(|(when, _)| when.elapsed() > LOOK);
+/// In a panel of its own.
+pub fn performance(ui: &mut egui::Ui, bench: &mut Bench) {
+    let memory = bench.performance.memory.0.back();
+    let is_new = memory.is_none_or(|(when, _)| when.elapsed() > LOOK);
     if let Some(bytes) = rss_bytes().filter(|_| is_new) {
         bench.performance.memory.push(bytes as f64 / f64::from(1 << 20));
     }
-    let mut is_open = true;
-    egui::Window::new("Performance")
-        .open(&mut is_open)
-        .default_pos(egui::pos2(700.0, 60.0))
-        .default_width(300.0)
-        .show(context, |ui| show(ui, bench));
-    bench.performance.is_open = is_open;
-    context.request_repaint_after(LOOK);
-}
-
-fn show(ui: &mut egui::Ui, bench: &Bench) {
+    ui.ctx().request_repaint_after(LOOK);
     let costs = &bench.performance;
     let pictures = costs
         .pictures
@@ -162,7 +144,7 @@ fn show(ui: &mut egui::Ui, bench: &Bench) {
         ),
     ];
     for (name, row, unit, text) in rows {
-        ui.horizontal(|ui| {
+        ui.horizontal_wrapped(|ui| {
             ui.strong(name);
             ui.label(text);
         });
@@ -171,12 +153,12 @@ fn show(ui: &mut egui::Ui, bench: &Bench) {
         }
     }
     for (name, text) in [("Simulation", simulated(costs)), ("Fields", fields(bench))] {
-        ui.horizontal(|ui| {
+        ui.horizontal_wrapped(|ui| {
             ui.strong(name);
             ui.label(text);
         });
     }
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         ui.strong("Meshes");
         let count = human_count(bench.triangles);
         ui.label(format!("{count} triangles, {}", human_bytes(costs.meshes)));

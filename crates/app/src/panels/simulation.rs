@@ -36,7 +36,7 @@ const PRESETS: [(&str, &str, [f64; 4], bool); 4] = [
 /// The scene as it is set.
 #[derive(Clone, Debug)]
 pub struct Simulation {
-    /// Whether its window is shown.
+    /// Whether its panel is shown.
     pub is_open: bool,
     mass: f64,
     stiffness: f64,
@@ -107,21 +107,8 @@ impl Simulation {
     }
 }
 
-/// In a window of its own.
-pub fn simulation(context: &egui::Context, bench: &mut Bench) {
-    let mut is_open = bench.simulation.is_open;
-    if !is_open {
-        return;
-    }
-    egui::Window::new("Simulation")
-        .open(&mut is_open)
-        .default_pos(egui::pos2(212.0, 36.0))
-        .default_width(280.0)
-        .show(context, |ui| show(ui, bench));
-    bench.simulation.is_open = is_open;
-}
-
-fn show(ui: &mut Ui, bench: &mut Bench) {
+/// In a panel of its own.
+pub fn simulation(ui: &mut Ui, bench: &mut Bench) {
     let set = &mut bench.simulation;
     ui.horizontal_wrapped(|ui| {
         for (name, hint, [stiffness, damping, rest_scale, plasticity], keeps) in PRESETS {

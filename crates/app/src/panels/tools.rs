@@ -90,6 +90,12 @@ fn settings(ui: &mut Ui, bench: &mut Bench) {
         ui.add(Slider::new(&mut tool.strength, 0.0..=1.0).max_decimals(2))
             .labelled_by(label.id);
     }
+    if bench.has_pen && tool.kind.has_press() {
+        let mut counts = !bench.ignores_pens;
+        let switch = ui.checkbox(&mut counts, "Pen pressure");
+        switch.on_hover_text("The harder the pen is pressed the nearer it comes to the strength above");
+        bench.ignores_pens = !counts;
+    }
     more(ui, tool);
     super::limits(ui, bench);
     clipping(ui, bench);

@@ -10,8 +10,8 @@ use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 use tools::paint::{Substance, values};
 
-/// Cells along the longest side of the box that triangles begin with.
-const CELLS: f64 = 32.0;
+/// Fewest cells along the longest side of the box that triangles begin with; there are fewer than twice as many.
+const CELLS: u32 = 24;
 /// Halvings of these, at most, and how many more than knots have: of a volume no cell is much finer than its voxels, tools add a level
 /// or two to others.
 const DEPTH: usize = 6;
@@ -86,7 +86,7 @@ impl Shape {
     ) -> Result<Self, PolygonizeError> {
         let world_box = object.field.world_box();
         let size = world_box.size();
-        let edge = size.max_element() / CELLS;
+        let edge = size.max_element() / f64::from(first_cells(object));
         let cells = (size / edge).ceil().max(DVec3::ONE).to_array().map(|n| n as u32);
         let options = AdaptiveOptions {
             iso,
@@ -182,7 +182,9 @@ impl Shape {
 
     /// A box round the triangles of a block, in the object's world.
     fn block_box(&self, block: &AdaptiveBlock) -> Aabb {
-        let cell = self.world_box.size().max_element() / CELLS / f64::from(1_u32 << block.level);
+        let cell = self.world_box.size().max_element()
+            / f64::from(first_cells(&self.object))
+            / f64::from(1_u32 << block.level);
         let min = self.world_box.min + 8.0 * cell * DVec3::from_array(block.block.map(f64::from));
         Aabb::new(min, min + 8.0 * cell).widened(cell)
     }
@@ -278,11 +280,28 @@ pub fn second(
     Ok(patches)
 }
 
+/// Cells along the longest side that triangles begin with: those between knots, halved or doubled, so that halvings meet knots again. Cells
+/// across knots cost half as much again.
+fn first_cells(object: &Object) -> u32 {
+    let knots = object.field.lattice().cells.into_iter().max().unwrap_or(1);
+    let mut cells = knots.max(1);
+    while cells >= 2 * CELLS {
+        cells = cells.div_ceil(2);
+    }
+    while cells < CELLS {
+        cells *= 2;
+    }
+    cells
+}
+
 /// Halvings of the first cells that show what an object is shaped to.
 fn depth(object: &Object) -> usize {
     let knots = object.field.lattice().cells_at(object.detail());
     let finest = knots.into_iter().max().unwrap_or(1);
-    let level = (f64::from(finest) / CELLS).log2().ceil().max(0.0) as usize;
+    let level = (f64::from(finest) / f64::from(first_cells(object)))
+        .log2()
+        .ceil()
+        .max(0.0) as usize;
     let is_volume = object.meta.source == SourceKind::Volume;
     (level + FINER[usize::from(!is_volume)]).clamp(1, DEPTH)
 }

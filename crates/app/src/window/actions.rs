@@ -6,6 +6,9 @@ use glam::DVec3;
 use super::Bench;
 use super::adjust::What;
 use super::arrange::Change;
+use super::docks::Rearrange;
+use super::kept::Sides;
+use super::layout::Panel;
 use super::orders::Order;
 use super::tool::Kind;
 use crate::panels;
@@ -95,7 +98,10 @@ actions! {
     Simulation: "View", "simulation", "Simulation", None;
     Performance: "View", "performance", "Performance", None;
     Log: "View", "log", "Log", None;
+    Tools: "View", "tool-panel", "Tool panel", None;
+    Objects: "View", "object-panel", "Object panel", None;
     Sides: "View", "sides", "Panels change sides", None;
+    AsAtFirst: "View", "layout-as-at-first", "Layout as at first", None;
     Panels: "View", "panels", "Side panels", plain(Key::F9);
     Pins: "Tool", "pins", "Pin points", plain(Key::N);
     Smaller: "Tool", "smaller", "Smaller tool", plain(Key::OpenBracket);
@@ -194,6 +200,8 @@ impl Action {
             Name::Pins => bench.pins,
             Name::Arrange => bench.arranging,
             Name::Panels => bench.sides.are_shown,
+            Name::Tools => bench.is_open(Panel::Tools),
+            Name::Objects => bench.is_open(Panel::Objects),
             _ => return None,
         })
     }
@@ -280,7 +288,13 @@ impl Name {
             Self::Simulation => bench.simulation.is_open ^= true,
             Self::Performance => bench.performance.is_open ^= true,
             Self::Log => bench.shows_log ^= true,
-            Self::Sides => bench.sides.are_swapped ^= true,
+            Self::Tools => bench.sides = bench.sides.toggled(|sides| &mut sides.has_tools),
+            Self::Objects => bench.sides = bench.sides.toggled(|sides| &mut sides.has_objects),
+            Self::Sides => bench.rearranges = Some(Rearrange::Mirror),
+            Self::AsAtFirst => {
+                bench.rearranges = Some(Rearrange::AsAtFirst);
+                bench.sides = Sides::default();
+            }
             Self::Panels => bench.sides.are_shown ^= true,
             Self::Pins => bench.pins ^= true,
             Self::Smaller => bench.tool.radius = (bench.tool.radius / 1.15).max(panels::RADII[0]),

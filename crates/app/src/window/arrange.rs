@@ -1,5 +1,5 @@
 //! The chosen object moved, turned and scaled by the mouse, as in Blender: a key, a way of the mouse or a number, a click. X, Y and Z take
-//! one axis. It becomes one stroke, `place`.
+//! one axis. Or a handle is dragged. It becomes one stroke, `place`.
 
 use egui::{Color32, Event, Key, Modifiers, PointerButton, Pos2, Rect, Stroke};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
@@ -28,7 +28,29 @@ pub struct Arrange {
     from: Pos2,
     axis: Option<usize>,
     typed: String,
+    /// Whether a handle is dragged: it ends when the button comes up.
+    is_held: bool,
 }
+
+impl Arrange {
+    /// By a handle that was taken at a place.
+    pub(super) fn held(change: Change, axis: Option<usize>, from: Pos2) -> Self {
+        Self {
+            change,
+            from,
+            axis,
+            typed: String::new(),
+            is_held: true,
+        }
+    }
+}
+
+/// Red, green and blue for the axes.
+pub const AXES: [Color32; 3] = [
+    Color32::from_rgb(230, 90, 80),
+    Color32::from_rgb(130, 200, 90),
+    Color32::from_rgb(90, 150, 240),
+];
 
 /// What an object gets.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -84,7 +106,8 @@ impl Gets {
     }
 }
 
-fn middle(thing: &Thing) -> DVec3 {
+/// What an object is turned and scaled about.
+pub(super) fn middle(thing: &Thing) -> DVec3 {
     thing.world_from_object.transform_point3(thing.own_box.center())
 }
 
@@ -100,6 +123,7 @@ impl Modeler {
                 from,
                 axis: None,
                 typed: String::new(),
+                is_held: false,
             });
         }
     }
@@ -130,8 +154,11 @@ impl Modeler {
             }
             let is_left = i.pointer.button_pressed(PointerButton::Secondary)
                 || i.consume_key(Modifiers::NONE, Key::Escape);
-            let is_done = i.pointer.button_pressed(PointerButton::Primary)
-                || i.consume_key(Modifiers::NONE, Key::Enter);
+            let is_clicked = match arrange.is_held {
+                true => !i.pointer.primary_down(),
+                false => i.pointer.button_pressed(PointerButton::Primary),
+            };
+            let is_done = is_clicked || i.consume_key(Modifiers::NONE, Key::Enter);
             (is_done, is_left)
         });
         let gets = self.gets(&arrange, &thing, rect, over);
@@ -160,7 +187,7 @@ impl Modeler {
         let (before, now) = (arrange.from - on_screen, over - on_screen);
         Some(match arrange.change {
             Change::Shift => {
-                let length = self.bench.look.camera.height / f64::from(rect.height());
+                let length = self.length_of_point(rect, center);
                 let way = over - arrange.from;
                 let way = length * (f64::from(way.x) * right - f64::from(way.y) * up);
                 Gets::Way(match (axis, typed) {
@@ -176,8 +203,12 @@ impl Modeler {
             Change::Turn => {
                 let turn = f64::from(before.angle() - now.angle()).to_degrees();
                 let toward = axis.map_or(1.0, |axis| axis.dot(toward_eye).signum());
-                let turn = (turn + 540.0).rem_euclid(360.0) - 180.0;
-                Gets::Turn(axis.unwrap_or(toward_eye), typed.unwrap_or(toward * turn))
+                let turn = toward * ((turn + 540.0).rem_euclid(360.0) - 180.0);
+                let turn = match axis.filter(|_| arrange.is_held) {
+                    Some(axis) => self.ring_turn(rect, [center, axis], [arrange.from, over]),
+                    None => turn,
+                };
+                Gets::Turn(axis.unwrap_or(toward_eye), typed.unwrap_or(turn))
             }
             Change::Scale => {
                 let factor = f64::from(now.length() / before.length().max(8.0));
@@ -204,12 +235,7 @@ impl Modeler {
         if let Some(axis) = arrange.axis {
             let way = self.bench.scene.1 * DVec3::AXES[axis];
             let ends = [center - way, center + way].map(|p| self.on_screen(rect, p));
-            let colors = [
-                Color32::from_rgb(230, 90, 80),
-                Color32::from_rgb(130, 200, 90),
-                Color32::from_rgb(90, 150, 240),
-            ];
-            painter.line_segment(ends, Stroke::new(1.5, colors[axis]));
+            painter.line_segment(ends, Stroke::new(1.5, AXES[axis]));
         }
         let along = arrange
             .axis

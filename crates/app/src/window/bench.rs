@@ -13,8 +13,10 @@ use glam::DVec3;
 
 use super::adjust::What;
 use super::arrange::Change;
+use super::docks::Rearrange;
 use super::kept::Sides;
 use super::keys::Keys;
+use super::layout::Panel;
 use super::limits::Limits;
 use super::measure::{Mark, Measure};
 use super::orders::{Order, Sheet, Thing};
@@ -91,8 +93,14 @@ pub struct Bench {
     pub performance: panels::Performance,
     /// What is laid on all over.
     pub fill: panels::Fill,
-    /// Where the panels beside the scene are.
+    /// Which of the panels beside the scene are there.
     pub sides: Sides,
+    /// What is to be done to their layout.
+    pub(super) rearranges: Option<Rearrange>,
+    /// Whether it does not matter how hard pens are pressed.
+    pub ignores_pens: bool,
+    /// Whether there is a pen that tells it.
+    pub has_pen: bool,
     /// How a device is to be held, if that panel is shown.
     pub touch: Option<panels::TouchWish>,
     /// What is in the hand.
@@ -127,6 +135,31 @@ impl Bench {
         match panels::is_large(&path) {
             true => self.part = Some(panels::Part::of(path)),
             false => self.order(Order::Open(path)),
+        }
+    }
+
+    /// Whether a panel is open.
+    pub fn is_open(&self, panel: Panel) -> bool {
+        let has_sides = self.sheet.is_some() && self.sides.are_shown;
+        match panel {
+            Panel::Scene => true,
+            Panel::Tools => has_sides && self.sides.has_tools,
+            Panel::Objects => has_sides && self.sides.has_objects,
+            Panel::Simulation => self.sheet.is_some() && self.simulation.is_open,
+            Panel::Performance => self.performance.is_open,
+            Panel::Log => self.shows_log,
+        }
+    }
+
+    /// Closes a panel.
+    pub fn close_panel(&mut self, panel: Panel) {
+        match panel {
+            Panel::Scene => {}
+            Panel::Tools => self.sides.has_tools = false,
+            Panel::Objects => self.sides.has_objects = false,
+            Panel::Simulation => self.simulation.is_open = false,
+            Panel::Performance => self.performance.is_open = false,
+            Panel::Log => self.shows_log = false,
         }
     }
 

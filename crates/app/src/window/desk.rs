@@ -140,8 +140,8 @@ impl Desk {
             Order::Save(path) => self.save(&path),
             Order::Export { out, scan, of_mesh } => self.export(&out, scan.as_deref(), &of_mesh),
             Order::Choose(name) => self.choose(name),
-            Order::Begin { tool, ray } => self.begin(tool, &ray),
-            Order::Along(ray) => self.along(&ray),
+            Order::Begin { tool, ray, press } => self.begin(tool, &ray, press),
+            Order::Along { ray, press } => self.along(&ray, press),
             Order::End => {
                 self.end();
                 self.end_drawing()

@@ -4,36 +4,57 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::layout::Layout;
 use crate::view::{Mode, Show};
 
 /// What is kept.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Kept {
     /// How solids become pixels.
     pub mode: Mode,
     /// What is shown beside them.
     pub show: Show,
-    /// Where the panels are.
+    /// Which of the panels beside the scene are there.
     pub sides: Sides,
+    /// Whether it does not matter how hard pens are pressed.
+    pub ignores_pens: bool,
+    /// Where the panels are, unless that is as at first.
+    pub layout: Option<Layout>,
 }
 
-/// Where the panels beside the scene are.
+/// Which of the panels beside the scene are there.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Sides {
     /// Whether they are there at all.
     pub are_shown: bool,
-    /// Whether the tools are on the right, and the objects on the left.
-    pub are_swapped: bool,
+    /// Whether the tools are.
+    pub has_tools: bool,
+    /// Whether the objects are.
+    pub has_objects: bool,
 }
 
 impl Default for Sides {
     fn default() -> Self {
         Self {
             are_shown: true,
-            are_swapped: false,
+            has_tools: true,
+            has_objects: true,
         }
+    }
+}
+
+impl Sides {
+    /// One of them is opened or closed; opened it is there even if all were hidden.
+    pub fn toggled(mut self, one: impl Fn(&mut Self) -> &mut bool) -> Self {
+        let is_there = self.are_shown && *one(&mut self);
+        if !self.are_shown {
+            (self.has_tools, self.has_objects) = (false, false);
+        }
+        self.are_shown = true;
+        *one(&mut self) = !is_there;
+        self
     }
 }
 
@@ -58,7 +79,7 @@ impl Kept {
         }
         // What cannot be written is told once.
         *self = now;
-        let text = serde_json::to_vec(&now).expect("names have a JSON form");
+        let text = serde_json::to_vec(self).expect("names have a JSON form");
         let file = file(home);
         std::fs::create_dir_all(home).map_err(|e| {
             format!(
@@ -88,9 +109,9 @@ mod tests {
                 scale_bar: false,
                 ..Show::default()
             },
-            ..kept
+            ..kept.clone()
         };
-        kept.keep(now, &within).unwrap();
+        kept.keep(now.clone(), &within).unwrap();
         assert_eq!(kept, now);
         assert_eq!(Kept::read(&within), kept);
         std::fs::write(file(&within), "{").unwrap();

@@ -20,11 +20,14 @@ use super::adjust::Adjust;
 use super::arrange::Arrange;
 use super::bench::Bench;
 use super::desk::Desk;
+use super::docks::Docks;
 use super::gesture::Gesture;
 use super::kept::Kept;
 use super::keys::Keys;
+use super::layout::Layout;
 use super::limits::Limits;
 use super::orders::{News, Order};
+use super::pen::{self, Pens};
 use super::shot::Shot;
 use super::show::{Beside, Shown};
 use super::tool::{Kind, Settings, Tool};
@@ -62,6 +65,17 @@ pub struct Modeler {
     pub(super) beside: Beside,
     /// Pictures that become files.
     pub(super) shot: Option<Shot>,
+    /// The panels round the scene.
+    pub(super) docks: Docks,
+    /// Where they are, unless that is as at first.
+    pub(super) layout: Option<Layout>,
+    /// How hard they are pressed.
+    pub(super) pens: Pens,
+    /// What they did in the time of this picture.
+    pen: pen::Moves,
+    /// Where the scene was drawn last.
+    #[cfg(test)]
+    pub(super) drawn_in: egui::Rect,
 }
 
 impl Modeler {
@@ -70,6 +84,7 @@ impl Modeler {
         let screen = context.wgpu_render_state.as_ref().map(Screen::new);
         let mut modeler = Self::on(&context.egui_ctx, screen, desk_files::home());
         modeler.bench.keys = Keys::read(&desk_files::settings());
+        modeler.pens = Pens::listen(context);
         close_when_asked(modeler.context.clone());
         for file in files {
             modeler.bench.order(Order::Open(file));
@@ -170,6 +185,9 @@ impl Modeler {
                 performance: panels::Performance::default(),
                 fill: panels::Fill::default(),
                 sides: kept.sides,
+                ignores_pens: kept.ignores_pens,
+                rearranges: None,
+                has_pen: false,
                 touch: None,
                 held: None,
                 seen: None,
@@ -182,6 +200,8 @@ impl Modeler {
                 orders,
                 cancel,
             },
+            docks: Docks::new(kept.layout.as_ref()),
+            layout: kept.layout.clone(),
             news,
             context,
             is_listening,
@@ -198,6 +218,10 @@ impl Modeler {
             home,
             beside: Beside::default(),
             shot: None,
+            pens: Pens::default(),
+            pen: pen::Moves::default(),
+            #[cfg(test)]
+            drawn_in: egui::Rect::ZERO,
         }
     }
 
@@ -217,21 +241,6 @@ impl Modeler {
         &self.lassoed.0
     }
 
-    /// The panels beside the scene.
-    fn sides(&mut self, ui: &mut egui::Ui) {
-        let is_swapped = self.bench.sides.are_swapped;
-        let beside = |is_left: bool, id: &'static str| match is_left {
-            true => egui::Panel::left(id),
-            false => egui::Panel::right(id),
-        };
-        beside(!is_swapped, "tools")
-            .exact_size(196.0)
-            .show(ui, |ui| panels::tools(ui, &mut self.bench));
-        beside(is_swapped, "document")
-            .default_size(210.0)
-            .show(ui, |ui| panels::document(ui, &mut self.bench));
-    }
-
     /// All of the window.
     pub fn show(&mut self, ui: &mut egui::Ui) {
         if self.is_lost(false) {
@@ -241,6 +250,7 @@ impl Modeler {
             return;
         }
         self.hear();
+        (self.pen, self.bench.has_pen) = (self.pens.since_last(), self.pens.are_there());
         self.bench.can_cast = self.screen.as_ref().is_none_or(|screen| screen.canvas.can_cast());
         self.keys(ui);
         let dropped: Vec<PathBuf> = ui.input(|i| {
@@ -252,24 +262,16 @@ impl Modeler {
         }
         egui::Panel::top("menu").show(ui, |ui| panels::menu(ui, &mut self.bench));
         egui::Panel::bottom("status").show(ui, |ui| panels::status(ui, &self.bench));
-        if self.bench.sheet.is_some() && self.bench.sides.are_shown {
-            self.sides(ui);
-        }
         self.begin_adjust(ui);
         self.begin_arranging(ui);
-        egui::CentralPanel::no_frame().show(ui, |ui| match &self.bench.sheet {
-            Some(_) => self.views(ui),
-            None => panels::start(ui, &mut self.bench),
-        });
+        self.bench.performance.picture();
+        egui::CentralPanel::no_frame().show(ui, |ui| self.docks(ui));
         panels::slices(ui.ctx(), &mut self.bench);
         panels::path_box(ui.ctx(), &mut self.bench);
         panels::written(ui.ctx(), &mut self.bench);
         panels::part(ui.ctx(), &mut self.bench);
         panels::touch(ui.ctx(), &mut self.bench);
         panels::measure(ui.ctx(), &mut self.bench);
-        panels::simulation(ui.ctx(), &mut self.bench);
-        panels::performance(ui.ctx(), &mut self.bench);
-        panels::log(ui.ctx(), &mut self.bench);
         panels::picture(ui.ctx(), &mut self.bench);
         panels::shortcuts(ui.ctx(), &mut self.bench);
         panels::commands(ui.ctx(), &mut self.bench);
@@ -279,6 +281,8 @@ impl Modeler {
             mode: self.bench.look.mode,
             show: self.bench.look.show,
             sides: self.bench.sides,
+            ignores_pens: self.bench.ignores_pens,
+            layout: self.layout.clone(),
         };
         if let Err(why) = self.kept.keep(now, &self.home) {
             self.bench.tell(why, true);

@@ -48,9 +48,16 @@ pub enum Order {
         tool: Tool,
         /// Where.
         ray: Ray,
+        /// How hard the pen is pressed, 0 to 1, if that counts.
+        press: Option<f64>,
     },
     /// It goes on.
-    Along(Ray),
+    Along {
+        /// Where.
+        ray: Ray,
+        /// As above.
+        press: Option<f64>,
+    },
     /// It ends.
     End,
     /// It leaves nothing.

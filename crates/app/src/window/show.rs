@@ -196,6 +196,12 @@ impl Modeler {
                         .is_none_or(|asked| !asked.is_like(&wish)) =>
                 {
                     self.bench.shown.words.insert(layer, Ok("…".into()));
+                    // What was made of another scene is wrong now.
+                    let asked = self.beside.asked.get(&layer);
+                    if asked.is_some_and(|asked| asked.scene != wish.scene) {
+                        self.lay(layer, &Made::Nothing);
+                        self.bench.shown.legends.remove(&layer);
+                    }
                     self.beside.ask(wish, context);
                 }
                 Some(_) => {}

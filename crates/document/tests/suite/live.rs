@@ -488,3 +488,82 @@ fn a_hand_beside_the_object_does_nothing_and_says_so() {
     }
     assert_eq!(document.state().sha256(), hash);
 }
+
+/// What a brush does in a step is as much as the hand presses; the script has the presses, and presses that make no sense are refused.
+#[test]
+fn a_brush_does_as_much_as_the_hand_presses() {
+    let directory = tempdir().unwrap();
+    let mut document = document(directory.path(), &block());
+    let control = &mut Control::default();
+    let pressed = |at, press| Pose {
+        press,
+        ..Pose::at(at)
+    };
+    let at = DVec3::new(12.0, 12.0, 12.0);
+    let mut live = begun(document.state(), "inflate = { along = [], radius = 3, by = 0.4 }");
+    let mut due = 0.0;
+    for press in [0.25, 0.0, 1.0, 0.5] {
+        live.step(pressed(at, press), control).unwrap();
+        due += 0.4 * press;
+        let (now, _) = live.look().unwrap();
+        let found = height(&now, 12.0, 12.0);
+        assert!((found - due).abs() < 0.02, "{press}: {found} of {due}");
+    }
+    for press in [-0.1, 1.5, f64::NAN] {
+        let why = live.step(pressed(at, press), control).unwrap_err().to_string();
+        assert!(why.contains("0 to 1"), "{why}");
+    }
+    assert!(live.end(&mut document, control).unwrap().0);
+    assert_eq!(again(&mut document, 1).sha256(), document.state().sha256());
+    let command = document.command(0).unwrap();
+    assert_eq!(
+        command["stroke"]["press"],
+        serde_json::json!([0.25, 0.0, 1.0, 0.5])
+    );
+
+    for text in [
+        "push = { along = [], radius = 3, speed = 0.1 }",
+        "smooth = { along = [], radius = 3, level = 4 }",
+        "paint = { layer = 'stiffness', brush = { along = [], radius = 3, value = 5 } }",
+    ] {
+        let poses: Vec<Pose> = (0..4)
+            .map(|n| pressed(at + DVec3::X * f64::from(n), 0.25 + 0.25 * f64::from(n)))
+            .collect();
+        made(&mut document, text, &poses);
+        let presses =
+            document.command(document.counts().unwrap().done - 1).unwrap()["stroke"]["press"].clone();
+        assert_eq!(presses, serde_json::json!([0.25, 0.5, 0.75, 1.0]), "{text}");
+    }
+    assert_eq!(again(&mut document, 4).sha256(), document.state().sha256());
+    // A solid does not know how hard it is pressed.
+    let solid = "carve = { shape = { sphere = { radius = 1 } }, along = [] }";
+    made(&mut document, solid, &[pressed(at, 0.5)]);
+    let command = document.command(4).unwrap();
+    assert_eq!(command["stroke"]["press"], serde_json::Value::Null);
+
+    for (text, word) in [
+        (
+            "press = [1]\ninflate = { along = [[12, 12, 12]], radius = 3, by = 0.1 }",
+            "paced",
+        ),
+        (
+            "press = [1, 1]\npaced = true\ninflate = { along = [[12, 12, 12]], radius = 3, by = 0.1 }",
+            "1 places and 2 presses",
+        ),
+        (
+            "press = [1]\npaced = true\nchisel = { along = [[12, 12, 12]], radius = 3, depth = 0.1 }",
+            "alone",
+        ),
+        (
+            "press = [2]\npaced = true\ninflate = { along = [[12, 12, 12]], radius = 3, by = 0.1 }",
+            "0 to 1",
+        ),
+    ] {
+        let command = Command::Stroke {
+            object: "clay".into(),
+            stroke: Box::new(stroke(text)),
+        };
+        let why = command.apply(document.state(), control).unwrap_err().to_string();
+        assert!(why.contains(word), "{text}: {why}");
+    }
+}

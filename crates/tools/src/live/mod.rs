@@ -33,20 +33,27 @@ pub struct Pose {
     pub turn: DVec3,
     /// How hard it is pushed, of `push`.
     pub force: f64,
+    /// Part of what it does that is done, 0 to 1, of brushes: see [`Stroke::press`].
+    pub press: f64,
 }
 
 impl Pose {
-    /// A tool at a place that is not turned, under a force of 1.
+    /// A tool at a place that is not turned, under a force of 1, and does all that it does.
     pub fn at(at: DVec3) -> Self {
         Self {
             at,
             turn: DVec3::ZERO,
             force: 1.0,
+            press: 1.0,
         }
     }
 
-    /// Refuses numbers that are not finite.
+    /// Refuses numbers that are not finite, and presses that are no part.
     pub(crate) fn check(&self) -> Result<(), ToolError> {
+        if !(0.0..=1.0).contains(&self.press) {
+            let why = format!("the hand cannot press by {}; give 0 to 1", self.press);
+            return Err(ToolError::Stroke(why));
+        }
         match self.at.is_finite() && self.turn.is_finite() && self.force.is_finite() {
             true => Ok(()),
             false => Err(ToolError::Stroke(format!(
@@ -149,6 +156,7 @@ impl LiveStroke {
         pose.check()?;
         let pose = Pose {
             force: self.force.unwrap_or(pose.force),
+            press: if self.stroke.has_press() { pose.press } else { 1.0 },
             ..pose
         };
         let first = self.first.unwrap_or(pose);

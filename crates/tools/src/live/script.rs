@@ -18,6 +18,36 @@ impl Stroke {
 
     /// Poses of the tool, one a step.
     pub(crate) fn poses(&self) -> Result<Vec<Pose>, ToolError> {
+        let mut poses = self.unpressed()?;
+        let presses = &self.press.0;
+        if presses.is_empty() {
+            return Ok(poses);
+        }
+        if !self.has_press() {
+            let why = "press is of push, inflate, smooth and the brush of paint alone; leave it out";
+            return Err(ToolError::Stroke(why.into()));
+        }
+        if presses.len() != poses.len() {
+            return Err(ToolError::Stroke(format!(
+                "there are {} places and {} presses; write one press for each place",
+                poses.len(),
+                presses.len()
+            )));
+        }
+        for (pose, press) in poses.iter_mut().zip(presses) {
+            pose.press = press.0;
+            pose.check()?;
+        }
+        Ok(poses)
+    }
+
+    /// Whether a hand that presses less does less.
+    pub(super) fn has_press(&self) -> bool {
+        let paints = self.paint.as_ref().is_some_and(|tool| tool.brush.is_some());
+        paints || self.push.is_some() || self.inflate.is_some() || self.smooth.is_some()
+    }
+
+    fn unpressed(&self) -> Result<Vec<Pose>, ToolError> {
         let tool = self.tool().map_err(ToolError::Stroke)?;
         let places = |along: &[Point]| along.iter().map(|p| Pose::at(p.0)).collect();
         Ok(match tool {
@@ -63,6 +93,12 @@ impl Stroke {
     /// One pose more, with its turn and its force where these are the hand's; a hand that grabs has the first and the last alone.
     pub(super) fn add_pose(&mut self, pose: Pose, turns: bool, forces: bool) {
         let at = Point(pose.at);
+        // A hand that pressed all the way has no presses.
+        if pose.press != 1.0 || !self.press.is_empty() {
+            let before = self.unpressed().map_or(0, |poses| poses.len());
+            self.press.0.resize(before, Finite(1.0));
+            self.press.0.push(Finite(pose.press));
+        }
         for tool in [&mut self.carve, &mut self.add].into_iter().flatten() {
             // Solids that were not turned so far have no turns.
             if turns && (pose.turn != DVec3::ZERO || !tool.turn.is_empty()) {

@@ -9,7 +9,7 @@ use crate::canvas::Canvas;
 use crate::force::{ForceError, ForceStroke, ForceTool, released};
 use crate::geometric::{Geometric, GeometricError};
 use crate::limits::Limits;
-use crate::number::{Finite, Numbers, Point};
+use crate::number::{Finite, Numbers, Point, Positive};
 use crate::paint::{Paint, PaintError};
 use crate::session::{During, Stroke};
 use crate::tool::{Tool, ToolError};
@@ -106,7 +106,7 @@ impl Work {
             return Ok(force.force());
         }
         let is_solid = matches!(tool, Tool::Carve(_) | Tool::Add(_));
-        if is_solid && from == Some(pose) {
+        if is_solid && from == Some(pose) || pose.press == 0.0 {
             return Ok(DVec3::ZERO);
         }
         match between(tool, from.unwrap_or(pose), pose, |tool| {
@@ -327,23 +327,25 @@ fn between<R>(
         Tool::Add(tool) => apply(&Tool::Add(&solid(tool))),
         Tool::Smooth(tool) => {
             let mut tool = tool.clone();
-            tool.along = along;
+            let level = (to.press * f64::from(tool.level)).round().max(1.0);
+            (tool.along, tool.level) = (along, level as u8);
             apply(&Tool::Smooth(&tool))
         }
         Tool::Inflate(tool) => {
             let mut tool = tool.clone();
-            tool.along = along;
+            (tool.along, tool.by) = (along, Finite(to.press * tool.by.0));
             apply(&Tool::Inflate(&tool))
         }
         Tool::Push(tool) => {
             let mut tool = tool.clone();
-            (tool.along, tool.force) = (along, Numbers(vec![Finite(to.force)]));
+            (tool.along, tool.force) = (along, Numbers(vec![Finite(to.press * to.force)]));
             apply(&Tool::Push(&tool))
         }
         Tool::Paint(tool) => {
             let mut tool = tool.clone();
             if let Some(brush) = &mut tool.brush {
-                brush.along = along;
+                let rate = brush.rate.map_or(1.0, |rate| rate.0);
+                (brush.along, brush.rate) = (along, Some(Positive(to.press * rate)));
             }
             apply(&Tool::Paint(&tool))
         }

@@ -6,7 +6,7 @@ use glam::{DAffine3, DVec3};
 
 use super::{Legend, Stretch};
 use crate::check::viridis;
-use crate::cli::quantity::human_number;
+use crate::cli::quantity::{human_count, human_number};
 
 /// Most cells that are drawn.
 const MOST: usize = 12_000;
@@ -70,16 +70,19 @@ pub fn cells(
             Legend {
                 title: titled("Side of cells", unit),
                 colors: band(),
-                marks: vec![(0.0, side(coarsest)), (1.0, side(finest))],
+                marks: match coarsest == finest {
+                    true => vec![(0.0, side(coarsest))],
+                    false => vec![(0.0, side(coarsest)), (1.0, side(finest))],
+                },
             }
         }
     };
     let told = match step {
-        1 => format!("{} cells with samples", all.len()),
+        1 => format!("{} cells with samples", human_count(all.len())),
         _ => format!(
-            "{} of {} cells with samples, every {step}th",
-            drawn().count(),
-            all.len()
+            "{} of {} cells with samples, one in {step}",
+            human_count(drawn().count()),
+            human_count(all.len())
         ),
     };
     (stretches, legend, told)

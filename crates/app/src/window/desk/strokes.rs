@@ -14,7 +14,7 @@ use crate::window::orders::{Acting, News};
 use crate::window::tool::{Tool, Use};
 
 impl Desk {
-    pub(super) fn begin(&mut self, tool: Tool, ray: &Ray) -> Result<(), String> {
+    pub(super) fn begin(&mut self, tool: Tool, ray: &Ray, press: Option<f64>) -> Result<(), String> {
         self.end();
         if tool.acts_at_once() {
             return self.begin_drawing(tool, ray);
@@ -29,34 +29,37 @@ impl Desk {
         let live = Live::begin(open.state(), &open.chosen, stroke).map_err(|e| e.to_string())?;
         let hold = (tool.kind.by() == Use::Grip).then_some([start.at, -start.along]);
         open.live = Some(InHand { live, tool, hold });
-        self.step(tool.middle(start.at, start.normal))
+        self.step(pose(&tool, start.at, start.normal, press))
     }
 
-    pub(super) fn along(&mut self, ray: &Ray) -> Result<(), String> {
+    pub(super) fn along(&mut self, ray: &Ray, press: Option<f64>) -> Result<(), String> {
         self.draw_on(ray);
         let Some(open) = &self.open else { return Ok(()) };
         let Some(hand) = &open.live else { return Ok(()) };
         let at = match hand.hold {
-            Some(plane) => open.own_ray(ray).and_then(|own| in_plane(&own, plane)),
+            Some(plane) => {
+                let at = open.own_ray(ray).and_then(|own| in_plane(&own, plane));
+                at.map(Pose::at)
+            }
             None => open
                 .under(ray)
-                .map(|(at, normal, _)| hand.tool.middle(at, normal)),
+                .map(|(at, normal, _)| pose(&hand.tool, at, normal, press)),
         };
-        at.map_or(Ok(()), |at| self.step(at))
+        at.map_or(Ok(()), |pose| self.step(pose))
     }
 
     /// One step of the stroke in the hand.
-    fn step(&mut self, at: DVec3) -> Result<(), String> {
+    fn step(&mut self, pose: Pose) -> Result<(), String> {
         let Some(open) = &mut self.open else { return Ok(()) };
         let Some(hand) = &mut open.live else { return Ok(()) };
         let start = Instant::now();
-        let done = hand.live.step(Pose::at(at), &mut Control::default());
+        let done = hand.live.step(pose, &mut Control::default());
         let seen = done.and_then(|force| Ok((hand.live.look()?.0, force)));
         let _ = self.news.send(News::Step(start.elapsed().as_secs_f64()));
         match seen {
             Ok((state, force)) => {
                 let placed = state.placement(&open.chosen).unwrap_or_default();
-                let acting = Acting::of(&hand.live, at, force, placed);
+                let acting = Acting::of(&hand.live, pose.at, force, placed);
                 open.shown = state;
                 if acting.is_some() {
                     self.tell(News::Acting(acting));
@@ -167,6 +170,15 @@ impl Desk {
         open.choose_what_is_there();
         self.lay_sheet();
         turned
+    }
+}
+
+/// Where a tool is when a hand has it at a place of the surface, and presses so. What a solid does less it is less deep.
+fn pose(tool: &Tool, at: DVec3, normal: DVec3, press: Option<f64>) -> Pose {
+    let press = press.unwrap_or(1.0);
+    Pose {
+        press,
+        ..Pose::at(tool.pressed(press).middle(at, normal))
     }
 }
 

@@ -53,6 +53,10 @@ impl Modeler {
         let start = start.unwrap_or(over);
         let under = is_free.then(|| self.under(rect, start)).flatten();
         if let Some(button) = pressed.filter(|_| response.hovered() && self.gesture.is_none()) {
+            if button == PointerButton::Primary && self.take_handle(rect, start) {
+                self.arrange(ui, rect, over);
+                return;
+            }
             if let (PointerButton::Primary, Some((p, normal))) = (button, under) {
                 if self.bench.arranging {
                     self.choose(rect, start);
@@ -81,11 +85,14 @@ impl Modeler {
                         .filter(|_| tool.acts_at_once())
                         .map(|(p, _)| *p)
                         .collect();
+                    let counts = !self.bench.ignores_pens && tool.kind.has_press();
+                    let press = self.pen.down.filter(|_| counts);
                     self.bench.order(Order::Begin {
                         tool,
                         ray: self.ray(rect, start),
+                        press,
                     });
-                    Gesture::Stroke(Way::new(start, step))
+                    Gesture::Stroke(Way::new(start, step, press))
                 }
                 (PointerButton::Middle, true, _) | (PointerButton::Secondary, ..) => Gesture::Pan,
                 _ => Gesture::Orbit,
@@ -98,11 +105,17 @@ impl Modeler {
         let way = DVec2::new(f64::from(way.x), -f64::from(way.y)) / f64::from(rect.height());
         match &mut self.gesture {
             Some(Gesture::Stroke(path)) => {
-                let steps: Vec<Pos2> = moves.into_iter().flat_map(|to| path.to(to)).collect();
-                for step in &steps {
-                    self.bench.order(Order::Along(self.ray(rect, *step)));
+                let presses = self.pen.presses(moves.len(), path.press().unwrap_or(1.0));
+                let steps = moves.into_iter().zip(presses);
+                let steps: Vec<_> = steps.flat_map(|(to, press)| path.to(to, press)).collect();
+                for (step, press) in &steps {
+                    self.bench.order(Order::Along {
+                        ray: self.ray(rect, *step),
+                        press: *press,
+                    });
                 }
                 if tool.acts_at_once() {
+                    let steps: Vec<Pos2> = steps.into_iter().map(|(at, _)| at).collect();
                     self.draw_line(rect, &tool, &steps);
                 } else if !steps.is_empty() {
                     self.meet_desk();

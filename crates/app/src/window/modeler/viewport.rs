@@ -16,6 +16,8 @@ impl Modeler {
     /// The scene, and what the mouse does in it.
     pub(in crate::window) fn viewport(&mut self, ui: &mut egui::Ui) {
         let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
+        #[cfg(test)]
+        (self.drawn_in = rect);
         // What the mouse does now shows in this picture, which is painted below what is drawn over it.
         let below = [(); 2].map(|()| ui.painter().add(egui::Shape::Noop));
         let over = response.hover_pos().or(response.interact_pointer_pos());
@@ -53,6 +55,7 @@ impl Modeler {
         self.draw_line_so_far(ui, rect);
         self.draw_boxes(ui, rect);
         self.draw_marks(ui, rect);
+        self.draw_handles(ui, rect);
         self.draw_hand(ui, rect);
         self.draw_acting(ui, rect);
     }

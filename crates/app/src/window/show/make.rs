@@ -194,7 +194,8 @@ fn errors(things: &[Thing]) -> Result<Answer, String> {
     let Some((scale, unit, rms)) = first else {
         return Err("no object knows of its errors, as what was fitted does".into());
     };
-    let told = format!("Of the fit, before edits: rms {} {unit} in all", short(rms));
+    let rms = format!("{} {unit}", short(rms));
+    let told = format!("Of the fit, before edits: rms {} in all", rms.trim_end());
     let shares = move |name: &str, places: &[DVec3]| match fits.get(name) {
         Some((own, known, scale)) => {
             let share = |p: &DVec3| {

@@ -52,7 +52,7 @@ pub fn points(thing: &Thing, scans: &[PathBuf], origin: DVec3) -> Result<Answer,
     let told = match step {
         1 => format!("{} points", human_count(places.len())),
         _ => format!(
-            "{} of {} points, every {step}th",
+            "{} of {} points, one in {step}",
             human_count(dots.len()),
             human_count(places.len())
         ),

@@ -117,8 +117,15 @@ pub fn stroke(tool: Tool, count: usize) -> Vec<Order> {
         from: place(n),
         along: -DVec3::Z,
     };
-    let begin = Order::Begin { tool, ray: ray(0) };
-    let along = (1..count).map(|n| Order::Along(ray(n)));
+    let begin = Order::Begin {
+        tool,
+        ray: ray(0),
+        press: None,
+    };
+    let along = (1..count).map(|n| Order::Along {
+        ray: ray(n),
+        press: None,
+    });
     std::iter::once(begin).chain(along).chain([Order::End]).collect()
 }
 
@@ -176,7 +183,11 @@ fn every_tool_leaves_an_edit_that_a_script_repeats_to_the_bit() {
                 along: -DVec3::Z,
             };
             let tool = tool(Kind::Copy);
-            desk.order(Order::Begin { tool, ray });
+            desk.order(Order::Begin {
+                tool,
+                ray,
+                press: None,
+            });
             desk.order(Order::End);
         }
         let count = if kind.by() == Use::Outline { 12 } else { 4 };

@@ -63,7 +63,7 @@ fn previewed(home: &Path, scan: &Path) -> Window {
     window.run_steps(3);
     write(&mut window, Role::TextInput, "File", scan.to_str().unwrap());
     window.get_by_role_and_label(Role::Button, "Preview").click();
-    wait_for(&mut window, "Not now");
+    wait_for(&mut window, "Cancel");
     steps_until(&mut window, "known", |window| {
         window.query_by_label("Looking at it").is_none()
     });
@@ -192,7 +192,7 @@ fn a_preview_of_what_is_no_scan_says_why() {
     let mut window = previewed(home.path(), &none);
     assert_told(&window, &["none.ply:"]);
     assert!(window.query_by_label_contains("Open it").is_none());
-    window.get_by_label("Not now").click();
+    window.get_by_label("Cancel").click();
     window.run_steps(3);
     assert!(window.state().bench().part.is_none() && window.state().bench().sheet.is_none());
 }

@@ -39,6 +39,12 @@ impl Tool {
         }
     }
 
+    /// As a pen makes it that is pressed so hard, 0 to 1.
+    pub fn pressed(&self, press: f64) -> Self {
+        let strength = press * self.strength;
+        Self { strength, ..*self }
+    }
+
     /// How deep it works.
     fn depth(&self) -> f64 {
         (0.05 + 0.95 * self.strength) * self.radius

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::Kind;
+use super::{Kind, Use};
 
 /// How the force of a tool is spread.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -167,6 +167,11 @@ impl Kind {
     /// Whether it turns by an angle.
     pub fn has_angle(self) -> bool {
         matches!(self, Self::Bend | Self::Flex | Self::Twist | Self::Whirl)
+    }
+
+    /// Whether it matters how hard a pen is pressed on the way.
+    pub fn has_press(self) -> bool {
+        self.by() == Use::Brush && self.has_strength() && !matches!(self, Self::Chisel | Self::Squirt)
     }
 
     /// Whether its strength makes a difference.
