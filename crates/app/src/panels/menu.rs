@@ -29,7 +29,13 @@ const VIEW: &[&[Name]] = &[
 /// Below entries of their own: all at once would not fit into a low window.
 const FROM: &[&[Name]] = &[&[Name::Front, Name::Right, Name::Top, Name::All]];
 const WINDOWS: &[&[Name]] = &[
-    &[Name::Slices, Name::Measure, Name::Touch, Name::Simulation],
+    &[
+        Name::Slices,
+        Name::FourViews,
+        Name::Measure,
+        Name::Touch,
+        Name::Simulation,
+    ],
     &[Name::Performance, Name::Log, Name::Picture],
     &[Name::Tools, Name::Objects],
 ];

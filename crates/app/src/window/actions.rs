@@ -90,8 +90,11 @@ actions! {
     ShowAll: "View", "show-all", "Show all objects", ctrl_shift(Key::H);
     Wireframe: "View", "wireframe", "Wireframe", None;
     Floor: "View", "floor", "Floor and axes", None;
+    Second: "View", "second-surface", "Second surface", None;
+    Points: "View", "input-points", "Input points", None;
     Picture: "View", "picture", "Picture…", None;
     Slices: "View", "slices", "Slices", None;
+    FourViews: "View", "four-views", "Four views", None;
     Clip: "View", "clip", "Clipping plane", None;
     Touch: "View", "touch", "Touch", None;
     Measure: "View", "measure", "Measure", plain(Key::M);
@@ -190,7 +193,10 @@ impl Action {
             Name::Paint => bench.look.paint,
             Name::Wireframe => bench.look.show.wireframe,
             Name::Floor => bench.look.show.floor,
+            Name::Second => bench.look.show.second,
+            Name::Points => bench.look.show.points,
             Name::Slices => bench.slices.is_some(),
+            Name::FourViews => bench.slices.as_ref().is_some_and(|slices| slices.is_four_up),
             Name::Clip => bench.look.cut.is_some(),
             Name::Touch => bench.touch.is_some(),
             Name::Measure => bench.measure.is_some(),
@@ -257,6 +263,11 @@ impl Name {
             Self::Wireframe => bench.look.show.wireframe ^= true,
             Self::Floor => bench.look.show.floor ^= true,
             Self::Picture => bench.shot.is_open = true,
+            Self::Second => bench.look.show.second ^= true,
+            Self::Points => bench.look.show.points ^= true,
+            Self::FourViews => {
+                bench.slices.get_or_insert_with(panels::Slices::new).is_four_up ^= true;
+            }
             Self::Slices => {
                 bench.slices = match bench.slices {
                     Some(_) => None,
