@@ -79,7 +79,7 @@ impl Field for FormulaSolid {
         // Where something is not finite the interval is the whole line.
         let (lo, hi) = (
             if value.lo > 0.0 { f64::MIN_POSITIVE } else { -most },
-            if value.hi < 0.0 { 0.0 } else { most },
+            if value.hi < 0.0 { -f64::MIN_POSITIVE } else { most },
         );
         Interval::new(lo, hi)
     }

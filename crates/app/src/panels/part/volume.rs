@@ -1,7 +1,7 @@
 //! What is asked of a volume: three coarse slices with a box over them, and what that will hold.
 
 use std::ffi::OsString;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use egui::{Color32, ColorImage, DragValue, Rect, Sense, Stroke, TextureHandle, TextureOptions, Ui};
 use formats::ReadLimits;
@@ -13,8 +13,12 @@ use crate::cli::quantity::{human_count, human_number};
 /// Voxels of the coarse slices along their longest side, at most.
 const COARSE: usize = 96;
 
+/// A region and a stride, and bytes.
+type Needs = (([[usize; 2]; 3], usize), u64);
+
 /// A volume of which a part is to be opened.
 pub struct Part {
+    path: PathBuf,
     preview: Preview,
     /// Every so many voxels of it.
     coarse: Volume,
@@ -25,6 +29,8 @@ pub struct Part {
     /// Where the slices are, in shares.
     at: [f32; 3],
     pictures: [Option<TextureHandle>; 3],
+    /// What reading a region at a stride holds.
+    needs: Option<Needs>,
     drags: Option<(usize, [f32; 2])>,
 }
 
@@ -52,6 +58,8 @@ impl Part {
             stride: 1,
             at: [0.5; 3],
             pictures: [None, None, None],
+            needs: None,
+            path: path.to_path_buf(),
             drags: None,
         })
     }
@@ -71,6 +79,31 @@ impl Part {
     fn voxels(&self) -> usize {
         let along = |[from, to]: [usize; 2]| (to - from).div_ceil(self.stride);
         self.region.into_iter().map(along).product()
+    }
+
+    /// Bytes that reading them holds.
+    fn bytes(&mut self) -> u64 {
+        let (region, stride) = (self.region, self.stride);
+        if let Some((_, bytes)) = self.needs.filter(|(of, _)| *of == (region, stride)) {
+            return bytes;
+        }
+        // All files of a directory would be looked at for every step of a drag.
+        let told = (!self.path.is_dir()).then(|| {
+            let part = VolumeOptions {
+                region: Some(region),
+                stride: [stride; 3],
+                ..VolumeOptions::default()
+            };
+            formats::volumes::peek(&self.path, &part).ok()
+        });
+        let each = size_of::<f32>() as u64;
+        let whole = each * self.preview.header.voxel_count() as u64;
+        let own = self.preview.read_bytes.saturating_sub(whole);
+        let bytes = told
+            .flatten()
+            .map_or(own + each * self.voxels() as u64, |part| part.read_bytes);
+        self.needs = Some(((region, stride), bytes));
+        bytes
     }
 
     /// What it is, and the box over it.
@@ -106,13 +139,7 @@ impl Part {
             ui.add(DragValue::new(&mut self.stride).range(1..=16))
                 .labelled_by(label.id);
         });
-        // Reading takes some room of its own, however much is read.
-        let each = size_of::<f32>() as u64;
-        let own = self
-            .preview
-            .read_bytes
-            .saturating_sub(each * self.preview.header.voxel_count() as u64);
-        let bytes = own + each * self.voxels() as u64;
+        let bytes = self.bytes();
         bytes_of(
             ui,
             &format!("{} voxels", human_count(self.voxels())),

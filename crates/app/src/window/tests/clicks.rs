@@ -50,15 +50,17 @@ fn clicks_stamp_whirl_cut_and_paste_as_a_script_does() {
     assert!(stamp["add"]["shape"].is_object(), "{stamp}");
     is_so_far(&mut window, &stamp);
 
+    // On the ball, beside its top: a flat face that is turned about its normal stays as it is.
     let whirl = used(
         &mut window,
         scratch.path(),
         "whirl",
-        at + egui::vec2(60.0, 0.0),
+        at + egui::vec2(14.0, 0.0),
         2,
     );
     let twist = &whirl["move"]["motion"]["twist"];
-    is_on_the_front(&twist["at"]);
+    let [_, _, z]: [f64; 3] = serde_json::from_value(twist["at"].clone()).unwrap();
+    assert!(z > 20.0 && z < 20.0 + radius + 0.1, "{whirl}");
     assert!(
         (twist["radius"].as_f64().unwrap() - radius).abs() < 1e-9,
         "{whirl}"

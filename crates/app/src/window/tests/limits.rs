@@ -24,8 +24,8 @@ fn change(document: &mut Document, p: DVec3) -> f64 {
     (value(document.state()) - first).abs()
 }
 
-/// A stroke over the middle begins within a lasso round its left half, and leaves the right half as it was; Ctrl has it the other way
-/// round.
+/// A stroke over the middle begins within a lasso round its left half, and leaves the right half as it was; with Ctrl it is
+/// the other way round.
 #[test]
 fn a_lasso_of_the_mouse_bounds_strokes() {
     let scratch = tempfile::tempdir().unwrap();

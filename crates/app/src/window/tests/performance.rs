@@ -27,7 +27,8 @@ fn figures_are_those_of_the_last_step_and_of_the_fields() {
 
     let script = {
         let bench = window.state().bench();
-        bench.simulation.script(bench.chosen().unwrap())
+        let still = bench.simulation.script(bench.chosen().unwrap());
+        still.replace("rest-scale = 1.0", "rest-scale = 1.1")
     };
     let scene: Scene = toml::from_str(&script).unwrap();
     let thing = &sheet.objects[0];

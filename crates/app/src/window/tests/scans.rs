@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use egui::accesskit::Role;
 use egui::{Key, Modifiers};
-use formats::ReadLimits;
-use formats::volumes::{VolumeOptions, peek};
+use formats::volumes::{StoreAs, VolumeOptions, peek};
+use formats::{ReadLimits, Unit};
 use serde_json::json;
 
 use super::*;
@@ -16,6 +16,22 @@ use crate::cli::quantity::{human_bytes, human_count, human_number};
 fn head(directory: &Path) -> PathBuf {
     let scan = directory.join("head.nii");
     command_line("phantom", &[&"head", &"-o", &scan, &"--size", &"24"]);
+    scan
+}
+
+/// The same with densities of a CT: air at -1000 HU, bone at 1000.
+fn in_hounsfield(directory: &Path) -> PathBuf {
+    let read = formats::volumes::read(
+        &head(directory),
+        &VolumeOptions::default(),
+        &ReadLimits::default(),
+    );
+    let volume = read.unwrap();
+    let values: Vec<f32> = volume.values.iter().map(|v| 2000.0 * v - 1000.0).collect();
+    let (header, scan) = (&volume.header, directory.join("ct.nii"));
+    let place = &header.world_from_voxel;
+    let store = StoreAs::Float32;
+    formats::volumes::save(&scan, header.dims, &values, place, Unit::Millimetre, store).unwrap();
     scan
 }
 
@@ -185,8 +201,8 @@ fn a_preview_of_what_is_no_scan_says_why() {
 #[test]
 fn presets_of_a_scan_are_strokes_of_a_script() {
     let (home, scratch) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    let scan = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/head.nii.gz"));
-    let options = ["--stride", "4"];
+    let scan = in_hounsfield(scratch.path());
+    let options = ["--region", "0:24,0:24,2:22"];
     let mut window = window_of(home.path(), TALL);
     window.step();
     let part = options.map(OsString::from).to_vec();

@@ -27,15 +27,16 @@ fn two(home: &Path) -> (Window, Vec<serde_json::Value>) {
 
 /// What the menu of an object has below another entry.
 fn below(window: &mut Window, object: &str, entry: &str, item: &str) {
+    // The tree has names too.
+    let in_tree: Vec<egui::Rect> = window.query_all_by_label(item).map(|node| node.rect()).collect();
     window.get_by_label(object).click_secondary();
-    window.run_steps(3);
+    window.run_steps(4);
     window.get_by_label_contains(entry).click();
-    window.run_steps(3);
-    // The tree has names too, on the right of the window; menus open on the left of that.
-    let left = |node: &egui_kittest::Node<'_>| node.rect().left();
-    let all = window.get_all_by_label(item);
-    all.min_by(|a, b| left(a).total_cmp(&left(b))).unwrap().click();
-    window.run_steps(3);
+    window.run_steps(6);
+    let is_new = |node: &egui_kittest::Node<'_>| !in_tree.contains(&node.rect());
+    let found = window.get_all_by_label(item).find(is_new);
+    found.unwrap_or_else(|| panic!("no {item} below {entry}")).click();
+    window.run_steps(4);
 }
 
 #[test]
