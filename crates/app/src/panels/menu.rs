@@ -24,7 +24,7 @@ const VIEW: &[&[Name]] = &[
         Name::Clip,
     ],
     &[Name::Hide, Name::Alone, Name::ShowAll],
-    &[Name::Panels, Name::Sides, Name::AsAtFirst],
+    &[Name::Panels, Name::AsAtFirst],
 ];
 /// Below entries of their own: all at once would not fit into a low window.
 const FROM: &[&[Name]] = &[&[Name::Front, Name::Right, Name::Top, Name::All]];
@@ -37,7 +37,7 @@ const WINDOWS: &[&[Name]] = &[
         Name::Simulation,
     ],
     &[Name::Performance, Name::Log, Name::Picture],
-    &[Name::Tools, Name::Objects],
+    &[Name::Tools, Name::Objects, Name::Sides],
 ];
 
 /// Along the top.

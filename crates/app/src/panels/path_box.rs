@@ -196,10 +196,6 @@ pub fn path_box(context: &egui::Context, bench: &mut Bench) {
         }
     }
     let (mut goes_on, mut is_given, mut is_entered) = (true, false, false);
-    let is_named = !asks.text.trim().is_empty();
-    let refusal = asks.refusal().filter(|_| is_named);
-    let is_own = bench.sheet.as_ref().is_some_and(|s| s.path == asks.path());
-    let replaces = asks.writes() && asks.path().is_file() && !is_own;
     let modal = egui::Modal::new(egui::Id::unique("path")).show(context, |ui| {
         ui.set_width(460.0);
         ui.heading(asks.title());
@@ -207,8 +203,6 @@ pub fn path_box(context: &egui::Context, bench: &mut Bench) {
         ui.add_space(6.0);
         ui.horizontal(|ui| {
             is_entered = asks.field(ui);
-            // What is there already goes away by the button alone.
-            is_given |= is_entered && !replaces;
             if ui.button("Browse…").clicked() {
                 asks.browse(context, false);
             }
@@ -226,6 +220,10 @@ pub fn path_box(context: &egui::Context, bench: &mut Bench) {
             let unit = bench.chosen().map_or("", |thing| thing.unit);
             asks.wishes.show(ui, unit);
         }
+        let is_named = !asks.text.trim().is_empty();
+        let refusal = asks.refusal().filter(|_| is_named);
+        let is_own = bench.sheet.as_ref().is_some_and(|s| s.path == asks.path());
+        let replaces = asks.writes() && asks.path().is_file() && !is_own;
         match (&refusal, std::path::absolute(asks.path())) {
             (Some(why), _) => drop(ui.colored_label(ui.visuals().error_fg_color, why)),
             (None, Ok(path)) if replaces => {
@@ -239,12 +237,14 @@ pub fn path_box(context: &egui::Context, bench: &mut Bench) {
         ui.horizontal(|ui| {
             let word = if replaces { "Replace" } else { asks.title() };
             let can = is_named && refusal.is_none();
-            is_given |= ui.add_enabled(can, egui::Button::new(word)).clicked();
+            let is_clicked = ui.add_enabled(can, egui::Button::new(word)).clicked();
+            // What is there already goes away by the button alone.
+            is_given = is_clicked || can && is_entered && !replaces;
             goes_on &= !ui.button("Cancel").clicked();
         });
     });
     goes_on &= !modal.should_close();
-    if is_given && is_named && refusal.is_none() {
+    if is_given {
         match asks.purpose {
             Purpose::Open => bench.open(asks.path()),
             Purpose::OpenPart => bench.part = Some(super::Part::of(asks.path())),

@@ -110,7 +110,7 @@ fn a_script_from_the_menu_does_what_sculpt_does() {
     std::fs::copy(&sheet.path, &document).unwrap();
     let script = scratch.path().join("two.jsonl");
     let lines = "{\"carve\": {\"shape\": {\"sphere\": {\"radius\": 6}}, \"along\": [[0, 0, 20]]}}\n\
-                 {\"smooth\": {\"radius\": 5, \"along\": [[0, 6, 20]]}}\n";
+                 {\"smooth\": {\"radius\": 5, \"level\": 2, \"along\": [[0, 6, 20]]}}\n";
     std::fs::write(&script, lines).unwrap();
     choose(&mut window, "File", "Run script");
     write(&mut window, Role::TextInput, "File", script.to_str().unwrap());

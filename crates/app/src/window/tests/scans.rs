@@ -109,7 +109,9 @@ fn a_part_of_a_volume_is_what_fit_makes_of_it() {
 fn fitted(window: &mut Window) -> Arc<Sheet> {
     until(window, "fitted", |sheet| {
         sheet.path.extension().is_some_and(|e| e == "isoclay")
-    })
+    });
+    steps_until(window, "done", |window| window.state().bench().busy.is_none());
+    until(window, "fitted", |_| true)
 }
 
 /// Labels that are there.
@@ -142,11 +144,6 @@ fn a_cloud_is_told_of_before_it_is_fitted() {
     );
     window.get_by_label("Open it").click();
     let sheet = fitted(&mut window);
-    until(&mut window, "whole", |_| true);
-    steps_until(&mut window, "done", |window| {
-        window.state().bench().busy.is_none()
-    });
-    let sheet = window.state().bench().sheet.clone().unwrap_or(sheet);
     assert_eq!(
         on_disk(&sheet, scratch.path()).state().sha256(),
         by_command_line(&scan, &[], &[])
