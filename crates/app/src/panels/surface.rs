@@ -129,14 +129,17 @@ fn show(ui: &mut egui::Ui, densities: &mut Densities, thing: &Thing) -> Option<f
             densities.pointed = None;
             chosen = Some(iso);
         }
-        if thing.is_volume && low < AIR {
+    });
+    if thing.is_volume && low < AIR {
+        // Beside the number there is no room for them.
+        ui.horizontal(|ui| {
             for (name, density) in TISSUES.iter().filter(|(_, d)| (low..high).contains(d)) {
                 let button = ui.small_button(*name);
                 if button.on_hover_text(format!("{density} HU")).clicked() {
                     chosen = Some(*density);
                 }
             }
-        }
-    });
+        });
+    }
     chosen
 }

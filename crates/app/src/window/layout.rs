@@ -61,6 +61,9 @@ pub enum Layout {
     Tabs(Vec<Self>, usize),
 }
 
+/// Share of what holds the scene in a row: it has what the others leave.
+const REST: f32 = 875.0;
+
 impl Default for Layout {
     /// Tools on the left, objects on the right; what is opened comes before the objects, or below the scene.
     fn default() -> Self {
@@ -68,11 +71,7 @@ impl Default for Layout {
         let middle = Self::Column(vec![(panel(Panel::Scene), 580.0), (panel(Panel::Log), 160.0)]);
         let right = [Panel::Objects, Panel::Simulation, Panel::Performance].map(panel);
         let right = Self::Tabs(right.to_vec(), 0);
-        Self::Row(vec![
-            (panel(Panel::Tools), 195.0),
-            (middle, 875.0),
-            (right, 210.0),
-        ])
+        Self::Row(vec![(panel(Panel::Tools), 195.0), (middle, REST), (right, 210.0)])
     }
 }
 
@@ -82,6 +81,15 @@ impl Layout {
         let mut seen = BTreeSet::new();
         let is_once = self.count(&mut seen);
         is_once && seen.len() == Panel::ALL.len()
+    }
+
+    /// Whether the scene is in it.
+    fn has_scene(&self) -> bool {
+        match self {
+            Self::Panel(panel) => *panel == Panel::Scene,
+            Self::Row(parts) | Self::Column(parts) => parts.iter().any(|(part, _)| part.has_scene()),
+            Self::Tabs(parts, _) => parts.iter().any(Self::has_scene),
+        }
     }
 
     fn count(&self, seen: &mut BTreeSet<Panel>) -> bool {
@@ -128,7 +136,13 @@ impl Layout {
     /// Of what the window draws; as at first if that holds nothing.
     pub fn of(tree: &Tree<Panel>) -> Self {
         let found = tree.root().and_then(|root| Self::found(&tree.tiles, root));
-        found.filter(Self::is_whole).unwrap_or_default()
+        let mut layout = found.filter(Self::is_whole).unwrap_or_default();
+        if let Self::Row(parts) = &mut layout
+            && let Some((_, share)) = parts.iter_mut().find(|(part, _)| part.has_scene())
+        {
+            *share = REST;
+        }
+        layout
     }
 
     fn found(tiles: &Tiles<Panel>, id: TileId) -> Option<Self> {
