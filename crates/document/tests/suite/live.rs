@@ -530,9 +530,9 @@ fn a_brush_does_as_much_as_the_hand_presses() {
             .map(|n| pressed(at + DVec3::X * f64::from(n), 0.25 + 0.25 * f64::from(n)))
             .collect();
         made(&mut document, text, &poses);
-        let presses =
-            document.command(document.counts().unwrap().done - 1).unwrap()["stroke"]["press"].clone();
-        assert_eq!(presses, serde_json::json!([0.25, 0.5, 0.75, 1.0]), "{text}");
+        let last = document.counts().unwrap().done - 1;
+        let presses = &document.command(last).unwrap()["stroke"]["press"];
+        assert_eq!(*presses, serde_json::json!([0.25, 0.5, 0.75, 1.0]), "{text}");
     }
     assert_eq!(again(&mut document, 4).sha256(), document.state().sha256());
     // A solid does not know how hard it is pressed.
