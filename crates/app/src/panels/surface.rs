@@ -65,15 +65,15 @@ pub fn surface(ui: &mut egui::Ui, bench: &mut Bench) {
 
 /// Densities that show black and white.
 fn shades(ui: &mut egui::Ui, [black, white]: &mut [f64; 2], [low, high]: [f64; 2]) {
-    ui.horizontal(|ui| {
-        for (name, density) in [("Black", black), ("White", white)] {
+    for (name, density) in [("Black", black), ("White", white)] {
+        ui.horizontal(|ui| {
             let label = ui.label(name);
             let value = egui::DragValue::new(density)
                 .speed((high - low) / 300.0)
                 .custom_formatter(|n, _| human_number(n));
             ui.add(value).labelled_by(label.id);
-        }
-    });
+        });
+    }
 }
 
 /// The histogram with the density in it; returns the one that is chosen.
