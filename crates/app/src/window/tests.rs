@@ -92,12 +92,6 @@ fn a_drag_within_one_picture_is_the_same_stroke() {
         let at = |n: usize| egui::pos2(620.0 + 2.0 * n as f32, 400.0);
         window.hover_at(at(0));
         window.step();
-        let button = |at, pressed| egui::Event::PointerButton {
-            pos: at,
-            button: egui::PointerButton::Primary,
-            pressed,
-            modifiers: egui::Modifiers::NONE,
-        };
         let moves = (1..=40).map(|n| egui::Event::PointerMoved(at(n)));
         let events = [button(at(0), true)]
             .into_iter()

@@ -18,12 +18,6 @@ fn drawn(
     let at = |n: usize| egui::pos2(620.0 + 3.0 * n as f32, 400.0);
     window.hover_at(at(0));
     window.step();
-    let button = |at, pressed| egui::Event::PointerButton {
-        pos: at,
-        button: egui::PointerButton::Primary,
-        pressed,
-        modifiers: egui::Modifiers::NONE,
-    };
     window.state_mut().pens.pretend(Some(0.1), &[], false);
     window.input_mut().events.push(button(at(0), true));
     for n in 1..=MOVES {

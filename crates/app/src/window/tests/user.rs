@@ -82,6 +82,16 @@ pub fn edits(window: &mut Window, count: usize) -> Arc<Sheet> {
     until(window, "edited", |sheet| sheet.history.len() == count)
 }
 
+/// The first button of the mouse goes down or up somewhere.
+pub fn button(pos: Pos2, pressed: bool) -> egui::Event {
+    egui::Event::PointerButton {
+        pos,
+        button: egui::PointerButton::Primary,
+        pressed,
+        modifiers: egui::Modifiers::NONE,
+    }
+}
+
 /// A click somewhere.
 pub fn click(window: &mut Window, at: Pos2) {
     draw(window, &[at]);
