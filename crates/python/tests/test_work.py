@@ -67,24 +67,27 @@ def large() -> np.ndarray:
 
 
 def test_ctrl_c_is_heard_at_once():
-    """A process of its own sends itself the signal, and measures when the exception comes; other programs may hold one try up, and
-    once in twenty runs one was missed: why is not known."""
+    """A process of its own sends itself the signal, and measures when the exception comes; other programs may hold one try up.
+
+    A shell without job control has its background jobs ignore the signal, and Python leaves it so: it is listened to by hand.
+    """
     code = """
         import os, signal, threading, time
         import numpy as np, isoclay
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         volume = np.random.default_rng(0).normal(size=(224, 224, 224)).astype(np.float32)
         sent, heard = [], []
         def press():
             sent.append(time.perf_counter())
             os.kill(os.getpid(), signal.SIGINT)
-        for _ in range(4):
+        for _ in range(3):
             try:
                 threading.Timer(0.5, press).start()
                 # A fit of some seconds.
                 isoclay.fit_volume(volume, tolerance=0.5)
             except KeyboardInterrupt:
                 heard.append(time.perf_counter() - sent[-1])
-        assert len(heard) >= 3, heard
+        assert len(heard) == 3, heard
         print(min(heard))
     """
     out = subprocess.run([sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True)
