@@ -20,8 +20,9 @@ impl Card {
     pub fn open() -> Result<Self, String> {
         let lacks = |why: String| {
             format!(
-                "no graphics driver for Vulkan or OpenGL answers ({why}): on Debian without a graphics card install \
-                 mesa-vulkan-drivers, or set WGPU_BACKEND=gl"
+                "no graphics driver for Vulkan or OpenGL answers ({}); on Debian without a graphics card install \
+                 mesa-vulkan-drivers, or set WGPU_BACKEND=gl",
+                why.replace(';', ",")
             )
         };
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());

@@ -253,6 +253,13 @@ impl Manifest {
     }
 }
 
+impl Drop for Manifest {
+    /// Closing would not do: a process that another thread is just starting holds the file until it runs its own program.
+    fn drop(&mut self) {
+        drop(self.file.unlock());
+    }
+}
+
 fn cannot(path: &Path, e: &io::Error) -> Failure {
     Failure::limit(format!(
         "{}: the manifest cannot be written ({e}); free some space, or name another directory by -o",
