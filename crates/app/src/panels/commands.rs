@@ -1,6 +1,6 @@
 //! The command palette: a few letters, and what is meant is done.
 
-use egui::{Key, Modifiers};
+use egui::{Event, Key, Modifiers};
 
 use crate::window::Bench;
 use crate::window::actions::Action;
@@ -31,7 +31,6 @@ pub fn commands(context: &egui::Context, bench: &mut Bench) {
     let Some(mut asked) = bench.commands.take() else {
         return;
     };
-    let all = found(&asked.text);
     let mut chosen = None;
     let modal = egui::Modal::new(egui::Id::unique("commands")).show(context, |ui| {
         ui.set_width(380.0);
@@ -43,19 +42,29 @@ pub fn commands(context: &egui::Context, bench: &mut Bench) {
                 asked.line = asked.line.saturating_sub(1);
             }
         });
-        asked.line = asked.line.min(all.len().saturating_sub(1));
         let is_done = ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::Enter));
-        if is_done {
-            chosen = all.get(asked.line).copied();
-        }
         let label = ui.label("What is to be done?");
+        let is_new = !std::mem::replace(&mut asked.is_old, true);
+        if is_new {
+            // What a slow picture brings together with the key that asked for the palette.
+            let typed = |event: &Event| match event {
+                Event::Text(text) => Some(text.clone()),
+                _ => None,
+            };
+            asked.text = ui.input(|i| i.events.iter().filter_map(typed).collect());
+        }
         let edit = egui::TextEdit::singleline(&mut asked.text).desired_width(f32::INFINITY);
         let edit = ui.add(edit).labelled_by(label.id);
-        if !std::mem::replace(&mut asked.is_old, true) {
+        if is_new {
             edit.request_focus();
         }
         if edit.changed() {
             asked.line = 0;
+        }
+        let all = found(&asked.text);
+        asked.line = asked.line.min(all.len().saturating_sub(1));
+        if is_done {
+            chosen = all.get(asked.line).copied();
         }
         ui.add_space(4.0);
         let first = asked.line.saturating_sub(LINES - 1);
@@ -65,11 +74,7 @@ pub fn commands(context: &egui::Context, bench: &mut Bench) {
             let button = egui::Button::selectable(n == asked.line, action.text())
                 .shortcut_text(keys)
                 .min_size(egui::vec2(ui.available_width(), 0.0));
-            if ui
-                .add_enabled(is_possible, button)
-                .on_hover_text(action.group())
-                .clicked()
-            {
+            if ui.add_enabled(is_possible, button).clicked() {
                 chosen = Some(*action);
             }
         }

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use egui_plot::{Plot, PlotPoints, Points};
+use egui_plot::{GridMark, Plot, PlotPoints, Points};
 use tools::scene::StepLine;
 
 use crate::cli::cost::rss_bytes;
@@ -199,6 +199,21 @@ fn fields(bench: &Bench) -> String {
 
 fn plot(ui: &mut egui::Ui, name: &str, row: &Row, unit: &str) {
     let unit = unit.to_string();
+    let most = row
+        .0
+        .iter()
+        .fold(f64::MIN_POSITIVE, |most, (_, figure)| most.max(*figure));
+    // Of so small a plot the ends alone are marked.
+    let ends = |far: f64| {
+        move |_| {
+            [0.0, far]
+                .map(|value| GridMark {
+                    value,
+                    step_size: far.abs(),
+                })
+                .to_vec()
+        }
+    };
     Plot::new(name)
         .height(64.0)
         .allow_drag(false)
@@ -208,7 +223,9 @@ fn plot(ui: &mut egui::Ui, name: &str, row: &Row, unit: &str) {
         .include_x(0.0)
         .include_y(0.0)
         .show_x(false)
-        .y_axis_formatter(move |mark, _| format!("{} {unit}", mark.value))
+        .y_grid_spacer(ends(most))
+        .x_grid_spacer(ends(-KEPT.as_secs_f64()))
+        .y_axis_formatter(move |mark, _| format!("{:.0} {unit}", mark.value))
         .x_axis_formatter(|mark, _| format!("{} s", mark.value))
         .show(ui, |plot| {
             plot.points(Points::new(name, PlotPoints::from(row.points())).radius(1.5))

@@ -266,6 +266,41 @@ fn the_palette_of_commands_finds_and_does() {
     assert!(window.query_by_label("All as usual").is_some());
 }
 
+/// Words and Enter that a slow picture sees at once choose what was typed, not what stood in the list before.
+#[test]
+fn the_palette_of_commands_is_right_at_any_frame_rate() {
+    let home = tempfile::tempdir().unwrap();
+    let mut window = window_with_clay(home.path());
+    let press = |key| egui::Event::Key {
+        key,
+        physical_key: None,
+        pressed: true,
+        repeat: false,
+        modifiers: egui::Modifiers::NONE,
+    };
+    let typed = [
+        press(egui::Key::F3),
+        egui::Event::Text("chis".into()),
+        press(egui::Key::Enter),
+    ];
+    for together in [1, 2, 3] {
+        window.key_press(egui::Key::C);
+        window.step();
+        assert_eq!(window.state().bench().tool.kind, Kind::Carve);
+        for events in typed.chunks(together) {
+            window.input_mut().events.extend(events.iter().cloned());
+            window.step();
+        }
+        window.run_steps(2);
+        assert_eq!(
+            window.state().bench().tool.kind,
+            Kind::Chisel,
+            "{together} at once"
+        );
+        assert!(window.state().bench().commands.is_none());
+    }
+}
+
 /// Symmetry, a box and a wall of the panel are those of the stroke in the journal.
 #[test]
 fn strokes_keep_to_the_limits_that_are_set() {
