@@ -16,6 +16,7 @@ mod desk;
 mod docks;
 mod files;
 mod handles;
+mod holds;
 mod limits;
 mod matter;
 mod panels;

@@ -161,6 +161,7 @@ impl Modeler {
         self.bench.order(match now {
             Some((over, tool)) => Order::Try(tool, self.ray(rect, over)),
             None => Order::Untry,
+            self.box_under(ui, rect, p, &tool);
         });
         self.tried = now;
     }
