@@ -100,6 +100,8 @@ pub struct Bench {
     pub(super) rearranges: Option<Rearrange>,
     /// Whether it does not matter how hard pens are pressed.
     pub ignores_pens: bool,
+    /// Whether strokes without a pen are the stronger the slower they are.
+    pub by_speed: bool,
     /// Whether there is a pen that tells it.
     pub has_pen: bool,
     /// How a device is to be held, if that panel is shown.
@@ -280,8 +282,6 @@ impl Bench {
         self.order(Order::Do(Box::new(stroke.expect("a finite place can be held"))));
     }
 
-    /// Marks a place of the chosen object's surface to be measured from.
-    pub(super) fn mark(&mut self, p: DVec3, normal: DVec3) {
     /// Holds the surface of the chosen object within a box of its world; whether there is any.
     pub fn pin_box(&mut self, b: &Aabb) -> bool {
         let Some(thing) = self.chosen() else { return false };
@@ -299,6 +299,8 @@ impl Bench {
         }
     }
 
+    /// Marks a place of the chosen object's surface to be measured from.
+    pub(super) fn mark(&mut self, p: DVec3, normal: DVec3) {
         let thing = self
             .sheet
             .as_ref()

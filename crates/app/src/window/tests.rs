@@ -19,6 +19,7 @@ mod handles;
 mod holds;
 mod limits;
 mod matter;
+mod pace;
 mod panels;
 mod pen;
 mod performance;
