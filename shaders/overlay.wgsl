@@ -102,21 +102,12 @@ fn ink_color(in: Inked) -> @location(0) vec4<f32> {
   return in.color;
 }
 
-// A surface that is looked through: denser where it is seen from the side, as glass is.
-const VEIL = vec3(0.42, 0.60, 0.75);
-
 @fragment
 fn veil(in: Seen) -> @location(0) vec4<f32> {
   if (is_cut(in.at)) {
     discard;
   }
-  // Its inside is seen too.
-  let toward = dot(normalize(in.normal), scene.axes[2].xyz);
-  let n = normalize(in.normal) * select(-1.0, 1.0, toward > 0.0);
-  let facing = max(dot(n, lights.way[SUN].xyz), 0.0);
-  let light = 0.10 + 0.55 + 0.30 * dot(n, scene.axes[1].xyz) + 0.6 * facing;
-  let aside = 1.0 - abs(toward);
-  return vec4(VEIL * light, 0.16 + 0.5 * aside * aside);
+  return veil_of(normalize(in.normal));
 }
 
 // Paint without light.

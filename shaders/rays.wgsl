@@ -19,6 +19,8 @@ struct Solid {
   width: f32,
   iso: f32,
   little: f32,
+  // Density of a second surface, looked through in the volume, and whether there is one.
+  second: vec4<f32>,
 };
 
 // A cube of a tree, with what is drawn of each of its octants `4x + 2y + z`: another node, or the numbers of its own brick, or nothing
@@ -204,7 +206,7 @@ fn range_of(brick: u32, cell: vec3<f32>, least: f32, span: f32) -> vec2<f32> {
   return least + span * unpack4x8unorm(word).xy;
 }
 
-// The brick round a place of a solid, whatever its density.
+// The octant of a cube round a place of a solid, with the brick that is drawn there, whatever its density.
 fn look_up(solid: u32, p: vec3<f32>) -> Spot {
   var at = solids[solid].root;
   var low = vec3(0.0);
@@ -215,7 +217,7 @@ fn look_up(solid: u32, p: vec3<f32>) -> Spot {
     let next = nodes[at].octants[4u * u32(is_far.x) + 2u * u32(is_far.y) + u32(is_far.z)];
     if (next >= INSIDE_ALL) {
       let brick = select(next, nodes[at].brick, next == OWN || nodes[at].brick < INSIDE_ALL);
-      return Spot(low, size, brick, low, CELLS / size);
+      return Spot(select(low, low + half, is_far), half, brick, low, CELLS / size);
     }
     at = next;
     low = select(low, low + half, is_far);
@@ -589,18 +591,22 @@ fn volume(@builtin(position) at: vec4<f32>) -> @location(0) vec4<f32> {
     let speed = length(line.way);
     let last = min(part.y, most);
     let little = solids[n].little;
+    let second = solids[n].second.x;
+    let has_second = solids[n].second.y > 0.5;
+    let lowest = select(eye.density.x, min(eye.density.x, second), has_second);
     var t = part.x;
     for (var k = 0; k < MOST; k += 1) {
       if (t >= last || left < 0.03) {
         break;
       }
-      let spot = find(n, at_length(line, t + little), eye.density.x);
-      let next = min(max(through(line, spot.low, spot.low + spot.size).y, t + 2.0 * little), last);
+      let spot = find(n, at_length(line, t + little), lowest);
       if (spot.brick == OUTSIDE) {
-        t = max(next, t + 2.0 * little);
+        t = max(through(line, spot.low, spot.low + spot.size).y, t + 2.0 * little);
         continue;
       }
+      // A cube that is all above the least density may be far larger than the brick in which the line is.
       let here = look_up(n, at_length(line, t + little));
+      let next = min(max(through(line, here.low, here.low + here.size).y, t + 2.0 * little), last);
       let least = bitcast<f32>(bricks[here.brick * BRICK + LEAST]);
       let span_here = bitcast<f32>(bricks[here.brick * BRICK + SPAN]);
       let in_brick = Line((line.start - here.corner) * here.scale, line.way * here.scale);
@@ -610,7 +616,7 @@ fn volume(@builtin(position) at: vec4<f32>) -> @location(0) vec4<f32> {
         }
         let cell = clamp(floor(at_length(in_brick, t + little)), vec3(0.0), vec3(CELLS - 1.0));
         let to_t = min(max(through(in_brick, cell, cell + 1.0).y, t + 2.0 * little), max(next, t + 2.0 * little));
-        if (range_of(here.brick, cell, least, span_here).y > eye.density.x) {
+        if (range_of(here.brick, cell, least, span_here).y > lowest) {
           let c = read_cell(here.brick, cell);
           let in_cell = Line(in_brick.start - cell, in_brick.way);
           let count = max(ceil((to_t - t) * speed * here.scale / eye.density.w), 1.0);
@@ -631,6 +637,13 @@ fn volume(@builtin(position) at: vec4<f32>) -> @location(0) vec4<f32> {
             let own = mix(SOFT_PART, HARD_PART, shade_of(0.5 * (now + f)));
             color += left * share * own * lit;
             left *= 1.0 - share;
+            if (has_second && (now < second) != (f < second)) {
+              let across = at_length(in_cell, t + (i + (second - now) / (f - now)) * step);
+              let rise = turn * gradient(c, across);
+              let veil = veil_of(-rise / max(length(rise), 1e-30));
+              color += left * veil.a * veil.rgb;
+              left *= 1.0 - veil.a;
+            }
             now = f;
           }
         }

@@ -185,3 +185,16 @@ fn paper(@builtin(vertex_index) n: u32) -> Paper {
 fn paper_color(in: Paper) -> @location(0) vec4<f32> {
   return vec4(mix(scene.paper[1].rgb, scene.paper[0].rgb, in.height), 1.0);
 }
+
+// A surface that is looked through: denser where it is seen from the side, as glass is.
+const VEIL = vec3(0.42, 0.60, 0.75);
+
+// Its light and how much of what is behind it takes, by its normal. Its inside is seen too.
+fn veil_of(normal: vec3<f32>) -> vec4<f32> {
+  let toward = dot(normal, scene.axes[2].xyz);
+  let n = normal * select(-1.0, 1.0, toward > 0.0);
+  let facing = max(dot(n, lights.way[SUN].xyz), 0.0);
+  let light = 0.10 + 0.55 + 0.30 * dot(n, scene.axes[1].xyz) + 0.6 * facing;
+  let aside = 1.0 - abs(toward);
+  return vec4(VEIL * light, 0.16 + 0.5 * aside * aside);
+}

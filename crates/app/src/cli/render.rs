@@ -52,6 +52,7 @@ impl Args {
             field: field.map_err(|e| Failure::input(e.to_string()))?,
             iso: asked.iso,
             world_from_object: DAffine3::IDENTITY,
+            second: None,
         }))
     }
 

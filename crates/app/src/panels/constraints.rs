@@ -1,4 +1,4 @@
-//! What force tools have to keep: points that are pinned by a click, lines that are drawn.
+//! What force tools have to keep: points that are pinned by a click, lines that are drawn, the surface in boxes.
 
 use serde_json::json;
 
@@ -16,8 +16,8 @@ pub fn constraints(ui: &mut egui::Ui, bench: &mut Bench) {
         .show(ui, |ui| {
             ui.toggle_value(&mut bench.pins, "Pin points (N)")
                 .on_hover_text("A click on the solid holds the surface there, whatever force tools do");
-            ui.horizontal(|ui| {
-                for kind in [Kind::PinLine, Kind::PinOutline] {
+            ui.horizontal_wrapped(|ui| {
+                for kind in [Kind::PinLine, Kind::PinOutline, Kind::PinBox] {
                     let label = ui.selectable_label(bench.tool.kind == kind, kind.name());
                     if label.on_hover_text(kind.hint()).clicked() {
                         bench.take(kind);
@@ -31,6 +31,9 @@ pub fn constraints(ui: &mut egui::Ui, bench: &mut Bench) {
                             format!("By springs of {} times the solid's stiffness", spring.0)
                         }
                         (None, [line]) if line.len() == 1 => "A point that does not move".into(),
+                        (None, lines) if lines.iter().all(|line| line.len() == 1) => {
+                            format!("{} points of the surface that do not move", lines.len())
+                        }
                         (None, _) => "A line that does not move".into(),
                     };
                     ui.label(&held.name).on_hover_text(about);
@@ -46,10 +49,10 @@ pub fn constraints(ui: &mut egui::Ui, bench: &mut Bench) {
     ui.add_space(10.0);
 }
 
-/// A name that no constraint of an object has.
-pub fn next_pin(thing: &Thing) -> String {
+/// A name that no constraint of an object has, by what it is.
+pub fn next_hold(thing: &Thing, what: &str) -> String {
     let is_free = |name: &String| thing.holds.iter().all(|held| held.name != *name);
-    let names = (1..).map(|n| format!("pin {n}"));
+    let names = (1..).map(|n| format!("{what} {n}"));
     names
         .into_iter()
         .find(is_free)

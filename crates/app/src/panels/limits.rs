@@ -105,13 +105,20 @@ fn masks(ui: &mut Ui, bench: &mut Bench, thing: &Thing) {
     if limits.lasso.is_some() {
         ui.label("Within the lasso");
     }
-    let mut gone = None;
+    let (mut gone, mut pinned) = (None, None);
     for (n, b) in limits.boxes.iter_mut().enumerate() {
         ui.push_id(n, |ui| {
             ui.horizontal(|ui| {
                 ui.label(format!("Box {}", n + 1));
                 if ui.small_button("Remove").clicked() {
                     gone = Some(n);
+                }
+                let pin = ui.small_button("Pin");
+                if pin
+                    .on_hover_text("Force tools leave the surface in it where it is, as it is now")
+                    .clicked()
+                {
+                    pinned = Some((n, *b));
                 }
             });
             let step = thing.own_box.size().max_element() / 500.0;
@@ -134,6 +141,12 @@ fn masks(ui: &mut Ui, bench: &mut Bench, thing: &Thing) {
             thing.unit,
             "Length inwards over which strokes grow to their whole",
         );
+    }
+    // A box that is held bounds strokes no more.
+    if let Some((n, b)) = pinned
+        && bench.pin_box(&b)
+    {
+        bench.limits.boxes.remove(n);
     }
 }
 

@@ -26,7 +26,7 @@ mod tools;
 mod touch;
 
 pub use commands::{Commands, commands};
-pub use constraints::{constraints, next_pin};
+pub use constraints::{constraints, next_hold};
 pub use document::document;
 pub use export::{Wishes, Written, written};
 pub use limits::limits;

@@ -96,6 +96,12 @@ fn settings(ui: &mut Ui, bench: &mut Bench) {
         switch.on_hover_text("The harder the pen is pressed the nearer it comes to the strength above");
         bench.ignores_pens = !counts;
     }
+    if tool.kind.has_press() {
+        let switch = ui.checkbox(&mut bench.by_speed, "Slower is stronger");
+        switch.on_hover_text(
+            "Without a pen: the slower the mouse goes the nearer a stroke comes to the strength above",
+        );
+    }
     more(ui, tool);
     super::limits(ui, bench);
     clipping(ui, bench);

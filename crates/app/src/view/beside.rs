@@ -73,13 +73,24 @@ impl Canvas {
     }
 
     /// Puts a second surface of an object in place of the one that there was: what is looked through, or what is seen within an object.
-    /// By rays it is always looked through.
+    /// By rays it is always looked through; volumes have no triangles, and show [theirs](Self::put_second).
     pub fn put_veil(&mut self, patches: &[Patch], within: Option<&str>) {
         let tinted = self.tinted.take();
         self.overlay.veil = patches.iter().map(|patch| self.hold(patch)).collect();
         self.overlay.within = within.map(str::to_owned);
         self.tinted = tinted;
         self.redraw();
+    }
+
+    /// Has volumes show the surface of another density in one object, looked through; none if missing.
+    pub fn put_second(&mut self, second: Option<(String, f64)>) {
+        if self
+            .cast
+            .as_mut()
+            .is_some_and(|cast| cast.rays.show_second(second))
+        {
+            self.redraw();
+        }
     }
 
     /// Has colours tell something else than paint, or paint again.

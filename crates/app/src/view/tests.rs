@@ -104,6 +104,7 @@ fn cast(field: &HierarchicalSpline<f32>) -> Solid {
         field: field.clone(),
         iso: 0.0,
         world_from_object: DAffine3::IDENTITY,
+        second: None,
     }
 }
 

@@ -6,6 +6,7 @@ use std::sync::mpsc::Sender;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use bspline::Aabb;
 use document::Command;
 use egui::Modifiers;
 use fitting::Cancel;
@@ -21,7 +22,7 @@ use super::limits::Limits;
 use super::measure::{Mark, Measure};
 use super::orders::{Order, Sheet, Thing};
 use super::show::Shown;
-use super::tool::{Kind, Tool};
+use super::tool::{Kind, Tool, surface_within};
 use super::touch::{Held, Seen};
 use crate::panels;
 use crate::view::{Camera, Histogram, Look, Mode, leave};
@@ -99,6 +100,8 @@ pub struct Bench {
     pub(super) rearranges: Option<Rearrange>,
     /// Whether it does not matter how hard pens are pressed.
     pub ignores_pens: bool,
+    /// Whether strokes without a pen are the stronger the slower they are.
+    pub by_speed: bool,
     /// Whether there is a pen that tells it.
     pub has_pen: bool,
     /// How a device is to be held, if that panel is shown.
@@ -274,9 +277,26 @@ impl Bench {
             return;
         };
         let own = thing.world_from_object.inverse().transform_point3(p);
-        let hold = serde_json::json!({ "name": panels::next_pin(thing), "points": [own.to_array()] });
+        let hold = serde_json::json!({ "name": panels::next_hold(thing, "pin"), "points": [own.to_array()] });
         let stroke = serde_json::from_value(serde_json::json!({ "hold": hold }));
         self.order(Order::Do(Box::new(stroke.expect("a finite place can be held"))));
+    }
+
+    /// Holds the surface of the chosen object within a box of its world; whether there is any.
+    pub fn pin_box(&mut self, b: &Aabb) -> bool {
+        let Some(thing) = self.chosen() else { return false };
+        match surface_within(&*thing.field, thing.iso, b) {
+            Ok(places) => {
+                let points: Vec<[f64; 3]> = places.iter().map(DVec3::to_array).collect();
+                let name = panels::next_hold(thing, "box");
+                self.stroke(serde_json::json!({ "hold": { "name": name, "points": points } }));
+                true
+            }
+            Err(why) => {
+                self.tell(why, true);
+                false
+            }
+        }
     }
 
     /// Marks a place of the chosen object's surface to be measured from.

@@ -1,12 +1,18 @@
 //! The panels round the scene, which are moved by their upper rim or their tab, laid one before the other, closed and opened again.
 
+mod titles;
+
 use std::collections::BTreeSet;
 
-use egui::{Color32, CursorIcon, Frame, Rect, Role, Sense, Stroke, Ui, WidgetInfo, WidgetText, vec2};
+use egui::{
+    Color32, CursorIcon, Frame, Rect, Response, Role, Sense, Stroke, Ui, Visuals, WidgetInfo, WidgetText,
+    vec2,
+};
 use egui_tiles::{
     Behavior, Container, Linear, LinearDir, ResizeState, Tile, TileId, Tiles, Tree, UiResponse,
 };
 
+use self::titles::{ASIDE, Titles, titles};
 use super::layout::{Layout, Panel};
 use super::modeler::Modeler;
 use crate::panels;
@@ -155,7 +161,17 @@ impl Modeler {
             .iter()
             .filter(|(_, tile)| has_bar(&docks.tree.tiles, tile));
         let bars = bars.map(|(id, _)| id.0).collect();
-        docks.tree.ui(&mut Shown { modeler: self, bars }, ui);
+        let fronts = docks.tree.tiles.tiles().filter_map(|tile| match tile {
+            Tile::Container(Container::Tabs(tabs)) => tabs.active.map(|id| id.0),
+            _ => None,
+        });
+        let mut shown = Shown {
+            modeler: self,
+            bars,
+            fronts: fronts.collect(),
+            titles: titles(ui, &docks.tree),
+        };
+        docks.tree.ui(&mut shown, ui);
         // While something is dragged it is nowhere to be kept.
         if !ui.input(|i| i.pointer.any_down()) {
             self.layout = docks.layout();
@@ -180,6 +196,10 @@ struct Shown<'a> {
     modeler: &'a mut Modeler,
     /// Of tabs.
     bars: BTreeSet<u64>,
+    /// Those before all others.
+    fronts: BTreeSet<u64>,
+    /// Titles that are shortened.
+    titles: Titles,
 }
 
 impl Shown<'_> {
@@ -256,8 +276,32 @@ impl Behavior<Panel> for Shown<'_> {
         panel.name().into()
     }
 
+    fn tab_title_for_tile(&mut self, tiles: &Tiles<Panel>, id: TileId) -> WidgetText {
+        match (self.titles.get(&id.0), tiles.get(id)) {
+            (Some(title), _) => title.as_str().into(),
+            (None, Some(Tile::Pane(panel))) => self.tab_title_for_pane(panel),
+            (None, Some(Tile::Container(container))) => format!("{:?}", container.kind()).into(),
+            (None, None) => WidgetText::default(),
+        }
+    }
+
+    fn on_tab_button(&mut self, tiles: &mut Tiles<Panel>, id: TileId, button: Response) -> Response {
+        let Some(panel) = tiles.get_pane(&id).filter(|_| self.titles.contains_key(&id.0)) else {
+            return button;
+        };
+        let is_front = self.fronts.contains(&id.0);
+        button.widget_info(|| WidgetInfo::selected(Role::Button, true, is_front, panel.name()));
+        button.on_hover_text(panel.name())
+    }
+
+    fn tab_title_spacing(&self, _: &Visuals) -> f32 {
+        ASIDE
+    }
+
     fn is_tab_closable(&self, tiles: &Tiles<Panel>, id: TileId) -> bool {
-        tiles.get_pane(&id).is_some_and(|panel| *panel != Panel::Scene)
+        // The one in front alone has a cross: there is no room for more.
+        let is_panel = tiles.get_pane(&id).is_some_and(|panel| *panel != Panel::Scene);
+        is_panel && self.fronts.contains(&id.0)
     }
 
     fn on_tab_close(&mut self, tiles: &mut Tiles<Panel>, id: TileId) -> bool {
@@ -298,7 +342,7 @@ impl Behavior<Panel> for Shown<'_> {
         }
     }
 
-    fn tab_bar_color(&self, visuals: &egui::Visuals) -> Color32 {
+    fn tab_bar_color(&self, visuals: &Visuals) -> Color32 {
         visuals.extreme_bg_color
     }
 }

@@ -20,7 +20,7 @@ pub enum Gesture {
 pub struct Way {
     last: Pos2,
     step: f32,
-    /// How hard the pen is pressed there, if it is one and that counts.
+    /// How hard the pen is pressed there, if it is one and that counts; or whatever else changes evenly from place to place.
     press: Option<f64>,
 }
 

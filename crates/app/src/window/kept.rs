@@ -19,6 +19,8 @@ pub struct Kept {
     pub sides: Sides,
     /// Whether it does not matter how hard pens are pressed.
     pub ignores_pens: bool,
+    /// Whether strokes without a pen are the stronger the slower they are.
+    pub by_speed: bool,
     /// Where the panels are, unless that is as at first.
     pub layout: Option<Layout>,
 }

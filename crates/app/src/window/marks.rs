@@ -1,5 +1,6 @@
 //! What is drawn over the scene: the ring of the tool, what is held, and a tool in the hand.
 
+use bspline::Aabb;
 use egui::{Color32, Pos2, Rect, Shape, Stroke};
 use glam::DVec3;
 use tools::number::Point;
@@ -11,10 +12,20 @@ use crate::cli::quantity::human_number;
 
 /// Sides of the ring that shows the tool.
 const RING: usize = 48;
+/// Points of a constraint that are marked as pins are.
+const FEW: usize = 20;
 /// Length of the arrow of the largest force of a stroke, in radii of the scene.
 const LARGEST: f64 = 0.3;
 /// Length of the arrow of a newton, in radii of the scene.
 const ARROW: f64 = 0.12;
+
+/// Of what is held.
+const HELD: Color32 = Color32::from_rgb(120, 220, 255);
+
+/// A corner of a box, number `4x + 2y + z`.
+fn corner_of(b: &Aabb, n: usize) -> DVec3 {
+    b.min + DVec3::new((n >> 2) as f64, (n >> 1 & 1) as f64, (n & 1) as f64) * b.size()
+}
 
 impl Modeler {
     /// Draws what is held on the chosen object.
@@ -24,12 +35,19 @@ impl Modeler {
             return;
         };
         let painter = ui.painter().with_clip_rect(rect);
-        let color = Color32::from_rgb(120, 220, 255);
-        for line in thing.holds.iter().flat_map(|held| &held.lines) {
+        let color = HELD;
+        for (count, line) in thing.holds.iter().flat_map(|held| {
+            let count = held.lines.len();
+            held.lines.iter().map(move |line| (count, line))
+        }) {
             let place = |p: &Point| self.on_screen(rect, thing.world_from_object.transform_point3(p.0));
             let places: Vec<Pos2> = line.iter().map(place).collect();
             if let [only] = places[..] {
-                painter.circle(only, 4.0, color, Stroke::new(1.5, Color32::BLACK));
+                // Those of a box are many.
+                match count > FEW {
+                    true => painter.circle_filled(only, 1.5, color),
+                    false => painter.circle(only, 4.0, color, Stroke::new(1.5, Color32::BLACK)),
+                };
             } else {
                 painter.line(places, Stroke::new(2.0, color));
             }
@@ -79,8 +97,7 @@ impl Modeler {
         };
         let world = |p: DVec3| self.on_screen(rect, thing.world_from_object.transform_point3(p));
         for b in &limits.boxes {
-            let share = |n: usize| DVec3::new((n >> 2) as f64, (n >> 1 & 1) as f64, (n & 1) as f64);
-            let corner = |n: usize| world(b.min + share(n) * b.size());
+            let corner = |n: usize| world(corner_of(b, n));
             for [from, to] in EDGES {
                 painter.line_segment([corner(from), corner(to)], Stroke::new(1.5, color));
             }
@@ -116,6 +133,24 @@ impl Modeler {
                 egui::FontId::proportional(13.0),
                 color,
             );
+        }
+    }
+
+    /// The box about a place of the chosen object that a click with the tool would hold.
+    pub(super) fn box_under(&self, ui: &egui::Ui, rect: Rect, p: DVec3, tool: &Tool) {
+        let Some(thing) = self.bench.chosen().filter(|_| tool.kind == Kind::PinBox) else {
+            return;
+        };
+        let placed = thing.world_from_object;
+        let own = Tool {
+            radius: tool.radius / placed.matrix3.determinant().abs().cbrt(),
+            ..*tool
+        };
+        let b = own.region(placed.inverse().transform_point3(p));
+        let corner = |n: usize| self.on_screen(rect, placed.transform_point3(corner_of(&b, n)));
+        let painter = ui.painter().with_clip_rect(rect);
+        for [from, to] in EDGES {
+            painter.line_segment([corner(from), corner(to)], Stroke::new(1.5, HELD));
         }
     }
 

@@ -19,6 +19,7 @@ mod marks;
 pub mod measure;
 mod modeler;
 pub mod orders;
+mod pace;
 mod pen;
 mod preview;
 pub mod samples;

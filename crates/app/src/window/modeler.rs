@@ -27,6 +27,7 @@ use super::keys::Keys;
 use super::layout::Layout;
 use super::limits::Limits;
 use super::orders::{News, Order};
+use super::pace::Pace;
 use super::pen::{self, Pens};
 use super::shot::Shot;
 use super::show::{Beside, Shown};
@@ -45,6 +46,10 @@ pub struct Modeler {
     is_listening: Arc<AtomicBool>,
     pub(super) screen: Option<Screen>,
     gesture: Option<Gesture>,
+    /// How fast the stroke is, if that counts.
+    pace: Option<Pace>,
+    /// When the last picture but one was, and the last, seconds.
+    times: [f64; 2],
     /// What the mouse sets.
     pub(super) adjust: Option<Adjust>,
     /// The object that is being arranged.
@@ -186,6 +191,7 @@ impl Modeler {
                 fill: panels::Fill::default(),
                 sides: kept.sides,
                 ignores_pens: kept.ignores_pens,
+                by_speed: kept.by_speed,
                 rearranges: None,
                 has_pen: false,
                 touch: None,
@@ -207,6 +213,8 @@ impl Modeler {
             is_listening,
             screen,
             gesture: None,
+            pace: None,
+            times: [0.0; 2],
             adjust: None,
             arrange: None,
             drawn: Vec::new(),
@@ -250,6 +258,7 @@ impl Modeler {
             return;
         }
         self.hear();
+        self.times = [self.times[1], ui.input(|i| i.time)];
         (self.pen, self.bench.has_pen) = (self.pens.since_last(), self.pens.are_there());
         self.bench.can_cast = self.screen.as_ref().is_none_or(|screen| screen.canvas.can_cast());
         self.keys(ui);
@@ -282,6 +291,7 @@ impl Modeler {
             show: self.bench.look.show,
             sides: self.bench.sides,
             ignores_pens: self.bench.ignores_pens,
+            by_speed: self.bench.by_speed,
             layout: self.layout.clone(),
         };
         if let Err(why) = self.kept.keep(now, &self.home) {

@@ -15,7 +15,7 @@ use self::make::{Done, Made, Wish, stiffness_legend};
 use super::Bench;
 use super::modeler::Modeler;
 use super::orders::{Acting, Order};
-use crate::view::{Cells, Histogram, Ink, Legend, Screen, Tint, floor};
+use crate::view::{Cells, Histogram, Ink, Legend, Mode, Screen, Tint, floor};
 
 /// What is made there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -116,6 +116,13 @@ impl Bench {
         }
     }
 
+    /// The second surface as volumes show it, at once while it is dragged, as it needs no triangles.
+    pub(super) fn second_in_volume(&self) -> Option<(String, f64)> {
+        let is_shown = self.look.show.second && self.look.mode == Mode::Volume;
+        let (name, density) = self.shown.second.as_ref().filter(|_| is_shown)?;
+        Some((name.clone(), self.shown.second_dragged.unwrap_or(*density)))
+    }
+
     /// What is wished of a layer, if it is shown.
     fn wish(&self, layer: Layer, (scene, origin): (u64, DVec3)) -> Option<Wish> {
         let sheet = self.sheet.as_ref()?;
@@ -157,7 +164,7 @@ impl Bench {
             sheet.objects.iter().any(painted)
         };
         let is_painted = self.look.paint && self.look.show.tint == Tint::Off;
-        let shows_paint = is_painted && self.look.mode != crate::view::Mode::Volume;
+        let shows_paint = is_painted && self.look.mode != Mode::Volume;
         let stiffness = (shows_paint && self.sheet.as_deref().is_some_and(is_stiff)).then(stiffness_legend);
         stiffness
             .into_iter()
@@ -185,6 +192,10 @@ impl Modeler {
         }
         if self.bench.look.show.second {
             self.bench.know_second();
+        }
+        let second = self.bench.second_in_volume();
+        if let Some(Screen { canvas, .. }) = &mut self.screen {
+            canvas.put_second(second);
         }
         for layer in Layer::ALL {
             match self.bench.wish(layer, scene) {

@@ -59,7 +59,10 @@ impl Wish {
     /// What a look wishes of a solid.
     pub fn new(solid: &Solid, look: &Look) -> Self {
         let range = match look.mode {
-            Mode::Volume => [look.density[0] as f32, f32::INFINITY],
+            Mode::Volume => {
+                let lowest = solid.second.unwrap_or(f64::INFINITY).min(look.density[0]);
+                [lowest as f32, f32::INFINITY]
+            }
             _ => [solid.iso as f32; 2],
         };
         let plane = look.cut.map(|(at, normal)| {

@@ -34,6 +34,7 @@ pub struct Record {
     width: f32,
     iso: f32,
     little: f32,
+    second: [f32; 4],
 }
 
 impl Eye {
@@ -107,6 +108,10 @@ impl Record {
             width: Cube::root(0, solid).width() as f32,
             iso: solid.iso as f32,
             little: little as f32,
+            second: match solid.second {
+                Some(density) => [density as f32, 1.0, 0.0, 0.0],
+                None => [0.0; 4],
+            },
         }
     }
 }

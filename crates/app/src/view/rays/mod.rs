@@ -35,6 +35,8 @@ pub struct Solid {
     pub iso: f64,
     /// Where it stands.
     pub world_from_object: DAffine3,
+    /// Density of a surface that is looked through where it is drawn as a volume.
+    pub second: Option<f64>,
 }
 
 impl Solid {
@@ -44,6 +46,7 @@ impl Solid {
             field: object.field.levels()?.clone(),
             iso,
             world_from_object,
+            second: None,
         })
     }
 
@@ -61,6 +64,8 @@ impl Solid {
 pub struct Rays {
     device: wgpu::Device,
     solids: BTreeMap<String, Solid>,
+    /// Of which of them a second surface is looked through, and its density.
+    second: Option<(String, f64)>,
     atlas: Atlas,
     /// What the card has, and for which look.
     plan: Option<(Plan, Look)>,
@@ -73,6 +78,7 @@ impl Rays {
         Self {
             device: device.clone(),
             solids: BTreeMap::new(),
+            second: None,
             atlas: Atlas::new(device, queue, budget),
             plan: None,
             made: Made::new(),
@@ -94,13 +100,34 @@ impl Rays {
     }
 
     /// Puts a solid in place of the one that there was; whether it is another.
-    pub fn put(&mut self, name: &str, solid: Solid) -> bool {
+    pub fn put(&mut self, name: &str, mut solid: Solid) -> bool {
+        solid.second = self.second_of(name);
         let is_other = self.solids.get(name).is_none_or(|old| !old.is_like(&solid));
         if is_other {
             self.forget(name);
             self.solids.insert(name.into(), solid);
         }
         is_other
+    }
+
+    /// Has volumes show a second surface of one solid, or none; whether that is another.
+    pub fn show_second(&mut self, second: Option<(String, f64)>) -> bool {
+        if self.second == second {
+            return false;
+        }
+        self.second = second;
+        let mut solids = std::mem::take(&mut self.solids);
+        for (name, solid) in &mut solids {
+            solid.second = self.second_of(name);
+        }
+        self.solids = solids;
+        self.plan.take_if(|(_, look)| look.mode == Mode::Volume);
+        true
+    }
+
+    fn second_of(&self, name: &str) -> Option<f64> {
+        let second = self.second.as_ref().filter(|(of, _)| of == name);
+        second.map(|(_, density)| *density)
     }
 
     /// Takes one away.

@@ -187,6 +187,61 @@ fn a_second_surface_is_looked_through() {
     assert!(b > b0 && r > b, "{r0} {b0} became {r} {b}");
 }
 
+/// In a volume it lies where the field has its density: lines that meet it there lose light to it, also where the volume is clear, and
+/// no others do.
+#[test]
+fn a_second_surface_is_seen_in_a_volume() {
+    let Some(card) = card("second surface in a volume") else {
+        return;
+    };
+    let (mut canvas, look, object) = easel(&card);
+    // All clear, and with the mist that is within the first surface.
+    for density in [[50.0, 60.0], [0.0, 40.0]] {
+        let look = Look {
+            mode: Mode::Volume,
+            density,
+            ..look
+        };
+        canvas.put_second(None);
+        let bare = pixels(&mut canvas, &look);
+        // Where it is nowhere, lines that look for it all the way find nothing else either.
+        canvas.put_second(Some(("solid".into(), -1e3)));
+        let lost = differing(&bare, &pixels(&mut canvas, &look));
+        assert!(lost.len() < 5, "{density:?}: {} pixels differ", lost.len());
+        for second in [-1.0, 1.0] {
+            canvas.put_second(Some(("another".into(), second)));
+            assert_eq!(pixels(&mut canvas, &look), bare);
+            canvas.put_second(Some(("solid".into(), second)));
+            let seen = differing(&bare, &pixels(&mut canvas, &look));
+            let within = object.field.world_box();
+            let (mut met, mut wrong) = (0, 0);
+            for n in 0..SIZE[0] * SIZE[1] {
+                let (x, y) = ((n % SIZE[0]) as f64 + 0.5, (n / SIZE[0]) as f64 + 0.5);
+                let at = DVec2::new(x - 0.5 * SIZE[0] as f64, 0.5 * SIZE[1] as f64 - y) / SIZE[1] as f64;
+                let is_met = pick(object.field.as_field(), second, &within, &look.camera.ray(at)).is_some();
+                met += usize::from(is_met);
+                wrong += usize::from(is_met != seen.contains(&n));
+            }
+            // At its rim a line looks past it between two steps.
+            assert!(
+                met > 2000 && wrong < met / 25,
+                "{density:?}, {second}: {wrong} of {met}"
+            );
+        }
+    }
+    // What is edited keeps it, and it goes when it is not wished.
+    let volume = Look {
+        mode: Mode::Volume,
+        density: [50.0, 60.0],
+        ..look
+    };
+    let shown = pixels(&mut canvas, &volume);
+    canvas.put_solid("solid", Solid::of(&object, 0.5, DAffine3::IDENTITY).unwrap());
+    assert_eq!(pixels(&mut canvas, &volume), shown);
+    canvas.put_second(None);
+    assert_ne!(pixels(&mut canvas, &volume), shown);
+}
+
 /// As fine as the first surface, but never of more triangles than it may have.
 #[test]
 fn a_second_surface_has_no_more_triangles_than_it_may() {

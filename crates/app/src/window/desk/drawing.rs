@@ -9,7 +9,7 @@ use super::{Clip, Desk, Open};
 use crate::panels;
 use crate::view::{Ray, leave};
 use crate::window::orders::{News, Thing};
-use crate::window::tool::{Drawn, Kind, Start, Tool, Use};
+use crate::window::tool::{Drawn, Kind, Start, Tool, Use, surface_within};
 
 /// Places of a line lie at least this apart, in radii of the tool.
 const APART: f64 = 0.25;
@@ -31,7 +31,7 @@ impl Desk {
         let (start, whole) = open.start(ray)?;
         let mut drawn = Drawn::new(start, whole);
         let thing = Thing::of(open.state(), &open.chosen);
-        drawn.name = thing.map_or(drawn.name, |thing| panels::next_pin(&thing));
+        drawn.name = thing.map_or(drawn.name, |thing| panels::next_hold(&thing, "pin"));
         drawn.free = open.free_name("part");
         drawn.part = open.part();
         Some(drawn)
@@ -51,7 +51,7 @@ impl Desk {
 
     /// The button came up: the tool acts on what was drawn.
     pub(super) fn end_drawing(&mut self) -> Result<(), String> {
-        let Some((tool, drawn)) = self.open.as_mut().and_then(|open| open.drawn.take()) else {
+        let Some((tool, mut drawn)) = self.open.as_mut().and_then(|open| open.drawn.take()) else {
             return Ok(());
         };
         let Some(chosen) = self.open.as_ref().map(|open| open.chosen.clone()) else {
@@ -72,6 +72,12 @@ impl Desk {
             }
             self.tell(News::Note(told));
             return Ok(());
+        }
+        if let (Kind::PinBox, Some(open)) = (tool.kind, &self.open)
+            && let Some(thing) = Thing::of(open.state(), &open.chosen)
+        {
+            drawn.name = panels::next_hold(&thing, "box");
+            drawn.line = surface_within(&*thing.field, thing.iso, &tool.region(drawn.start.at))?;
         }
         let stroke = self.limits.on(tool.made(&drawn)?);
         self.apply(stroke)?;
@@ -94,7 +100,9 @@ impl Desk {
         };
         let limits = self.limits.clone();
         let Some(open) = &mut self.open else { return };
-        if open.live.is_some() || open.drawn.is_some() || tool.kind.by() != Use::Click {
+        // What is held looks as it did.
+        let leaves_all = tool.kind.by() != Use::Click || tool.kind == Kind::PinBox;
+        if open.live.is_some() || open.drawn.is_some() || leaves_all {
             return;
         }
         // What cannot be done is told when it is asked for.

@@ -19,7 +19,7 @@ impl Modeler {
         // Menus have it else.
         let is_stroke = matches!(self.gesture, Some(Gesture::Stroke(_)));
         if is_stroke && ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::Escape)) {
-            self.gesture = None;
+            (self.gesture, self.pace) = (None, None);
             self.bench.order(Order::Drop);
         }
         let mut pressed = self.bench.keys.pressed(ui.ctx(), self.bench.arranging);

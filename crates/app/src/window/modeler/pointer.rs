@@ -11,6 +11,7 @@ use crate::view::Ray;
 use crate::window::gesture::{Gesture, Way};
 use crate::window::lasso;
 use crate::window::orders::Order;
+use crate::window::pace::Pace;
 use crate::window::tool::{Kind, Tool, Use};
 
 impl Modeler {
@@ -21,8 +22,18 @@ impl Modeler {
             self.bench.limits.lasso = Some(formula);
             self.bench.limits.keeps = keeps;
         }
+        let waits = self.pace.take().and_then(|pace| pace.waits);
         if let Some(Gesture::Stroke(_)) = self.gesture.take() {
+            // It went nowhere: nothing is slower.
+            self.begin_waiting(waits, Some(1.0));
             self.bench.order(Order::End);
+        }
+    }
+
+    /// Begins a stroke that waited for how fast it is.
+    fn begin_waiting(&self, waits: Option<(Tool, Ray)>, press: Option<f64>) {
+        if let Some((tool, ray)) = waits {
+            self.bench.order(Order::Begin { tool, ray, press });
         }
     }
 
@@ -50,7 +61,11 @@ impl Modeler {
         let is_free = self.bench.busy.is_none() && self.gesture.is_none();
         // A slow picture may hold a press, its way and even the release.
         let (start, moves) = ui.input(|i| since_press(&i.events));
-        let start = start.unwrap_or(over);
+        let (start, begun) = start.unwrap_or((over, 1.0));
+        let time = {
+            let [before, now] = self.times;
+            move |share: f64| before + share * (now - before)
+        };
         let under = is_free.then(|| self.under(rect, start)).flatten();
         if let Some(button) = pressed.filter(|_| response.hovered() && self.gesture.is_none()) {
             if button == PointerButton::Primary && self.take_handle(rect, start) {
@@ -85,14 +100,16 @@ impl Modeler {
                         .filter(|_| tool.acts_at_once())
                         .map(|(p, _)| *p)
                         .collect();
-                    let counts = !self.bench.ignores_pens && tool.kind.has_press();
-                    let press = self.pen.down.filter(|_| counts);
-                    self.bench.order(Order::Begin {
-                        tool,
-                        ray: self.ray(rect, start),
-                        press,
-                    });
-                    Gesture::Stroke(Way::new(start, step, press))
+                    let counts = tool.kind.has_press();
+                    let press = self.pen.down.filter(|_| counts && !self.bench.ignores_pens);
+                    let ray = self.ray(rect, start);
+                    if counts && press.is_none() && self.bench.by_speed {
+                        self.pace = Some(Pace::new(step, time(begun), (tool, ray)));
+                        Gesture::Stroke(Pace::way(start, step))
+                    } else {
+                        self.bench.order(Order::Begin { tool, ray, press });
+                        Gesture::Stroke(Way::new(start, step, press))
+                    }
                 }
                 (PointerButton::Middle, true, _) | (PointerButton::Secondary, ..) => Gesture::Pan,
                 _ => Gesture::Orbit,
@@ -105,9 +122,23 @@ impl Modeler {
         let way = DVec2::new(f64::from(way.x), -f64::from(way.y)) / f64::from(rect.height());
         match &mut self.gesture {
             Some(Gesture::Stroke(path)) => {
-                let presses = self.pen.presses(moves.len(), path.press().unwrap_or(1.0));
-                let steps = moves.into_iter().zip(presses);
-                let steps: Vec<_> = steps.flat_map(|(to, press)| path.to(to, press)).collect();
+                let steps: Vec<_> = match &mut self.pace {
+                    Some(pace) => {
+                        let moves = moves.into_iter();
+                        moves
+                            .flat_map(|(to, share)| pace.steps(path, to, time(share)))
+                            .collect()
+                    }
+                    None => {
+                        let presses = self.pen.presses(moves.len(), path.press().unwrap_or(1.0));
+                        let moves = moves.into_iter().zip(presses);
+                        moves.flat_map(|((to, _), press)| path.to(to, press)).collect()
+                    }
+                };
+                if let Some((_, press)) = steps.first() {
+                    let waits = self.pace.as_mut().and_then(|pace| pace.waits.take());
+                    self.begin_waiting(waits, *press);
+                }
                 for (step, press) in &steps {
                     self.bench.order(Order::Along {
                         ray: self.ray(rect, *step),
@@ -130,6 +161,7 @@ impl Modeler {
         let over_solid = under.filter(|_| is_sculpting && self.gesture.is_none());
         if let Some((p, normal)) = over_solid {
             self.ring(ui, rect, p, normal, &tool);
+            self.box_under(ui, rect, p, &tool);
         }
         self.try_out(rect, over_solid.is_some().then_some(over), &tool);
     }
@@ -206,24 +238,32 @@ impl Modeler {
 }
 
 /// Where a button went down last among the events of a picture, if one did, and the way from there, or from the beginning, until one
-/// came up.
-fn since_press(events: &[egui::Event]) -> (Option<Pos2>, Vec<Pos2>) {
-    let pressed = events
-        .iter()
-        .enumerate()
-        .rev()
-        .find_map(|(n, event)| match event {
-            egui::Event::PointerButton {
-                pos, pressed: true, ..
-            } => Some((n + 1, *pos)),
-            _ => None,
-        });
-    let way = &events[pressed.map_or(0, |(n, _)| n)..];
-    let is_release = |event: &egui::Event| matches!(event, egui::Event::PointerButton { pressed: false, .. });
-    let until = way.iter().position(is_release).unwrap_or(way.len());
-    let moves = way[..until].iter().filter_map(|event| match event {
-        egui::Event::PointerMoved(to) => Some(*to),
+/// came up; each with its share of the time of the picture.
+fn since_press(events: &[egui::Event]) -> (Option<(Pos2, f64)>, Vec<(Pos2, f64)>) {
+    let is_told = |event: &&egui::Event| {
+        matches!(
+            event,
+            egui::Event::PointerMoved(_) | egui::Event::PointerButton { .. }
+        )
+    };
+    let told: Vec<&egui::Event> = events.iter().filter(is_told).collect();
+    let share = |n: usize| (n + 1) as f64 / told.len() as f64;
+    let pressed = told.iter().enumerate().rev().find_map(|(n, event)| match event {
+        egui::Event::PointerButton {
+            pos, pressed: true, ..
+        } => Some((n, *pos)),
         _ => None,
     });
-    (pressed.map(|(_, at)| at), moves.collect())
+    let from = pressed.map_or(0, |(n, _)| n + 1);
+    let moves = told
+        .iter()
+        .enumerate()
+        .skip(from)
+        .map_while(|(n, event)| match event {
+            egui::Event::PointerMoved(to) => Some(Some((*to, share(n)))),
+            egui::Event::PointerButton { pressed: false, .. } => None,
+            _ => Some(None),
+        });
+    let moves = moves.flatten().collect();
+    (pressed.map(|(n, at)| (at, share(n))), moves)
 }

@@ -87,6 +87,37 @@ fn panels_that_are_opened_come_to_the_front() {
     assert!(!window.state().bench().is_open(Panel::Simulation));
 }
 
+/// Three tabs fit into the narrow panel, under titles that are shortened if they have to be; a click on any brings it to the front.
+#[test]
+fn three_tabs_are_all_in_sight() {
+    use egui::accesskit::Role;
+    let home = tempfile::tempdir().unwrap();
+    let mut window = window_with_clay(home.path());
+    run(&mut window, Name::Simulation);
+    run(&mut window, Name::Performance);
+    window.run_steps(3);
+    assert!(window.query_by_label("Scroll tabs right").is_none());
+    assert!(window.query_by_label("Scroll tabs left").is_none());
+    let right = scene(&window).right();
+    for (name, within) in [
+        ("Objects", "History"),
+        ("Simulation", "Play"),
+        ("Performance", "Memory"),
+    ] {
+        let tab = window.get_by_role_and_label(Role::Button, name).rect();
+        assert!(tab.left() >= right && tab.right() <= 1272.0, "{name}: {tab}");
+        window.get_by_role_and_label(Role::Button, name).click();
+        window.run_steps(3);
+        assert!(window.query_by_label_contains(within).is_some(), "{name}");
+        // The one in front can be closed.
+        assert_eq!(window.get_all_by_label("Close").count(), 1);
+    }
+    window.get_by_label("Close").click();
+    window.run_steps(3);
+    assert!(!window.state().bench().is_open(Panel::Performance));
+    assert!(window.state().bench().is_open(Panel::Simulation));
+}
+
 /// A panel that is moved is there in the next window too, until all are as at first.
 #[test]
 fn a_panel_that_is_moved_stays_there() {

@@ -53,6 +53,9 @@ fn a_pen_that_is_pressed_harder_goes_deeper() {
     for pictures in [1, 4] {
         assert_eq!(drawn(Kind::Carve, pictures, |_| {}).1, digest, "{pictures}");
     }
+    // It is a pen, whatever a mouse would do.
+    let by_speed = |window: &mut Harness<'_, Modeler>| window.state_mut().bench.by_speed = true;
+    assert_eq!(drawn(Kind::Carve, 4, by_speed).1, digest);
     let off = |window: &mut Harness<'_, Modeler>| {
         window.get_by_label("Pen pressure").click();
         window.run_steps(2);

@@ -68,6 +68,24 @@ fn what_cannot_be_shown_says_why() {
     assert!(density != sheet.objects[0].iso);
 }
 
+/// Volumes show it without triangles, of the density that is told below its box; other modes and other wishes leave it out.
+#[test]
+fn volumes_show_the_second_surface() {
+    let home = tempfile::tempdir().unwrap();
+    let mut window = unfolded(home.path());
+    tick(&mut window, "Volume");
+    assert_eq!(window.state().bench().second_in_volume(), None);
+    tick(&mut window, "Second surface");
+    let bench = window.state().bench();
+    let (name, density) = bench.second_in_volume().expect("it is wished");
+    assert_eq!(Some((name, density)), bench.shown.second);
+    set(&mut window, ("Density", 0), "1.5");
+    let shown = window.state().bench().second_in_volume();
+    assert_eq!(shown, Some(("clay".into(), 1.5)));
+    tick(&mut window, "Mesh");
+    assert_eq!(window.state().bench().second_in_volume(), None);
+}
+
 /// A click in a plane takes the other two there; beside the scene the planes are still there, and the tools.
 #[test]
 fn slices_share_a_cursor_and_stand_beside_the_scene() {

@@ -188,6 +188,8 @@ kinds! {
 
     /// Holds a line.
     PinLine: Hold, Line, None, "Pin line", "Force tools leave the surface where it is along the line that is drawn";
+    /// Holds what lies in a box.
+    PinBox: Hold, Click, None, "Pin box", "A click holds the surface within the box under the mouse: force tools leave it where it is";
     /// Bounds strokes.
     Lasso: Hold, Outline, Some(Key::K), "Lasso", "Strokes change only what is drawn round, to any depth. Ctrl: they spare it";
     /// Holds an outline.

@@ -220,6 +220,7 @@ impl Tool {
                     json!({ "along": drawn.line(), "radius": r, "tolerance": tolerance }),
                 )
             }
+            Kind::PinBox => stroke_of("hold", json!({ "name": drawn.name, "points": drawn.line() })),
             Kind::PinLine => self.held(drawn, json!(drawn.line())),
             Kind::PinOutline => self.held(drawn, drawn.outline()?),
             _ => return Err(format!("{} is used step by step", self.kind.name())),

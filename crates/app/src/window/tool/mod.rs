@@ -1,10 +1,12 @@
 //! What the mouse does to the solid.
 
+mod boxed;
 mod kind;
 mod made;
 mod settings;
 mod stroke;
 
+pub use boxed::surface_within;
 pub use kind::{Group, Kind, Use};
 pub use made::{Drawn, turned};
 pub use settings::{Filter, Settings, Solid};

@@ -191,6 +191,7 @@ impl Kind {
                 | Self::Paste
                 | Self::Lasso
                 | Self::PinLine
+                | Self::PinBox
                 | Self::PinOutline
         ) && !self.has_angle()
     }
