@@ -25,6 +25,7 @@ mod planes;
 mod scans;
 mod shortcuts;
 mod show;
+mod stereo;
 mod tree;
 mod user;
 
