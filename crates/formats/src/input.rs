@@ -14,6 +14,11 @@ const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 /// Largest first allocation on the word of a file alone.
 const TRUSTED_HINT: u64 = 64 << 20;
 
+/// Whether a content begins as one that is gzipped.
+pub(crate) fn is_gzip(head: &[u8]) -> bool {
+    head.starts_with(&GZIP_MAGIC)
+}
+
 /// The content of a file as a stream.
 pub(crate) enum Source {
     Plain(BufReader<File>),

@@ -24,10 +24,10 @@ const VIEW: &[&[Name]] = &[
         Name::Clip,
     ],
     &[Name::Hide, Name::Alone, Name::ShowAll],
-    &[Name::Panels, Name::AsAtFirst],
 ];
 /// Below entries of their own: all at once would not fit into a low window.
 const FROM: &[&[Name]] = &[&[Name::Front, Name::Right, Name::Top, Name::All]];
+const STEREO: &[&[Name]] = &[&[Name::NoStereo, Name::SideBySide, Name::Anaglyph]];
 const WINDOWS: &[&[Name]] = &[
     &[
         Name::Slices,
@@ -37,7 +37,8 @@ const WINDOWS: &[&[Name]] = &[
         Name::Simulation,
     ],
     &[Name::Performance, Name::Log, Name::Picture],
-    &[Name::Tools, Name::Objects, Name::Sides],
+    &[Name::Tools, Name::Objects, Name::Panels],
+    &[Name::Sides, Name::AsAtFirst],
 ];
 
 /// Along the top.
@@ -48,6 +49,7 @@ pub fn menu(ui: &mut egui::Ui, bench: &mut Bench) {
         ui.menu_button("View", |ui| {
             ui.menu_button("Look from", |ui| entries(ui, bench, FROM));
             ui.menu_button("Windows", |ui| entries(ui, bench, WINDOWS));
+            ui.menu_button("Stereo", |ui| entries(ui, bench, STEREO));
             ui.separator();
             entries(ui, bench, VIEW);
             ui.separator();

@@ -1,7 +1,7 @@
 //! What is shown beside the solids themselves.
 
 use crate::cli::quantity::human_number;
-use crate::view::{Cells, Tint};
+use crate::view::{Cells, Pair, Stereo, Tint};
 use crate::window::Bench;
 use crate::window::show::Layer;
 
@@ -17,6 +17,13 @@ const CELLS: [(Cells, &str); 3] = [
     (Cells::Off, "no cells"),
     (Cells::Level, "cells by size"),
     (Cells::Error, "cells by error"),
+];
+
+/// Where the pictures of two eyes may be.
+const PAIRS: [(Pair, &str); 3] = [
+    (Pair::Off, "off"),
+    (Pair::Beside, "side by side"),
+    (Pair::Anaglyph, "red and cyan"),
 ];
 
 /// Boxes for all that may be shown beside the solids.
@@ -62,11 +69,42 @@ pub fn show(ui: &mut egui::Ui, bench: &mut Bench) {
         ui.checkbox(&mut show.scale_bar, "Scale bar");
         ui.checkbox(&mut show.forces, "Forces")
             .on_hover_text("Arrows of forces at the tool, in newtons");
+        stereo(ui, &mut show.stereo);
         if ui.button("Picture…").clicked() {
             bench.shot.is_open = true;
         }
     });
     ui.add_space(10.0);
+}
+
+/// Whether each eye has a picture of its own, and how far the eyes are apart.
+fn stereo(ui: &mut egui::Ui, stereo: &mut Stereo) {
+    egui::ComboBox::new("stereo", "Stereo")
+        .selected_text(name(&PAIRS, stereo.pair))
+        .width(112.0)
+        .show_ui(ui, |ui| {
+            for (pair, name) in PAIRS {
+                ui.selectable_value(&mut stereo.pair, pair, name);
+            }
+        });
+    if stereo.pair == Pair::Off {
+        return;
+    }
+    ui.horizontal(|ui| {
+        let hint = "From one eye to the other, as a share of their way to what the view turns round";
+        let label = ui.label("Eyes apart").on_hover_text(hint);
+        let [least, most] = Stereo::RANGE.map(|share| 100.0 * share);
+        let mut percent = 100.0 * stereo.apart;
+        let field = egui::DragValue::new(&mut percent)
+            .range(least..=most)
+            .speed(0.05)
+            .max_decimals(2)
+            .suffix(" %");
+        let field = ui.add(field).on_hover_text(hint).labelled_by(label.id);
+        if field.changed() {
+            stereo.apart = percent / 100.0;
+        }
+    });
 }
 
 fn name<T: PartialEq + Copy>(all: &[(T, &'static str)], chosen: T) -> &'static str {

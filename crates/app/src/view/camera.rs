@@ -2,7 +2,7 @@
 
 // Clip space as wgpu has it: y up, z from 0 to 1.
 use glam::dcamera::rh::proj::directx as project;
-use glam::{DMat3, DMat4, DQuat, DVec2, DVec3};
+use glam::{DMat3, DMat4, DQuat, DVec2, DVec3, DVec4};
 
 /// Angle of the picture's height, rad.
 const ANGLE: f64 = 0.52;
@@ -29,6 +29,8 @@ pub struct Camera {
     pub up: DVec3,
     /// Angles about `up` and above the horizon, rad.
     pub turn: [f64; 2],
+    /// How far the eye stands to the right, as a share of its way to what it goes round, which stays in its place in the picture.
+    pub aside: f64,
 }
 
 impl Camera {
@@ -40,6 +42,7 @@ impl Camera {
             perspective: true,
             up,
             turn: [0.35, 0.25],
+            aside: 0.0,
         }
     }
 
@@ -52,6 +55,7 @@ impl Camera {
             perspective: false,
             up,
             turn: [0.0; 2],
+            aside: 0.0,
         };
         let [right, _, front] = camera.axes();
         let toward_eye = toward_eye.normalize();
@@ -78,16 +82,22 @@ impl Camera {
         [right, above * self.up, above * (around * front)]
     }
 
-    /// From the eye to what it goes round.
+    /// From what it goes round to the eye, 1 long towards it.
+    pub fn toward_eye(&self) -> DVec3 {
+        let [right, _, back] = self.axes();
+        back + self.aside * right
+    }
+
+    /// From the eye to what it goes round, straight ahead.
     pub fn distance(&self) -> f64 {
         0.5 * self.height / (0.5 * ANGLE).tan()
     }
 
     /// The line under a place of the picture, from the eye.
     pub fn ray(&self, at: DVec2) -> Ray {
-        let [right, up, back] = self.axes();
+        let [right, up, _] = self.axes();
         let on_plane = self.center + self.height * (at.x * right + at.y * up);
-        let eye = self.center + self.distance() * back;
+        let eye = self.center + self.distance() * self.toward_eye();
         match self.perspective {
             true => Ray {
                 from: eye,
@@ -95,8 +105,8 @@ impl Camera {
             },
             // From so far away that all that is seen lies before it.
             false => Ray {
-                from: on_plane + 1e3 * self.height * back,
-                along: -back,
+                from: on_plane + 1e3 * self.height * self.toward_eye(),
+                along: -self.toward_eye().normalize(),
             },
         }
     }
@@ -109,7 +119,7 @@ impl Camera {
             true => self.height * (1.0 - way.dot(back) / self.distance()),
             false => self.height,
         };
-        DVec2::new(way.dot(right), way.dot(up)) / size
+        DVec2::new(way.dot(right) - self.aside * way.dot(back), way.dot(up)) / size
     }
 
     /// Clip space from a world whose origin is at `origin`, for things within `radius` of the centre.
@@ -132,7 +142,17 @@ impl Camera {
                 project::orthographic(-w, w, -h, h, distance - radius, far)
             }
         };
-        seen * view
+        // What is seen from aside is seen from ahead when it leans, about the plane of what the eye goes round.
+        let lean = DMat4::from_cols(
+            DVec4::X,
+            DVec4::Y,
+            DVec4::new(-self.aside, 0.0, 1.0, 0.0),
+            DVec4::new(-self.aside * distance, 0.0, 0.0, 1.0),
+        );
+        match self.aside == 0.0 {
+            true => seen * view,
+            false => seen * lean * view,
+        }
     }
 
     /// Turns round the centre by a way over the picture, half a turn for its whole height.
@@ -179,9 +199,11 @@ mod tests {
     }
 
     fn cameras() -> impl Iterator<Item = Camera> {
-        [DVec3::Y, DVec3::Z].into_iter().flat_map(|up| {
-            [true, false].map(|perspective| Camera {
+        let kinds = [(true, 0.0), (false, 0.0), (true, 0.05), (false, -0.05)];
+        [DVec3::Y, DVec3::Z].into_iter().flat_map(move |up| {
+            kinds.map(|(perspective, aside)| Camera {
                 perspective,
+                aside,
                 ..Camera::onto(DVec3::new(3.0, -2.0, 5.0), 4.0, up)
             })
         })

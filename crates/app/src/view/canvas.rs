@@ -161,6 +161,8 @@ pub struct Canvas {
     pub(super) aside: BTreeMap<String, Solid>,
     /// How many scenes there were.
     pub(super) scenes: u64,
+    /// How often what is drawn became another.
+    pub(super) changes: u64,
     /// What throws shadows in place of these.
     shades: Option<Held>,
     /// The same.
@@ -220,6 +222,7 @@ impl Canvas {
             hidden: BTreeSet::new(),
             aside: BTreeMap::new(),
             scenes: 0,
+            changes: 0,
             shadow: shadow(device, &shader, &layout),
             lights: Lights::new(device, &looked_up, sky),
             sky: None,
@@ -244,6 +247,7 @@ impl Canvas {
 
     /// The same, but light falls as before.
     pub(super) fn redraw(&mut self) {
+        self.changes += 1;
         self.targets.iter_mut().flatten().for_each(|t| t.drawn = None);
         self.cast.iter_mut().for_each(|cast| cast.renew());
     }
@@ -277,6 +281,7 @@ impl Canvas {
             && cast.rays.put(object, solid)
         {
             cast.renew();
+            self.changes += 1;
             if self.overlay.caps.forget(object) {
                 self.redraw();
             }

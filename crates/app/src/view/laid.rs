@@ -22,6 +22,11 @@ pub struct Laid {
 impl Layer {
     /// For a window whose pixels are so.
     pub fn new(device: &wgpu::Device, pixels: wgpu::TextureFormat) -> Self {
+        Self::of(device, pixels, wgpu::ColorWrites::ALL)
+    }
+
+    /// The same, for some of the colours alone.
+    pub fn of(device: &wgpu::Device, pixels: wgpu::TextureFormat, colors: wgpu::ColorWrites) -> Self {
         let shader = device.create_shader_module(wgpu::include_wgsl!("../../../../shaders/window.wgsl"));
         let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some("window"),
@@ -39,7 +44,10 @@ impl Layer {
                 module: &shader,
                 entry_point: Some("color"),
                 compilation_options: wgpu::PipelineCompilationOptions::default(),
-                targets: &[Some(pixels.into())],
+                targets: &[Some(wgpu::ColorTargetState {
+                    write_mask: colors,
+                    ..pixels.into()
+                })],
             }),
             multiview_mask: None,
             cache: None,
@@ -87,12 +95,17 @@ impl Laid {
     pub fn over(self, place: Rect) -> Shape {
         egui_wgpu::Callback::new_paint_callback(place, self).into()
     }
+
+    /// Over all of a pass's place.
+    pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, &self.bindings, &[]);
+        pass.draw(0..3, 0..1);
+    }
 }
 
 impl CallbackTrait for Laid {
     fn paint(&self, _: PaintCallbackInfo, pass: &mut wgpu::RenderPass<'static>, _: &CallbackResources) {
-        pass.set_pipeline(&self.pipeline);
-        pass.set_bind_group(0, &self.bindings, &[]);
-        pass.draw(0..3, 0..1);
+        self.draw(pass);
     }
 }

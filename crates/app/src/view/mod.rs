@@ -18,6 +18,7 @@ mod screen;
 mod shape;
 mod show;
 mod slice;
+mod stereo;
 mod still;
 #[cfg(test)]
 mod tests;
@@ -36,6 +37,7 @@ pub use screen::{SKY, Screen};
 pub use shape::{Patch, Shape, second};
 pub use show::{Cells, Show, Tint};
 pub use slice::{Slice, sides};
+pub use stereo::{Pair, Stereo};
 #[cfg(test)]
 use still::MESH;
 pub use still::{Manner, still};

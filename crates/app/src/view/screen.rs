@@ -7,6 +7,7 @@ use eframe::egui_wgpu::{RenderState, wgpu};
 
 use super::canvas::Drawn;
 use super::laid::{Laid, Layer};
+use super::stereo::Eyes;
 use super::{Canvas, Look};
 use crate::cli::ceiling::of_bricks;
 
@@ -30,6 +31,7 @@ pub struct Screen {
     device: wgpu::Device,
     is_lost: Arc<AtomicBool>,
     layer: Layer,
+    eyes: Eyes,
     /// Whole and rough pictures.
     shown: [Option<(wgpu::Texture, Laid)>; 2],
 }
@@ -47,6 +49,7 @@ impl Screen {
             canvas: Canvas::new(&state.device, &state.queue, SKY, of_bricks()),
             device: state.device.clone(),
             layer: Layer::new(&state.device, state.target_format),
+            eyes: Eyes::default(),
             shown: [None, None],
         }
     }
@@ -62,13 +65,13 @@ impl Screen {
         self.is_lost.load(Ordering::Relaxed)
     }
 
-    /// As [`Canvas::draw`].
+    /// As [`Canvas::draw`], for each eye if that is wished.
     pub fn draw(&mut self, look: &Look, size: [u32; 2], is_rough: bool) -> Shown {
         let Drawn {
             picture,
             rows,
             is_done,
-        } = self.canvas.draw(look, size, is_rough);
+        } = self.eyes.draw(&mut self.canvas, look, size, is_rough);
         let shown = &mut self.shown[usize::from(is_rough)];
         let laid = match shown.take() {
             Some((texture, laid)) if texture == picture => laid,

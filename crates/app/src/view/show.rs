@@ -2,8 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::Stereo;
+
 /// What is shown beside the solids themselves; kept from one window to the next.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Show {
     /// Sides of the triangles.
@@ -22,6 +24,8 @@ pub struct Show {
     pub forces: bool,
     /// A grid below, and the axes.
     pub floor: bool,
+    /// Whether each eye has a picture of its own.
+    pub stereo: Stereo,
 }
 
 /// What the colours of the surface tell.
@@ -64,6 +68,7 @@ impl Default for Show {
             scale_bar: true,
             forces: true,
             floor: false,
+            stereo: Stereo::default(),
         }
     }
 }

@@ -2,6 +2,7 @@
 
 mod beside;
 mod laid;
+mod stereo;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;

@@ -12,6 +12,7 @@ use super::layout::Panel;
 use super::orders::Order;
 use super::tool::Kind;
 use crate::panels;
+use crate::view::Pair;
 
 /// Something that can be asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -84,6 +85,9 @@ actions! {
     All: "View", "all", "All", plain(Key::Home);
     Perspective: "View", "perspective", "Perspective", plain(Key::Num5);
     NextMode: "View", "next-mode", "Mesh, rays, volume", plain(Key::V);
+    NoStereo: "View", "stereo-off", "Stereo off", None;
+    SideBySide: "View", "stereo-side-by-side", "Stereo side by side", None;
+    Anaglyph: "View", "stereo-anaglyph", "Stereo for red and cyan glasses", None;
     Paint: "View", "paint", "Painted stiffness", None;
     Hide: "View", "hide", "Hide the object", ctrl(Key::H);
     Alone: "View", "alone", "Show this object alone", None;
@@ -190,6 +194,9 @@ impl Action {
         let Self::Do(name) = self else { return None };
         Some(match name {
             Name::Perspective => bench.look.camera.perspective,
+            Name::NoStereo => bench.look.show.stereo.pair == Pair::Off,
+            Name::SideBySide => bench.look.show.stereo.pair == Pair::Beside,
+            Name::Anaglyph => bench.look.show.stereo.pair == Pair::Anaglyph,
             Name::Paint => bench.look.paint,
             Name::Wireframe => bench.look.show.wireframe,
             Name::Floor => bench.look.show.floor,
@@ -256,6 +263,9 @@ impl Name {
             Self::All => bench.frame_all(),
             Self::Perspective => bench.look.camera.perspective ^= true,
             Self::NextMode => bench.look.mode = panels::next_mode(bench.look.mode),
+            Self::NoStereo => bench.look.show.stereo.pair = Pair::Off,
+            Self::SideBySide => bench.look.show.stereo.pair = Pair::Beside,
+            Self::Anaglyph => bench.look.show.stereo.pair = Pair::Anaglyph,
             Self::Paint => bench.look.paint ^= true,
             Self::Hide => bench.hide_chosen(),
             Self::Alone => bench.hide_others(),

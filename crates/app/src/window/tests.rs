@@ -27,6 +27,7 @@ mod planes;
 mod scans;
 mod shortcuts;
 mod show;
+mod stereo;
 mod tree;
 mod user;
 

@@ -7,6 +7,7 @@ mod e57;
 mod las;
 mod normals;
 pub(crate) mod obj;
+mod part;
 pub(crate) mod pcd;
 pub(crate) mod ply;
 mod revise;
@@ -21,6 +22,7 @@ pub use e57::parse_e57;
 #[cfg(feature = "lidar")]
 pub use las::parse_las;
 pub use obj::parse_obj;
+pub use part::{CloudPart, read_part};
 pub use pcd::parse_pcd;
 pub use ply::parse_ply;
 pub use revise::{CloudChanges, Placed, save_revised};
@@ -44,19 +46,23 @@ pub fn read(path: &Path, limits: &ReadLimits) -> Result<PointCloud, FormatError>
 fn read_faulty(path: &Path, limits: &ReadLimits) -> Result<PointCloud, Fault> {
     let mut budget = Budget::new(limits);
     let bytes = input::open(path)?.read_all(&mut budget)?;
-    let budget = &mut budget;
-    let raw = match kind_of(&bytes, path)? {
-        Kind::Cloud(PointFormat::Ply) => ply::parse(&bytes, Wanted::Cloud, budget),
-        Kind::Cloud(PointFormat::Xyz) => xyz::parse(&bytes, budget),
-        Kind::Cloud(PointFormat::Pcd) => pcd::parse(&bytes, budget),
+    read_bytes(&bytes, path, &mut budget)
+}
+
+/// Reads the bytes of a file with this name.
+fn read_bytes(bytes: &[u8], path: &Path, budget: &mut Budget) -> Result<PointCloud, Fault> {
+    let raw = match kind_of(bytes, path)? {
+        Kind::Cloud(PointFormat::Ply) => ply::parse(bytes, Wanted::Cloud, budget),
+        Kind::Cloud(PointFormat::Xyz) => xyz::parse(bytes, budget),
+        Kind::Cloud(PointFormat::Pcd) => pcd::parse(bytes, budget),
         #[cfg(feature = "lidar")]
-        Kind::Cloud(PointFormat::Las) => las::parse(&bytes, budget),
+        Kind::Cloud(PointFormat::Las) => las::parse(bytes, budget),
         #[cfg(feature = "lidar")]
-        Kind::Cloud(PointFormat::E57) => e57::parse(&bytes, budget),
+        Kind::Cloud(PointFormat::E57) => e57::parse(bytes, budget),
         #[cfg(not(feature = "lidar"))]
         kind @ Kind::Cloud(PointFormat::Las | PointFormat::E57) => Err(Fault::left_out(kind, "lidar")),
-        Kind::Cloud(PointFormat::Obj) => obj::parse(&bytes, Wanted::Cloud, budget),
-        Kind::Mesh(format) => meshes::parse(&bytes, format, path, budget),
+        Kind::Cloud(PointFormat::Obj) => obj::parse(bytes, Wanted::Cloud, budget),
+        Kind::Mesh(format) => meshes::parse(bytes, format, path, budget),
         other => Err(Fault::UnknownKind {
             found: format!("a {other}"),
             purpose: "point cloud",

@@ -8,7 +8,7 @@ use formats::points::{NormalSource, PointCloud};
 use formats::{Kind, ReadLimits};
 use glam::DVec3;
 
-use super::{WIDE, bytes_of};
+use super::{LARGE, WIDE, bytes_of};
 use crate::cli::quantity::{human_bytes, human_count, human_number};
 
 /// Points that are drawn, at most.
@@ -26,6 +26,8 @@ const OF_A_POINT: [f64; 2] = [1e-6, 4e-5];
 pub struct Cloud {
     kind: Kind,
     count: usize,
+    /// What was not read, in words.
+    rest: Option<String>,
     face_count: usize,
     bounds: Aabb,
     unit: formats::Unit,
@@ -42,8 +44,37 @@ impl Cloud {
     /// # Errors
     /// Why it cannot be read.
     pub fn of(path: &Path, kind: Kind) -> Result<Self, String> {
-        let cloud = formats::points::read(path, &ReadLimits::default()).map_err(|e| e.to_string())?;
-        Ok(Self::new(kind, cloud))
+        Self::by_part(path, kind, LARGE)
+    }
+
+    /// The same, of a file that is no longer than this all of it.
+    fn by_part(path: &Path, kind: Kind, most: u64) -> Result<Self, String> {
+        let limits = ReadLimits::default();
+        let length = path.metadata().map_or(0, |file| file.len());
+        let part = match length > most {
+            true => formats::points::read_part(path, &limits, most / 4).map_err(|e| e.to_string())?,
+            false => None,
+        };
+        let Some(part) = part else {
+            let cloud = formats::points::read(path, &limits).map_err(|e| e.to_string())?;
+            let mut whole = Self::new(kind, cloud);
+            if length > most {
+                whole.rest = Some("All of it was read: files of this kind are not read in parts".into());
+            }
+            return Ok(whole);
+        };
+        let seen = part.cloud.positions.len();
+        let mut cloud = Self::new(kind, part.cloud);
+        cloud.count = part.count as usize;
+        let about = if part.is_guess { "about " } else { "" };
+        cloud.rest = Some(format!(
+            "Seen are {} of {about}{} points, from all over the file: {} of {}. Its size, and what else is told, is that of these",
+            human_count(seen),
+            human_count(cloud.count),
+            human_bytes(part.bytes),
+            human_bytes(length)
+        ));
+        Ok(cloud)
     }
 
     fn new(kind: Kind, cloud: PointCloud) -> Self {
@@ -57,6 +88,7 @@ impl Cloud {
         Self {
             kind,
             count: all.len(),
+            rest: None,
             face_count: cloud.face_count,
             bounds: Aabb { min, max },
             unit: cloud.unit,
@@ -74,6 +106,9 @@ impl Cloud {
                 self.picture(ui, axis);
             }
         });
+        if let Some(rest) = &self.rest {
+            ui.label(rest);
+        }
         for line in self.about() {
             ui.label(line);
         }
@@ -162,4 +197,44 @@ fn image(points: &[DVec3], bounds: &Aabb, [u, v]: [usize; 2], [wide, high]: [usi
     };
     let pixels: Vec<u8> = counts.iter().map(gray).collect();
     ColorImage::from_gray([wide, high], &pixels)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of a file that is too long some of the points are seen, and it is said so; of another one all are.
+    #[test]
+    fn of_a_long_file_a_part_is_seen() {
+        let scratch = tempfile::tempdir().unwrap();
+        let line = |n: usize| format!("{} {} {}\n", n % 100, n / 100 % 100, n / 10_000);
+        let text: String = (0..50_000).map(line).collect();
+        let path = scratch.path().join("long.xyz");
+        std::fs::write(&path, &text).unwrap();
+        let kind = formats::detect(&path).unwrap();
+        let whole = Cloud::by_part(&path, kind, 1 << 20).unwrap();
+        assert_eq!((whole.count, &whole.rest), (50_000, &None));
+        let part = Cloud::by_part(&path, kind, 100_000).unwrap();
+        let rest = part.rest.unwrap();
+        assert!((49_000..51_000).contains(&part.count), "{}", part.count);
+        assert!(
+            rest.starts_with("Seen are ")
+                && rest.contains(" of about ")
+                && rest.contains("from all over the file"),
+            "{rest}"
+        );
+        assert!((1000..10_000).contains(&part.drawn.len()), "{}", part.drawn.len());
+        // The first layer and the last one.
+        assert_eq!((part.bounds.min.z, part.bounds.max.z), (0.0, 4.0));
+
+        let path = scratch.path().join("long.obj");
+        std::fs::write(
+            &path,
+            text.lines().map(|line| format!("v {line}\n")).collect::<String>(),
+        )
+        .unwrap();
+        let packed = Cloud::by_part(&path, Kind::Cloud(formats::PointFormat::Obj), 100_000);
+        let rest = packed.unwrap().rest.unwrap();
+        assert!(rest.contains("All of it was read"), "{rest}");
+    }
 }

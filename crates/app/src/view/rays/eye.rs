@@ -48,22 +48,23 @@ impl Eye {
         is_rough: bool,
     ) -> Self {
         let camera = &look.camera;
-        let [right, up, back] = camera.axes();
+        let [right, up, _] = camera.axes();
+        let toward_eye = camera.toward_eye();
         let aspect = f64::from(size[0]) / f64::from(size[1]);
         let aside = [0.5 * camera.height * aspect * right, 0.5 * camera.height * up];
         let center = camera.center - origin;
         let reach = radius + center.length();
         let (start, way) = match camera.perspective {
             true => {
-                let far = camera.distance() * back;
+                let far = camera.distance() * toward_eye;
                 (
                     [center + far, DVec3::ZERO, DVec3::ZERO],
                     [-far, aside[0], aside[1]],
                 )
             }
             false => (
-                [center + reach * back, aside[0], aside[1]],
-                [-back, DVec3::ZERO, DVec3::ZERO],
+                [center + reach * toward_eye, aside[0], aside[1]],
+                [-toward_eye, DVec3::ZERO, DVec3::ZERO],
             ),
         };
         let four = |v: DVec3| v.as_vec3().extend(0.0).to_array();

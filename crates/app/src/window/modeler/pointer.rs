@@ -6,7 +6,7 @@ use egui::{PointerButton, Pos2, Rect};
 use glam::DVec2;
 
 use super::Modeler;
-use super::viewport::at;
+use super::viewport::{Ring, at};
 use crate::view::Ray;
 use crate::window::gesture::{Gesture, Way};
 use crate::window::lasso;
@@ -37,9 +37,16 @@ impl Modeler {
         }
     }
 
-    pub(super) fn pointer(&mut self, ui: &egui::Ui, rect: Rect, response: &egui::Response, over: Pos2) {
+    /// Does what the mouse wants; where the tool would act then.
+    pub(super) fn pointer(
+        &mut self,
+        ui: &egui::Ui,
+        rect: Rect,
+        response: &egui::Response,
+        over: Pos2,
+    ) -> Option<Ring> {
         if self.adjust(ui, rect, over) || self.arrange(ui, rect, over) {
-            return;
+            return None;
         }
         let (keys, scroll, pressed) = ui.input(|i| {
             let pressed = [
@@ -70,20 +77,20 @@ impl Modeler {
         if let Some(button) = pressed.filter(|_| response.hovered() && self.gesture.is_none()) {
             if button == PointerButton::Primary && self.take_handle(rect, start) {
                 self.arrange(ui, rect, over);
-                return;
+                return None;
             }
             if let (PointerButton::Primary, Some((p, normal))) = (button, under) {
                 if self.bench.arranging {
                     self.choose(rect, start);
-                    return;
+                    return None;
                 }
                 if self.bench.measure.is_some() {
                     self.bench.mark(p, normal);
-                    return;
+                    return None;
                 }
                 if self.bench.pins {
                     self.bench.pin(p);
-                    return;
+                    return None;
                 }
             }
             self.gesture = Some(match (button, keys.shift, keys.alt) {
@@ -115,7 +122,7 @@ impl Modeler {
                 _ => Gesture::Orbit,
             });
             if !matches!(self.gesture, Some(Gesture::Stroke(_))) {
-                return;
+                return None;
             }
         }
         let way = ui.input(|i| i.pointer.delta());
@@ -159,11 +166,8 @@ impl Modeler {
         self.lead(rect, over);
         let is_sculpting = !self.bench.arranging && self.bench.held.is_none();
         let over_solid = under.filter(|_| is_sculpting && self.gesture.is_none());
-        if let Some((p, normal)) = over_solid {
-            self.ring(ui, rect, p, normal, &tool);
-            self.box_under(ui, rect, p, &tool);
-        }
         self.try_out(rect, over_solid.is_some().then_some(over), &tool);
+        over_solid.map(|(p, normal)| (p, normal, tool))
     }
 
     /// The nearest object under the mouse is chosen.

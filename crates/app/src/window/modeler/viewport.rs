@@ -8,9 +8,13 @@ use glam::{DVec2, DVec3};
 
 use super::Modeler;
 use crate::view::{Legend, Ray, SCALE_BAR, scale_bar};
+use crate::window::tool::Tool;
 
 /// Time after which a picture in which nothing moves is drawn whole.
 const STILL: Duration = Duration::from_millis(45);
+
+/// Where the tool would act: a place, the normal there, and the tool.
+pub(super) type Ring = (DVec3, DVec3, Tool);
 
 impl Modeler {
     /// The scene, and what the mouse does in it.
@@ -21,9 +25,15 @@ impl Modeler {
         // What the mouse does now shows in this picture, which is painted below what is drawn over it.
         let below = [(); 2].map(|()| ui.painter().add(egui::Shape::Noop));
         let over = response.hover_pos().or(response.interact_pointer_pos());
-        if let Some(over) = over {
-            self.pointer(ui, rect, &response, over);
-        }
+        let ring = over.and_then(|over| {
+            // A drag stays with the eye that it began with.
+            let from = ui.input(|i| i.pointer.press_origin()).unwrap_or(over);
+            let (view, aside) = self.bench.look.show.stereo.view_at(rect, from);
+            self.bench.look.camera.aside = aside;
+            let ring = self.pointer(ui, view, &response, over);
+            self.bench.look.camera.aside = 0.0;
+            ring
+        });
         if response.drag_stopped() || !ui.input(|i| i.pointer.any_down()) {
             self.end_gesture();
         }
@@ -50,6 +60,19 @@ impl Modeler {
             scale_bar(ui.painter(), beside, length_of_point, thing.unit);
         }
         Legend::draw(&legends, ui.painter(), rect);
+        for (view, aside) in self.bench.look.show.stereo.views(rect) {
+            self.bench.look.camera.aside = aside;
+            self.draw_over(ui, view, ring);
+            self.bench.look.camera.aside = 0.0;
+        }
+    }
+
+    /// Draws over the scene what is no part of it, with a ring on the surface under the mouse.
+    fn draw_over(&self, ui: &egui::Ui, rect: Rect, ring: Option<Ring>) {
+        if let Some((p, normal, tool)) = ring {
+            self.ring(ui, rect, p, normal, &tool);
+            self.box_under(ui, rect, p, &tool);
+        }
         self.draw_cursor(ui, rect);
         self.draw_holds(ui, rect);
         self.draw_line_so_far(ui, rect);
@@ -67,9 +90,10 @@ impl Modeler {
         };
         let look = &self.bench.look;
         let pixels = rect.size() * ui.ctx().pixels_per_point();
-        let rough = screen
-            .canvas
-            .rough_share(look.mode, f64::from(pixels.x * pixels.y));
+        let rough = screen.canvas.rough_share(
+            look.mode,
+            look.show.stereo.load() * f64::from(pixels.x * pixels.y),
+        );
         let mut draw = |is_rough: bool| {
             let pixels = if is_rough { pixels * rough } else { pixels }.round();
             screen.draw(look, [pixels.x as u32, pixels.y as u32], is_rough)
