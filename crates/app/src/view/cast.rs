@@ -170,7 +170,7 @@ impl Canvas {
             let clock = if is_rough { &cast.rough } else { &cast.strip };
             match clock.millis() {
                 _ if is_rough => {
-                    self.strip(&cast.rays, passes, &mut sheet, is_lit, size[1]);
+                    self.strip(&cast.rays, passes, &mut sheet, is_lit, None);
                     sheet.stage = Stage::Done;
                     cast.rough_pixels = f64::from(size[0]) * f64::from(size[1]);
                     clock.start(&self.queue);
@@ -180,7 +180,7 @@ impl Canvas {
                         let more = (STRIP / millis).clamp(0.25, 2.0);
                         cast.rows = ((f64::from(cast.rows) * more) as u32).clamp(LEAST, MOST);
                     }
-                    self.strip(&cast.rays, passes, &mut sheet, is_lit, cast.rows);
+                    self.strip(&cast.rays, passes, &mut sheet, is_lit, Some(cast.rows));
                     clock.start(&self.queue);
                 }
                 None => {}
@@ -237,13 +237,13 @@ impl Canvas {
         }
     }
 
-    /// Draws the next rows.
-    fn strip(&mut self, rays: &Rays, passes: &Passes, sheet: &mut Sheet, is_lit: bool, rows: u32) {
+    /// Draws the next rows of a whole picture, or all of a rough one.
+    fn strip(&mut self, rays: &Rays, passes: &Passes, sheet: &mut Sheet, is_lit: bool, rows: Option<u32>) {
         let (Some(look), Some(solids)) = (sheet.look, rays.bindings(passes)) else {
             return;
         };
         let size = sheet.first.size;
-        let is_rough = rows >= size[1] && !is_lit;
+        let (is_rough, rows) = (rows.is_none(), rows.unwrap_or(size[1]));
         self.tell(&look, size);
         let eye = Eye::new(&look, size, rays.count(), self.origin, self.radius, is_rough);
         passes.tell(&self.queue, &eye);
