@@ -17,6 +17,7 @@ mod docks;
 mod files;
 mod handles;
 mod limits;
+mod low;
 mod matter;
 mod panels;
 mod pen;
