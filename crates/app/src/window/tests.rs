@@ -27,6 +27,7 @@ mod scans;
 mod shortcuts;
 mod show;
 mod stereo;
+mod touch;
 mod tree;
 mod user;
 

@@ -21,8 +21,11 @@ impl Modeler {
             self.bench.limits.lasso = Some(formula);
             self.bench.limits.keeps = keeps;
         }
-        if let Some(Gesture::Stroke(_)) = self.gesture.take() {
-            self.bench.order(Order::End);
+        match self.gesture.take() {
+            Some(Gesture::Stroke(_)) => self.bench.order(Order::End),
+            // The button may come up where no scene is, and nothing leads the tool.
+            Some(Gesture::Hand) => self.release(),
+            _ => {}
         }
     }
 
