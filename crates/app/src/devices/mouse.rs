@@ -71,6 +71,11 @@ impl Mouse {
         let at = self.at.to_array().map(f64::to_bits);
         self.told.put([at[0], at[1], at[2], self.buttons.into()]);
     }
+
+    /// The button is up, wherever the mouse is now.
+    pub fn release(&mut self) {
+        self.put(self.at, false);
+    }
 }
 
 impl Device for Pointer {

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use egui::Ui;
 use serde_json::{Map, Value};
 
+use super::over::over;
 use crate::cli::quantity::{human_count, human_number};
 use crate::window::Bench;
 
@@ -155,9 +156,8 @@ impl Written {
 pub fn written(context: &egui::Context, bench: &mut Bench) {
     let Some(written) = &bench.written else { return };
     let mut is_open = true;
-    egui::Window::new("Written")
+    over(context, "Written", 212.0)
         .open(&mut is_open)
-        .default_pos(egui::pos2(212.0, 36.0))
         .resizable(false)
         .show(context, |ui| {
             ui.label(written.path.display().to_string());

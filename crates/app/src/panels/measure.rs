@@ -1,5 +1,6 @@
 //! Lengths, angles, walls, area and volume.
 
+use super::over::over;
 use crate::cli::quantity::human_number;
 use crate::window::Bench;
 use crate::window::orders::Order;
@@ -13,9 +14,8 @@ pub fn measure(context: &egui::Context, bench: &mut Bench) {
     let (name, unit) = chosen.map_or(("", ""), |thing| (thing.name.as_str(), thing.unit));
     let length = |x: f64| format!("{} {unit}", human_number(x)).trim_end().to_string();
     let mut is_open = true;
-    egui::Window::new("Measure")
+    over(context, "Measure", 212.0)
         .open(&mut is_open)
-        .default_pos(egui::pos2(212.0, 36.0))
         .default_width(220.0)
         .show(context, |ui| {
             if measure.marks.is_empty() {

@@ -10,6 +10,7 @@ mod matter;
 mod measure;
 mod menu;
 mod modes;
+mod over;
 mod part;
 mod path_box;
 mod performance;

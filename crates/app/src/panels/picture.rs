@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::over::over;
 use crate::window::Bench;
 use crate::window::shot::Wanted;
 
@@ -51,9 +52,8 @@ pub fn picture(context: &egui::Context, bench: &mut Bench) {
         return;
     }
     let mut is_open = true;
-    egui::Window::new("Picture")
+    over(context, "Picture", 212.0)
         .open(&mut is_open)
-        .default_pos(egui::pos2(212.0, 36.0))
         .resizable(false)
         .show(context, |ui| match (shots.progress, shots.asks.clone()) {
             (Some((drawn, count)), _) => {

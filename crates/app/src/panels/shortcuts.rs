@@ -2,6 +2,7 @@
 
 use egui::{Event, Key, KeyboardShortcut, Modifiers};
 
+use super::over::over;
 use crate::window::Bench;
 use crate::window::actions::Action;
 use crate::window::keys::written;
@@ -39,9 +40,8 @@ pub fn shortcuts(context: &egui::Context, bench: &mut Bench) {
         }
     }
     let mut is_open = true;
-    egui::Window::new("Shortcuts")
+    over(context, "Shortcuts", 212.0)
         .open(&mut is_open)
-        .default_pos(egui::pos2(212.0, 36.0))
         .default_size([420.0, 440.0])
         .show(context, |ui| show(ui, bench, &mut table));
     if is_open {

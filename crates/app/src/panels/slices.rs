@@ -3,6 +3,7 @@
 use egui::{Align2, Color32, FontId, Pos2, Rect, Stroke, pos2};
 use glam::DVec3;
 
+use super::over::over;
 use super::profile::{Profile, profile};
 use crate::cli::quantity::human_number;
 use crate::view::{Slice, sides};
@@ -13,6 +14,10 @@ use crate::window::orders::Thing;
 const PLANES: [(usize, &str); 3] = [(2, "Axial"), (1, "Coronal"), (0, "Sagittal")];
 /// Width of a picture in the window over the scene, points.
 const WIDE: f32 = 210.0;
+/// What stands beside them there, and below and above them.
+const BESIDE: [f32; 2] = [40.0, 190.0];
+/// Width of a picture below which there is no room for the number of its place.
+const NARROW: f32 = 170.0;
 /// Of the other planes in a picture, of the names of its sides, and of the line along which densities are shown.
 const CURSOR: Color32 = Color32::from_rgba_premultiplied(60, 100, 130, 130);
 const NAMES: Color32 = Color32::from_rgb(120, 200, 255);
@@ -147,8 +152,11 @@ pub fn slices(context: &egui::Context, bench: &mut Bench) {
     };
     slices.draw(context, thing);
     let mut is_open = true;
-    egui::Window::new("Slices")
-        .default_pos([210.0, 40.0])
+    let whole = context.content_rect().size();
+    // No larger than the window lets all three be seen with what is set of them.
+    let wide = WIDE.min((whole.x - BESIDE[0]) / 3.0);
+    let room = [wide, whole.y - BESIDE[1]];
+    over(context, "Slices", 212.0)
         .open(&mut is_open)
         .resizable(false)
         .show(context, |ui| {
@@ -156,7 +164,7 @@ pub fn slices(context: &egui::Context, bench: &mut Bench) {
             if !slices.is_four_up {
                 ui.horizontal(|ui| {
                     for n in 0..3 {
-                        ui.vertical(|ui| told += &plane(ui, &mut slices, n, thing, [WIDE, f32::INFINITY]));
+                        ui.vertical(|ui| told += &plane(ui, &mut slices, n, thing, room));
                     }
                 });
                 ui.separator();
@@ -233,8 +241,12 @@ fn plane(ui: &mut egui::Ui, slices: &mut Slices, n: usize, thing: &Thing, room: 
         let share = slices.shares[axis];
         let (low, high) = (thing.own_box.min[axis], thing.own_box.max[axis]);
         let mut place = low + share * (high - low);
-        ui.spacing_mut().slider_width = (scale * w - 140.0).max(40.0);
-        let slider = egui::Slider::new(&mut place, low..=high).custom_formatter(|n, _| human_number(n));
+        let has_room = room[0] >= NARROW;
+        let others = if has_room { 140.0 } else { 70.0 };
+        ui.spacing_mut().slider_width = (scale * w - others).max(40.0);
+        let slider = egui::Slider::new(&mut place, low..=high)
+            .show_value(has_room)
+            .custom_formatter(|n, _| human_number(n));
         let slider = ui.add(slider);
         if slider
             .on_hover_text(format!("Where the {} plane lies", name.to_lowercase()))

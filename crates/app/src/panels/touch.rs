@@ -3,6 +3,7 @@
 use tools::haptics::Contact;
 use tools::haptics::gates::Trip;
 
+use super::over::over;
 use crate::devices;
 use crate::window::Bench;
 use crate::window::orders::Order;
@@ -59,10 +60,9 @@ pub fn touch(context: &egui::Context, bench: &mut Bench) {
         return;
     };
     let mut is_open = true;
-    egui::Window::new("Touch")
+    over(context, "Touch", 730.0)
         .open(&mut is_open)
         .resizable(false)
-        .default_pos(egui::pos2(730.0, 36.0))
         .show(context, |ui| {
             ui.set_width(250.0);
             match &bench.held {
@@ -112,8 +112,9 @@ fn choose(ui: &mut egui::Ui, bench: &Bench, wish: &mut TouchWish) {
             }
         });
     ui.horizontal(|ui| {
-        ui.label("or by name");
+        let label = ui.label("or by name");
         ui.text_edit_singleline(&mut wish.device)
+            .labelled_by(label.id)
             .on_hover_text("As `isoclay devices` lists it. Empty: the mouse");
     });
     if wish.device.is_empty() {

@@ -237,7 +237,7 @@ impl Canvas {
         }
     }
 
-    /// Draws the next rows of a whole picture, or a rough one at once.
+    /// Draws the next rows of a whole picture, or all of a rough one.
     fn strip(&mut self, rays: &Rays, passes: &Passes, sheet: &mut Sheet, is_lit: bool, rows: Option<u32>) {
         let (Some(look), Some(solids)) = (sheet.look, rays.bindings(passes)) else {
             return;

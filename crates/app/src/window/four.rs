@@ -15,6 +15,8 @@ impl Modeler {
             return self.viewport(ui);
         }
         let whole = ui.available_rect_before_wrap();
+        // Names and numbers stand beside the planes.
+        ui.painter().rect_filled(whole, 0.0, ui.visuals().panel_fill);
         let half = 0.5 * (whole.size() - vec2(GAP, GAP));
         let quarter = |column: f32, row: f32| {
             let corner = whole.min + vec2(column * (half.x + GAP), row * (half.y + GAP));

@@ -30,6 +30,14 @@ impl Modeler {
             .unwrap_or_else(PoisonError::into_inner)
             .put(in_room(held, at), is_down);
     }
+
+    /// The button of the mouse that leads the tool comes up.
+    pub(super) fn release(&self) {
+        let mouse = self.bench.held.as_ref().and_then(|held| held.mouse.as_ref());
+        if let Some(mouse) = mouse {
+            mouse.lock().unwrap_or_else(PoisonError::into_inner).release();
+        }
+    }
 }
 
 /// A place of the world in the room of a device, mm.

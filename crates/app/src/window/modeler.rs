@@ -13,6 +13,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use egui::Color32;
 use fitting::Cancel;
 use glam::DVec3;
 
@@ -306,6 +307,11 @@ impl Modeler {
 /// Hints are read too: egui's own are too faint for that.
 fn style(context: &egui::Context) {
     context.all_styles_mut(|style| style.visuals.weak_text_alpha = 0.85);
+    // On white its own warnings are as faint.
+    context.style_mut_of(egui::Theme::Light, |style| {
+        style.visuals.warn_fg_color = Color32::from_rgb(165, 75, 0);
+        style.visuals.error_fg_color = Color32::from_rgb(185, 0, 0);
+    });
 }
 
 /// Closes the window on Ctrl-C and SIGTERM, as its own button does.

@@ -18,6 +18,7 @@ mod files;
 mod handles;
 mod holds;
 mod limits;
+mod low;
 mod matter;
 mod pace;
 mod panels;
@@ -28,6 +29,7 @@ mod scans;
 mod shortcuts;
 mod show;
 mod stereo;
+mod touch;
 mod tree;
 mod user;
 

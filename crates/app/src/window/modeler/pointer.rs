@@ -23,10 +23,15 @@ impl Modeler {
             self.bench.limits.keeps = keeps;
         }
         let waits = self.pace.take().and_then(|pace| pace.waits);
-        if let Some(Gesture::Stroke(_)) = self.gesture.take() {
-            // It went nowhere: nothing is slower.
-            self.begin_waiting(waits, Some(1.0));
-            self.bench.order(Order::End);
+        match self.gesture.take() {
+            Some(Gesture::Stroke(_)) => {
+                // It went nowhere: nothing is slower.
+                self.begin_waiting(waits, Some(1.0));
+                self.bench.order(Order::End);
+            }
+            // The button may come up where no scene is, and nothing leads the tool.
+            Some(Gesture::Hand) => self.release(),
+            _ => {}
         }
     }
 

@@ -94,8 +94,8 @@ fn read_faulty(path: &Path, limits: &ReadLimits, most: u64) -> Result<Option<Clo
     let mut bytes = (layout.head)(count);
     bytes.extend(rows);
     let mut cloud = read_bytes(&bytes, path, &mut budget)?;
-    if layout.faces > 0 {
-        (cloud.face_count, cloud.normals) = (layout.faces as usize, None);
+    cloud.face_count = layout.faces as usize;
+    if layout.faces > 0 && cloud.normals.is_none() {
         cloud.normal_source = NormalSource::Faces;
     }
     Ok(Some(CloudPart {
