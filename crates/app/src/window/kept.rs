@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use egui::{Context, ThemePreference};
 use serde::{Deserialize, Serialize};
 
 use super::layout::Layout;
@@ -23,6 +24,41 @@ pub struct Kept {
     pub by_speed: bool,
     /// Where the panels are, unless that is as at first.
     pub layout: Option<Layout>,
+    /// Whether the window is light or dark.
+    pub theme: Theme,
+}
+
+/// Whether a window is light or dark.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Theme {
+    /// As the others on the screen.
+    #[default]
+    System,
+    /// Dark.
+    Dark,
+    /// Light.
+    Light,
+}
+
+impl Theme {
+    /// That of a window.
+    pub fn of(context: &Context) -> Self {
+        match context.options(|o| o.theme_preference) {
+            ThemePreference::System => Self::System,
+            ThemePreference::Dark => Self::Dark,
+            ThemePreference::Light => Self::Light,
+        }
+    }
+
+    /// Gives it to a window.
+    pub fn give(self, context: &Context) {
+        context.set_theme(match self {
+            Self::System => ThemePreference::System,
+            Self::Dark => ThemePreference::Dark,
+            Self::Light => ThemePreference::Light,
+        });
+    }
 }
 
 /// Which of the panels beside the scene are there.

@@ -23,7 +23,7 @@ use super::bench::Bench;
 use super::desk::Desk;
 use super::docks::Docks;
 use super::gesture::Gesture;
-use super::kept::Kept;
+use super::kept::{Kept, Theme};
 use super::keys::Keys;
 use super::layout::Layout;
 use super::limits::Limits;
@@ -130,6 +130,8 @@ impl Modeler {
     /// With nothing open.
     pub(super) fn on(context: &egui::Context, screen: Option<Screen>, home: PathBuf) -> Self {
         style(context);
+        let kept = Kept::read(&home);
+        kept.theme.give(context);
         let context = Arc::new(Mutex::new(context.clone()));
         let (orders, received) = channel();
         let (told, news) = channel();
@@ -141,7 +143,6 @@ impl Modeler {
             .name("desk".into())
             .spawn(move || desk.work(&received))
             .expect("the system has threads enough");
-        let kept = Kept::read(&home);
         Self {
             bench: Bench {
                 sheet: None,
@@ -294,6 +295,7 @@ impl Modeler {
             ignores_pens: self.bench.ignores_pens,
             by_speed: self.bench.by_speed,
             layout: self.layout.clone(),
+            theme: Theme::of(ui.ctx()),
         };
         if let Err(why) = self.kept.keep(now, &self.home) {
             self.bench.tell(why, true);

@@ -31,7 +31,10 @@ impl Legend {
     /// What a picture has left beside so many legends for what is so wide, or above them where it is too narrow for both.
     pub fn beside(count: usize, rect: Rect, wide: f32) -> Rect {
         let has_room = rect.width() >= wide + 2.0 * ASIDE + BAND[0];
-        let taken = if has_room { 0.0 } else { count as f32 * HIGH };
+        let taken = match count {
+            1.. if !has_room => ASIDE + count as f32 * HIGH,
+            _ => 0.0,
+        };
         Rect::from_min_max(rect.min, rect.max - vec2(0.0, taken))
     }
 
@@ -71,7 +74,7 @@ mod tests {
         let picture = |wide: f32| Rect::from_min_size(pos2(10.0, 20.0), vec2(wide, 300.0));
         assert_eq!(Legend::beside(2, picture(800.0), 180.0), picture(800.0));
         let narrow = Legend::beside(2, picture(234.0), 180.0);
-        assert_eq!(narrow.bottom(), 320.0 - 2.0 * HIGH);
+        assert_eq!(narrow.bottom(), 320.0 - ASIDE - 2.0 * HIGH);
         assert_eq!(Legend::beside(0, picture(234.0), 180.0), picture(234.0));
     }
 }

@@ -12,6 +12,9 @@ use crate::cli::desk_files;
 use crate::window::orders::{News, Sheet, Thing};
 use crate::window::preview;
 
+/// Coefficients from which triangles take so long that it is said that they are made.
+const MANY: usize = 1_000_000;
+
 impl Desk {
     /// Closes the document. One without a name in which nothing was done leaves no file.
     pub(super) fn put_away(&mut self) {
@@ -127,6 +130,10 @@ impl Desk {
             Some(object.field.world_box().transformed(&placed))
         });
         let all = boxes.reduce(bspline::Aabb::hull).ok_or("the document is empty")?;
+        let mut counts = state.objects().values().map(|o| o.field.coefficient_count());
+        if is_seen && counts.any(|count| count > MANY) {
+            self.tell(News::Note("the fit is done; its triangles are being made".into()));
+        }
         self.put_away();
         self.open = Some(Open {
             document: Some(document),

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::view::{Cells, Tint};
+use crate::window::kept::Theme;
 use crate::window::show::Layer;
 
 /// The panel, unfolded.
@@ -168,4 +169,16 @@ fn menus_fit_into_a_low_window() {
         window.key_press(egui::Key::Escape);
         window.run_steps(4);
     }
+}
+
+/// A light window is followed by a light one.
+#[test]
+fn the_theme_is_kept() {
+    let home = tempfile::tempdir().unwrap();
+    let mut window = window_with_clay(home.path());
+    assert_eq!(Theme::of(&window.ctx), Theme::System);
+    choose(&mut window, "View", "Light");
+    drop(window);
+    let window = window_with_clay(home.path());
+    assert_eq!(Theme::of(&window.ctx), Theme::Light);
 }

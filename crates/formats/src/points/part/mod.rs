@@ -78,7 +78,8 @@ fn read_faulty(path: &Path, limits: &ReadLimits, most: u64) -> Result<Option<Clo
         Kind::Cloud(PointFormat::Las) => las::layout(&head),
         _ => None,
     };
-    let Some(layout) = layout.filter(|layout| layout.rows.end <= meta.len()) else {
+    let is_readable = |rows: &Rows| rows.end <= meta.len() && rows.stride.is_none_or(|stride| stride <= most);
+    let Some(layout) = layout.filter(|layout| is_readable(&layout.rows)) else {
         return Ok(None);
     };
     let mut budget = Budget::new(limits);
