@@ -2,6 +2,10 @@
 
 use eframe::egui_wgpu::wgpu;
 
+/// What helps where no graphics driver answers.
+pub const DRIVERS: &str =
+    "on Debian without a graphics card install mesa-vulkan-drivers, or set WGPU_BACKEND=gl";
+
 /// A graphics card, or the processor in the place of one.
 pub struct Card {
     /// What makes things on it.
@@ -19,11 +23,8 @@ impl Card {
     /// Why there is none, and what helps.
     pub fn open() -> Result<Self, String> {
         let lacks = |why: String| {
-            format!(
-                "no graphics driver for Vulkan or OpenGL answers ({}); on Debian without a graphics card install \
-                 mesa-vulkan-drivers, or set WGPU_BACKEND=gl",
-                why.replace(';', ",")
-            )
+            let why = why.replace(';', ",");
+            format!("no graphics driver for Vulkan or OpenGL answers ({why}); {DRIVERS}")
         };
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
         let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions {

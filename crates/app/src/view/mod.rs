@@ -26,7 +26,7 @@ mod tests;
 pub use beside::Tinted;
 pub use camera::{Camera, Ray};
 pub use canvas::{Canvas, LINE, Look, Mode, Paper};
-pub use card::Card;
+pub use card::{Card, DRIVERS};
 pub use histogram::Histogram;
 pub use overlay::legend::Legend;
 pub use overlay::{Ink, Stretch, cells, floor};

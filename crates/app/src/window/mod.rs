@@ -40,7 +40,7 @@ use std::time::{Duration, Instant};
 pub use bench::Bench;
 use modeler::Modeler;
 
-use crate::view::Screen;
+use crate::view::{DRIVERS, Screen};
 
 /// What works in the window, and stays when that falls.
 type Shared = Rc<RefCell<Option<Modeler>>>;
@@ -145,8 +145,7 @@ fn once(files: Vec<PathBuf>, shared: &Shared) -> Result<(), String> {
             why => why.to_string(),
         };
         format!(
-            "no window can be opened ({why}); isoclay needs a display, and a graphics driver for Vulkan or OpenGL: on Debian without a \
-             graphics card install mesa-vulkan-drivers, or set WGPU_BACKEND=gl"
+            "no window can be opened ({why}); isoclay needs a display, and a graphics driver for Vulkan or OpenGL: {DRIVERS}"
         )
     })
 }
