@@ -5,7 +5,7 @@ use bspline::{Aabb, Csg, Field};
 use glam::{DAffine3, DQuat, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
-use super::chain::Leg;
+use super::chain::{Leg, Rival};
 use super::swept::{Pose, Search, Swept};
 use crate::formula_solid::FormulaSolid;
 use crate::number::{Point, Positive};
@@ -128,10 +128,13 @@ impl Shape {
     }
 
     /// A solid whose distance is known between two poses.
-    fn leg(&self, solid: &Primitive, size: f64, [from, to]: [Pose; 2]) -> Result<Arc<dyn Field>, String> {
+    fn leg(&self, solid: &Primitive, size: f64, [from, to]: [Pose; 2]) -> Result<Arc<dyn Rival>, String> {
         Ok(match self {
             // However it is turned, a ball is a ball.
-            Self::Sphere { .. } if from.at == to.at => placed(solid, &from)?,
+            Self::Sphere { radius } if from.at == to.at => {
+                let ball: Primitive = Sphere::new(from.at, radius.0).map_err(|e| e.to_string())?.into();
+                Arc::new(ball)
+            }
             Self::Sphere { radius } => {
                 Arc::new(Capsule::new(from.at, to.at, radius.0).map_err(|e| e.to_string())?)
             }
@@ -153,7 +156,7 @@ impl Shape {
         }
         let kind = self.kind(&Others::default())?;
         let leg = |from: Pose, to: Pose| {
-            let solid = match &kind {
+            let solid: Arc<dyn Rival> = match &kind {
                 Kind::Known(solid, size) => self.leg(solid, *size, [from, to])?,
                 Kind::Any(field, b) => {
                     let size = 0.5 * b.size().length();

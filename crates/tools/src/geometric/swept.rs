@@ -3,10 +3,15 @@ use std::sync::Arc;
 use bspline::{Aabb, Field, Interval, Jet};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
+use super::chain::Rival;
+
 /// Share of the solid's size to which the nearest pose is told from others that are as near.
 const APART: f64 = 1e-3;
 
-/// Steps of the golden section: they leave `0.618³⁰ ≈ 5e-7` of the way.
+/// Share of the solid's size by which the distance of the nearest pose may be off.
+const PEAK: f64 = 1e-6;
+
+/// Steps that look for a peak, at most: those of a golden section leave `0.618³⁰ ≈ 5e-7` of the way.
 const SECTIONS: usize = 30;
 
 /// Where a tool is, and how it is turned.
@@ -26,8 +31,9 @@ impl Pose {
 /// The union of all poses of a solid on its way from one pose to another: straight, and turning evenly.
 ///
 /// `f(x) = max_t d(x(t))`, `x(t)` the point in the coordinates of the solid, is the distance to what was swept outside, and no more
-/// than that inside. Of convex solids that do not turn `d(x(t))` is concave in `t`, and a golden section finds the largest; of others
-/// a search that uses that `d` is a distance, so `d(x(t))` changes no faster than the point moves \[Piyavskii72\].
+/// than that inside. Of convex solids that do not turn `d(x(t))` is concave in `t`, so it lies under its tangents \[Kelley60\]; of
+/// others a search finds the largest that uses that `d` is a distance, so `d(x(t))` changes no faster than the point moves
+/// \[Piyavskii72\].
 #[derive(Clone)]
 pub(super) struct Swept {
     solid: Arc<dyn Field>,
@@ -38,6 +44,14 @@ pub(super) struct Swept {
     axis: DVec3,
     angle: f64,
     search: Search,
+}
+
+/// A distance on the way.
+#[derive(Clone, Copy)]
+struct Rise {
+    t: f64,
+    value: f64,
+    slope: f64,
 }
 
 /// What is known of a solid that helps to find its nearest pose.
@@ -103,29 +117,38 @@ impl Swept {
         self.solid.value(self.local(p, t))
     }
 
-    /// Where on its way the solid is nearest, and its distance there.
-    fn nearest(&self, p: DVec3) -> (f64, f64) {
-        let ends = [0.0, 1.0].map(|t| (t, self.at(p, t)));
-        let found = match self.search {
-            Search::Distance { is_convex: true } if self.angle == 0.0 => self.golden(p, 0.0, 1.0),
-            Search::Distance { .. } => self.searched(p, ends),
-            Search::Any => self.asked(p, ends),
-        };
-        // An end counts as much as what is between.
-        ends.into_iter()
-            .fold(found, |best, end| if end.1 >= best.1 { end } else { best })
+    /// The distance at `t`, and how fast it changes with `t`.
+    fn rise(&self, p: DVec3, t: f64) -> Rise {
+        let turn = self.turn(t);
+        let away = p - self.from.at - self.by * t;
+        let (value, gradient) = self.solid.value_gradient(turn.transpose() * away);
+        let slope = -(turn * gradient).dot(self.by + self.angle * self.axis.cross(away));
+        Rise { t, value, slope }
+    }
+
+    /// Where on its way the solid is nearest, and its distance there; if that is not above `floor`, any pose.
+    fn nearest(&self, p: DVec3, floor: f64) -> (f64, f64) {
+        let ends = || [0.0, 1.0].map(|t| (t, self.at(p, t)));
+        match self.search {
+            Search::Distance { is_convex: true } if self.angle == 0.0 => {
+                let ends = [0.0, 1.0].map(|t| self.rise(p, t));
+                self.peak(p, ends, floor).0
+            }
+            Search::Distance { .. } => self.searched(p, ends(), floor),
+            Search::Any => self.asked(p, ends(), floor),
+        }
     }
 
     /// The nearest pose, told from others to a share of the solid's size, and then followed to its peak.
-    fn searched(&self, p: DVec3, ends: [(f64, f64); 2]) -> (f64, f64) {
+    fn searched(&self, p: DVec3, ends: [(f64, f64); 2], floor: f64) -> (f64, f64) {
         let speed = self.speed(p);
         let [first, last] = ends;
         let mut best = if last.1 > first.1 { last } else { first };
         let mut around = (first.0, last.0);
+        let top = |a: (f64, f64), b: (f64, f64)| 0.5 * (a.1 + b.1 + speed * (b.0 - a.0));
         let mut open = vec![(first, last)];
         while let Some((a, b)) = open.pop() {
-            let peak = 0.5 * (a.1 + b.1 + speed * (b.0 - a.0));
-            if peak <= best.1 + self.slack(best.1) {
+            if top(a, b) <= floor.max(best.1 + self.slack(best.1)) {
                 continue;
             }
             let t = (0.5 * (a.0 + b.0) + 0.5 * (b.1 - a.1) / speed).clamp(a.0, b.0);
@@ -139,12 +162,23 @@ impl Swept {
                 false => open.extend([(a, middle), (middle, b)]),
             }
         }
-        let refined = self.golden(p, around.0, around.1);
+        if best.1 + speed * (around.1 - best.0).max(best.0 - around.0) <= floor {
+            return best;
+        }
+        let at = self.rise(p, best.0);
+        let pair = match at.slope > 0.0 {
+            true => [at, self.rise(p, around.1)],
+            false => [self.rise(p, around.0), at],
+        };
+        let refined = match self.peak(p, pair, floor) {
+            (refined, true) => refined,
+            (_, false) => self.golden(p, around.0, around.1),
+        };
         if refined.1 > best.1 { refined } else { best }
     }
 
     /// The nearest pose of a solid of which only bounds are known.
-    fn asked(&self, p: DVec3, ends: [(f64, f64); 2]) -> (f64, f64) {
+    fn asked(&self, p: DVec3, ends: [(f64, f64); 2], floor: f64) -> (f64, f64) {
         let speed = self.speed(p);
         let [first, last] = ends;
         let mut best = if last.1 > first.1 { last } else { first };
@@ -154,7 +188,7 @@ impl Swept {
             let t: f64 = 0.5 * (a + b);
             let reach = 0.5 * (b - a) * speed;
             let at = self.local(p, t);
-            if self.solid.bounds(&Aabb::new(at - reach, at + reach)).hi <= best.1 {
+            if self.solid.bounds(&Aabb::new(at - reach, at + reach)).hi <= best.1.max(floor) {
                 continue;
             }
             let value = self.solid.value(at);
@@ -176,6 +210,32 @@ impl Swept {
             best = (top, self.at(p, top));
         }
         best
+    }
+
+    /// The largest between two places if all lies under the tangents there, as of concave functions, and whether it was found or is
+    /// not above `floor`: not if the slopes at both ends say that it lies beyond.
+    fn peak(&self, p: DVec3, [mut a, mut b]: [Rise; 2], floor: f64) -> ((f64, f64), bool) {
+        let mut best = if b.value > a.value { b } else { a };
+        let mut is_found = a.slope <= 0.0 && best.t == a.t || b.slope >= 0.0 && best.t == b.t;
+        let mut n = 0;
+        while a.slope > 0.0 && b.slope < 0.0 && n < SECTIONS {
+            let (width, bend) = (b.t - a.t, a.slope - b.slope);
+            let meet = (b.value - a.value - b.slope * width) / bend;
+            let top = a.value + a.slope * meet;
+            is_found = true;
+            if top <= floor.max(best.value + PEAK * self.size) {
+                break;
+            }
+            // Smooth ones peak where the slope would be none if it changed evenly, others where the tangents meet.
+            let step = if n % 2 == 0 { width * a.slope / bend } else { meet };
+            let c = self.rise(p, a.t + step.clamp(0.0, width));
+            if c.value > best.value {
+                best = c;
+            }
+            *(if c.slope > 0.0 { &mut a } else { &mut b }) = c;
+            n += 1;
+        }
+        ((best.t, best.value), is_found)
     }
 
     /// How far a distance may be off; far from the surface nobody asks for more.
@@ -205,14 +265,24 @@ impl Swept {
     }
 }
 
+impl Rival for Swept {
+    fn value_above(&self, p: DVec3, floor: f64) -> f64 {
+        self.nearest(p, floor).1
+    }
+
+    fn has_bounds_of_distance(&self) -> bool {
+        self.search != Search::Any
+    }
+}
+
 impl Field for Swept {
     fn value(&self, p: DVec3) -> f64 {
-        self.nearest(p).1
+        self.value_above(p, f64::NEG_INFINITY)
     }
 
     /// That of the nearest pose: it does not change the largest value to first order.
     fn value_gradient(&self, p: DVec3) -> (f64, DVec3) {
-        let (t, _) = self.nearest(p);
+        let (t, _) = self.nearest(p, f64::NEG_INFINITY);
         let (value, gradient) = self.solid.value_gradient(self.local(p, t));
         (value, self.turn(t) * gradient)
     }
