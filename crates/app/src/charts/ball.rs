@@ -9,7 +9,7 @@ use bspline::hierarchical::{BrickKey, DenseCorrections, Lattice, LevelEdit};
 use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 
-/// Cells of level 0 on an axis of the box.
+/// Cells of level 0 on an axis of the box, mostly.
 pub(super) const CELLS: u32 = 32;
 /// Radius of the ball in edges of the box.
 const RADIUS: f64 = 0.36;
@@ -20,29 +20,36 @@ const BAND: f64 = 2.0;
 pub(super) struct Ball {
     pub field: HierarchicalSpline<f32>,
     pub level: usize,
+    cells: u32,
 }
 
 impl Ball {
-    /// Distance to a ball on level 0; small waves near its surface on `depth` finer levels.
+    /// One of so many levels above the first.
     pub fn new(depth: u32) -> Self {
+        Self::of(CELLS, depth)
+    }
+
+    /// Distance to a ball on level 0, of so many cells on an axis; small waves near its surface on `depth` finer levels.
+    pub fn of(cells: u32, depth: u32) -> Self {
         let lattice = Lattice {
             world_from_lattice: DAffine3::IDENTITY,
-            cells: [CELLS; 3],
+            cells: [cells; 3],
         };
         let levels = (0..=depth).map(|level| {
-            let n = CELLS << level;
+            let n = cells << level;
             let bricks = (n + 2) / 8 + 1;
             let keys = (0..bricks).into_par_iter().flat_map_iter(|x| {
                 (0..bricks).flat_map(move |y| (0..bricks).map(move |z| BrickKey([x, y, z])))
             });
             let full: Vec<_> = keys
-                .filter_map(|key| Some((key, Arc::new(brick(level, key)?.pack()))))
+                .filter_map(|key| Some((key, Arc::new(brick(n, level, key)?.pack()))))
                 .collect();
             full.into_iter().collect()
         });
         Self {
             field: HierarchicalSpline::from_corrections(lattice, 1.0, levels.collect()),
             level: depth as usize,
+            cells,
         }
     }
 
@@ -63,23 +70,28 @@ impl Ball {
 
     /// Where a stroke along the surface is after `i` steps of one finest interval each.
     pub fn stroke(&self, i: usize) -> DVec3 {
-        let turn = 0.4 + i as f64 * self.cell() / (RADIUS * f64::from(CELLS));
+        let turn = 0.4 + i as f64 * self.cell() / (RADIUS * f64::from(self.cells));
         let (u, v) = (DVec3::new(0.8, 0.0, 0.6), DVec3::new(0.36, 0.8, -0.48));
-        on_ball(libm::cos(turn) * u + libm::sin(turn) * v)
+        self.on_ball(libm::cos(turn) * u + libm::sin(turn) * v)
     }
 
     /// Point number `i` of a sequence that covers the surface evenly: steps of the plastic number \[Roberts18\].
-    pub fn scattered(i: usize) -> DVec3 {
+    pub fn scattered(&self, i: usize) -> DVec3 {
         let [a, b] = [0.754_877_666_25, 0.569_840_290_998].map(|step| (i as f64 * step).fract());
         let (z, turn) = (2.0 * a - 1.0, std::f64::consts::TAU * b);
         let r = (1.0 - z * z).sqrt();
-        on_ball(DVec3::new(r * libm::cos(turn), r * libm::sin(turn), z))
+        self.on_ball(DVec3::new(r * libm::cos(turn), r * libm::sin(turn), z))
     }
 
     /// Diagonal of the box round it.
     #[cfg(feature = "window")]
-    pub fn diagonal() -> f64 {
-        2.0 * RADIUS * f64::from(CELLS) * 3f64.sqrt()
+    pub fn diagonal(&self) -> f64 {
+        2.0 * RADIUS * f64::from(self.cells) * 3f64.sqrt()
+    }
+
+    fn on_ball(&self, direction: DVec3) -> DVec3 {
+        let edge = f64::from(self.cells);
+        DVec3::splat(0.5 * edge) + RADIUS * edge * direction
     }
 
     /// Width of a cell of the finest level.
@@ -88,14 +100,8 @@ impl Ball {
     }
 }
 
-fn on_ball(direction: DVec3) -> DVec3 {
-    let edge = f64::from(CELLS);
-    DVec3::splat(0.5 * edge) + RADIUS * edge * direction
-}
-
-/// Functions of one brick of the ball; none if there are none.
-fn brick(level: u32, key: BrickKey) -> Option<DenseCorrections<f32>> {
-    let n = CELLS << level;
+/// Functions of one brick of a level of `n` cells; none if there are none.
+fn brick(n: u32, level: u32, key: BrickKey) -> Option<DenseCorrections<f32>> {
     let (middle, radius) = (DVec3::splat(f64::from(n) / 2.0), RADIUS * f64::from(n));
     let height = |knot: DVec3| radius - (knot - middle).length();
     let centre = DVec3::from_array(key.0.map(|k| f64::from(8 * k) + 2.5));

@@ -72,7 +72,7 @@ fn measure(ball: &Ball) -> Result<EditCosts, PolygonizeError> {
         change: Change::Add(vec![0.001 * ball.cell() as f32; 24 * 24 * 24]),
     };
     let one = |i: usize| field.edited(&[edit(ball.stroke(i))]).expect(OF_LATTICE);
-    let scattered: Vec<_> = (0..10_000).map(|i| edit(Ball::scattered(i))).collect();
+    let scattered: Vec<_> = (0..10_000).map(|i| edit(ball.scattered(i))).collect();
     // The first hash is that of the whole field.
     black_box(field.sha256());
     let edited: Vec<_> = (0..50).map(one).collect();

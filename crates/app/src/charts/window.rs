@@ -12,13 +12,13 @@ use glam::{DAffine3, DVec2, DVec3};
 use serde_json::{Map, Value};
 use tools::live::Pose;
 
-use super::ball::{Ball, median, middle};
+use super::ball::{Ball, CELLS, median, middle};
 use super::{Chart, Series};
 use crate::view::{BUDGET, Camera, Canvas, Card, LINE, Look, Mode, Paper, Patch, SKY, Shape, Show, Solid};
 use crate::window::tool::{Kind, Settings, Start, Tool};
 
-/// Finest levels of the balls.
-const DEPTHS: [u32; 3] = [2, 3, 4];
+/// Cells of the balls, and their finest levels; the third has a million coefficients.
+const BALLS: [(u32, u32); 4] = [(CELLS, 2), (CELLS, 3), (41, 3), (CELLS, 4)];
 /// Pixels of a whole picture; a rough one has fewer along each side.
 const SIZE: [u32; 2] = [1280, 720];
 /// Dabs of which the median is taken, and steps of each stroke.
@@ -46,7 +46,7 @@ impl WindowCosts {
     }
 }
 
-/// Measures balls of three sizes on a card; `go_on` is told of each before it is made. None if it says to stop.
+/// Measures balls of several sizes on a card; `go_on` is told of each before it is made. None if it says to stop.
 ///
 /// # Errors
 /// What the card, the mesher or a tool has against a ball.
@@ -55,11 +55,11 @@ pub fn window_costs(
     mut go_on: impl FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Option<Vec<WindowCosts>>, String> {
     let mut all = Vec::new();
-    for (n, depth) in DEPTHS.into_iter().enumerate() {
-        if go_on(n as f64 / DEPTHS.len() as f64).is_break() {
+    for (n, (cells, depth)) in BALLS.into_iter().enumerate() {
+        if go_on(n as f64 / BALLS.len() as f64).is_break() {
             return Ok(None);
         }
-        all.push(measure(card, &Ball::new(depth))?);
+        all.push(measure(card, &Ball::of(cells, depth))?);
     }
     Ok(Some(all))
 }
@@ -230,11 +230,11 @@ struct Stroke {
 
 impl Stroke {
     fn begin(ball: &Ball, state: &State, n: usize) -> Result<Self, String> {
-        let at = Ball::scattered(n);
+        let at = ball.scattered(n);
         let normal = -ball.field.value_gradient(at).1.normalize();
         let tool = Tool {
             kind: Kind::Add,
-            radius: RADIUS * Ball::diagonal(),
+            radius: RADIUS * ball.diagonal(),
             strength: 0.5,
             inverted: false,
             settings: Settings::default(),

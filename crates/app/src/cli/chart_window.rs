@@ -22,7 +22,7 @@ pub struct Args {
     pub json: bool,
 }
 
-/// Measures what the window shows of fields of three sizes, prints a line of JSON each, and draws them.
+/// Measures what the window shows of fields of several sizes, prints a line of JSON each, and draws them.
 pub fn run(args: &Args, cancel: &Cancel) -> Outcome {
     let mut staged = StagedFiles::new("-o", &args.output)?;
     let card = Card::open().map_err(Failure::limit)?;

@@ -244,17 +244,16 @@ fn choice<T: Copy + PartialEq>(ui: &mut Ui, name: &str, value: &mut T, all: &[(T
 }
 
 fn clipping(ui: &mut Ui, bench: &mut Bench) {
-    let Some((at, normal)) = bench.look.cut else {
+    let Some(mut height) = bench.plane_height() else {
         return;
     };
     let unit = bench.chosen().map_or("", |thing| thing.unit);
-    let (center, radius) = bench.scene;
-    let mut height = (at - center).dot(normal);
+    let radius = bench.scene.1;
     let label = ui.label("Clipping plane");
     let slider = Slider::new(&mut height, -radius..=radius)
         .custom_formatter(|n, _| human_number(n))
         .suffix(format!(" {unit}"));
     if ui.add(slider).labelled_by(label.id).changed() {
-        bench.look.cut = Some((center + height * normal, normal));
+        bench.set_plane_height(height);
     }
 }

@@ -358,6 +358,19 @@ impl Bench {
         self.density_of = Some(thing.name.clone());
     }
 
+    /// Height of the clipping plane above the middle of the scene.
+    pub fn plane_height(&self) -> Option<f64> {
+        self.look.cut.map(|(at, normal)| (at - self.scene.0).dot(normal))
+    }
+
+    /// Moves the clipping plane to a height, within the scene.
+    pub fn set_plane_height(&mut self, height: f64) {
+        let (center, radius) = self.scene;
+        if let Some((at, normal)) = &mut self.look.cut {
+            *at = center + height.clamp(-radius, radius) * *normal;
+        }
+    }
+
     /// Looks at the whole scene.
     pub fn frame_all(&mut self) {
         let (center, radius) = self.scene;

@@ -63,6 +63,8 @@ pub struct Modeler {
     tried: Option<(egui::Pos2, Tool)>,
     /// When something moved last that no button held: a turn of the view is over as the button comes up.
     moved: Instant,
+    /// Whether the wheel moves the clipping plane.
+    moves_plane: bool,
     desk: Option<JoinHandle<()>>,
     /// How things are looked at, as it is written in a directory.
     kept: Kept,
@@ -223,6 +225,7 @@ impl Modeler {
             lassoed: (Vec::new(), false),
             tried: None,
             moved: Instant::now(),
+            moves_plane: false,
             desk: Some(desk),
             kept,
             home,

@@ -76,7 +76,8 @@ impl Chain {
 
 impl Field for Chain {
     fn value(&self, p: DVec3) -> f64 {
-        self.largest(p, 0.0, |leg, floor| leg.solid.value_above(p, floor)).1
+        self.largest(p, 0.0, |leg, floor| leg.solid.value_above(p, floor))
+            .1
     }
 
     fn value_gradient(&self, p: DVec3) -> (f64, DVec3) {

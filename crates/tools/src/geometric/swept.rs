@@ -320,3 +320,66 @@ impl Field for Swept {
         Interval::point(value).widened(0.5 * b.size().length() + self.slack(value))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use bspline::primitives::{Cuboid, Cylinder, Torus};
+
+    use super::*;
+
+    /// Against the largest of 4000 poses; and a floor only spares work.
+    #[test]
+    fn the_nearest_pose_is_found() {
+        let half = DVec3::new(1.0, 0.6, 0.3);
+        let ends = DVec3::Z * 0.7;
+        let solids: [(Arc<dyn Field>, f64, bool); 3] = [
+            (
+                Arc::new(Cuboid::new(DVec3::ZERO, half).unwrap()),
+                half.length(),
+                true,
+            ),
+            (Arc::new(Cylinder::new(-ends, ends, 0.5).unwrap()), 0.9, true),
+            (
+                Arc::new(Torus::new(DVec3::ZERO, DVec3::X, 0.8, 0.3).unwrap()),
+                1.1,
+                false,
+            ),
+        ];
+        let mut drawn = 1u64;
+        let mut draw = || {
+            drawn = drawn.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            f64::from((drawn >> 32) as u32) / 2f64.powi(31) - 1.0
+        };
+        let mut worst = 0.0_f64;
+        for round in 0..120 {
+            let (solid, size, is_convex) = solids[round % 3].clone();
+            let mut pose = |turns: f64| Pose {
+                at: DVec3::new(draw(), draw(), draw()) * 2.0,
+                turn: DQuat::from_scaled_axis(DVec3::new(draw(), draw(), draw()) * turns),
+            };
+            let (from, mut to) = (pose(2.0), pose(2.0));
+            if round % 2 == 0 {
+                to.turn = from.turn;
+            }
+            let swept = Swept::new(solid, size, [from, to], Search::Distance { is_convex });
+            for _ in 0..20 {
+                let p = DVec3::new(draw(), draw(), draw()) * 3.0;
+                let value = swept.value(p);
+                let most = (0..=4000).map(|i| swept.at(p, f64::from(i) / 4000.0));
+                let most = most.fold(f64::NEG_INFINITY, f64::max);
+                let bound = PEAK * size
+                    + if is_convex && round % 2 == 0 {
+                        0.0
+                    } else {
+                        swept.slack(most)
+                    };
+                worst = worst.max((most - value) / size);
+                assert!(most - value <= bound, "{round}: {value} for {most} at {p}");
+                assert!(swept.bounds(&Aabb::new(p, p)).hi >= most - 1e-12);
+                assert!(swept.value_above(p, value - 1e-3) > value - 1e-3);
+                assert!(swept.value_above(p, value + bound) <= value + bound);
+            }
+        }
+        println!("{worst:.2e} of the size");
+    }
+}

@@ -14,6 +14,9 @@ use crate::window::orders::Order;
 use crate::window::pace::Pace;
 use crate::window::tool::{Kind, Tool, Use};
 
+/// Way of the clipping plane for a point of the wheel, over the radius of the scene.
+const PLANE: f64 = 4e-4;
+
 impl Modeler {
     pub(super) fn end_gesture(&mut self) {
         self.drawn.clear();
@@ -64,8 +67,21 @@ impl Modeler {
             (i.modifiers, i.smooth_scroll_delta().y, pressed)
         });
         if response.hovered() && scroll != 0.0 {
-            let factor = (-0.003 * f64::from(scroll)).exp();
-            self.bench.look.camera.zoom(factor, at(rect, over));
+            // It goes on a while after its last notch, and means the same.
+            let notch = ui.input(|i| {
+                i.events.iter().rev().find_map(|e| match e {
+                    egui::Event::MouseWheel { modifiers, .. } => Some(modifiers.alt),
+                    _ => None,
+                })
+            });
+            self.moves_plane = notch.unwrap_or(self.moves_plane);
+            if let (true, Some(height)) = (self.moves_plane, self.bench.plane_height()) {
+                let by = PLANE * f64::from(scroll) * self.bench.scene.1;
+                self.bench.set_plane_height(height + by);
+            } else {
+                let factor = (-0.003 * f64::from(scroll)).exp();
+                self.bench.look.camera.zoom(factor, at(rect, over));
+            }
             self.moved = Instant::now();
         }
         let tool = self.bench.tool_in_hand(keys);

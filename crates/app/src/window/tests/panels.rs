@@ -116,6 +116,21 @@ fn what_is_only_seen_is_no_edit() {
     let bench = window.state().bench();
     let (at, normal) = bench.look.cut.unwrap();
     assert!(((at - bench.scene.0).dot(normal) - 3.0).abs() < 1e-9, "{at}");
+    // The wheel with Alt takes it toward the eye, which stays.
+    let away = bench.look.camera.distance();
+    let over = middle(&window);
+    window.hover_at(over);
+    window.event(egui::Event::MouseWheel {
+        unit: egui::MouseWheelUnit::Line,
+        delta: egui::vec2(0.0, 2.0),
+        phase: egui::TouchPhase::Move,
+        source: egui::MouseWheelSource::Wheel,
+        modifiers: egui::Modifiers::ALT,
+    });
+    window.run_steps(20);
+    let bench = window.state().bench();
+    assert!(bench.plane_height().unwrap() > 3.1, "{:?}", bench.plane_height());
+    assert_eq!(bench.look.camera.distance(), away);
     let sheet = bench.sheet.clone().unwrap();
     assert_eq!((sheet.history.len(), sheet.done), (1, 1));
     assert_eq!(on_disk(&sheet, scratch.path()).state().sha256(), before);
