@@ -194,7 +194,10 @@ impl Canvas {
             Stage::First(rows) => rows as f32 / size[1] as f32,
             _ => 1.0,
         };
-        let is_first = is_rough || look.mode == Mode::Volume || matches!(sheet.stage, Stage::First(_));
+        // The second look begins with what the first left, and has nothing to show before.
+        let is_first = is_rough
+            || look.mode == Mode::Volume
+            || matches!(sheet.stage, Stage::First(_) | Stage::Second(0));
         let drawn = Drawn {
             picture: if is_first { &sheet.first } else { &sheet.last }.picture.clone(),
             rows,
