@@ -17,7 +17,7 @@ use glam::{DAffine3, DVec2, DVec3};
 
 use super::still::easel;
 use super::{
-    BUDGET, Camera, Canvas, Card, Look, MESH, Manner, Mode, Paper, SKY, Shape, Show, Solid, pick, still,
+    BUDGET, Camera, Canvas, Card, Look, MESH, Manner, Mode, Paper, SKY, Shape, Show, Solid, pick, read, still,
 };
 use crate::picture::{Drawing, Scene, Surface, View, clay, depths};
 
@@ -232,6 +232,35 @@ fn rays_show_the_field_itself() {
     }
 }
 
+/// Strip by strip, before the second look and in it, nothing is shown that was not drawn: neither clay nor sky is black.
+#[test]
+fn whole_pictures_are_never_black_on_the_way() {
+    let Some(card) = card("strips") else { return };
+    let meta = FieldMeta {
+        iso: Some(0.0),
+        ..FieldMeta::default()
+    };
+    let (mut canvas, look) = on_canvas(&card, &Object::of(solid().into(), meta));
+    let look = Look {
+        mode: Mode::Rays,
+        ..look
+    };
+    for count in 1.. {
+        let drawn = canvas.draw(&look, SIZE.map(|n| n as u32), false);
+        let bytes = read::bytes(&card.device, &card.queue, &drawn.picture).unwrap();
+        let pixels = (drawn.rows * SIZE[1] as f32) as usize * SIZE[0];
+        let black = bytes.chunks_exact(4).take(pixels).position(|p| p[..3] == [0; 3]);
+        assert_eq!(black, None, "call {count}, {} of the rows", drawn.rows);
+        if drawn.is_done {
+            assert!(count > 4, "{count} calls");
+            break;
+        }
+        let _ = card
+            .device
+            .poll(eframe::egui_wgpu::wgpu::PollType::wait_indefinitely());
+    }
+}
+
 /// With room for a few bricks alone all of the solid is there, only coarser; with room for all it is as fine as it is.
 #[test]
 fn bricks_without_room_are_drawn_coarser() {
@@ -421,7 +450,7 @@ fn write(path: &std::path::Path, pixels: &[u8]) {
     encoder.write_header().unwrap().write_image_data(pixels).unwrap();
 }
 
-fn read(path: &std::path::Path) -> Vec<u8> {
+fn recorded(path: &std::path::Path) -> Vec<u8> {
     let file = std::fs::File::open(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     let mut reader = png::Decoder::new(std::io::BufReader::new(file))
         .read_info()
