@@ -1,6 +1,7 @@
 //! Asks for a file: by the system's own dialog, or by its path where there is none.
 
-use std::path::PathBuf;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, channel};
 
 use egui::text::{CCursor, CCursorRange};
@@ -29,6 +30,9 @@ pub struct PathBox {
     chosen: Option<Receiver<Option<PathBuf>>>,
     is_new: bool,
 }
+
+/// Endings of what is written.
+const ENDINGS: [&str; 8] = ["3mf", "glb", "iclay", "isoclay", "jsonl", "obj", "ply", "stl"];
 
 impl PathBox {
     /// For one to open.
@@ -116,16 +120,30 @@ impl PathBox {
         )
     }
 
-    /// The file that is named; `~` is the home directory, and documents and scripts get their endings.
+    /// The file that is named; `~` is the home directory, and documents and scripts get their endings,
+    /// and an ending that is typed before the one that was offered takes its place.
     fn path(&self) -> PathBuf {
         let text = self.text.trim();
         let path = match (text.strip_prefix("~/"), etcetera::home_dir()) {
             (Some(rest), Ok(home)) => home.join(rest),
             _ => text.into(),
         };
-        match (self.purpose, path.extension()) {
-            (Purpose::Save, None) => path.with_extension("isoclay"),
-            (Purpose::SaveScript, None) => path.with_extension("jsonl"),
+        let offered = match self.purpose {
+            Purpose::Save => "isoclay",
+            Purpose::SaveScript => "jsonl",
+            Purpose::Export => "stl",
+            Purpose::Open | Purpose::OpenPart | Purpose::RunScript => return path,
+        };
+        let is_typed = |stem: &OsStr| {
+            let ending = Path::new(stem).extension();
+            ending.is_some_and(|e| ENDINGS.iter().any(|known| e.eq_ignore_ascii_case(known)))
+        };
+        match path.extension() {
+            None if self.purpose != Purpose::Export => path.with_extension(offered),
+            // Another one was typed before it.
+            Some(ending) if ending == offered && path.file_stem().is_some_and(is_typed) => {
+                path.with_extension("")
+            }
             _ => path,
         }
     }
@@ -269,5 +287,27 @@ fn order(asks: &PathBox) -> Order {
             scan: asks.wishes.scan(),
             of_mesh: asks.wishes.of_mesh(),
         },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_ending_that_is_typed_takes_the_place_of_the_offered_one() {
+        for (purpose, text, path) in [
+            (Purpose::Export, "mine.3mf.stl", "mine.3mf"),
+            (Purpose::Export, "mine.PLY.stl", "mine.PLY"),
+            (Purpose::Export, "mine.stl", "mine.stl"),
+            (Purpose::Export, "mine.v2.stl", "mine.v2.stl"),
+            (Purpose::Export, "mine.stl.gz", "mine.stl.gz"),
+            (Purpose::Save, "mine", "mine.isoclay"),
+            (Purpose::Save, "mine.isoclay.isoclay", "mine.isoclay"),
+            (Purpose::Open, "mine.3mf.stl", "mine.3mf.stl"),
+        ] {
+            let asks = PathBox::new(purpose, text.into());
+            assert_eq!(asks.path(), PathBuf::from(path), "{text}");
+        }
     }
 }
