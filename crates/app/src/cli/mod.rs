@@ -42,7 +42,7 @@ pub mod interrupt;
 mod keep;
 mod mesh;
 mod mesh_check;
-mod mesh_output;
+pub mod mesh_output;
 #[cfg(feature = "window")]
 mod open;
 mod output;

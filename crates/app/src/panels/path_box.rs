@@ -7,6 +7,7 @@ use std::sync::mpsc::{Receiver, channel};
 use egui::text::{CCursor, CCursorRange};
 
 use super::Wishes;
+use crate::cli::mesh_output::MESHES;
 use crate::window::Bench;
 use crate::window::orders::{Order, Sheet};
 
@@ -31,8 +32,8 @@ pub struct PathBox {
     is_new: bool,
 }
 
-/// Endings of what is written.
-const ENDINGS: [&str; 8] = ["3mf", "glb", "iclay", "isoclay", "jsonl", "obj", "ply", "stl"];
+/// Endings of what is written beside meshes.
+const ENDINGS: [&str; 3] = ["iclay", "isoclay", "jsonl"];
 
 impl PathBox {
     /// For one to open.
@@ -136,7 +137,12 @@ impl PathBox {
         };
         let is_typed = |stem: &OsStr| {
             let ending = Path::new(stem).extension();
-            ending.is_some_and(|e| ENDINGS.iter().any(|known| e.eq_ignore_ascii_case(known)))
+            ending.is_some_and(|e| {
+                MESHES
+                    .iter()
+                    .chain(&ENDINGS)
+                    .any(|known| e.eq_ignore_ascii_case(known))
+            })
         };
         match path.extension() {
             None if self.purpose != Purpose::Export => path.with_extension(offered),
@@ -299,6 +305,7 @@ mod tests {
         for (purpose, text, path) in [
             (Purpose::Export, "mine.3mf.stl", "mine.3mf"),
             (Purpose::Export, "mine.PLY.stl", "mine.PLY"),
+            (Purpose::Export, "mine.wrl.stl", "mine.wrl"),
             (Purpose::Export, "mine.stl", "mine.stl"),
             (Purpose::Export, "mine.v2.stl", "mine.v2.stl"),
             (Purpose::Export, "mine.stl.gz", "mine.stl.gz"),

@@ -145,10 +145,10 @@ impl Swept {
         let [first, last] = ends;
         let mut best = if last.1 > first.1 { last } else { first };
         let mut around = (first.0, last.0);
-        let top = |a: (f64, f64), b: (f64, f64)| 0.5 * (a.1 + b.1 + speed * (b.0 - a.0));
         let mut open = vec![(first, last)];
         while let Some((a, b)) = open.pop() {
-            if top(a, b) <= floor.max(best.1 + self.slack(best.1)) {
+            let top = 0.5 * (a.1 + b.1 + speed * (b.0 - a.0));
+            if top <= floor.max(best.1 + self.slack(best.1)) {
                 continue;
             }
             let t = (0.5 * (a.0 + b.0) + 0.5 * (b.1 - a.1) / speed).clamp(a.0, b.0);
