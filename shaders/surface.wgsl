@@ -16,6 +16,7 @@ struct Scene {
   picture: vec4<f32>,
   // Densities that are black and white; nothing.
   density: vec4<f32>,
+  world_from_clip: mat4x4<f32>,
 };
 
 // The sun comes after the most lights that the sky can have.
@@ -29,7 +30,10 @@ struct Lights {
 
 @group(0) @binding(0) var<uniform> scene: Scene;
 @group(0) @binding(1) var<uniform> lights: Lights;
-// Depths of what each light sees.
+// The light of each pixel of a picture, and how far its surface is.
+@group(1) @binding(0) var light_there: texture_2d<f32>;
+@group(1) @binding(1) var depth_there: texture_depth_2d;
+// Depths of what each light sees, where the light is not known yet.
 @group(1) @binding(0) var sky: texture_depth_2d_array;
 @group(1) @binding(1) var sun: texture_depth_2d;
 
@@ -137,13 +141,26 @@ fn is_cut(at: vec3<f32>) -> bool {
   return scene.cut_normal.w > 0.5 && dot(at - scene.cut_at.xyz, scene.cut_normal.xyz) > 0.0;
 }
 
-// The light that reaches a place, and all of the light, darker in hollows.
+// The light that reaches a place: of its own pixel, or, where another surface has that, of the one beside whose depth is like its.
 fn light_at(in: Seen) -> f32 {
-  let n = normalize(in.normal);
-  let facing = max(dot(n, lights.way[SUN].xyz), 0.0);
-  return 0.05 + from_sky(in.at, n) + 0.95 * facing * from_sun(in.at, n);
+  let own = vec2<i32>(in.clip.xy);
+  var pixel = own;
+  var off = abs(textureLoad(depth_there, own, 0) - in.clip.z);
+  if (off > 0.5 * fwidth(in.clip.z) + 1e-6) {
+    for (var n = 0; n < 8; n += 1) {
+      let place = n + select(0, 1, n >= 4);
+      let beside = own + vec2(place % 3 - 1, place / 3 - 1);
+      let there = abs(textureLoad(depth_there, beside, 0) - in.clip.z);
+      if (there < off) {
+        off = there;
+        pixel = beside;
+      }
+    }
+  }
+  return textureLoad(light_there, pixel, 0).r;
 }
 
+// All of the light, darker in hollows.
 fn all_light(in: Seen) -> f32 {
   let n = normalize(in.normal);
   let facing = max(dot(n, lights.way[SUN].xyz), 0.0);

@@ -66,7 +66,7 @@ pub enum Shape {
 /// Names that a volume can be written under.
 pub const VOLUMES: [&str; 5] = ["nii", "nii.gz", "nrrd", "mha", "vti"];
 /// Names that a cloud can be written under.
-const CLOUDS: [&str; 8] = ["ply", "xyz", "xyzn", "txt", "pcd", "las", "laz", "e57"];
+pub const CLOUDS: [&str; 8] = ["ply", "xyz", "xyzn", "txt", "pcd", "las", "laz", "e57"];
 
 /// All of these, each once.
 fn output_formats() -> PossibleValuesParser {

@@ -76,7 +76,9 @@ pub fn fit(
         if let Some(Memory(most)) = memory {
             arguments.extend(["--memory".into(), most.to_string().into()]);
         }
-        command("fit", &arguments, cancel, scratch.path(), show)?;
+        // What is waited for is not done aside.
+        let is_aside = !options.iter().any(|option| option == "--coarse");
+        command("fit", &arguments, cancel, is_aside, scratch.path(), show)?;
         of_field(&field, Some(scan))
     });
     fitted.map_err(|e| e.to_string())
@@ -149,7 +151,7 @@ pub fn export(
             "mesh"
         }
     };
-    let done = scratch("the export").and_then(|s| command(name, &arguments, cancel, s.path(), show));
+    let done = scratch("the export").and_then(|s| command(name, &arguments, cancel, true, s.path(), show));
     done.map_err(|e| e.to_string())
 }
 
@@ -158,6 +160,7 @@ fn command(
     name: &str,
     arguments: &[OsString],
     cancel: &Cancel,
+    is_aside: bool,
     scratch: &Path,
     show: Show<'_>,
 ) -> Outcome<Map<String, Value>> {
@@ -165,6 +168,7 @@ fn command(
         cancel,
         deadline: None,
         scratch,
+        is_aside,
     };
     ask(name, arguments, &bounds, show)
         .said

@@ -21,7 +21,7 @@ mod charts;
 mod check;
 mod coarse;
 mod compare;
-mod convert;
+pub mod convert;
 pub mod cost;
 #[cfg(feature = "window")]
 pub mod desk_files;

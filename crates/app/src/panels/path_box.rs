@@ -1,12 +1,13 @@
 //! Asks for a file: by the system's own dialog, or by its path where there is none.
 
 use std::ffi::OsStr;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, channel};
 
 use egui::text::{CCursor, CCursorRange};
 
 use super::Wishes;
+use crate::cli::convert::{CLOUDS, VOLUMES};
 use crate::cli::mesh_output::MESHES;
 use crate::window::Bench;
 use crate::window::orders::{Order, Sheet};
@@ -32,7 +33,7 @@ pub struct PathBox {
     is_new: bool,
 }
 
-/// Endings of what is written beside meshes.
+/// Endings of what is written beside meshes and scans.
 const ENDINGS: [&str; 3] = ["iclay", "isoclay", "jsonl"];
 
 impl PathBox {
@@ -136,13 +137,9 @@ impl PathBox {
             Purpose::Open | Purpose::OpenPart | Purpose::RunScript => return path,
         };
         let is_typed = |stem: &OsStr| {
-            let ending = Path::new(stem).extension();
-            ending.is_some_and(|e| {
-                MESHES
-                    .iter()
-                    .chain(&ENDINGS)
-                    .any(|known| e.eq_ignore_ascii_case(known))
-            })
+            let stem = stem.to_string_lossy().to_ascii_lowercase();
+            let mut known = MESHES.iter().chain(&CLOUDS).chain(&VOLUMES).chain(&ENDINGS);
+            known.any(|known| stem.strip_suffix(known).is_some_and(|name| name.ends_with('.')))
         };
         match path.extension() {
             None if self.purpose != Purpose::Export => path.with_extension(offered),
@@ -306,6 +303,8 @@ mod tests {
             (Purpose::Export, "mine.3mf.stl", "mine.3mf"),
             (Purpose::Export, "mine.PLY.stl", "mine.PLY"),
             (Purpose::Export, "mine.wrl.stl", "mine.wrl"),
+            (Purpose::Export, "mine.nii.gz.stl", "mine.nii.gz"),
+            (Purpose::Export, "mine.las.stl", "mine.las"),
             (Purpose::Export, "mine.stl", "mine.stl"),
             (Purpose::Export, "mine.v2.stl", "mine.v2.stl"),
             (Purpose::Export, "mine.stl.gz", "mine.stl.gz"),

@@ -31,6 +31,7 @@ impl Tinted {
             part: patch.part,
             vertices: vertices.map(|(v, paint)| Vertex { paint, ..*v }).collect(),
             indices: patch.indices.clone(),
+            rough: patch.rough.clone(),
         }
     }
 }
@@ -162,7 +163,7 @@ impl Canvas {
             let clear = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
             let mut pass = self.pass(&mut encoder, textures, clear, wgpu::LoadOp::Clear(1.0));
             pass.set_pipeline(&self.overlay.brushes(0, 1).paint);
-            draw(self.visible().map(|(_, held)| held), &mut pass, 0);
+            draw(self.visible().map(|(_, held)| held), 0, &mut pass, 0);
         }
         self.queue.submit([encoder.finish()]);
     }

@@ -2,6 +2,7 @@
 
 use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 use eframe::egui_wgpu::wgpu::{self, util::DeviceExt};
@@ -10,6 +11,7 @@ use glam::{DMat4, DVec3};
 use super::beside::Tinted;
 use super::brush::{Brush, shadow};
 use super::cast::Cast;
+use super::light_pass::LightPass;
 use super::lights::{self, Axes, Lights};
 use super::overlay::{Lines, Overlay, edges};
 use super::rays::Solid;
@@ -96,13 +98,17 @@ struct Scene {
     paper: [[f32; 4]; 2],
     picture: [f32; 4],
     density: [f32; 4],
+    world_from_clip: [[f32; 4]; 4],
 }
 
 /// Triangles on the card.
 pub struct Held {
     vertices: wgpu::Buffer,
     indices: wgpu::Buffer,
-    count: u32,
+    /// Which of these are drawn while something moves, and where nothing does.
+    ranges: [Range<u32>; 2],
+    /// Whether no whole picture has shown them yet: what a stroke does is seen at once.
+    is_fresh: bool,
     /// The same, to be coloured otherwise and for their sides.
     pub(super) patch: Patch,
     pub(super) is_painted: bool,
@@ -110,6 +116,10 @@ pub struct Held {
 }
 
 impl Held {
+    fn range(&self, which: usize) -> Range<u32> {
+        self.ranges[which.max(usize::from(self.is_fresh))].clone()
+    }
+
     /// Sides of the triangles.
     pub fn wires(&self, device: &wgpu::Device) -> &Lines {
         self.wires.get_or_init(|| Lines::new(device, &edges(&self.patch)))
@@ -146,6 +156,7 @@ pub struct Canvas {
     maps: wgpu::Buffer,
     pub(super) bindings: wgpu::BindGroup,
     pub(super) lights: Lights,
+    light_pass: LightPass,
     /// Round which eye the maps of the sky were drawn, unless the triangles are others since.
     sky: Option<Axes>,
     shadow: wgpu::RenderPipeline,
@@ -214,10 +225,13 @@ impl Canvas {
         // As many as `shaders/rays.wgsl` reads.
         let can_cast = device.limits().max_storage_buffers_per_shader_stage >= 3;
         let layouts = [layout.clone(), looked_up.clone()];
+        let light_pass = LightPass::new(device, layouts.clone());
+        let lit = light_pass.layout();
         Self {
             cast: can_cast.then(|| Box::new(Cast::new(device, queue, layouts, bricks))),
-            brushes: [1, SAMPLES].map(|n| Brush::new(device, &shader, [&layout, &looked_up], n)),
-            overlay: Overlay::new(device, [layout.clone(), looked_up.clone()]),
+            brushes: [1, SAMPLES].map(|n| Brush::new(device, &shader, [&layout, lit], n)),
+            overlay: Overlay::new(device, [layout.clone(), lit.clone()]),
+            light_pass,
             tinted: None,
             hidden: BTreeSet::new(),
             aside: BTreeMap::new(),
@@ -312,7 +326,7 @@ impl Canvas {
     pub fn put(&mut self, patch: &Patch) {
         let key = (patch.object.clone(), patch.part);
         self.renew();
-        match patch.indices.is_empty() {
+        match patch.vertices.is_empty() {
             true => self.held.remove(&key),
             false => self.held.insert(key, self.hold(patch)),
         };
@@ -330,6 +344,8 @@ impl Canvas {
             .as_ref()
             .map(|tinted| tinted.patch(patch, self.origin));
         let shown = tinted.as_ref().unwrap_or(patch);
+        let [whole, rough] = [&patch.indices, &patch.rough].map(|indices| indices.len() as u32);
+        let (whole, rough) = (0..whole, whole..whole + rough);
         let buffer = |label, contents: &[u8], usage| {
             let contents = wgpu::util::BufferInitDescriptor {
                 label: Some(label),
@@ -346,10 +362,18 @@ impl Canvas {
             ),
             indices: buffer(
                 "indices",
-                bytemuck::cast_slice(&patch.indices),
+                bytemuck::cast_slice(&[&patch.indices[..], &patch.rough].concat()),
                 wgpu::BufferUsages::INDEX,
             ),
-            count: patch.indices.len() as u32,
+            ranges: [
+                if patch.rough.is_empty() {
+                    whole.clone()
+                } else {
+                    rough
+                },
+                whole,
+            ],
+            is_fresh: true,
             is_painted: shown.vertices.iter().any(|v| v.paint != 0.0),
             patch: patch.clone(),
             wires: OnceCell::new(),
@@ -358,7 +382,7 @@ impl Canvas {
 
     /// Triangles that it holds.
     pub fn triangles(&self) -> usize {
-        self.held.values().map(|held| held.count as usize / 3).sum()
+        self.held.values().map(|held| held.ranges[1].len() / 3).sum()
     }
 
     /// Bytes of them.
@@ -390,6 +414,9 @@ impl Canvas {
             // What is cut off would still throw its shadow.
             let is_lit = !is_rough && look.cut.is_none();
             self.paint(&target, look, which, is_lit, |_| true);
+            if !is_rough {
+                self.held.values_mut().for_each(|held| held.is_fresh = false);
+            }
         }
         let target = Target {
             drawn: Some(*look),
@@ -424,12 +451,15 @@ impl Canvas {
         is_lit: bool,
         shown: impl Fn(&str) -> bool,
     ) {
+        // What is looked through would still throw its shadow.
+        let is_lit = is_lit && self.overlay.around(look).is_none();
+        if is_lit {
+            self.light_pass.fit(target.size);
+        }
         let brush = &self.brushes[which];
         self.tell(look, target.size);
         let is_shared = self.paint_of(look) > 1.0;
         let around = self.overlay.around(look);
-        // What is looked through would still throw its shadow.
-        let is_lit = is_lit && around.is_none();
         let is_besides = is_shared || self.overlay.is_shown(look);
         let besides = is_besides.then(|| self.overlay.brushes(which, [1, SAMPLES][which]));
         let is_sky_old = self.sky.is_none();
@@ -441,9 +471,16 @@ impl Canvas {
                 pass.set_pipeline(&self.shadow);
                 pass.set_bind_group(0, &self.bindings, &[]);
                 match &self.shades {
-                    Some(shades) => draw([shades], pass, light),
-                    None => draw(self.visible().map(|(_, held)| held), pass, light),
+                    Some(shades) => draw([shades], 0, pass, light),
+                    None => draw(self.visible().map(|(_, held)| held), 0, pass, light),
                 }
+            });
+        }
+        if is_lit {
+            let from = [&self.bindings, &self.lights.bindings];
+            self.light_pass.draw(&mut encoder, from, |pass| {
+                let all = self.visible().filter(|(name, _)| shown(name));
+                draw(all.map(|(_, held)| held), which, pass, 0);
             });
         }
         let picture = target
@@ -483,8 +520,8 @@ impl Canvas {
                 None => [&brush.surface, &brush.lit],
             };
             pass.set_pipeline(if is_lit { lit } else { plain });
-            if is_lit {
-                pass.set_bind_group(1, &self.lights.bindings, &[]);
+            if let Some(light) = self.light_pass.bindings().filter(|_| is_lit) {
+                pass.set_bind_group(1, light, &[]);
             }
             let shown = || {
                 self.visible()
@@ -493,9 +530,9 @@ impl Canvas {
             };
             let (veiled, bare): (Vec<&Held>, Vec<&Held>) =
                 shown().partition(|held| around == Some(&held.patch.object));
-            draw(bare, &mut pass, 0);
+            draw(bare, which, &mut pass, 0);
             if around.is_some() {
-                draw(&self.overlay.veil, &mut pass, 0);
+                draw(&self.overlay.veil, which, &mut pass, 0);
             }
             if let Some(brushes) = besides {
                 self.overlay.draw(&mut pass, brushes, look, shown());
@@ -518,11 +555,12 @@ impl Canvas {
         let camera = &look.camera;
         let reach = self.radius + camera.center.distance(self.origin);
         let columns = |m: DMat4| m.as_mat4().to_cols_array_2d();
+        let clip_from_world = camera.clip_from_world(self.origin, reach, aspect);
         let [right, up, back] = camera.axes().map(|axis| axis.extend(0.0));
         let (cut_at, cut_normal) = look.cut.unwrap_or((DVec3::ZERO, DVec3::ZERO));
         let has_cut = f64::from(u8::from(look.cut.is_some()));
         Scene {
-            clip_from_world: columns(camera.clip_from_world(self.origin, reach, aspect)),
+            clip_from_world: columns(clip_from_world),
             axes: columns(DMat4::from_cols(right, up, back, glam::DVec4::W)),
             cut_at: (cut_at - self.origin).extend(0.0).as_vec4().to_array(),
             cut_normal: cut_normal.extend(has_cut).as_vec4().to_array(),
@@ -540,6 +578,7 @@ impl Canvas {
                 (camera.height / f64::from(size[1])) as f32,
             ],
             density: [look.density[0] as f32, look.density[1] as f32, 0.0, 0.0],
+            world_from_clip: columns(clip_from_world.inverse()),
         }
     }
 
@@ -644,11 +683,16 @@ impl Canvas {
     }
 }
 
-/// Draws triangles as a light, or whoever looks, sees them.
-pub fn draw<'a>(all: impl IntoIterator<Item = &'a Held>, pass: &mut wgpu::RenderPass<'_>, instance: u32) {
+/// Draws triangles, all (1) or those for where something moves (0), as a light, or whoever looks, sees them.
+pub fn draw<'a>(
+    all: impl IntoIterator<Item = &'a Held>,
+    which: usize,
+    pass: &mut wgpu::RenderPass<'_>,
+    instance: u32,
+) {
     for held in all {
         pass.set_vertex_buffer(0, held.vertices.slice(..));
         pass.set_index_buffer(held.indices.slice(..), wgpu::IndexFormat::Uint32);
-        pass.draw_indexed(0..held.count, 0, instance..instance + 1);
+        pass.draw_indexed(held.range(which), 0, instance..instance + 1);
     }
 }

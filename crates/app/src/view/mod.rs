@@ -8,6 +8,7 @@ mod card;
 mod cast;
 mod histogram;
 mod laid;
+mod light_pass;
 mod lights;
 mod overlay;
 mod pick;

@@ -1,23 +1,28 @@
 //! The triangles of an object, kept as it changes.
 
-use std::collections::BTreeMap;
+mod surface;
 
-use bspline::polygonize::{AdaptiveBlock, AdaptiveBlockMesh, AdaptiveOptions, Mesh, PolygonizeError};
-use bspline::{Aabb, Field, Frame, Jet};
+use std::collections::BTreeSet;
+use std::iter;
+
+use bspline::polygonize::PolygonizeError;
+use bspline::{Aabb, Field, Jet};
 use document::Object;
 use formats::field::SourceKind;
 use glam::{DAffine3, DVec3};
-use rayon::prelude::*;
-use tools::paint::{Substance, values};
+use tools::paint::Substance;
 
-/// Fewest cells along the longest side of the box that triangles begin with; there are fewer than twice as many.
-const CELLS: u32 = 24;
-/// Halvings of these, at most, and how many more than knots have: of a volume no cell is much finer than its voxels, tools add a level
+use self::surface::{Lying, Part, Surface, first_cells};
+
+/// Halvings of the first cells, at most, and how many more than knots have: of a volume no cell is much finer than its voxels, tools add a level
 /// or two to others.
 const DEPTH: usize = 6;
 const FINER: [usize; 2] = [1, 2];
 /// Chord error over the diagonal of the box: half a pixel where the box fills a screen.
 const ERROR: f64 = 8e-4;
+/// Most triangles while something moves, as long as their error is no more than [`ROUGHEST`]: two cores draw these 20 times a second.
+const MOVING: usize = 150_000;
+const ROUGHEST: f64 = 16.0 * ERROR;
 /// Radius of curvature, over the diagonal of the box, at which a hollow is half as dark as it can be.
 pub const HOLLOW: f64 = 0.02;
 
@@ -41,11 +46,13 @@ pub struct Patch {
     /// Whose.
     pub object: String,
     /// Which part.
-    pub part: [i32; 3],
+    pub part: Part,
     /// Corners.
     pub vertices: Vec<Vertex>,
     /// Three for each triangle.
     pub indices: Vec<u32>,
+    /// Three for each of a coarser surface, for where something moves; none where `indices` are few enough.
+    pub rough: Vec<u32>,
 }
 
 /// A field that was not asked yet.
@@ -57,16 +64,13 @@ pub const NOTHING: Jet = Jet {
 
 /// The triangles of an object.
 pub struct Shape {
-    mesh: AdaptiveBlockMesh,
+    whole: Surface,
+    /// Where these are many.
+    rough: Option<Surface>,
     object: Object,
-    world_box: Aabb,
+    iso: f64,
     world_from_object: DAffine3,
-    /// Of each part the blocks with triangles.
-    parts: BTreeMap<[i32; 3], BTreeMap<AdaptiveBlock, Made>>,
 }
-
-/// Corners and triangles of a block.
-type Made = (Vec<Vertex>, Vec<u32>);
 
 impl Shape {
     /// Of an object with an iso-value that stands at a place.
@@ -74,41 +78,19 @@ impl Shape {
     /// # Errors
     /// That the surface cannot be followed, such as for its size.
     pub fn new(object: &Object, iso: f64, world_from_object: DAffine3) -> Result<Self, PolygonizeError> {
-        Self::of_depth(object, iso, world_from_object, depth(object))
-    }
-
-    /// The same with so many halvings of the first cells, at most.
-    fn of_depth(
-        object: &Object,
-        iso: f64,
-        world_from_object: DAffine3,
-        depth: usize,
-    ) -> Result<Self, PolygonizeError> {
-        let world_box = object.field.world_box();
-        let size = world_box.size();
-        let edge = size.max_element() / f64::from(first_cells(object));
-        let cells = (size / edge).ceil().max(DVec3::ONE).to_array().map(|n| n as u32);
-        let options = AdaptiveOptions {
-            iso,
-            depth,
-            detection: depth - 1,
-            ..AdaptiveOptions::default()
-        };
-        let frame = Frame::over(&world_box, cells);
-        let field = object.field.as_field();
         Ok(Self {
-            mesh: AdaptiveBlockMesh::new(field, &frame, &options, ERROR * size.length(), false)?,
+            whole: Surface::new(object, iso, depth(object), ERROR)?,
+            rough: None,
             object: object.clone(),
-            world_box,
+            iso,
             world_from_object,
-            parts: BTreeMap::new(),
         })
     }
 
     /// Of its triangles, which are closed where the solid does not leave the field's box.
     pub fn area_and_volume(&self) -> [f64; 2] {
         let (mut area, mut volume) = (0.0, 0.0);
-        for (vertices, indices) in self.parts.values().flat_map(BTreeMap::values) {
+        for (vertices, indices) in self.whole.made() {
             for corners in indices.chunks_exact(3) {
                 let [a, b, c] =
                     [0, 1, 2].map(|n| glam::Vec3::from(vertices[corners[n] as usize].at).as_dvec3());
@@ -122,17 +104,30 @@ impl Shape {
 
     /// Whether it can follow to another state of its object.
     pub fn follows(&self, object: &Object, world_from_object: DAffine3) -> bool {
-        self.world_box == object.field.world_box()
+        self.object.field.world_box() == object.field.world_box()
             && self.object.iso() == object.iso()
             && self.world_from_object == world_from_object
     }
 
     /// All that is to be drawn of it.
     pub fn all(&mut self, name: &str, origin: DVec3) -> Vec<Patch> {
-        self.parts.clear();
-        let blocks = self.mesh.blocks();
-        self.renew(&blocks, origin);
-        self.parts.keys().map(|part| self.patch(name, *part)).collect()
+        let lying = Lying::new(&self.object, self.world_from_object, origin);
+        self.whole.renew_all(&lying);
+        self.rough = None;
+        let (mut count, mut error) = (self.whole.triangles(), ERROR);
+        while count > MOVING && error < ROUGHEST {
+            // Twice the error leaves a quarter of the triangles at the least; half of that way may do.
+            let halves = (count as f64 / MOVING as f64).log2().ceil().max(1.0);
+            error = (error * (0.5 * halves).exp2()).min(ROUGHEST);
+            // A solid that has no coarser ones is turned as it is.
+            let Ok(mut rough) = Surface::new(&self.object, self.iso, depth(&self.object), error) else {
+                break;
+            };
+            rough.renew_all(&lying);
+            count = rough.triangles();
+            self.rough = Some(rough);
+        }
+        self.whole.parts().map(|part| self.patch(name, part)).collect()
     }
 
     /// Follows its object; what is to be drawn anew.
@@ -145,109 +140,39 @@ impl Shape {
         object: &Object,
         origin: DVec3,
     ) -> Result<Vec<Patch>, PolygonizeError> {
-        let mut boxes = object.field.changed_boxes(&self.object.field);
-        let update = self.mesh.update(object.field.as_field(), &boxes)?;
+        let reshaped = object.field.changed_boxes(&self.object.field);
+        let mut boxes = reshaped.clone();
         boxes.extend(painted(&self.object, object));
+        boxes.retain(|b| b.min.cmple(b.max).all());
         self.object = object.clone();
-        let boxes: Vec<Aabb> = boxes.into_iter().filter(|b| b.min.cmple(b.max).all()).collect();
-        let mut stale = update.changed;
-        // Normals and paint are new there, even where triangles are not.
-        let kept = self.parts.values().flat_map(BTreeMap::keys);
-        stale.extend(kept.filter(|block| {
-            let b = self.block_box(block);
-            boxes
-                .iter()
-                .any(|c| b.min.cmple(c.max).all() && c.min.cmple(b.max).all())
-        }));
-        stale.sort_unstable();
-        stale.dedup();
-        self.renew(&stale, origin);
-        let mut parts: Vec<[i32; 3]> = stale.iter().map(part).collect();
-        parts.sort_unstable();
-        parts.dedup();
+        let lying = Lying::new(&self.object, self.world_from_object, origin);
+        let mut parts = BTreeSet::new();
+        for surface in iter::once(&mut self.whole).chain(&mut self.rough) {
+            parts.extend(surface.follow(&lying, &reshaped, &boxes)?);
+        }
         Ok(parts.into_iter().map(|part| self.patch(name, part)).collect())
     }
 
     /// A box round its surface, in the world.
     pub fn bounding_box(&self) -> Option<Aabb> {
-        let pieces = self
-            .mesh
-            .blocks()
-            .into_iter()
-            .filter_map(|block| self.mesh.piece(block));
-        let boxes = pieces.filter_map(|piece| piece.bounding_box());
-        let whole = boxes.reduce(Aabb::hull)?;
-        Some(whole.transformed(&self.world_from_object))
+        Some(self.whole.bounding_box()?.transformed(&self.world_from_object))
     }
 
-    /// A box round the triangles of a block, in the object's world.
-    fn block_box(&self, block: &AdaptiveBlock) -> Aabb {
-        let cell = self.world_box.size().max_element()
-            / f64::from(first_cells(&self.object))
-            / f64::from(1_u32 << block.level);
-        let min = self.world_box.min + 8.0 * cell * DVec3::from_array(block.block.map(f64::from));
-        Aabb::new(min, min + 8.0 * cell).widened(cell)
+    fn patch(&self, name: &str, part: Part) -> Patch {
+        patch(name, part, &self.whole, self.rough.as_ref())
     }
+}
 
-    /// Makes the corners and triangles of blocks anew.
-    fn renew(&mut self, blocks: &[AdaptiveBlock], origin: DVec3) {
-        let made: Vec<Made> = blocks.par_iter().map(|b| self.made(*b, origin)).collect();
-        for (block, made) in blocks.iter().zip(made) {
-            let of_part = self.parts.entry(part(block)).or_default();
-            match made.1.is_empty() {
-                true => of_part.remove(block),
-                false => of_part.insert(*block, made),
-            };
-        }
-    }
-
-    fn patch(&self, name: &str, part: [i32; 3]) -> Patch {
-        let (mut vertices, mut indices) = (Vec::new(), Vec::new());
-        for (corners, triangles) in self.parts.get(&part).into_iter().flat_map(BTreeMap::values) {
-            let first = vertices.len() as u32;
-            indices.extend(triangles.iter().map(|n| first + n));
-            vertices.extend_from_slice(corners);
-        }
-        Patch {
-            object: name.into(),
-            part,
-            vertices,
-            indices,
-        }
-    }
-
-    fn made(&self, block: AdaptiveBlock, origin: DVec3) -> Made {
-        let Some(Mesh {
-            positions: places,
-            triangles,
-            ..
-        }) = self.mesh.piece(block)
-        else {
-            return Made::default();
-        };
-        let mut jets = vec![NOTHING; places.len()];
-        self.object.field.as_field().jets(&places, &mut jets);
-        let hollow = HOLLOW * self.world_box.size().length();
-        let stiffness = values(&self.object.layers, Substance::Stiffness, &places);
-        let placed = self.world_from_object;
-        let normals = placed.matrix3.inverse().transpose();
-        let vertices = places.iter().zip(&jets).enumerate().map(|(n, (p, jet))| {
-            let steep = jet.gradient.length();
-            let normal = -jet.gradient / steep.max(f64::MIN_POSITIVE);
-            // Twice the mean curvature: div n.
-            let h = &jet.hessian;
-            let trace = h.x_axis.x + h.y_axis.y + h.z_axis.z;
-            let bent = -(trace - normal.dot(*h * normal)) / steep.max(f64::MIN_POSITIVE);
-            let factor = stiffness.as_ref().map_or(1.0, |stiffness| stiffness[n]);
-            Vertex {
-                at: (placed.transform_point3(*p) - origin).as_vec3().to_array(),
-                normal: normals.mul_vec3(normal).normalize_or_zero().as_vec3().to_array(),
-                ridge: libm::tanh(0.5 * hollow * bent) as f32,
-                paint: libm::log2(f64::max(factor, 1e-6)) as f32,
-            }
-        });
-        let indices = triangles.into_iter().flatten().collect();
-        (vertices.collect(), indices)
+fn patch(name: &str, part: Part, whole: &Surface, rough: Option<&Surface>) -> Patch {
+    let mut vertices = Vec::new();
+    let indices = whole.triangles_of(part, &mut vertices);
+    let rough = rough.map_or(Vec::new(), |rough| rough.triangles_of(part, &mut vertices));
+    Patch {
+        object: name.into(),
+        part,
+        vertices,
+        indices,
+        rough,
     }
 }
 
@@ -264,34 +189,25 @@ pub fn second(
     most: usize,
 ) -> Result<Vec<Patch>, PolygonizeError> {
     let finest = depth(object);
-    let mut patches = Vec::new();
+    let lying = Lying::new(object, world_from_object, origin);
+    let mut found = None;
     // The coarser ones take a third of the time of the last, as there are so many fewer of them.
     for depth in 1..=finest {
-        let finer = Shape::of_depth(object, iso, world_from_object, depth)?.all("", origin);
-        let count: usize = finer.iter().map(|patch| patch.indices.len() / 3).sum();
-        if count > most && !patches.is_empty() {
+        let mut finer = Surface::new(object, iso, depth, ERROR)?;
+        finer.renew_all(&lying);
+        let count = finer.triangles();
+        if count > most && found.is_some() {
             break;
         }
-        patches = finer;
+        found = Some(finer);
         if 3 * count > most {
             break;
         }
     }
-    Ok(patches)
-}
-
-/// Cells along the longest side that triangles begin with: those between knots, halved or doubled, so that halvings meet knots again. Cells
-/// across knots cost half as much again.
-fn first_cells(object: &Object) -> u32 {
-    let knots = object.field.lattice().cells.into_iter().max().unwrap_or(1);
-    let mut cells = knots.max(1);
-    while cells >= 2 * CELLS {
-        cells = cells.div_ceil(2);
-    }
-    while cells < CELLS {
-        cells *= 2;
-    }
-    cells
+    Ok(found.map_or(Vec::new(), |surface| {
+        let patch = |part| patch("", part, &surface, None);
+        surface.parts().map(patch).collect()
+    }))
 }
 
 /// Halvings of the first cells that show what an object is shaped to.
@@ -304,11 +220,6 @@ fn depth(object: &Object) -> usize {
         .max(0.0) as usize;
     let is_volume = object.meta.source == SourceKind::Volume;
     (level + FINER[usize::from(!is_volume)]).clamp(1, DEPTH)
-}
-
-/// The part of an object in which a block lies.
-fn part(block: &AdaptiveBlock) -> [i32; 3] {
-    block.block.map(|n| n >> block.level)
 }
 
 /// Boxes that hold all places whose stiffness was painted anew.

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use bspline::hierarchical::{BrickKey, DenseCorrections, Lattice, LevelCorrections};
+use bspline::hierarchical::{BlockEdit, BrickKey, Change, DenseCorrections, Lattice, LevelCorrections};
 use bspline::polygonize::{BlockMesh, Mesh, PolygonizeOptions};
 use bspline::{Aabb, Frame, HierarchicalSpline};
 use document::Object;
@@ -401,6 +401,72 @@ fn on_canvas(card: &Card, object: &Object) -> (Canvas, Look) {
         line: 1.0 / 120.0,
     };
     (canvas, look)
+}
+
+/// A solid of so many triangles that it cannot be drawn 20 times a second: a box full of small balls.
+fn balls() -> HierarchicalSpline<f32> {
+    const SIDE: u32 = 14;
+    let lattice = Lattice {
+        world_from_lattice: DAffine3::IDENTITY,
+        cells: [6 * SIDE; 3],
+    };
+    let ball = |p: DVec3| 2.2 - (p - 6.0 * (p / 6.0).floor() - 3.0).length();
+    HierarchicalSpline::schoenberg(lattice, 1.0, ball).unwrap()
+}
+
+/// What is much is drawn coarser while something moves, and to the same silhouette; what a stroke changes is drawn as it is.
+#[test]
+fn many_triangles_are_fewer_while_something_moves() {
+    let Some(card) = card("rough triangles") else {
+        return;
+    };
+    let field = balls();
+    let of = |field: HierarchicalSpline<f32>| {
+        let meta = FieldMeta {
+            iso: Some(0.0),
+            ..FieldMeta::default()
+        };
+        Object::of(field.into(), meta)
+    };
+    let object = of(field.clone());
+    let mut shape = Shape::new(&object, 0.0, DAffine3::IDENTITY).unwrap();
+    let origin = object.field.world_box().center();
+    let all = shape.all("solid", origin);
+    let whole: usize = all.iter().map(|patch| patch.indices.len() / 3).sum();
+    let rough: usize = all.iter().map(|patch| patch.rough.len() / 3).sum();
+    assert!(
+        whole > 250_000 && rough <= 200_000 && rough > 20_000,
+        "{rough} of {whole}"
+    );
+    let (mut canvas, look) = on_canvas(&card, &object);
+    let size = SIZE.map(|n| n as u32);
+    let fresh = canvas.pixels(&look, size, true).unwrap();
+    canvas.pixels(&look, size, false).unwrap();
+    let turned = Look {
+        line: 1.01 * look.line,
+        ..look
+    };
+    let rough = canvas.pixels(&turned, size, true).unwrap();
+    assert_ne!(fresh, rough, "what no whole picture has shown is drawn as it is");
+    let (mean, far) = difference(&fresh, &rough);
+    assert!(mean < 4.0 && far < 0.04, "{mean} {far}");
+    // Both follow a dent.
+    let dent = BlockEdit {
+        level: 0,
+        first: [40; 3],
+        shape: [3; 3],
+        change: Change::Add(vec![-0.5; 27]),
+    };
+    let dented = of(field.edited_blocks(&[dent]).unwrap());
+    let anew = shape.follow("solid", &dented, origin).unwrap();
+    assert!(!anew.is_empty() && anew.len() < all.len());
+    let mut again = Shape::new(&dented, 0.0, DAffine3::IDENTITY).unwrap();
+    let again = again.all("solid", origin);
+    for patch in &anew {
+        let same = again.iter().find(|p| p.part == patch.part).unwrap();
+        assert_eq!((&patch.vertices, &patch.indices), (&same.vertices, &same.indices));
+        assert_eq!(patch.rough, same.rough);
+    }
 }
 
 /// The viewport as it was looked at and found good. `UPDATE_SNAPSHOTS=1` draws it anew.

@@ -7,7 +7,7 @@ use super::Bench;
 use super::adjust::What;
 use super::arrange::Change;
 use super::docks::Rearrange;
-use super::kept::Sides;
+use super::kept::{Sides, Theme};
 use super::layout::Panel;
 use super::orders::Order;
 use super::tool::Kind;
@@ -110,6 +110,9 @@ actions! {
     Sides: "View", "sides", "Panels change sides", None;
     AsAtFirst: "View", "layout-as-at-first", "Layout as at first", None;
     Panels: "View", "panels", "Side panels", plain(Key::F9);
+    Dark: "View", "dark", "Dark", None;
+    Light: "View", "light", "Light", None;
+    AsSystem: "View", "as-the-system", "Light or dark as the system", None;
     Pins: "Tool", "pins", "Pin points", plain(Key::N);
     Smaller: "Tool", "smaller", "Smaller tool", plain(Key::OpenBracket);
     Larger: "Tool", "larger", "Larger tool", plain(Key::CloseBracket);
@@ -180,7 +183,7 @@ impl Action {
             Name::Open | Name::Preview | Name::NewClay | Name::Quit | Name::Commands | Name::Shortcuts => {
                 true
             }
-            Name::Log | Name::Performance => true,
+            Name::Log | Name::Performance | Name::Dark | Name::Light | Name::AsSystem => true,
             Name::Undo => sheet.is_some_and(|s| s.done > 0),
             Name::Redo => sheet.is_some_and(|s| s.done < s.history.len()),
             Name::Remove => sheet.is_some_and(|s| s.objects.len() > 1),
@@ -266,6 +269,9 @@ impl Name {
             Self::NoStereo => bench.look.show.stereo.pair = Pair::Off,
             Self::SideBySide => bench.look.show.stereo.pair = Pair::Beside,
             Self::Anaglyph => bench.look.show.stereo.pair = Pair::Anaglyph,
+            Self::Dark => Theme::Dark.give(context),
+            Self::Light => Theme::Light.give(context),
+            Self::AsSystem => Theme::System.give(context),
             Self::Paint => bench.look.paint ^= true,
             Self::Hide => bench.hide_chosen(),
             Self::Alone => bench.hide_others(),

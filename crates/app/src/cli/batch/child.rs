@@ -9,6 +9,7 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
 use fitting::Cancel;
+use rustix::process::{Pid, setpriority_pgrp};
 use serde_json::{Map, Value};
 
 use super::super::cost::peak_rss_bytes_of;
@@ -25,6 +26,8 @@ pub struct Bounds<'a> {
     pub deadline: Option<(Instant, Duration)>,
     /// Where it may keep what goes away with it.
     pub scratch: &'a Path,
+    /// Whether it gives way to what else is to be done: a window is used meanwhile.
+    pub is_aside: bool,
 }
 
 /// Why a command has no result.
@@ -45,6 +48,8 @@ pub struct Ended {
 
 /// Time between two looks at a cancel, the clock and the memory.
 const LOOK: Duration = Duration::from_millis(25);
+/// How nice it is, of 0 to 19, to what else is to be done.
+const ASIDE: i32 = 10;
 /// Most that a command may print.
 const MOST: u64 = 64 << 20;
 /// Characters of a message that are kept.
@@ -71,6 +76,10 @@ pub fn ask(command: &str, arguments: &[OsString], bounds: &Bounds, show: &dyn Fn
         Ok(started) => started,
         Err(e) => return fail(e),
     };
+    if bounds.is_aside {
+        // Where that cannot be said, it takes its half.
+        let _ = setpriority_pgrp(Pid::from_raw(run.id as i32), ASIDE);
+    }
     // Where memory runs out, the system shall rather end a fit than the batch.
     let _ = std::fs::write(format!("/proc/{}/oom_score_adj", run.id), "500");
     let (mut peak, mut lines, mut object, mut stopped) = (None, Vec::new(), Vec::new(), None);

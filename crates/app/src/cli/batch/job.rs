@@ -178,6 +178,7 @@ impl Plan<'_> {
             cancel: self.cancel,
             deadline: self.time_limit.map(|t| (start + t, t)),
             scratch,
+            is_aside: false,
         };
         let path = |ending: &str| scratch.join(format!("{}.{ending}", item.name));
         let field = path("iclay");

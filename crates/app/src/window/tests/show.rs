@@ -171,15 +171,28 @@ fn menus_fit_into_a_low_window() {
     }
 }
 
-/// A light window is followed by a light one.
+/// A light window is followed by a light one, whether a menu or the palette of commands made it so.
 #[test]
 fn the_theme_is_kept() {
-    let home = tempfile::tempdir().unwrap();
-    let mut window = window_with_clay(home.path());
-    choose(&mut window, "View", "Light");
-    drop(window);
-    // Windows of tests are dark in any case.
-    let next = egui::Context::default();
-    Kept::read(home.path()).theme.give(&next);
-    assert_eq!(Theme::of(&next), Theme::Light);
+    let by_palette = |window: &mut Harness<'static, Modeler>| {
+        window.key_press(egui::Key::F3);
+        window.run_steps(3);
+        window.event(egui::Event::Text("light".into()));
+        window.run_steps(2);
+        window.key_press(egui::Key::Enter);
+        window.run_steps(2);
+    };
+    for ask in [
+        |window: &mut Harness<'static, Modeler>| choose(window, "View", "Light"),
+        by_palette,
+    ] {
+        let home = tempfile::tempdir().unwrap();
+        let mut window = window_with_clay(home.path());
+        ask(&mut window);
+        drop(window);
+        // Windows of tests are dark in any case.
+        let next = egui::Context::default();
+        Kept::read(home.path()).theme.give(&next);
+        assert_eq!(Theme::of(&next), Theme::Light);
+    }
 }
