@@ -20,9 +20,11 @@ const DEPTH: usize = 6;
 const FINER: [usize; 2] = [1, 2];
 /// Chord error over the diagonal of the box: half a pixel where the box fills a screen.
 const ERROR: f64 = 8e-4;
-/// Most triangles while something moves, as long as their error is no more than [`ROUGHEST`]: two cores draw these 20 times a second.
+/// Most triangles while something moves: two cores draw these 20 times a second.
 const MOVING: usize = 150_000;
-const ROUGHEST: f64 = 16.0 * ERROR;
+/// Error of these that is tried first, and how many are: each takes a tenth of a second.
+const ROUGH: f64 = 8.0 * ERROR;
+const TRIES: usize = 4;
 /// Radius of curvature, over the diagonal of the box, at which a hollow is half as dark as it can be.
 pub const HOLLOW: f64 = 0.02;
 
@@ -113,20 +115,10 @@ impl Shape {
     pub fn all(&mut self, name: &str, origin: DVec3) -> Vec<Patch> {
         let lying = Lying::new(&self.object, self.world_from_object, origin);
         self.whole.renew_all(&lying);
-        self.rough = None;
-        let (mut count, mut error) = (self.whole.triangles(), ERROR);
-        while count > MOVING && error < ROUGHEST {
-            // Twice the error leaves a quarter of the triangles at the least; half of that way may do.
-            let halves = (count as f64 / MOVING as f64).log2().ceil().max(1.0);
-            error = (error * (0.5 * halves).exp2()).min(ROUGHEST);
-            // A solid that has no coarser ones is turned as it is.
-            let Ok(mut rough) = Surface::new(&self.object, self.iso, depth(&self.object), error) else {
-                break;
-            };
-            rough.renew_all(&lying);
-            count = rough.triangles();
-            self.rough = Some(rough);
-        }
+        self.rough = match self.whole.triangles() > MOVING {
+            true => rough(&lying, self.iso),
+            false => None,
+        };
         self.whole.parts().map(|part| self.patch(name, part)).collect()
     }
 
@@ -174,6 +166,24 @@ fn patch(name: &str, part: Part, whole: &Surface, rough: Option<&Surface>) -> Pa
         indices,
         rough,
     }
+}
+
+/// Triangles for where something moves; none of a solid that has no coarser ones, which is turned as it is.
+fn rough(lying: &Lying<'_>, iso: f64) -> Option<Surface> {
+    let (mut error, mut found) = (ROUGH, None);
+    for _ in 0..TRIES {
+        let mut surface = Surface::new(lying.object, iso, depth(lying.object), error).ok()?;
+        surface.renew_all(lying);
+        let count = surface.triangles();
+        found = Some(surface);
+        // Half the error has four times as many triangles at the most, nearly.
+        match (count > MOVING, 4 * count < MOVING) {
+            (true, _) => error *= 2.0,
+            (_, true) if error > 2.0 * ERROR => error *= 0.5,
+            _ => break,
+        }
+    }
+    found
 }
 
 /// Triangles of another density of an object, about as fine as those that are shown of it, but no more than `most`, unless the coarsest

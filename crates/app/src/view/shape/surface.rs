@@ -29,7 +29,7 @@ pub struct Surface {
 
 /// An object, and where it lies.
 pub struct Lying<'a> {
-    object: &'a Object,
+    pub object: &'a Object,
     world_box: Aabb,
     world_from_object: DAffine3,
     origin: DVec3,
