@@ -43,7 +43,7 @@ pub use picture::{Shots, picture};
 pub use shortcuts::{Shortcuts, shortcuts};
 pub use show::show;
 pub use simulation::{Simulation, simulation};
-pub use slices::{Slices, slice_beside, slices};
+pub use slices::{Slices, slice_beside, slice_settings, slices};
 pub use start::start;
 pub use status::status;
 pub use surface::{Densities, surface};

@@ -18,6 +18,8 @@ const WIDE: f32 = 210.0;
 const BESIDE: [f32; 2] = [40.0, 190.0];
 /// Width of a picture below which there is no room for the number of its place.
 const NARROW: f32 = 170.0;
+/// Height that the profile and the line of what is told take below the scene of four views.
+const CHART: f32 = 200.0;
 /// Of the other planes in a picture, of the names of its sides, and of the line along which densities are shown.
 const CURSOR: Color32 = Color32::from_rgba_premultiplied(60, 100, 130, 130);
 const NAMES: Color32 = Color32::from_rgb(120, 200, 255);
@@ -142,7 +144,7 @@ impl Slices {
     }
 }
 
-/// A window over the scene, if it is wished: with the planes, or, where they stand beside the scene, with what is set of them.
+/// A window over the scene, if it is wished: with the planes, or, where they stand beside the scene, with the profile, if one is drawn.
 pub fn slices(context: &egui::Context, bench: &mut Bench) {
     let (Some(mut slices), Some(sheet)) = (bench.slices.take(), bench.sheet.clone()) else {
         return;
@@ -152,6 +154,22 @@ pub fn slices(context: &egui::Context, bench: &mut Bench) {
     };
     slices.draw(context, thing);
     let mut is_open = true;
+    if slices.is_four_up {
+        if let Some(line) = &slices.profile {
+            let all = context.content_rect();
+            egui::Window::new("Profile")
+                .default_pos(pos2(all.center().x, all.bottom() - CHART))
+                .constrain_to(all)
+                .open(&mut is_open)
+                .resizable(false)
+                .show(context, |ui| profile(ui, line, thing));
+        }
+        if !is_open {
+            slices.profile = None;
+        }
+        bench.slices = Some(slices);
+        return;
+    }
     let whole = context.content_rect().size();
     // No larger than the window lets all three be seen with what is set of them.
     let wide = WIDE.min((whole.x - BESIDE[0]) / 3.0);
@@ -161,28 +179,37 @@ pub fn slices(context: &egui::Context, bench: &mut Bench) {
         .resizable(false)
         .show(context, |ui| {
             let mut told = String::new();
-            if !slices.is_four_up {
-                ui.horizontal(|ui| {
-                    for n in 0..3 {
-                        ui.vertical(|ui| told += &plane(ui, &mut slices, n, thing, room));
-                    }
-                });
-                ui.separator();
-            }
-            settings(ui, &mut slices, thing);
+            ui.horizontal(|ui| {
+                for n in 0..3 {
+                    ui.vertical(|ui| told += &plane(ui, &mut slices, n, thing, room));
+                }
+            });
+            ui.separator();
+            ui.horizontal(|ui| shades(ui, &mut slices));
+            ui.horizontal(|ui| choices(ui, &mut slices, thing));
             if let Some(line) = &slices.profile {
                 profile(ui, line, thing);
             }
-            if !slices.is_four_up {
-                ui.weak(if told.is_empty() {
-                    "Value and place are told under the mouse"
-                } else {
-                    &told
-                });
-            }
+            ui.weak(if told.is_empty() {
+                "Value and place are told under the mouse"
+            } else {
+                &told
+            });
         });
     if is_open {
         bench.slices = Some(slices);
+    }
+}
+
+/// What is set of planes that stand beside the scene, above them.
+pub fn slice_settings(ui: &mut egui::Ui, bench: &mut Bench) {
+    let sheet = bench.sheet.clone();
+    let thing = sheet.as_ref().and_then(|sheet| sheet.objects.get(sheet.chosen));
+    if let (Some(slices), Some(thing)) = (&mut bench.slices, thing) {
+        ui.horizontal_wrapped(|ui| {
+            shades(ui, slices);
+            choices(ui, slices, thing);
+        });
     }
 }
 
@@ -200,31 +227,31 @@ pub fn slice_beside(ui: &mut egui::Ui, bench: &mut Bench, n: usize) {
     bench.slices = Some(slices);
 }
 
-fn settings(ui: &mut egui::Ui, slices: &mut Slices, thing: &Thing) {
-    ui.horizontal(|ui| {
-        let range = slices.range;
-        let [black, white] = &mut slices.window;
-        for (name, density) in [("Black", black), ("White", white)] {
-            let label = ui.label(name);
-            let slider = egui::Slider::new(density, range[0]..=range[1]);
-            ui.add(slider.custom_formatter(|n, _| human_number(n)))
-                .labelled_by(label.id);
-        }
-    });
-    ui.horizontal(|ui| {
-        ui.checkbox(&mut slices.is_four_up, "Four views")
-            .on_hover_text("The planes beside the scene, each in a quarter of the window");
-        if thing.is_volume {
-            let hint = "On: the patient's right is on the left, as radiologists see it. Off: on the right";
-            ui.checkbox(&mut slices.is_radiological, "Radiological")
-                .on_hover_text(hint);
-        }
-        ui.checkbox(&mut slices.draws_line, "Profile")
-            .on_hover_text("A drag in a plane draws a line, along which the densities are shown");
-        if slices.profile.is_some() && ui.button("Clear").clicked() {
-            slices.profile = None;
-        }
-    });
+/// The values that are black and white.
+fn shades(ui: &mut egui::Ui, slices: &mut Slices) {
+    let range = slices.range;
+    let [black, white] = &mut slices.window;
+    for (name, density) in [("Black", black), ("White", white)] {
+        let label = ui.label(name);
+        let slider = egui::Slider::new(density, range[0]..=range[1]);
+        ui.add(slider.custom_formatter(|n, _| human_number(n)))
+            .labelled_by(label.id);
+    }
+}
+
+fn choices(ui: &mut egui::Ui, slices: &mut Slices, thing: &Thing) {
+    ui.checkbox(&mut slices.is_four_up, "Four views")
+        .on_hover_text("The planes beside the scene, each in a quarter of the window");
+    if thing.is_volume {
+        let hint = "On: the patient's right is on the left, as radiologists see it. Off: on the right";
+        ui.checkbox(&mut slices.is_radiological, "Radiological")
+            .on_hover_text(hint);
+    }
+    ui.checkbox(&mut slices.draws_line, "Profile")
+        .on_hover_text("A drag in a plane draws a line, along which the densities are shown");
+    if slices.profile.is_some() && ui.button("Clear").clicked() {
+        slices.profile = None;
+    }
 }
 
 /// One plane with its slider, no larger than there is room; what is under the mouse.

@@ -14,9 +14,12 @@ impl Modeler {
         if !self.bench.slices.as_ref().is_some_and(|slices| slices.is_four_up) {
             return self.viewport(ui);
         }
-        let whole = ui.available_rect_before_wrap();
+        let all = ui.available_rect_before_wrap();
         // Names and numbers stand beside the planes.
-        ui.painter().rect_filled(whole, 0.0, ui.visuals().panel_fill);
+        ui.painter().rect_filled(all, 0.0, ui.visuals().panel_fill);
+        let mut above = ui.new_child(UiBuilder::new().max_rect(all.shrink(4.0)).id_salt("above"));
+        panels::slice_settings(&mut above, &mut self.bench);
+        let whole = all.with_min_y(above.min_rect().bottom());
         let half = 0.5 * (whole.size() - vec2(GAP, GAP));
         let quarter = |column: f32, row: f32| {
             let corner = whole.min + vec2(column * (half.x + GAP), row * (half.y + GAP));
@@ -32,7 +35,7 @@ impl Modeler {
         }
         let mut scene = ui.new_child(UiBuilder::new().max_rect(quarter(1.0, 1.0)).id_salt("scene"));
         self.viewport(&mut scene);
-        ui.allocate_rect(whole, egui::Sense::hover());
+        ui.allocate_rect(all, egui::Sense::hover());
     }
 
     /// Where the planes meet, in the scene.

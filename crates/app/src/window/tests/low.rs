@@ -40,6 +40,10 @@ fn menus_and_windows_fit_into_a_low_window() {
             let last = window.get_by_label("Sagittal").rect();
             assert!(last.max.x < LOW[0], "{last}");
             window.get_by_label("Four views").click();
+            window.run_steps(5);
+            let set = window.get_by_label("Profile").rect();
+            let plane = window.get_by_label("Axial").rect();
+            assert!(set.max.x < LOW[0] && set.max.y <= plane.min.y, "{set} {plane}");
         }
     }
 }

@@ -82,6 +82,8 @@ fn the_scene_among_four_views_is_worked_on() {
     let mut window = with_planes(home.path());
     window.get_by_label("Four views").click();
     window.run_steps(3);
+    let [set, plane] = ["Four views", "Axial"].map(|label| window.get_by_label(label).rect());
+    assert!(set.max.y <= plane.min.y, "{set} lies over {plane}");
     // The middle of the lower right quarter, between the panels.
     let at = egui::pos2(850.0, 590.0);
     let way: Vec<egui::Pos2> = (0..8).map(|n| at + egui::vec2(4.0 * n as f32, 0.0)).collect();
