@@ -6,7 +6,8 @@ use std::sync::Arc;
 use eframe::egui_wgpu::wgpu;
 use glam::{DVec3, Vec3};
 
-use super::canvas::{Canvas, Held, Look, Target, draw};
+use super::canvas::{Canvas, Look, Target};
+use super::held::{Held, draw};
 use super::overlay::{Ink, Stretch};
 use super::shape::Vertex;
 use super::{Mode, Patch, read};

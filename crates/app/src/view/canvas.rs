@@ -1,19 +1,18 @@
 //! The graphics card: triangles in, a picture out.
 
-use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet};
-use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
-use eframe::egui_wgpu::wgpu::{self, util::DeviceExt};
+use eframe::egui_wgpu::wgpu;
 use glam::{DMat4, DVec3};
 
 use super::beside::Tinted;
 use super::brush::{Brush, shadow};
 use super::cast::Cast;
+use super::held::{Held, draw};
 use super::light_pass::LightPass;
 use super::lights::{self, Axes, Lights};
-use super::overlay::{Lines, Overlay, edges};
+use super::overlay::Overlay;
 use super::rays::Solid;
 use super::read;
 use super::shape::Patch;
@@ -99,31 +98,6 @@ struct Scene {
     picture: [f32; 4],
     density: [f32; 4],
     world_from_clip: [[f32; 4]; 4],
-}
-
-/// Triangles on the card.
-pub struct Held {
-    vertices: wgpu::Buffer,
-    indices: wgpu::Buffer,
-    /// Which of these are drawn while something moves, and where nothing does.
-    ranges: [Range<u32>; 2],
-    /// Whether no whole picture has shown them yet: what a stroke does is seen at once.
-    is_fresh: bool,
-    /// The same, to be coloured otherwise and for their sides.
-    pub(super) patch: Patch,
-    pub(super) is_painted: bool,
-    wires: OnceCell<Lines>,
-}
-
-impl Held {
-    fn range(&self, which: usize) -> Range<u32> {
-        self.ranges[which.max(usize::from(self.is_fresh))].clone()
-    }
-
-    /// Sides of the triangles.
-    pub fn wires(&self, device: &wgpu::Device) -> &Lines {
-        self.wires.get_or_init(|| Lines::new(device, &edges(&self.patch)))
-    }
 }
 
 /// Where a picture is drawn to.
@@ -343,55 +317,17 @@ impl Canvas {
             .tinted
             .as_ref()
             .map(|tinted| tinted.patch(patch, self.origin));
-        let shown = tinted.as_ref().unwrap_or(patch);
-        let [whole, rough] = [&patch.indices, &patch.rough].map(|indices| indices.len() as u32);
-        let (whole, rough) = (0..whole, whole..whole + rough);
-        let buffer = |label, contents: &[u8], usage| {
-            let contents = wgpu::util::BufferInitDescriptor {
-                label: Some(label),
-                contents,
-                usage,
-            };
-            self.device.create_buffer_init(&contents)
-        };
-        Held {
-            vertices: buffer(
-                "vertices",
-                bytemuck::cast_slice(&shown.vertices),
-                wgpu::BufferUsages::VERTEX,
-            ),
-            indices: buffer(
-                "indices",
-                bytemuck::cast_slice(&[&patch.indices[..], &patch.rough].concat()),
-                wgpu::BufferUsages::INDEX,
-            ),
-            ranges: [
-                if patch.rough.is_empty() {
-                    whole.clone()
-                } else {
-                    rough
-                },
-                whole,
-            ],
-            is_fresh: true,
-            is_painted: shown.vertices.iter().any(|v| v.paint != 0.0),
-            patch: patch.clone(),
-            wires: OnceCell::new(),
-        }
+        Held::new(&self.device, patch, tinted.as_ref())
     }
 
     /// Triangles that it holds.
     pub fn triangles(&self) -> usize {
-        self.held.values().map(|held| held.ranges[1].len() / 3).sum()
+        self.held.values().map(Held::triangles).sum()
     }
 
     /// Bytes of them.
     pub fn mesh_bytes(&self) -> u64 {
-        let buffers = self
-            .held
-            .values()
-            .flat_map(|held| [&held.vertices, &held.indices]);
-        buffers.map(wgpu::Buffer::size).sum()
+        self.held.values().map(Held::bytes).sum()
     }
 
     /// A picture of so many pixels: rough while something moves. It is drawn anew only if it would be another. Without triangles a whole
@@ -415,7 +351,7 @@ impl Canvas {
             let is_lit = !is_rough && look.cut.is_none();
             self.paint(&target, look, which, is_lit, |_| true);
             if !is_rough {
-                self.held.values_mut().for_each(|held| held.is_fresh = false);
+                self.held.values_mut().for_each(Held::was_seen);
             }
         }
         let target = Target {
@@ -680,19 +616,5 @@ impl Canvas {
         let reach = self.radius + look.camera.center.distance(self.origin);
         let toward_eye = |depth: &f32| (*depth < 1.0).then(|| reach * (1.0 - 2.0 * f64::from(*depth)));
         Ok(bytemuck::cast_slice(&bytes).iter().map(toward_eye).collect())
-    }
-}
-
-/// Draws triangles, all (1) or those for where something moves (0), as a light, or whoever looks, sees them.
-pub fn draw<'a>(
-    all: impl IntoIterator<Item = &'a Held>,
-    which: usize,
-    pass: &mut wgpu::RenderPass<'_>,
-    instance: u32,
-) {
-    for held in all {
-        pass.set_vertex_buffer(0, held.vertices.slice(..));
-        pass.set_index_buffer(held.indices.slice(..), wgpu::IndexFormat::Uint32);
-        pass.draw_indexed(held.range(which), 0, instance..instance + 1);
     }
 }

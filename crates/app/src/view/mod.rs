@@ -6,6 +6,7 @@ mod camera;
 mod canvas;
 mod card;
 mod cast;
+mod held;
 mod histogram;
 mod laid;
 mod light_pass;

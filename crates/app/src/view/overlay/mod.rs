@@ -16,7 +16,7 @@ pub use self::brushes::Brushes;
 pub use self::cap::Caps;
 pub use self::legend::Legend;
 pub use self::lines::{Lines, Stretch, edges};
-use super::canvas::{Held, draw};
+use super::held::{Held, draw};
 use super::{Cells, Look, Mode};
 
 /// What lines and dots show.
