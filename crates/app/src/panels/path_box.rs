@@ -122,8 +122,8 @@ impl PathBox {
         )
     }
 
-    /// The file that is named; `~` is the home directory, and documents and scripts get their endings,
-    /// and an ending that is typed before the one that was offered takes its place.
+    /// The file that is named; `~` is the home directory. Documents and scripts get their endings;
+    /// one that is typed before the one that was offered takes its place.
     fn path(&self) -> PathBuf {
         let text = self.text.trim();
         let path = match (text.strip_prefix("~/"), etcetera::home_dir()) {

@@ -14,8 +14,8 @@ const LIGHT: wgpu::TextureFormat = wgpu::TextureFormat::R16Float;
 /// What finds it.
 pub struct LightPass {
     device: wgpu::Device,
-    /// How `normals` and `depth` of a sheet are found, and what comes of them.
-    found: [wgpu::BindGroupLayout; 2],
+    /// How a texture of a sheet is found, and its depth.
+    found: wgpu::BindGroupLayout,
     layouts: [wgpu::BindGroupLayout; 2],
     /// Made when they are needed first.
     pipelines: OnceCell<[wgpu::RenderPipeline; 2]>,
@@ -46,15 +46,13 @@ impl LightPass {
             count: None,
         };
         let numbers = wgpu::TextureSampleType::Float { filterable: false };
-        let layout = || {
-            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-                label: Some("light"),
-                entries: &[texture(0, numbers), texture(1, wgpu::TextureSampleType::Depth)],
-            })
-        };
+        let found = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some("light"),
+            entries: &[texture(0, numbers), texture(1, wgpu::TextureSampleType::Depth)],
+        });
         Self {
             device: device.clone(),
-            found: [layout(), layout()],
+            found,
             layouts,
             pipelines: OnceCell::new(),
             sheet: None,
@@ -63,7 +61,7 @@ impl LightPass {
 
     /// How surfaces find the light.
     pub fn layout(&self) -> &wgpu::BindGroupLayout {
-        &self.found[1]
+        &self.found
     }
 
     /// For surfaces, once it was drawn.
@@ -128,14 +126,14 @@ impl LightPass {
             texture.create_view(&wgpu::TextureViewDescriptor::default())
         };
         let [normals, depth, light] = [NORMALS, DEPTH, LIGHT].map(texture);
-        let bindings = [(&self.found[0], &normals), (&self.found[1], &light)].map(|(layout, first)| {
+        let bindings = [&normals, &light].map(|first| {
             let entry = |binding, view| wgpu::BindGroupEntry {
                 binding,
                 resource: wgpu::BindingResource::TextureView(view),
             };
             self.device.create_bind_group(&wgpu::BindGroupDescriptor {
                 label: Some("light"),
-                layout,
+                layout: &self.found,
                 entries: &[entry(0, first), entry(1, &depth)],
             })
         });
@@ -209,7 +207,7 @@ impl LightPass {
                 NORMALS,
             ),
             pipeline(
-                &[Some(scene), Some(maps), Some(&self.found[0])],
+                &[Some(scene), Some(maps), Some(&self.found)],
                 ["paper", "light_of"],
                 &[],
                 None,

@@ -268,12 +268,7 @@ fn a_saved_script_does_it_again() {
 fn the_palette_of_commands_finds_and_does() {
     let home = tempfile::tempdir().unwrap();
     let mut window = window_with_clay(home.path());
-    window.key_press(egui::Key::F3);
-    window.run_steps(3);
-    window.event(egui::Event::Text("chis".into()));
-    window.run_steps(2);
-    window.key_press(egui::Key::Enter);
-    window.run_steps(2);
+    command(&mut window, "chis");
     assert_eq!(window.state().bench().tool.kind, Kind::Chisel);
     assert!(window.state().bench().commands.is_none());
     assert!(window.state().bench().keys.text(Action::Take(Kind::Chisel)) == "H");

@@ -174,18 +174,8 @@ fn menus_fit_into_a_low_window() {
 /// A light window is followed by a light one, whether a menu or the palette of commands made it so.
 #[test]
 fn the_theme_is_kept() {
-    let by_palette = |window: &mut Harness<'static, Modeler>| {
-        window.key_press(egui::Key::F3);
-        window.run_steps(3);
-        window.event(egui::Event::Text("light".into()));
-        window.run_steps(2);
-        window.key_press(egui::Key::Enter);
-        window.run_steps(2);
-    };
-    for ask in [
-        |window: &mut Harness<'static, Modeler>| choose(window, "View", "Light"),
-        by_palette,
-    ] {
+    let asks: [fn(&mut Window); 2] = [|w| choose(w, "View", "Light"), |w| command(w, "light")];
+    for ask in asks {
         let home = tempfile::tempdir().unwrap();
         let mut window = window_with_clay(home.path());
         ask(&mut window);
