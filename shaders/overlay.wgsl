@@ -26,8 +26,8 @@ fn of_scale(share: f32) -> vec3<f32> {
 
 // Surfaces whose colours tell shares of a scale in place of paint.
 @fragment
-fn shade_scale_lit(in: Seen, @builtin(front_facing) is_front: bool) -> @location(0) vec4<f32> {
-  return colored(in, is_front, of_scale(in.paint), light_at(in));
+fn shade_scale_lit(in: Seen) -> @location(0) vec4<f32> {
+  return vec4(of_scale(in.paint) * light_at(in), 1.0);
 }
 
 @fragment

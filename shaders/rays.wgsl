@@ -502,10 +502,10 @@ fn pixel_of(pixel: vec2<f32>, lit: bool) -> Dot {
   let facing = max(dot(shape.normal, lights.way[SUN].xyz), 0.0);
   var light = 0.05;
   if (lit) {
-    light += from_sky(seen.at, shape.normal) + 0.95 * facing * from_sun(seen.at, shape.normal);
+    light += all_sky(shape.normal) * from_sky(seen.at, shape.normal) + 0.95 * facing * from_sun(seen.at, shape.normal);
   } else {
     let hollow = 1.0 + 0.45 * clamp(shape.ridge, -1.0, 0.0);
-    light += (0.55 + 0.30 * dot(shape.normal, scene.axes[1].xyz)) * hollow + 0.95 * facing;
+    light += all_sky(shape.normal) * hollow + 0.95 * facing;
   }
   return Dot(vec4(paint_under(pixel) * light, 1.0), depth);
 }

@@ -30,9 +30,8 @@ struct Lights {
 
 @group(0) @binding(0) var<uniform> scene: Scene;
 @group(0) @binding(1) var<uniform> lights: Lights;
-// The light of each pixel of a picture, and how far its surface is.
-@group(1) @binding(0) var light_there: texture_2d<f32>;
-@group(1) @binding(1) var depth_there: texture_depth_2d;
+// Of every second pixel of a picture, across and down: how far its surface is, as bits, and what reaches it of the sky and of the sun.
+@group(1) @binding(0) var light_there: texture_2d<u32>;
 // Depths of what each light sees, where the light is not known yet.
 @group(1) @binding(0) var sky: texture_depth_2d_array;
 @group(1) @binding(1) var sun: texture_depth_2d;
@@ -52,14 +51,26 @@ struct Seen {
   @location(3) paint: f32,
 };
 
-@vertex
-fn corner(in: Corner) -> Seen {
+fn seen(in: Corner) -> Seen {
   var out: Seen;
   out.clip = scene.clip_from_world * vec4(in.at, 1.0);
   out.at = in.at;
   out.normal = in.normal;
   out.ridge = in.ridge;
   out.paint = in.paint;
+  return out;
+}
+
+@vertex
+fn corner(in: Corner) -> Seen {
+  return seen(in);
+}
+
+// A little farther away: coarser triangles of the inside do not come through the outside.
+@vertex
+fn corner_inside(in: Corner) -> Seen {
+  var out = seen(in);
+  out.clip = scene.clip_from_world * vec4(in.at - 0.02 * scene.shows.z * scene.axes[2].xyz, 1.0);
   return out;
 }
 
@@ -94,10 +105,11 @@ fn from_sky(at: vec3<f32>, n: vec3<f32>) -> f32 {
   for (var i = 0u; i < count; i += 1u) {
     let weight = dot(n, lights.way[i].xyz);
     if (weight > 0.0) {
-      all += weight;
+      let own = weight * (0.55 + 0.45 * dot(lights.way[i].xyz, scene.axes[1].xyz));
+      all += own;
       let q = in_map(i, at, n, 2.5, side);
       if (q.z <= textureLoad(sky, vec2<i32>(q.xy), i32(i), 0)) {
-        light += weight * (0.55 + 0.45 * dot(lights.way[i].xyz, scene.axes[1].xyz));
+        light += own;
       }
     }
   }
@@ -122,10 +134,15 @@ fn painted(paint: f32) -> vec3<f32> {
   return mix(CLAY, select(SOFT, STIFF, share > 0.0), sqrt(abs(share)) * 0.85);
 }
 
+// Colour of the inside of a solid, where that is open or cut.
+fn inside(n: vec3<f32>) -> vec4<f32> {
+  return vec4(INSIDE * (0.55 + 0.3 * abs(dot(normalize(n), scene.axes[2].xyz))), 1.0);
+}
+
 // Colour of a place in a light, as the cut has it.
 fn colored(in: Seen, is_front: bool, color: vec3<f32>, light: f32) -> vec4<f32> {
   if (!is_front) {
-    return vec4(INSIDE * (0.55 + 0.3 * abs(dot(normalize(in.normal), scene.axes[2].xyz))), 1.0);
+    return inside(in.normal);
   }
   return vec4(color * light, 1.0);
 }
@@ -141,23 +158,29 @@ fn is_cut(at: vec3<f32>) -> bool {
   return scene.cut_normal.w > 0.5 && dot(at - scene.cut_at.xyz, scene.cut_normal.xyz) > 0.0;
 }
 
-// The light that reaches a place: of its own pixel, or, where another surface has that, of the one beside whose depth is like its.
+// All of the sky's light.
+fn all_sky(n: vec3<f32>) -> f32 {
+  return 0.55 + 0.30 * dot(n, scene.axes[1].xyz);
+}
+
+// The light that reaches a place: as in the four pixels round it, those above all whose surface is as far away.
 fn light_at(in: Seen) -> f32 {
-  let own = vec2<i32>(in.clip.xy);
-  var pixel = own;
-  var off = abs(textureLoad(depth_there, own, 0) - in.clip.z);
-  if (off > 0.5 * fwidth(in.clip.z) + 1e-6) {
-    for (var n = 0; n < 8; n += 1) {
-      let place = n + select(0, 1, n >= 4);
-      let beside = own + vec2(place % 3 - 1, place / 3 - 1);
-      let there = abs(textureLoad(depth_there, beside, 0) - in.clip.z);
-      if (there < off) {
-        off = there;
-        pixel = beside;
-      }
-    }
+  let n = normalize(in.normal);
+  let place = 0.5 * in.clip.xy - 0.5;
+  let first = floor(place);
+  let part = place - first;
+  let near = fwidth(in.clip.z) + 1e-6;
+  var sum = vec3(0.0);
+  for (var i = 0; i < 4; i += 1) {
+    let beside = vec2(i & 1, i >> 1u);
+    let there = textureLoad(light_there, vec2<i32>(first) + beside, 0);
+    let share = abs(1.0 - vec2<f32>(beside) - part);
+    let off = abs(bitcast<f32>(there.x) - in.clip.z);
+    sum += (share.x * share.y + 0.01) / (off + near) * vec3(unpack2x16unorm(there.y), 1.0);
   }
-  return textureLoad(light_there, pixel, 0).r;
+  let reaches = sum.xy / sum.z;
+  let facing = max(dot(n, lights.way[SUN].xyz), 0.0);
+  return 0.05 + all_sky(n) * reaches.x + 0.95 * facing * reaches.y;
 }
 
 // All of the light, darker in hollows.
@@ -165,13 +188,18 @@ fn all_light(in: Seen) -> f32 {
   let n = normalize(in.normal);
   let facing = max(dot(n, lights.way[SUN].xyz), 0.0);
   let hollow = 1.0 + 0.45 * clamp(in.ridge, -1.0, 0.0);
-  return 0.05 + (0.55 + 0.30 * dot(n, scene.axes[1].xyz)) * hollow + 0.95 * facing;
+  return 0.05 + all_sky(n) * hollow + 0.95 * facing;
 }
 
 // In the light that reaches a place. Of its own, not a branch: processors that stand in for graphics cards take both sides of those.
 @fragment
-fn shade_lit(in: Seen, @builtin(front_facing) is_front: bool) -> @location(0) vec4<f32> {
-  return colored(in, is_front, clay_or_paint(in.paint), light_at(in));
+fn shade_lit(in: Seen) -> @location(0) vec4<f32> {
+  return vec4(clay_or_paint(in.paint) * light_at(in), 1.0);
+}
+
+@fragment
+fn shade_inside(in: Seen) -> @location(0) vec4<f32> {
+  return inside(in.normal);
 }
 
 // In all of the light.
@@ -211,7 +239,7 @@ fn veil_of(normal: vec3<f32>) -> vec4<f32> {
   let toward = dot(normal, scene.axes[2].xyz);
   let n = normal * select(-1.0, 1.0, toward > 0.0);
   let facing = max(dot(n, lights.way[SUN].xyz), 0.0);
-  let light = 0.10 + 0.55 + 0.30 * dot(n, scene.axes[1].xyz) + 0.6 * facing;
+  let light = 0.10 + all_sky(n) + 0.6 * facing;
   let aside = 1.0 - abs(toward);
   return vec4(VEIL * light, 0.16 + 0.5 * aside * aside);
 }

@@ -1,6 +1,6 @@
 //! What a canvas shows beside the solids as they are: other colours, lines, a surface that is looked through; and what it hides.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use eframe::egui_wgpu::wgpu;
@@ -33,8 +33,18 @@ impl Tinted {
             vertices: vertices.map(|(v, paint)| Vertex { paint, ..*v }).collect(),
             indices: patch.indices.clone(),
             rough: patch.rough.clone(),
+            is_open: patch.is_open,
         }
     }
+}
+
+/// Triangles of objects that are not hidden, and whose they are.
+pub(super) fn visible<'a>(
+    held: &'a BTreeMap<(String, [i32; 3]), Held>,
+    hidden: &'a BTreeSet<String>,
+) -> impl Iterator<Item = (&'a str, &'a Held)> {
+    let all = held.iter().map(|((name, _), held)| (name.as_str(), held));
+    all.filter(|(name, _)| !hidden.contains(*name))
 }
 
 impl Canvas {
@@ -131,8 +141,7 @@ impl Canvas {
 
     /// Triangles that are drawn, and whose they are.
     pub(super) fn visible(&self) -> impl Iterator<Item = (&str, &Held)> {
-        let all = self.held.iter().map(|((name, _), held)| (name.as_str(), held));
-        all.filter(move |(name, _)| !self.hidden.contains(*name))
+        visible(&self.held, &self.hidden)
     }
 
     /// Reads the densities on the cut, where triangles are cut.
@@ -164,7 +173,8 @@ impl Canvas {
             let clear = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
             let mut pass = self.pass(&mut encoder, textures, clear, wgpu::LoadOp::Clear(1.0));
             pass.set_pipeline(&self.overlay.brushes(0, 1).paint);
-            draw(self.visible().map(|(_, held)| held), 0, &mut pass, 0);
+            let all = self.visible().map(|(_, held)| held);
+            draw(all, |held| held.seen(0), &mut pass, 0);
         }
         self.queue.submit([encoder.finish()]);
     }

@@ -9,8 +9,10 @@ use super::shape::Vertex;
 pub struct Brush {
     /// Triangles in all light.
     pub surface: wgpu::RenderPipeline,
-    /// In the light that reaches them.
+    /// Their fronts, in the light that reaches them.
     pub lit: wgpu::RenderPipeline,
+    /// Their backs beside these, of coarser ones.
+    pub inside: wgpu::RenderPipeline,
     /// What is behind them.
     pub paper: wgpu::RenderPipeline,
 }
@@ -22,13 +24,13 @@ pub const VERTEX: wgpu::VertexBufferLayout<'_> = wgpu::VertexBufferLayout {
     attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32, 3 => Float32],
 };
 
-/// A way to draw: from corners to colours, if any, of so many samples a pixel.
+/// A way to draw: from corners to colours, of so many samples a pixel.
 fn pipeline(
     device: &wgpu::Device,
     shader: &wgpu::ShaderModule,
     layout: &wgpu::PipelineLayout,
     [corner, color]: [&str; 2],
-    buffers: &[Option<wgpu::VertexBufferLayout<'_>>],
+    hides: Option<wgpu::Face>,
     samples: u32,
 ) -> wgpu::RenderPipeline {
     device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
@@ -38,9 +40,12 @@ fn pipeline(
             module: shader,
             entry_point: Some(corner),
             compilation_options: wgpu::PipelineCompilationOptions::default(),
-            buffers,
+            buffers: if corner == "paper" { &[] } else { &[Some(VERTEX)] },
         },
-        primitive: wgpu::PrimitiveState::default(),
+        primitive: wgpu::PrimitiveState {
+            cull_mode: hides,
+            ..wgpu::PrimitiveState::default()
+        },
         depth_stencil: Some(wgpu::DepthStencilState {
             format: DEPTH,
             depth_write_enabled: Some(true),
@@ -52,7 +57,7 @@ fn pipeline(
             count: samples,
             ..wgpu::MultisampleState::default()
         },
-        fragment: (!color.is_empty()).then_some(wgpu::FragmentState {
+        fragment: Some(wgpu::FragmentState {
             module: shader,
             entry_point: Some(color),
             compilation_options: wgpu::PipelineCompilationOptions::default(),
@@ -81,40 +86,12 @@ impl Brush {
     ) -> Self {
         let lit = layout(device, &[Some(scene), Some(lights)]);
         let plain = layout(device, &[Some(scene)]);
+        let made = |layout, ways, hides| pipeline(device, shader, layout, ways, hides, samples);
         Self {
-            surface: pipeline(
-                device,
-                shader,
-                &plain,
-                ["corner", "shade"],
-                &[Some(VERTEX)],
-                samples,
-            ),
-            lit: pipeline(
-                device,
-                shader,
-                &lit,
-                ["corner", "shade_lit"],
-                &[Some(VERTEX)],
-                samples,
-            ),
-            paper: pipeline(device, shader, &plain, ["paper", "paper_color"], &[], samples),
+            surface: made(&plain, ["corner", "shade"], None),
+            lit: made(&lit, ["corner", "shade_lit"], Some(wgpu::Face::Back)),
+            inside: made(&plain, ["corner_inside", "shade_inside"], Some(wgpu::Face::Front)),
+            paper: made(&plain, ["paper", "paper_color"], None),
         }
     }
-}
-
-/// Triangles as a light sees them.
-pub fn shadow(
-    device: &wgpu::Device,
-    shader: &wgpu::ShaderModule,
-    scene: &wgpu::BindGroupLayout,
-) -> wgpu::RenderPipeline {
-    pipeline(
-        device,
-        shader,
-        &layout(device, &[Some(scene)]),
-        ["lit", ""],
-        &[Some(VERTEX)],
-        1,
-    )
 }

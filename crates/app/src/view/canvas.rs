@@ -6,12 +6,12 @@ use bytemuck::{Pod, Zeroable};
 use eframe::egui_wgpu::wgpu;
 use glam::{DMat4, DVec3};
 
-use super::beside::Tinted;
-use super::brush::{Brush, shadow};
+use super::beside::{Tinted, visible};
+use super::brush::Brush;
 use super::cast::Cast;
 use super::held::{Held, draw};
 use super::light_pass::LightPass;
-use super::lights::{self, Axes, Lights};
+use super::lights::{self, Lights};
 use super::overlay::Overlay;
 use super::rays::Solid;
 use super::read;
@@ -131,9 +131,6 @@ pub struct Canvas {
     pub(super) bindings: wgpu::BindGroup,
     pub(super) lights: Lights,
     light_pass: LightPass,
-    /// Round which eye the maps of the sky were drawn, unless the triangles are others since.
-    sky: Option<Axes>,
-    shadow: wgpu::RenderPipeline,
     /// For one sample, and for [`SAMPLES`].
     brushes: [Brush; 2],
     pub(super) held: BTreeMap<(String, [i32; 3]), Held>,
@@ -211,9 +208,7 @@ impl Canvas {
             aside: BTreeMap::new(),
             scenes: 0,
             changes: 0,
-            shadow: shadow(device, &shader, &layout),
-            lights: Lights::new(device, &looked_up, sky),
-            sky: None,
+            lights: Lights::new(device, [&layout, &looked_up], &shader, sky),
             scene,
             maps,
             bindings,
@@ -229,7 +224,7 @@ impl Canvas {
 
     /// What was drawn is old.
     pub(super) fn renew(&mut self) {
-        self.sky = None;
+        self.lights.renew();
         self.redraw();
     }
 
@@ -299,11 +294,14 @@ impl Canvas {
     /// Puts triangles in place of those that there were.
     pub fn put(&mut self, patch: &Patch) {
         let key = (patch.object.clone(), patch.part);
-        self.renew();
-        match patch.vertices.is_empty() {
-            true => self.held.remove(&key),
-            false => self.held.insert(key, self.hold(patch)),
+        let held = (!patch.vertices.is_empty()).then(|| self.hold(patch));
+        held.iter().for_each(|held| self.lights.touch(held.within));
+        let before = match held {
+            None => self.held.remove(&key),
+            Some(held) => self.held.insert(key, held),
         };
+        before.iter().for_each(|held| self.lights.touch(held.within));
+        self.redraw();
     }
 
     /// Has other triangles throw the shadows.
@@ -370,10 +368,7 @@ impl Canvas {
         let scene = self.scene_of(look, size);
         self.queue
             .write_buffer(&self.scene, 0, bytemuck::bytes_of(&scene));
-        let axes = look.camera.axes();
-        // It takes as long as all else, and nobody sees it turn.
-        let of_sky = self.sky.unwrap_or(axes);
-        let maps = lights::maps(self.lights.count, [of_sky, axes], self.radius);
+        let maps = self.lights.maps(look.camera.axes(), self.radius);
         self.queue
             .write_buffer(&self.maps, 0, bytemuck::cast_slice(&maps));
     }
@@ -398,25 +393,27 @@ impl Canvas {
         let around = self.overlay.around(look);
         let is_besides = is_shared || self.overlay.is_shown(look);
         let besides = is_besides.then(|| self.overlay.brushes(which, [1, SAMPLES][which]));
-        let is_sky_old = self.sky.is_none();
         let mut encoder = self
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         if is_lit {
-            self.lights.draw(&mut encoder, is_sky_old, |pass, light| {
-                pass.set_pipeline(&self.shadow);
-                pass.set_bind_group(0, &self.bindings, &[]);
-                match &self.shades {
-                    Some(shades) => draw([shades], 0, pass, light),
-                    None => draw(self.visible().map(|(_, held)| held), 0, pass, light),
-                }
-            });
+            let triangles: Vec<&Held> = match &self.shades {
+                Some(shades) => vec![shades],
+                None => visible(&self.held, &self.hidden).map(|(_, held)| held).collect(),
+            };
+            let eye = (look.camera.axes(), self.radius);
+            self.lights.draw(&mut encoder, &self.bindings, eye, &triangles);
         }
+        let shown = self.visible().filter(|(name, _)| shown(name));
+        let mut shown: Vec<&Held> = shown.map(|(_, held)| held).collect();
+        // What comes first hides what is behind it before that is coloured.
+        let [_, _, back] = look.camera.axes();
+        let nearness = |held: &&Held| held.within.center().dot(back);
+        shown.sort_by(|a, b| nearness(b).total_cmp(&nearness(a)));
         if is_lit {
             let from = [&self.bindings, &self.lights.bindings];
             self.light_pass.draw(&mut encoder, from, |pass| {
-                let all = self.visible().filter(|(name, _)| shown(name));
-                draw(all.map(|(_, held)| held), which, pass, 0);
+                draw(shown.iter().copied(), Held::coarse, pass, 0);
             });
         }
         let picture = target
@@ -449,8 +446,6 @@ impl Canvas {
                 ..wgpu::RenderPassDescriptor::default()
             });
             pass.set_bind_group(0, &self.bindings, &[]);
-            pass.set_pipeline(&brush.paper);
-            pass.draw(0..3, 0..1);
             let [plain, lit] = match besides.filter(|_| is_shared) {
                 Some(brushes) => brushes.shared.each_ref(),
                 None => [&brush.surface, &brush.lit],
@@ -459,19 +454,21 @@ impl Canvas {
             if let Some(light) = self.light_pass.bindings().filter(|_| is_lit) {
                 pass.set_bind_group(1, light, &[]);
             }
-            let shown = || {
-                self.visible()
-                    .filter(|(name, _)| shown(name))
-                    .map(|(_, held)| held)
-            };
             let (veiled, bare): (Vec<&Held>, Vec<&Held>) =
-                shown().partition(|held| around == Some(&held.patch.object));
-            draw(bare, which, &mut pass, 0);
+                shown.iter().partition(|held| around == Some(&held.patch.object));
+            let seen = |held: &Held| held.seen(which);
+            draw(bare, seen, &mut pass, 0);
             if around.is_some() {
-                draw(&self.overlay.veil, which, &mut pass, 0);
+                draw(&self.overlay.veil, seen, &mut pass, 0);
             }
+            if is_lit && self.shows_insides(&look.camera) {
+                pass.set_pipeline(&brush.inside);
+                draw(shown.iter().copied(), Held::coarse, &mut pass, 0);
+            }
+            pass.set_pipeline(&brush.paper);
+            pass.draw(0..3, 0..1);
             if let Some(brushes) = besides {
-                self.overlay.draw(&mut pass, brushes, look, shown());
+                self.overlay.draw(&mut pass, brushes, look, shown.iter().copied());
                 // Lines come before it, and hide it.
                 if self.overlay.has_veil(look) && look.mode != Mode::Rays {
                     let own = self.overlay.veil.iter().filter(|_| around.is_none());
@@ -481,15 +478,23 @@ impl Canvas {
             }
         }
         self.queue.submit([encoder.finish()]);
-        if is_lit {
-            self.sky.get_or_insert(look.camera.axes());
-        }
+    }
+
+    /// How far all that is drawn reaches from what a camera goes round.
+    fn reach(&self, camera: &Camera) -> f64 {
+        self.radius + camera.center.distance(self.origin)
+    }
+
+    /// Whether a camera may see the backs of triangles: solids are open where they leave their box, and an eye may be in them.
+    fn shows_insides(&self, camera: &Camera) -> bool {
+        let is_within = camera.perspective && camera.distance() < self.reach(camera);
+        is_within || self.visible().any(|(_, held)| held.patch.is_open)
     }
 
     fn scene_of(&self, look: &Look, size: [u32; 2]) -> Scene {
         let aspect = f64::from(size[0]) / f64::from(size[1]);
         let camera = &look.camera;
-        let reach = self.radius + camera.center.distance(self.origin);
+        let reach = self.reach(camera);
         let columns = |m: DMat4| m.as_mat4().to_cols_array_2d();
         let clip_from_world = camera.clip_from_world(self.origin, reach, aspect);
         let [right, up, back] = camera.axes().map(|axis| axis.extend(0.0));
@@ -613,7 +618,7 @@ impl Canvas {
                 .expect("it was drawn"),
         };
         let bytes = read::bytes(&self.device, &self.queue, depth)?;
-        let reach = self.radius + look.camera.center.distance(self.origin);
+        let reach = self.reach(&look.camera);
         let toward_eye = |depth: &f32| (*depth < 1.0).then(|| reach * (1.0 - 2.0 * f64::from(*depth)));
         Ok(bytemuck::cast_slice(&bytes).iter().map(toward_eye).collect())
     }

@@ -1,4 +1,5 @@
-//! The light that reaches each pixel of a whole picture, looked up once: where many triangles share a pixel, each of them would look it up.
+//! The light that reaches a whole picture, looked up once for every second pixel across and down: where many triangles share a pixel, each of
+//! them would look it up, and what reaches a place is softer than pixels are.
 
 use std::cell::OnceCell;
 
@@ -9,14 +10,21 @@ use super::canvas::DEPTH;
 
 /// Outward normals, and 1 where there is a surface.
 const NORMALS: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
-const LIGHT: wgpu::TextureFormat = wgpu::TextureFormat::R16Float;
+/// A depth, as bits, and two shares.
+const LIGHT: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Uint;
+/// No surface as far away as that is, and all light.
+const NOTHING: wgpu::Color = wgpu::Color {
+    r: 1.0_f32.to_bits() as f64,
+    g: u32::MAX as f64,
+    b: 0.0,
+    a: 0.0,
+};
 
 /// What finds it.
 pub struct LightPass {
     device: wgpu::Device,
-    /// How a texture of a sheet is found, and its depth.
-    found: wgpu::BindGroupLayout,
-    layouts: [wgpu::BindGroupLayout; 2],
+    /// How scenes and the maps of lights are bound, what light is found from, and light.
+    layouts: [wgpu::BindGroupLayout; 4],
     /// Made when they are needed first.
     pipelines: OnceCell<[wgpu::RenderPipeline; 2]>,
     sheet: Option<Sheet>,
@@ -35,25 +43,30 @@ struct Sheet {
 impl LightPass {
     /// With the layouts of scenes and of the maps of lights.
     pub fn new(device: &wgpu::Device, layouts: [wgpu::BindGroupLayout; 2]) -> Self {
-        let texture = |binding, sample_type| wgpu::BindGroupLayoutEntry {
-            binding,
-            visibility: wgpu::ShaderStages::FRAGMENT,
-            ty: wgpu::BindingType::Texture {
-                sample_type,
-                view_dimension: wgpu::TextureViewDimension::D2,
-                multisampled: false,
-            },
-            count: None,
+        let sheet = |types: &[wgpu::TextureSampleType]| {
+            let texture = |(binding, sample_type)| wgpu::BindGroupLayoutEntry {
+                binding,
+                visibility: wgpu::ShaderStages::FRAGMENT,
+                ty: wgpu::BindingType::Texture {
+                    sample_type,
+                    view_dimension: wgpu::TextureViewDimension::D2,
+                    multisampled: false,
+                },
+                count: None,
+            };
+            let entries: Vec<_> = (0..).zip(types.iter().copied()).map(texture).collect();
+            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                label: Some("light"),
+                entries: &entries,
+            })
         };
         let numbers = wgpu::TextureSampleType::Float { filterable: false };
-        let found = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("light"),
-            entries: &[texture(0, numbers), texture(1, wgpu::TextureSampleType::Depth)],
-        });
+        let [scene, maps] = layouts;
+        let from = sheet(&[numbers, wgpu::TextureSampleType::Depth]);
+        let light = sheet(&[wgpu::TextureSampleType::Uint]);
         Self {
             device: device.clone(),
-            found,
-            layouts,
+            layouts: [scene, maps, from, light],
             pipelines: OnceCell::new(),
             sheet: None,
         }
@@ -61,7 +74,7 @@ impl LightPass {
 
     /// How surfaces find the light.
     pub fn layout(&self) -> &wgpu::BindGroupLayout {
-        &self.found
+        &self.layouts[3]
     }
 
     /// For surfaces, once it was drawn.
@@ -69,7 +82,7 @@ impl LightPass {
         self.sheet.as_ref().map(|sheet| &sheet.bindings[1])
     }
 
-    /// Makes room for a picture of so many pixels.
+    /// Makes room for the light of a picture of so many pixels.
     pub fn fit(&mut self, size: [u32; 2]) {
         if self.sheet.as_ref().is_none_or(|sheet| sheet.size != size) {
             self.sheet = Some(self.new_sheet(size));
@@ -94,12 +107,14 @@ impl LightPass {
                 }),
                 stencil_ops: None,
             };
-            let mut pass = begin(encoder, &sheet.normals, Some(depth));
+            let mut pass = begin(encoder, &sheet.normals, wgpu::Color::TRANSPARENT, Some(depth));
+            let [width, height] = sheet.size.map(|n| 0.5 * n as f32);
+            pass.set_viewport(0.0, 0.0, width, height, 0.0, 1.0);
             pass.set_pipeline(normals);
             pass.set_bind_group(0, scene, &[]);
             triangles(&mut pass);
         }
-        let mut pass = begin(encoder, &sheet.light, None);
+        let mut pass = begin(encoder, &sheet.light, NOTHING, None);
         pass.set_pipeline(light);
         pass.set_bind_group(0, scene, &[]);
         pass.set_bind_group(1, maps, &[]);
@@ -112,8 +127,8 @@ impl LightPass {
             let texture = self.device.create_texture(&wgpu::TextureDescriptor {
                 label: Some("light"),
                 size: wgpu::Extent3d {
-                    width: size[0],
-                    height: size[1],
+                    width: size[0].div_ceil(2),
+                    height: size[1].div_ceil(2),
                     depth_or_array_layers: 1,
                 },
                 mip_level_count: 1,
@@ -126,17 +141,20 @@ impl LightPass {
             texture.create_view(&wgpu::TextureViewDescriptor::default())
         };
         let [normals, depth, light] = [NORMALS, DEPTH, LIGHT].map(texture);
-        let bindings = [&normals, &light].map(|first| {
-            let entry = |binding, view| wgpu::BindGroupEntry {
+        let bind = |layout, views: &[&wgpu::TextureView]| {
+            let entry = |(binding, view)| wgpu::BindGroupEntry {
                 binding,
                 resource: wgpu::BindingResource::TextureView(view),
             };
+            let entries: Vec<_> = (0..).zip(views.iter().copied()).map(entry).collect();
             self.device.create_bind_group(&wgpu::BindGroupDescriptor {
                 label: Some("light"),
-                layout: &self.found,
-                entries: &[entry(0, first), entry(1, &depth)],
+                layout,
+                entries: &entries,
             })
-        });
+        };
+        let [_, _, from, lit] = &self.layouts;
+        let bindings = [bind(from, &[&normals, &depth]), bind(lit, &[&light])];
         Sheet {
             size,
             normals,
@@ -155,7 +173,7 @@ impl LightPass {
             label: Some("light"),
             source: wgpu::ShaderSource::Wgsl(source.into()),
         });
-        let [scene, maps] = self.layouts.each_ref();
+        let [scene, maps, from, _] = self.layouts.each_ref();
         let of_triangles = wgpu::DepthStencilState {
             format: DEPTH,
             depth_write_enabled: Some(true),
@@ -207,7 +225,7 @@ impl LightPass {
                 NORMALS,
             ),
             pipeline(
-                &[Some(scene), Some(maps), Some(&self.found)],
+                &[Some(scene), Some(maps), Some(from)],
                 ["paper", "light_of"],
                 &[],
                 None,
@@ -220,6 +238,7 @@ impl LightPass {
 fn begin<'a>(
     encoder: &'a mut wgpu::CommandEncoder,
     view: &wgpu::TextureView,
+    clear: wgpu::Color,
     depth: Option<wgpu::RenderPassDepthStencilAttachment<'_>>,
 ) -> wgpu::RenderPass<'a> {
     encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -229,7 +248,7 @@ fn begin<'a>(
             depth_slice: None,
             resolve_target: None,
             ops: wgpu::Operations {
-                load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+                load: wgpu::LoadOp::Clear(clear),
                 store: wgpu::StoreOp::Store,
             },
         })],

@@ -1,9 +1,12 @@
 //! What light reaches: the depth of the triangles as each light sees them, as [`crate::picture`] has it.
 
+use bspline::Aabb;
 use eframe::egui_wgpu::wgpu;
-use glam::{DMat3, DMat4, DVec3};
+use glam::{DMat3, DMat4, DVec2, DVec3};
 
+use super::brush::VERTEX;
 use super::canvas::DEPTH;
+use super::held::{Held, draw};
 
 /// Most directions of the sky.
 pub const MOST: usize = 64;
@@ -19,6 +22,13 @@ pub struct Lights {
     sun: wgpu::Texture,
     /// For shaders that look up what light reaches.
     pub bindings: wgpu::BindGroup,
+    /// Draws triangles as a light sees them, and nothing at all in place of them.
+    shadow: wgpu::RenderPipeline,
+    wipe: wgpu::RenderPipeline,
+    /// Round which eye the maps of the sky were drawn, unless they are to be drawn again.
+    seen_by: Option<Axes>,
+    /// Round all triangles that are others since.
+    stale: Option<Aabb>,
 }
 
 /// Axes, in the world: to the right, up and towards an eye.
@@ -26,6 +36,14 @@ pub type Axes = [DVec3; 3];
 
 /// To the sun, in the axes of the eye.
 const TO_SUN: DVec3 = DVec3::new(-0.45, 0.65, 0.62);
+
+fn world_from([right, up, back]: Axes) -> DMat3 {
+    DMat3::from_cols(right, up, back)
+}
+
+fn to_sun(axes: Axes) -> DVec3 {
+    world_from(axes) * TO_SUN.normalize()
+}
 
 /// To so many parts of the sky: a spiral of equal areas over the sphere.
 fn to_sky(count: usize) -> impl Iterator<Item = DVec3> {
@@ -37,24 +55,28 @@ fn to_sky(count: usize) -> impl Iterator<Item = DVec3> {
     })
 }
 
-/// For each light the clip space of its map, of a ball round the origin, and after these the way to each: the sky as it stood round
-/// an eye, the sun behind another.
-pub fn maps(count: usize, [of_sky, of_sun]: [Axes; 2], radius: f64) -> Vec<[f32; 4]> {
-    let world_from = |[right, up, back]: Axes| DMat3::from_cols(right, up, back);
-    let sky = to_sky(count).map(|d| world_from(of_sky) * d);
-    let sun = world_from(of_sun) * TO_SUN.normalize();
-    let mut columns = vec![[0.0; 4]; 5 * (MOST + 1)];
-    // The sun has the place after all that the sky might have.
-    for (place, way) in sky.enumerate().chain([(MOST, sun)]) {
-        let across = way.any_orthonormal_vector();
-        let turn = DMat3::from_cols(across, way.cross(across), way).transpose();
-        let shrink = DMat4::from_translation(0.5 * DVec3::Z)
-            * DMat4::from_scale(DVec3::new(1.0, 1.0, -0.5) / radius)
-            * DMat4::from_mat3(turn);
-        columns[4 * place..4 * place + 4].copy_from_slice(&shrink.as_mat4().to_cols_array_2d());
-        columns[4 * (MOST + 1) + place] = way.as_vec3().extend(0.0).to_array();
-    }
-    columns
+/// Clip space of the map of a light, of a ball round the origin, from the way to it.
+fn map(way: DVec3, radius: f64) -> DMat4 {
+    let across = way.any_orthonormal_vector();
+    let turn = DMat3::from_cols(across, way.cross(across), way).transpose();
+    DMat4::from_translation(0.5 * DVec3::Z)
+        * DMat4::from_scale(DVec3::new(1.0, 1.0, -0.5) / radius)
+        * DMat4::from_mat3(turn)
+}
+
+/// Where in the map of a light, of pixels a side, a box is: left, top, width and height in whole pixels.
+fn place(map: &DMat4, b: &Aabb, side: u32) -> [u32; 4] {
+    let mut places = (0..8).map(|n| {
+        let corner = DVec3::select(glam::BVec3::new(n & 1 > 0, n & 2 > 0, n & 4 > 0), b.max, b.min);
+        let q = map.project_point3(corner);
+        (DVec2::new(q.x, -q.y) * 0.5 + 0.5) * f64::from(side)
+    });
+    let first = places.next().unwrap_or_default();
+    let (low, high) = places.fold((first, first), |(low, high), p| (low.min(p), high.max(p)));
+    let [low, high] =
+        [low.floor() - 1.0, high.ceil() + 1.0].map(|p| p.clamp(DVec2::ZERO, DVec2::splat(side.into())));
+    let size = high - low;
+    [low.x, low.y, size.x, size.y].map(|n| n as u32)
 }
 
 impl Lights {
@@ -79,8 +101,13 @@ impl Lights {
         })
     }
 
-    /// With so many directions of the sky, [`MOST`] at most.
-    pub fn new(device: &wgpu::Device, layout: &wgpu::BindGroupLayout, count: usize) -> Self {
+    /// With so many directions of the sky, [`MOST`] at most, for scenes that are bound so to a shader.
+    pub fn new(
+        device: &wgpu::Device,
+        [scene, layout]: [&wgpu::BindGroupLayout; 2],
+        shader: &wgpu::ShaderModule,
+        count: usize,
+    ) -> Self {
         let count = count.clamp(2, MOST);
         let map = |label, side, layers| {
             device.create_texture(&wgpu::TextureDescriptor {
@@ -114,24 +141,105 @@ impl Lights {
                 },
             ],
         });
+        let pipeline = |corner, buffers: &[_], compare| {
+            let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                label: Some("lights"),
+                bind_group_layouts: &[Some(scene)],
+                immediate_size: 0,
+            });
+            device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                label: Some("lights"),
+                layout: Some(&layout),
+                vertex: wgpu::VertexState {
+                    module: shader,
+                    entry_point: Some(corner),
+                    compilation_options: wgpu::PipelineCompilationOptions::default(),
+                    buffers,
+                },
+                primitive: wgpu::PrimitiveState::default(),
+                depth_stencil: Some(wgpu::DepthStencilState {
+                    format: DEPTH,
+                    depth_write_enabled: Some(true),
+                    depth_compare: Some(compare),
+                    stencil: wgpu::StencilState::default(),
+                    bias: wgpu::DepthBiasState::default(),
+                }),
+                multisample: wgpu::MultisampleState::default(),
+                fragment: None,
+                multiview_mask: None,
+                cache: None,
+            })
+        };
         Self {
             count,
             sky,
             sun,
             bindings,
+            shadow: pipeline("lit", &[Some(VERTEX)], wgpu::CompareFunction::LessEqual),
+            wipe: pipeline("paper", &[], wgpu::CompareFunction::Always),
+            seen_by: None,
+            stale: None,
         }
     }
 
-    /// Draws the map of the sun, and those of the sky if they are old; `triangles` draws them as light number n sees them.
+    /// Has all of the sky drawn again.
+    pub fn renew(&mut self) {
+        self.seen_by = None;
+    }
+
+    /// Has the sky drawn again where a box throws shadows.
+    pub fn touch(&mut self, b: Aabb) {
+        self.stale = Some(self.stale.map_or(b, |stale| stale.hull(b)));
+    }
+
+    /// For each light the clip space of its map, of a ball round the origin, and after these the way to each: the sky as it stood round
+    /// the eye for which it was drawn, the sun behind this one.
+    pub fn maps(&self, axes: Axes, radius: f64) -> Vec<[f32; 4]> {
+        let mut columns = vec![[0.0; 4]; 5 * (MOST + 1)];
+        // The sun has the place after all that the sky might have.
+        for (n, way) in self.to_sky(axes).enumerate().chain([(MOST, to_sun(axes))]) {
+            let map = map(way, radius).as_mat4();
+            columns[4 * n..4 * n + 4].copy_from_slice(&map.to_cols_array_2d());
+            columns[4 * (MOST + 1) + n] = way.as_vec3().extend(0.0).to_array();
+        }
+        columns
+    }
+
+    /// The ways to the sky, which stays as it was drawn: that takes as long as all else, and nobody sees it turn.
+    fn to_sky(&self, axes: Axes) -> impl Iterator<Item = DVec3> + use<> {
+        let world_from = world_from(self.seen_by.unwrap_or(axes));
+        to_sky(self.count).map(move |way| world_from * way)
+    }
+
+    /// Draws the map of the sun, and those of the sky where they are old, of triangles within a radius of the origin.
     pub fn draw(
-        &self,
+        &mut self,
         encoder: &mut wgpu::CommandEncoder,
-        is_sky_old: bool,
-        triangles: impl Fn(&mut wgpu::RenderPass<'_>, u32),
+        scene: &wgpu::BindGroup,
+        (axes, radius): (Axes, f64),
+        triangles: &[&Held],
     ) {
-        let sky = if is_sky_old { self.count as u32 } else { 0 };
-        let layers = (0..sky).map(|n| (&self.sky, n, n));
-        for (texture, layer, light) in layers.chain([(&self.sun, 0, MOST as u32)]) {
+        let whole = |texture: &wgpu::Texture| [0, 0, texture.width(), texture.width()];
+        let sky = self.to_sky(axes).enumerate().filter_map(|(n, way)| {
+            let map = map(way, radius);
+            let part = match (self.seen_by, &self.stale) {
+                (None, _) => whole(&self.sky),
+                (Some(_), Some(stale)) => place(&map, stale, SKY),
+                (Some(_), None) => return None,
+            };
+            Some((&self.sky, n as u32, n as u32, map, part))
+        });
+        let sun = (
+            &self.sun,
+            0,
+            MOST as u32,
+            map(to_sun(axes), radius),
+            whole(&self.sun),
+        );
+        for (texture, layer, light, map, [x, y, width, height]) in sky.chain([sun]) {
+            if width == 0 || height == 0 {
+                continue;
+            }
             let view = texture.create_view(&wgpu::TextureViewDescriptor {
                 dimension: Some(wgpu::TextureViewDimension::D2),
                 base_array_layer: layer,
@@ -143,14 +251,26 @@ impl Lights {
                 depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
                     view: &view,
                     depth_ops: Some(wgpu::Operations {
-                        load: wgpu::LoadOp::Clear(1.0),
+                        load: wgpu::LoadOp::Load,
                         store: wgpu::StoreOp::Store,
                     }),
                     stencil_ops: None,
                 }),
                 ..wgpu::RenderPassDescriptor::default()
             });
-            triangles(&mut pass, light);
+            pass.set_bind_group(0, scene, &[]);
+            pass.set_scissor_rect(x, y, width, height);
+            pass.set_pipeline(&self.wipe);
+            pass.draw(0..3, 0..1);
+            pass.set_pipeline(&self.shadow);
+            let is_there = |held: &&&Held| {
+                let [left, top, w, h] = place(&map, &held.within, texture.width());
+                left < x + width && x < left + w && top < y + height && y < top + h
+            };
+            let there = triangles.iter().filter(is_there).copied();
+            draw(there, Held::coarse, &mut pass, light);
         }
+        self.seen_by.get_or_insert(axes);
+        self.stale = None;
     }
 }

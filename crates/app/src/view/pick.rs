@@ -10,15 +10,25 @@ const SHORTEST: u32 = 12;
 /// Bisections of a crossing.
 const BISECTIONS: usize = 40;
 
-/// Where a line first goes into the solid, and the outward normal there, of length 1. None where it passes by, or is inside from
-/// the start to the end.
+/// Where a line first goes into the solid, and the outward normal there, of length 1: of the side of the box where that cuts the solid off.
+/// None where it passes by, or is inside from the start to the end.
 pub fn pick(field: &dyn Field, iso: f64, within: &Aabb, ray: &Ray) -> Option<(DVec3, DVec3)> {
     let [from, to] = through(within, ray)?;
     let at = |t: f64| ray.from + t * ray.along;
+    if from > 0.0 && field.value(at(from)) > iso {
+        return Some((at(from), side(within, at(from))?));
+    }
     let enters = crossing(field, iso, [at(from), at(to)], true, 0)?;
     let gradient = field.value_gradient(enters).1;
     let normal = -gradient.try_normalize()?;
     Some((enters, normal))
+}
+
+/// Outward normal of the side of a box that a place lies on, if it lies on one.
+pub fn side(b: &Aabb, p: DVec3) -> Option<DVec3> {
+    let far = 2.0 * (p - b.center()) / b.size();
+    let axis = far.abs().max_position();
+    (far[axis].abs() > 1.0 - 1e-9).then(|| DVec3::AXES[axis] * far[axis].signum())
 }
 
 /// Where a line that begins on the surface, and goes into the solid, leaves it first; none where it stays inside as far as the box goes.
@@ -136,6 +146,26 @@ mod tests {
             assert!(first.x < -1.9, "{first}");
         }
         assert_eq!(leave(&field, 0.0, &b, DVec3::ZERO, DVec3::Y), None);
+    }
+
+    /// The box cuts both balls through the middle.
+    #[test]
+    fn lines_stop_where_the_box_cuts_the_solid_off() {
+        let field = two_balls();
+        let b = Aabb::new(DVec3::splat(-12.0), DVec3::new(12.0, 12.0, 0.5));
+        for n in 0..100 {
+            let (sine, cosine) = (0.063 * f64::from(n)).sin_cos();
+            let aim = DVec3::new(-5.0 + 2.0 * cosine, 2.0 * sine, 0.5);
+            let along = DVec3::new(0.3 * sine, 0.2 * cosine, -1.0).normalize();
+            let from = aim - 30.0 * along;
+            let (p, normal) = pick(&field, 0.0, &b, &Ray { from, along }).expect("it hits");
+            assert!(p.distance(aim) < 1e-9 && normal == DVec3::Z, "{p} {normal}");
+        }
+        // An eye in the solid looks out of it, and into the other ball.
+        let from = DVec3::new(-5.0, 0.0, 0.0);
+        let along = DVec3::X;
+        let (p, _) = pick(&field, 0.0, &b, &Ray { from, along }).expect("it hits");
+        assert!((p.x - 2.0).abs() < 0.2, "{p}");
     }
 
     #[test]

@@ -3,7 +3,6 @@
 mod surface;
 
 use std::collections::BTreeSet;
-use std::iter;
 
 use bspline::polygonize::PolygonizeError;
 use bspline::{Aabb, Field, Jet};
@@ -22,9 +21,12 @@ const FINER: [usize; 2] = [1, 2];
 const ERROR: f64 = 8e-4;
 /// Most triangles while something moves: two cores draw these 20 times a second.
 const MOVING: usize = 150_000;
-/// Error of these that is tried first, and how many are: each takes a tenth of a second.
+/// Error and halvings of these that are tried first, and how many are: each takes a tenth of a second.
 const ROUGH: f64 = 8.0 * ERROR;
+const FEW: usize = 3;
 const TRIES: usize = 4;
+/// Most triangles that lie in parts of the first blocks: each part takes as long to begin with as a thousand triangles do.
+const LARGE: usize = 500_000;
 /// Radius of curvature, over the diagonal of the box, at which a hollow is half as dark as it can be.
 pub const HOLLOW: f64 = 0.02;
 
@@ -53,8 +55,10 @@ pub struct Patch {
     pub vertices: Vec<Vertex>,
     /// Three for each triangle.
     pub indices: Vec<u32>,
-    /// Three for each of a coarser surface, for where something moves; none where `indices` are few enough.
-    pub rough: Vec<u32>,
+    /// Three for each of a coarser surface, for where something moves; missing where `indices` are few enough.
+    pub rough: Option<Vec<u32>>,
+    /// Whether they may be no closed surface, so that their backs are seen.
+    pub is_open: bool,
 }
 
 /// A field that was not asked yet.
@@ -80,22 +84,34 @@ impl Shape {
     /// # Errors
     /// That the surface cannot be followed, such as for its size.
     pub fn new(object: &Object, iso: f64, world_from_object: DAffine3) -> Result<Self, PolygonizeError> {
-        Ok(Self {
-            whole: Surface::new(object, iso, depth(object), ERROR)?,
+        Ok(Self::of(fine(object, iso)?, object, iso, world_from_object))
+    }
+
+    /// For a first look: of no more triangles than are turned.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn preview(object: &Object, iso: f64, world_from_object: DAffine3) -> Result<Self, PolygonizeError> {
+        Ok(Self::of(rough(object, iso)?, object, iso, world_from_object))
+    }
+
+    fn of(whole: Surface, object: &Object, iso: f64, world_from_object: DAffine3) -> Self {
+        Self {
+            whole,
             rough: None,
             object: object.clone(),
             iso,
             world_from_object,
-        })
+        }
     }
 
     /// Of its triangles, which are closed where the solid does not leave the field's box.
     pub fn area_and_volume(&self) -> [f64; 2] {
         let (mut area, mut volume) = (0.0, 0.0);
-        for (vertices, indices) in self.whole.made() {
-            for corners in indices.chunks_exact(3) {
-                let [a, b, c] =
-                    [0, 1, 2].map(|n| glam::Vec3::from(vertices[corners[n] as usize].at).as_dvec3());
+        for made in self.whole.made() {
+            for corners in made.indices.chunks_exact(3) {
+                let at = |n: u32| glam::Vec3::from(made.vertices[n as usize].at).as_dvec3();
+                let [a, b, c] = [0, 1, 2].map(|n| at(corners[n]));
                 let across = (b - a).cross(c - a);
                 area += 0.5 * across.length();
                 volume += a.dot(across) / 6.0;
@@ -114,12 +130,19 @@ impl Shape {
     /// All that is to be drawn of it.
     pub fn all(&mut self, name: &str, origin: DVec3) -> Vec<Patch> {
         let lying = Lying::new(&self.object, self.world_from_object, origin);
-        self.whole.renew_all(&lying);
-        self.rough = match self.whole.triangles() > MOVING {
-            true => rough(&lying, self.iso),
-            false => None,
-        };
-        self.whole.parts().map(|part| self.patch(name, part)).collect()
+        let count = self.whole.triangles();
+        let halvings = halvings(count);
+        self.whole.renew_all(&lying, halvings);
+        let coarser = (count > MOVING).then(|| rough(&self.object, self.iso));
+        // A solid that has no coarser surface is turned as it is.
+        self.rough = coarser.and_then(Result::ok);
+        self.rough
+            .iter_mut()
+            .for_each(|rough| rough.renew_all(&lying, halvings));
+        self.parts()
+            .into_iter()
+            .map(|part| self.patch(name, part))
+            .collect()
     }
 
     /// Follows its object; what is to be drawn anew.
@@ -138,9 +161,18 @@ impl Shape {
         boxes.retain(|b| b.min.cmple(b.max).all());
         self.object = object.clone();
         let lying = Lying::new(&self.object, self.world_from_object, origin);
-        let mut parts = BTreeSet::new();
-        for surface in iter::once(&mut self.whole).chain(&mut self.rough) {
-            parts.extend(surface.follow(&lying, &reshaped, &boxes)?);
+        let mut parts = BTreeSet::from_iter(self.whole.follow(&lying, &reshaped, &boxes)?);
+        let coarser = self
+            .rough
+            .as_mut()
+            .map(|rough| rough.follow(&lying, &reshaped, &boxes));
+        match coarser.transpose() {
+            Ok(changed) => parts.extend(changed.into_iter().flatten()),
+            // Then it is turned as it is.
+            Err(_) => {
+                parts = self.parts();
+                self.rough = None;
+            }
         }
         Ok(parts.into_iter().map(|part| self.patch(name, part)).collect())
     }
@@ -150,38 +182,74 @@ impl Shape {
         Some(self.whole.bounding_box()?.transformed(&self.world_from_object))
     }
 
+    /// Those of either surface: a large cell of the coarser one may lie where the finer one has none that begins there.
+    fn parts(&self) -> BTreeSet<Part> {
+        let coarser = self.rough.iter().flat_map(Surface::parts);
+        self.whole.parts().chain(coarser).collect()
+    }
+
     fn patch(&self, name: &str, part: Part) -> Patch {
         patch(name, part, &self.whole, self.rough.as_ref())
     }
 }
 
 fn patch(name: &str, part: Part, whole: &Surface, rough: Option<&Surface>) -> Patch {
-    let mut vertices = Vec::new();
-    let indices = whole.triangles_of(part, &mut vertices);
-    let rough = rough.map_or(Vec::new(), |rough| rough.triangles_of(part, &mut vertices));
-    Patch {
+    let mut patch = Patch {
         object: name.into(),
         part,
-        vertices,
-        indices,
-        rough,
+        vertices: Vec::new(),
+        indices: Vec::new(),
+        rough: rough.map(|_| Vec::new()),
+        is_open: false,
+    };
+    for (surface, is_rough) in [(Some(whole), false), (rough, true)] {
+        for made in surface.into_iter().flat_map(|surface| surface.made_in(part)) {
+            let first = patch.vertices.len() as u32;
+            let indices = match &mut patch.rough {
+                Some(rough) if is_rough => rough,
+                _ => &mut patch.indices,
+            };
+            indices.extend(made.indices.iter().map(|n| first + n));
+            patch.vertices.extend_from_slice(&made.vertices);
+        }
+    }
+    patch
+}
+
+/// Halvings of the first blocks after which so many triangles are in parts of a size that dabs may put anew.
+fn halvings(triangles: usize) -> u32 {
+    (0..)
+        .find(|n| triangles >> (2 * n) <= LARGE)
+        .expect("numbers run out of bits")
+}
+
+/// Triangles as fine as an object, or as can be had of so many.
+fn fine(object: &Object, iso: f64) -> Result<Surface, PolygonizeError> {
+    let mut depth = depth(object);
+    loop {
+        match Surface::new(object, iso, depth, ERROR) {
+            Err(PolygonizeError::TooManyBlocks { .. }) if depth > 1 => depth -= 1,
+            made => return made,
+        }
     }
 }
 
-/// Triangles for where something moves; none of a solid that has no coarser ones, which is turned as it is.
-fn rough(lying: &Lying<'_>, iso: f64) -> Option<Surface> {
-    let (mut error, mut found) = (ROUGH, None);
-    for _ in 0..TRIES {
-        let mut surface = Surface::new(lying.object, iso, depth(lying.object), error).ok()?;
-        surface.renew_all(lying);
-        let count = surface.triangles();
-        found = Some(surface);
-        // Half the error has four times as many triangles at the most, nearly.
-        match (count > MOVING, 4 * count < MOVING) {
-            (true, _) => error *= 2.0,
-            (_, true) if error > 2.0 * ERROR => error *= 0.5,
-            _ => break,
+/// Triangles for where something moves.
+fn rough(object: &Object, iso: f64) -> Result<Surface, PolygonizeError> {
+    let (mut error, mut depth) = (ROUGH, depth(object).min(FEW));
+    let mut found = Surface::new(object, iso, depth, error);
+    for _ in 1..TRIES {
+        let count = found.as_ref().map_or(usize::MAX, Surface::triangles);
+        if count > MOVING {
+            // Of noise a larger error leaves as many: what smaller cells find stands alone.
+            (error, depth) = (2.0 * error, (depth - 1).max(1));
+        } else if 4 * count < MOVING && error > 2.0 * ERROR {
+            // Half the error has four times as many at the most, nearly.
+            error *= 0.5;
+        } else {
+            break;
         }
+        found = Surface::new(object, iso, depth, error);
     }
     found
 }
@@ -203,9 +271,12 @@ pub fn second(
     let mut found = None;
     // The coarser ones take a third of the time of the last, as there are so many fewer of them.
     for depth in 1..=finest {
-        let mut finer = Surface::new(object, iso, depth, ERROR)?;
-        finer.renew_all(&lying);
+        let mut finer = match Surface::new(object, iso, depth, ERROR) {
+            Err(PolygonizeError::TooManyBlocks { .. }) if found.is_some() => break,
+            made => made?,
+        };
         let count = finer.triangles();
+        finer.renew_all(&lying, halvings(count));
         if count > most && found.is_some() {
             break;
         }
@@ -240,5 +311,45 @@ fn painted(before: &Object, now: &Object) -> Vec<Aabb> {
         (None, None) => Vec::new(),
         (Some(before), Some(now)) => Field::changed_boxes(now.tree(), before.tree(), &whole),
         _ => vec![whole],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bspline::HierarchicalSpline;
+    use bspline::hierarchical::Lattice;
+
+    use super::*;
+
+    /// Large cells of the coarser surface begin where the finer one has none: they are in patches of their own.
+    #[test]
+    fn patches_hold_all_triangles_of_both_surfaces() {
+        let lattice = Lattice {
+            world_from_lattice: DAffine3::from_translation(DVec3::splat(-24.0)),
+            cells: [48; 3],
+        };
+        // Cut off by its box: the sides are flat, and their cells large.
+        let ball = |p: DVec3| 30.0 - p.length() + 0.4 * (2.0 * p.x).sin() * (2.0 * p.y).cos();
+        let field = HierarchicalSpline::<f32>::schoenberg(lattice, 1.0, ball).unwrap();
+        let object = Object::of(field.into(), formats::field::FieldMeta::default());
+        let lying = Lying::new(&object, DAffine3::IDENTITY, DVec3::ZERO);
+        let made = |depth, error| {
+            let mut surface = Surface::new(&object, 0.0, depth, error).unwrap();
+            surface.renew_all(&lying, 2);
+            surface
+        };
+        let mut shape = Shape::of(made(3, ERROR), &object, 0.0, DAffine3::IDENTITY);
+        shape.rough = Some(made(2, 4.0 * ROUGH));
+        let alone = shape.parts().len() - shape.whole.parts().count();
+        assert!(alone > 0, "all parts have fine triangles");
+        let patches: Vec<_> = shape
+            .parts()
+            .into_iter()
+            .map(|part| shape.patch("", part))
+            .collect();
+        let count = |of: fn(&Patch) -> usize| patches.iter().map(of).sum::<usize>() / 3;
+        assert_eq!(count(|patch| patch.indices.len()), shape.whole.triangles());
+        let coarser = count(|patch| patch.rough.as_ref().unwrap().len());
+        assert_eq!(coarser, shape.rough.as_ref().unwrap().triangles());
     }
 }

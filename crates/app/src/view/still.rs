@@ -91,6 +91,7 @@ fn patch(scene: &Scene, surface: &Surface, origin: DVec3) -> Patch {
         part: [0; 3],
         vertices: vertices.collect(),
         indices: surface.triangles.iter().flatten().copied().collect(),
-        rough: Vec::new(),
+        rough: None,
+        is_open: true,
     }
 }

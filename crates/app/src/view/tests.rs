@@ -433,7 +433,11 @@ fn many_triangles_are_fewer_while_something_moves() {
     let origin = object.field.world_box().center();
     let all = shape.all("solid", origin);
     let whole: usize = all.iter().map(|patch| patch.indices.len() / 3).sum();
-    let rough: usize = all.iter().map(|patch| patch.rough.len() / 3).sum();
+    let rough: usize = all
+        .iter()
+        .flat_map(|patch| &patch.rough)
+        .map(|rough| rough.len() / 3)
+        .sum();
     assert!(
         whole > 250_000 && rough <= 200_000 && rough > 20_000,
         "{rough} of {whole}"
@@ -467,6 +471,68 @@ fn many_triangles_are_fewer_while_something_moves() {
         assert_eq!((&patch.vertices, &patch.indices), (&same.vertices, &same.indices));
         assert_eq!(patch.rough, same.rough);
     }
+}
+
+/// Where triangles change, the sky is drawn again as if it were drawn whole.
+#[test]
+fn light_follows_what_changes() {
+    let Some(card) = card("light") else { return };
+    let of = |field: HierarchicalSpline<f32>| {
+        let meta = FieldMeta {
+            iso: Some(0.0),
+            ..FieldMeta::default()
+        };
+        Object::of(field.into(), meta)
+    };
+    let field = balls();
+    let (object, size) = (of(field.clone()), SIZE.map(|n| n as u32));
+    let (mut canvas, look) = on_canvas(&card, &object);
+    let before = canvas.pixels(&look, size, false).unwrap();
+    let mut shape = Shape::new(&object, 0.0, DAffine3::IDENTITY).unwrap();
+    let all = shape.all("solid", canvas.origin()).len();
+    // A corner goes that the eye sees, and the shadows of its balls.
+    let cut = BlockEdit {
+        level: 0,
+        first: [66; 3],
+        shape: [20; 3],
+        change: Change::Add(vec![-9.0; 8000]),
+    };
+    let less = of(field.edited_blocks(&[cut]).unwrap());
+    let patches = shape.follow("solid", &less, canvas.origin()).unwrap();
+    assert!(!patches.is_empty() && 2 * patches.len() < all);
+    patches.iter().for_each(|patch| canvas.put(patch));
+    let followed = canvas.pixels(&look, size, false).unwrap();
+    canvas.renew();
+    assert_eq!(canvas.pixels(&look, size, false).unwrap(), followed);
+    assert!(difference(&before, &followed).1 > 2e-3);
+}
+
+/// A scan may fill its box, which cuts it off: the sides are lit as sides, whatever the field says there.
+#[test]
+fn what_the_box_cuts_off_has_the_normals_of_its_sides() {
+    let lattice = Lattice {
+        world_from_lattice: DAffine3::from_translation(DVec3::splat(-8.0)),
+        cells: [16; 3],
+    };
+    // Round a place beyond a side: the field's own normal there points back into the box.
+    let ball = |p: DVec3| 11.0 - p.distance(DVec3::new(0.0, 0.0, 11.0));
+    let field = HierarchicalSpline::schoenberg(lattice, 1.0, ball).unwrap();
+    let meta = FieldMeta {
+        iso: Some(0.0),
+        ..FieldMeta::default()
+    };
+    let mut shape = Shape::new(&Object::of(field.into(), meta), 0.0, DAffine3::IDENTITY).unwrap();
+    let patches = shape.all("ball", DVec3::ZERO);
+    let vertices = patches.iter().flat_map(|patch| &patch.vertices);
+    let on_sides = vertices.filter(|v| v.at.iter().any(|x| x.abs() > 7.9999));
+    let mut count = 0;
+    for v in on_sides {
+        let (at, normal) = (glam::Vec3::from(v.at), glam::Vec3::from(v.normal));
+        let flat = glam::Vec3::AXES[at.abs().max_position()] * at[at.abs().max_position()].signum();
+        assert!(normal.dot(flat) > 0.499, "{at} {normal}");
+        count += 1;
+    }
+    assert!(count > 100, "{count}");
 }
 
 /// The viewport as it was looked at and found good. `UPDATE_SNAPSHOTS=1` draws it anew.

@@ -12,6 +12,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
 use bspline::Aabb;
 use document::{Document, Live, State};
@@ -25,10 +26,16 @@ use super::touch::Wanted;
 use crate::cli::desk_files;
 use crate::view::{Ray, Shape};
 
+/// Has the window look at the news, after a while at the latest.
+pub type Wake = Arc<dyn Fn(Duration) + Send + Sync>;
+
+/// Time in which it looks how far work has come: pictures of that take their time from the work.
+const LOOK: Duration = Duration::from_millis(200);
+
 /// What lies on the desk.
 pub struct Desk {
     news: Sender<News>,
-    wake: Arc<dyn Fn() + Send + Sync>,
+    wake: Wake,
     cancel: Arc<Mutex<Cancel>>,
     /// Where documents are kept that have no name yet.
     home: PathBuf,
@@ -80,13 +87,8 @@ struct InHand {
 }
 
 impl Desk {
-    /// A desk with nothing on it. `wake` has the window look at the news; `cancel` ends what takes a while.
-    pub fn new(
-        news: Sender<News>,
-        wake: Arc<dyn Fn() + Send + Sync>,
-        cancel: Arc<Mutex<Cancel>>,
-        home: PathBuf,
-    ) -> Self {
+    /// A desk with nothing on it. `cancel` ends what takes a while.
+    pub fn new(news: Sender<News>, wake: Wake, cancel: Arc<Mutex<Cancel>>, home: PathBuf) -> Self {
         Self {
             news,
             wake,
@@ -122,9 +124,13 @@ impl Desk {
     }
 
     pub(super) fn tell(&self, news: News) {
+        let within = match news {
+            News::Busy(Some(_)) => LOOK,
+            _ => Duration::ZERO,
+        };
         // Without a window nobody is left to be told.
         let _ = self.news.send(news);
-        (self.wake)();
+        (self.wake)(within);
     }
 
     fn obey(&mut self, order: Order) {

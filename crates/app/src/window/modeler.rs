@@ -20,7 +20,7 @@ use glam::DVec3;
 use super::adjust::Adjust;
 use super::arrange::Arrange;
 use super::bench::Bench;
-use super::desk::Desk;
+use super::desk::{Desk, Wake};
 use super::docks::Docks;
 use super::gesture::Gesture;
 use super::kept::{Kept, Theme};
@@ -332,11 +332,11 @@ fn close_when_asked(context: Arc<Mutex<egui::Context>>) {
     });
 }
 
-fn wake(context: Arc<Mutex<egui::Context>>, is_listening: Arc<AtomicBool>) -> Arc<dyn Fn() + Send + Sync> {
-    Arc::new(move || {
+fn wake(context: Arc<Mutex<egui::Context>>, is_listening: Arc<AtomicBool>) -> Wake {
+    Arc::new(move |within| {
         if !is_listening.load(Ordering::SeqCst) {
             let context = context.lock().unwrap_or_else(PoisonError::into_inner);
-            context.request_repaint();
+            context.request_repaint_after(within);
         }
     })
 }

@@ -16,7 +16,7 @@ pub fn news(scan: &Path, name: &str, object: Object) -> Result<Vec<News>, String
     let state = State::new().with(name, object).map_err(|e| e.to_string())?;
     let object = state.object(name).map_err(|e| e.to_string())?;
     let thing = Thing::of(&state, name).ok_or("it has no surface")?;
-    let mut shape = Shape::new(object, thing.iso, thing.world_from_object).map_err(|e| e.to_string())?;
+    let mut shape = Shape::preview(object, thing.iso, thing.world_from_object).map_err(|e| e.to_string())?;
     let origin = thing.own_box.center();
     let scene = News::scene(origin, shape.bounding_box(), thing.is_volume, false);
     let (thing_iso, placed) = (thing.iso, thing.world_from_object);

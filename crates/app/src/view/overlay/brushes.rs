@@ -16,7 +16,7 @@ pub struct Brushes {
     pub cap: wgpu::RenderPipeline,
     /// Paint without light.
     pub paint: wgpu::RenderPipeline,
-    /// Surfaces whose colours tell shares of a scale, in all light and in the light that reaches them.
+    /// Surfaces whose colours tell shares of a scale, in all light, and their fronts in the light that reaches them.
     pub shared: [wgpu::RenderPipeline; 2],
 }
 
@@ -94,13 +94,18 @@ impl Brushes {
                     ..opaque
                 },
             ),
-            shared: [(&plain, "shade_scale"), (&lit, "shade_scale_lit")].map(|(layout, color)| {
+            shared: [
+                (&plain, "shade_scale", None),
+                (&lit, "shade_scale_lit", Some(wgpu::Face::Back)),
+            ]
+            .map(|(layout, color, hides)| {
                 made(
                     layout,
                     Way {
                         corner: "corner",
                         color,
                         buffers: &[Some(VERTEX)],
+                        hides,
                         ..opaque
                     },
                 )

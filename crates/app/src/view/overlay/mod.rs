@@ -140,7 +140,7 @@ impl Overlay {
     ) {
         for side in &brushes.veil {
             pass.set_pipeline(side);
-            draw(veil.clone(), 1, pass, 0);
+            draw(veil.clone(), |held| held.seen(1), pass, 0);
         }
     }
 }

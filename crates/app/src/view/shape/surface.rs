@@ -10,19 +10,30 @@ use rayon::prelude::*;
 use tools::paint::{Substance, values};
 
 use super::{HOLLOW, NOTHING, Vertex};
+use crate::view::pick::side;
 
 /// Fewest cells along the longest side of the box that triangles begin with; there are fewer than twice as many.
 const CELLS: u32 = 24;
 
-/// Cells along each side of the first blocks, which are parts of all finenesses.
+/// Most blocks that hold triangles, of about 250: noise may have a hundred times as many triangles as a picture has pixels.
+const BLOCKS: usize = 16_384;
+
+/// A place among blocks of one fineness, which holds blocks of all.
 pub type Part = [i32; 3];
 
-/// Corners and triangles of a block.
-type Made = (Vec<Vertex>, Vec<u32>);
+/// Triangles of a block.
+#[derive(Default)]
+pub struct Made {
+    pub vertices: Vec<Vertex>,
+    /// Three for each triangle.
+    pub indices: Vec<u32>,
+}
 
 /// Triangles that follow an object.
 pub struct Surface {
     mesh: AdaptiveBlockMesh,
+    /// Halvings of the first blocks that give parts.
+    halvings: u32,
     /// Of each part the blocks with triangles.
     parts: BTreeMap<Part, BTreeMap<AdaptiveBlock, Made>>,
 }
@@ -57,18 +68,21 @@ impl Surface {
             iso,
             depth,
             detection: depth - 1,
+            max_blocks: BLOCKS,
             ..AdaptiveOptions::default()
         };
         let frame = Frame::over(&world_box, cells);
         let field = object.field.as_field();
         Ok(Self {
             mesh: AdaptiveBlockMesh::new(field, &frame, &options, error * size.length(), false)?,
+            halvings: 0,
             parts: BTreeMap::new(),
         })
     }
 
-    /// Makes all corners and triangles anew.
-    pub fn renew_all(&mut self, lying: &Lying<'_>) {
+    /// Makes all corners and triangles anew, in parts that so many halvings of the first blocks give.
+    pub fn renew_all(&mut self, lying: &Lying<'_>, halvings: u32) {
+        self.halvings = halvings;
         self.parts.clear();
         let blocks = self.mesh.blocks();
         self.renew(&blocks, lying);
@@ -94,7 +108,7 @@ impl Surface {
         stale.sort_unstable();
         stale.dedup();
         self.renew(&stale, lying);
-        Ok(stale.iter().map(part).collect())
+        Ok(stale.iter().map(|block| self.part(block)).collect())
     }
 
     /// A box round it, in the object's world.
@@ -117,30 +131,38 @@ impl Surface {
 
     /// How many triangles there are.
     pub fn triangles(&self) -> usize {
-        self.made().map(|(_, indices)| indices.len() / 3).sum()
+        let pieces = self
+            .mesh
+            .blocks()
+            .into_iter()
+            .filter_map(|block| self.mesh.piece(block));
+        pieces.map(|piece| piece.triangles.len()).sum()
     }
 
-    /// The triangles of a part, whose corners are put behind others.
-    pub fn triangles_of(&self, part: Part, vertices: &mut Vec<Vertex>) -> Vec<u32> {
-        let mut indices = Vec::new();
-        for (corners, triangles) in self.parts.get(&part).into_iter().flat_map(BTreeMap::values) {
-            let first = vertices.len() as u32;
-            indices.extend(triangles.iter().map(|n| first + n));
-            vertices.extend_from_slice(corners);
-        }
-        indices
+    /// Those of a part.
+    pub fn made_in(&self, part: Part) -> impl Iterator<Item = &Made> {
+        self.parts.get(&part).into_iter().flat_map(BTreeMap::values)
     }
 
     /// Makes the corners and triangles of blocks anew.
     fn renew(&mut self, blocks: &[AdaptiveBlock], lying: &Lying<'_>) {
         let made: Vec<Made> = blocks.par_iter().map(|b| self.made_of(*b, lying)).collect();
         for (block, made) in blocks.iter().zip(made) {
-            let of_part = self.parts.entry(part(block)).or_default();
-            match made.1.is_empty() {
+            let of_part = self.parts.entry(self.part(block)).or_default();
+            match made.indices.is_empty() {
                 true => of_part.remove(block),
                 false => of_part.insert(*block, made),
             };
         }
+    }
+
+    /// The part in which a block lies, or begins.
+    fn part(&self, block: &AdaptiveBlock) -> Part {
+        let level = block.level as u32;
+        block.block.map(|n| match level.checked_sub(self.halvings) {
+            Some(finer) => n >> finer,
+            None => n << (self.halvings - level),
+        })
     }
 
     fn made_of(&self, block: AdaptiveBlock, lying: &Lying<'_>) -> Made {
@@ -160,11 +182,15 @@ impl Surface {
         let normals = placed.matrix3.inverse().transpose();
         let vertices = places.iter().zip(&jets).enumerate().map(|(n, (p, jet))| {
             let steep = jet.gradient.length();
-            let normal = -jet.gradient / steep.max(f64::MIN_POSITIVE);
+            let mut normal = -jet.gradient / steep.max(f64::MIN_POSITIVE);
             // Twice the mean curvature: div n.
             let h = &jet.hessian;
             let trace = h.x_axis.x + h.y_axis.y + h.z_axis.z;
-            let bent = -(trace - normal.dot(*h * normal)) / steep.max(f64::MIN_POSITIVE);
+            let mut bent = -(trace - normal.dot(*h * normal)) / steep.max(f64::MIN_POSITIVE);
+            // Where the box cuts the solid off, the field's normal is not that of the cut.
+            if let Some(flat) = side(&lying.world_box, *p).filter(|flat| normal.dot(*flat) < 0.5) {
+                (normal, bent) = (flat, 0.0);
+            }
             let factor = stiffness.as_ref().map_or(1.0, |stiffness| stiffness[n]);
             Vertex {
                 at: (placed.transform_point3(*p) - lying.origin).as_vec3().to_array(),
@@ -173,8 +199,10 @@ impl Surface {
                 paint: libm::log2(f64::max(factor, 1e-6)) as f32,
             }
         });
-        let indices = triangles.into_iter().flatten().collect();
-        (vertices.collect(), indices)
+        Made {
+            vertices: vertices.collect(),
+            indices: triangles.into_iter().flatten().collect(),
+        }
     }
 }
 
@@ -198,9 +226,4 @@ pub fn first_cells(object: &Object) -> u32 {
         cells *= 2;
     }
     cells
-}
-
-/// The part of an object in which a block lies.
-fn part(block: &AdaptiveBlock) -> [i32; 3] {
-    block.block.map(|n| n >> block.level)
 }

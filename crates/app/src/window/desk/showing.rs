@@ -22,8 +22,13 @@ impl Desk {
             let (Some(iso), Ok(placed)) = (object.iso(), open.shown.placement(name)) else {
                 continue;
             };
-            let followed = match open.shapes.get_mut(name) {
-                Some(shape) if shape.follows(object, placed) => shape.follow(name, object, open.origin),
+            let kept = open
+                .shapes
+                .get_mut(name)
+                .filter(|shape| shape.follows(object, placed));
+            let followed = match kept.map(|shape| shape.follow(name, object, open.origin)) {
+                Some(Ok(patches)) => Ok(patches),
+                // What became too large to follow is made anew, coarser.
                 _ => Shape::new(object, iso, placed).map(|mut shape| {
                     told.push(News::Gone(name.clone()));
                     let all = shape.all(name, open.origin);

@@ -8,7 +8,7 @@ use glam::DVec3;
 use tools::live::Pose;
 use tools::session::Stroke;
 
-use super::{Desk, InHand};
+use super::{Desk, InHand, LOOK};
 use crate::view::Ray;
 use crate::window::orders::{Acting, News};
 use crate::window::tool::{Tool, Use};
@@ -135,7 +135,7 @@ impl Desk {
             cancel: self.begin_long(),
             on_progress: Box::new(move |at| {
                 let _ = news.send(News::Busy(Some((format!("{what}: {}", at.stage), at.fraction))));
-                wake();
+                wake(LOOK);
             }),
             ..Control::default()
         };

@@ -15,7 +15,7 @@ impl Bare {
         let (orders, received) = channel();
         let (told, news) = channel();
         let cancel = Arc::new(Mutex::new(Cancel::new()));
-        let desk = Desk::new(told, Arc::new(|| ()), cancel, home.into());
+        let desk = Desk::new(told, Arc::new(|_| ()), cancel, home.into());
         Self {
             orders,
             news,
