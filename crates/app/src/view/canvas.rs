@@ -485,7 +485,7 @@ impl Canvas {
         self.radius + camera.center.distance(self.origin)
     }
 
-    /// Whether a camera may see the backs of triangles: solids are open where they leave their box, and an eye may be in them.
+    /// Whether a camera may see the backs of triangles: of open meshes, and of a solid that the eye may be in.
     fn shows_insides(&self, camera: &Camera) -> bool {
         let is_within = camera.perspective && camera.distance() < self.reach(camera);
         is_within || self.visible().any(|(_, held)| held.patch.is_open)

@@ -321,6 +321,24 @@ mod tests {
 
     use super::*;
 
+    #[test]
+    fn mirrored_objects_show_their_fronts() {
+        let lattice = Lattice {
+            world_from_lattice: DAffine3::from_translation(DVec3::splat(-8.0)),
+            cells: [16; 3],
+        };
+        let ball = |p: DVec3| 5.0 - p.length();
+        let field = HierarchicalSpline::<f32>::schoenberg(lattice, 1.0, ball).unwrap();
+        let object = Object::of(field.into(), formats::field::FieldMeta::default());
+        for side in [1.0, -1.0] {
+            let placed = DAffine3::from_scale(DVec3::new(side, 1.0, 1.0));
+            let mut shape = Shape::new(&object, 0.0, placed).unwrap();
+            shape.all("ball", DVec3::ZERO);
+            let [_, volume] = shape.area_and_volume();
+            assert!((volume - 523.6).abs() < 10.0, "{volume}");
+        }
+    }
+
     /// Large cells of the coarser surface begin where the finer one has none: they are in patches of their own.
     #[test]
     fn patches_hold_all_triangles_of_both_surfaces() {

@@ -180,6 +180,9 @@ impl Surface {
         let stiffness = values(&lying.object.layers, Substance::Stiffness, &places);
         let placed = lying.world_from_object;
         let normals = placed.matrix3.inverse().transpose();
+        // Mirrored ones show their backs else.
+        let is_mirrored = placed.matrix3.determinant() < 0.0;
+        let around = |[a, b, c]: [u32; 3]| if is_mirrored { [a, c, b] } else { [a, b, c] };
         let vertices = places.iter().zip(&jets).enumerate().map(|(n, (p, jet))| {
             let steep = jet.gradient.length();
             let mut normal = -jet.gradient / steep.max(f64::MIN_POSITIVE);
@@ -201,7 +204,7 @@ impl Surface {
         });
         Made {
             vertices: vertices.collect(),
-            indices: triangles.into_iter().flatten().collect(),
+            indices: triangles.into_iter().flat_map(around).collect(),
         }
     }
 }
