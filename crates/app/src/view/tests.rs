@@ -377,6 +377,15 @@ fn difference(a: &[u8], b: &[u8]) -> (f64, f64) {
     (mean, far)
 }
 
+/// The object that a field is.
+fn of(field: HierarchicalSpline<f32>) -> Object {
+    let meta = FieldMeta {
+        iso: Some(0.0),
+        ..FieldMeta::default()
+    };
+    Object::of(field.into(), meta)
+}
+
 /// An object on the canvas of a window, and a look at it.
 fn on_canvas(card: &Card, object: &Object) -> (Canvas, Look) {
     let mut shape = Shape::new(object, 0.0, DAffine3::IDENTITY).unwrap();
@@ -421,13 +430,6 @@ fn many_triangles_are_fewer_while_something_moves() {
         return;
     };
     let field = balls();
-    let of = |field: HierarchicalSpline<f32>| {
-        let meta = FieldMeta {
-            iso: Some(0.0),
-            ..FieldMeta::default()
-        };
-        Object::of(field.into(), meta)
-    };
     let object = of(field.clone());
     let mut shape = Shape::new(&object, 0.0, DAffine3::IDENTITY).unwrap();
     let origin = object.field.world_box().center();
@@ -477,13 +479,6 @@ fn many_triangles_are_fewer_while_something_moves() {
 #[test]
 fn light_follows_what_changes() {
     let Some(card) = card("light") else { return };
-    let of = |field: HierarchicalSpline<f32>| {
-        let meta = FieldMeta {
-            iso: Some(0.0),
-            ..FieldMeta::default()
-        };
-        Object::of(field.into(), meta)
-    };
     let field = balls();
     let (object, size) = (of(field.clone()), SIZE.map(|n| n as u32));
     let (mut canvas, look) = on_canvas(&card, &object);
@@ -517,11 +512,7 @@ fn what_the_box_cuts_off_has_the_normals_of_its_sides() {
     // Round a place beyond a side: the field's own normal there points back into the box.
     let ball = |p: DVec3| 11.0 - p.distance(DVec3::new(0.0, 0.0, 11.0));
     let field = HierarchicalSpline::schoenberg(lattice, 1.0, ball).unwrap();
-    let meta = FieldMeta {
-        iso: Some(0.0),
-        ..FieldMeta::default()
-    };
-    let mut shape = Shape::new(&Object::of(field.into(), meta), 0.0, DAffine3::IDENTITY).unwrap();
+    let mut shape = Shape::new(&of(field), 0.0, DAffine3::IDENTITY).unwrap();
     let patches = shape.all("ball", DVec3::ZERO);
     let vertices = patches.iter().flat_map(|patch| &patch.vertices);
     let on_sides = vertices.filter(|v| v.at.iter().any(|x| x.abs() > 7.9999));
