@@ -30,6 +30,7 @@ fn pipeline(
     shader: &wgpu::ShaderModule,
     layout: &wgpu::PipelineLayout,
     [corner, color]: [&str; 2],
+    buffers: &[Option<wgpu::VertexBufferLayout<'_>>],
     hides: Option<wgpu::Face>,
     samples: u32,
 ) -> wgpu::RenderPipeline {
@@ -40,7 +41,7 @@ fn pipeline(
             module: shader,
             entry_point: Some(corner),
             compilation_options: wgpu::PipelineCompilationOptions::default(),
-            buffers: if corner == "paper" { &[] } else { &[Some(VERTEX)] },
+            buffers,
         },
         primitive: wgpu::PrimitiveState {
             cull_mode: hides,
@@ -86,12 +87,14 @@ impl Brush {
     ) -> Self {
         let lit = layout(device, &[Some(scene), Some(lights)]);
         let plain = layout(device, &[Some(scene)]);
-        let made = |layout, ways, hides| pipeline(device, shader, layout, ways, hides, samples);
+        let made =
+            |layout, ways, hides| pipeline(device, shader, layout, ways, &[Some(VERTEX)], hides, samples);
+        let behind = ["paper", "paper_color"];
         Self {
             surface: made(&plain, ["corner", "shade"], None),
             lit: made(&lit, ["corner", "shade_lit"], Some(wgpu::Face::Back)),
             inside: made(&plain, ["corner_inside", "shade_inside"], Some(wgpu::Face::Front)),
-            paper: made(&plain, ["paper", "paper_color"], None),
+            paper: pipeline(device, shader, &plain, behind, &[], None, samples),
         }
     }
 }

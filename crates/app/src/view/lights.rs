@@ -141,12 +141,12 @@ impl Lights {
                 },
             ],
         });
+        let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some("lights"),
+            bind_group_layouts: &[Some(scene)],
+            immediate_size: 0,
+        });
         let pipeline = |corner, buffers: &[_], compare| {
-            let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                label: Some("lights"),
-                bind_group_layouts: &[Some(scene)],
-                immediate_size: 0,
-            });
             device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
                 label: Some("lights"),
                 layout: Some(&layout),
