@@ -6,7 +6,7 @@
 
 @fragment
 fn normal_of(in: Seen) -> @location(0) vec4<f32> {
-  return vec4(normalize(in.normal), 1.0);
+  return vec4(normalize(in.normal_paint.xyz), 1.0);
 }
 
 @fragment

@@ -27,15 +27,20 @@ fn of_scale(share: f32) -> vec3<f32> {
 // Surfaces whose colours tell shares of a scale in place of paint.
 @fragment
 fn shade_scale_lit(in: Seen) -> @location(0) vec4<f32> {
-  return vec4(of_scale(in.paint) * light_at(in), 1.0);
+  return vec4(of_scale(in.normal_paint.w) * light_at(in), 1.0);
+}
+
+@fragment
+fn shade_scale_front(in: Seen) -> @location(0) vec4<f32> {
+  return vec4(of_scale(in.normal_paint.w) * all_light(in), 1.0);
 }
 
 @fragment
 fn shade_scale(in: Seen, @builtin(front_facing) is_front: bool) -> @location(0) vec4<f32> {
-  if (is_cut(in.at)) {
+  if (is_cut(in.at_ridge.xyz)) {
     discard;
   }
-  return colored(in, is_front, of_scale(in.paint), all_light(in));
+  return colored(in, is_front, of_scale(in.normal_paint.w), all_light(in));
 }
 
 // A line, or a dot where both ends are one; its colour as the screen has it.
@@ -104,19 +109,19 @@ fn ink_color(in: Inked) -> @location(0) vec4<f32> {
 
 @fragment
 fn veil(in: Seen) -> @location(0) vec4<f32> {
-  if (is_cut(in.at)) {
+  if (is_cut(in.at_ridge.xyz)) {
     discard;
   }
-  return veil_of(normalize(in.normal));
+  return veil_of(normalize(in.normal_paint.xyz));
 }
 
 // Paint without light.
 @fragment
 fn paint_alone(in: Seen) -> @location(0) vec4<f32> {
-  if (is_cut(in.at)) {
+  if (is_cut(in.at_ridge.xyz)) {
     discard;
   }
-  return vec4(select(painted(in.paint), of_scale(in.paint), scene.shows.x > 1.5), 1.0);
+  return vec4(select(painted(in.normal_paint.w), of_scale(in.normal_paint.w), scene.shows.x > 1.5), 1.0);
 }
 
 // A sheet of the clipping plane through a solid.

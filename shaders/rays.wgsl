@@ -446,10 +446,10 @@ struct Dot {
 
 fn seen_at(line: Line, t: f32, shape: Shape) -> Seen {
   var seen: Seen;
-  seen.at = line.start + t * line.way;
-  seen.normal = shape.normal;
-  seen.ridge = shape.ridge;
-  seen.clip = scene.clip_from_world * vec4(seen.at, 1.0);
+  let at = line.start + t * line.way;
+  seen.normal_paint = vec4(shape.normal, 0.0);
+  seen.at_ridge = vec4(at, shape.ridge);
+  seen.clip = scene.clip_from_world * vec4(at, 1.0);
   return seen;
 }
 
@@ -502,7 +502,7 @@ fn pixel_of(pixel: vec2<f32>, lit: bool) -> Dot {
   let facing = max(dot(shape.normal, lights.way[SUN].xyz), 0.0);
   var light = 0.05;
   if (lit) {
-    light += all_sky(shape.normal) * from_sky(seen.at, shape.normal) + 0.95 * facing * from_sun(seen.at, shape.normal);
+    light += all_sky(shape.normal) * from_sky(seen.at_ridge.xyz, shape.normal) + 0.95 * facing * from_sun(seen.at_ridge.xyz, shape.normal);
   } else {
     let hollow = 1.0 + 0.45 * clamp(shape.ridge, -1.0, 0.0);
     light += all_sky(shape.normal) * hollow + 0.95 * facing;

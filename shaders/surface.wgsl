@@ -43,21 +43,19 @@ struct Corner {
   @location(3) paint: f32,
 };
 
+// In fours, with the paint beside the normal: processors that stand in for graphics cards take time for each four that a colour asks for, as
+// long as for small triangles themselves.
 struct Seen {
   @builtin(position) clip: vec4<f32>,
-  @location(0) at: vec3<f32>,
-  @location(1) normal: vec3<f32>,
-  @location(2) ridge: f32,
-  @location(3) paint: f32,
+  @location(0) normal_paint: vec4<f32>,
+  @location(1) at_ridge: vec4<f32>,
 };
 
 fn seen(in: Corner) -> Seen {
   var out: Seen;
   out.clip = scene.clip_from_world * vec4(in.at, 1.0);
-  out.at = in.at;
-  out.normal = in.normal;
-  out.ridge = in.ridge;
-  out.paint = in.paint;
+  out.normal_paint = vec4(in.normal, in.paint);
+  out.at_ridge = vec4(in.at, in.ridge);
   return out;
 }
 
@@ -142,7 +140,7 @@ fn inside(n: vec3<f32>) -> vec4<f32> {
 // Colour of a place in a light, as the cut has it.
 fn colored(in: Seen, is_front: bool, color: vec3<f32>, light: f32) -> vec4<f32> {
   if (!is_front) {
-    return inside(in.normal);
+    return inside(in.normal_paint.xyz);
   }
   return vec4(color * light, 1.0);
 }
@@ -165,7 +163,7 @@ fn all_sky(n: vec3<f32>) -> f32 {
 
 // The light that reaches a place: as in the four pixels round it, those above all whose surface is as far away.
 fn light_at(in: Seen) -> f32 {
-  let n = normalize(in.normal);
+  let n = normalize(in.normal_paint.xyz);
   let place = 0.5 * in.clip.xy - 0.5;
   let first = floor(place);
   let part = place - first;
@@ -185,30 +183,36 @@ fn light_at(in: Seen) -> f32 {
 
 // All of the light, darker in hollows.
 fn all_light(in: Seen) -> f32 {
-  let n = normalize(in.normal);
+  let n = normalize(in.normal_paint.xyz);
   let facing = max(dot(n, lights.way[SUN].xyz), 0.0);
-  let hollow = 1.0 + 0.45 * clamp(in.ridge, -1.0, 0.0);
+  let hollow = 1.0 + 0.45 * clamp(in.at_ridge.w, -1.0, 0.0);
   return 0.05 + all_sky(n) * hollow + 0.95 * facing;
 }
 
 // In the light that reaches a place. Of its own, not a branch: processors that stand in for graphics cards take both sides of those.
 @fragment
 fn shade_lit(in: Seen) -> @location(0) vec4<f32> {
-  return vec4(clay_or_paint(in.paint) * light_at(in), 1.0);
+  return vec4(clay_or_paint(in.normal_paint.w) * light_at(in), 1.0);
 }
 
 @fragment
 fn shade_inside(in: Seen) -> @location(0) vec4<f32> {
-  return inside(in.normal);
+  return inside(in.normal_paint.xyz);
 }
 
-// In all of the light.
+// In all of the light. Of its own too: what may be discarded is coloured even where it is hidden.
+@fragment
+fn shade_front(in: Seen) -> @location(0) vec4<f32> {
+  return vec4(clay_or_paint(in.normal_paint.w) * all_light(in), 1.0);
+}
+
+// The same, with the cut and the inside.
 @fragment
 fn shade(in: Seen, @builtin(front_facing) is_front: bool) -> @location(0) vec4<f32> {
-  if (is_cut(in.at)) {
+  if (is_cut(in.at_ridge.xyz)) {
     discard;
   }
-  return colored(in, is_front, clay_or_paint(in.paint), all_light(in));
+  return colored(in, is_front, clay_or_paint(in.normal_paint.w), all_light(in));
 }
 
 struct Paper {

@@ -14,7 +14,9 @@ use tools::live::Pose;
 
 use super::ball::{Ball, CELLS, median, middle};
 use super::{Chart, Series};
-use crate::view::{BUDGET, Camera, Canvas, Card, LINE, Look, Mode, Paper, Patch, SKY, Shape, Show, Solid};
+use crate::view::{
+    BUDGET, Camera, Canvas, Card, LINE, Look, Mode, Paper, Patch, SKY, Shape, Show, Solid, TRIANGLES,
+};
 use crate::window::tool::{Kind, Settings, Start, Tool};
 
 /// Cells of the balls, and their finest levels; the third has a million coefficients.
@@ -77,7 +79,7 @@ fn measure(card: &Card, ball: &Ball) -> Result<WindowCosts, String> {
     let origin = within.center();
     let mut canvas = Canvas::new(&card.device, &card.queue, SKY, BUDGET);
     let start = Instant::now();
-    let mut shape = Shape::new(&object, 0.0, DAffine3::IDENTITY).map_err(|e| e.to_string())?;
+    let mut shape = Shape::new(&object, 0.0, DAffine3::IDENTITY, TRIANGLES[0]).map_err(|e| e.to_string())?;
     let patches = shape.all("ball", origin);
     let meshed = start.elapsed().as_secs_f64() * 1e3;
     let size = shape.bounding_box().ok_or("the ball has no surface")?.size();

@@ -74,10 +74,6 @@ pub fn touch(context: &egui::Context, bench: &mut Bench) {
                     if held.mouse.is_some() {
                         presses(ui, &mut wish.press);
                     }
-                    match &bench.seen {
-                        Some(seen) => felt(ui, seen),
-                        None => drop(ui.weak("It has not told where it is yet")),
-                    }
                     ui.horizontal(|ui| {
                         if ui.button("Let go").clicked() {
                             bench.order(Order::LetGo);
@@ -87,6 +83,11 @@ pub fn touch(context: &egui::Context, bench: &mut Bench) {
                             bench.order(Order::Take(wish.wanted(bench)));
                         }
                     });
+                    // Below the buttons: its lines come and go.
+                    match &bench.seen {
+                        Some(seen) => felt(ui, seen),
+                        None => drop(ui.weak("It has not told where it is yet")),
+                    }
                 }
                 None => choose(ui, bench, &mut wish),
             }

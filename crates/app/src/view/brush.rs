@@ -7,9 +7,11 @@ use super::shape::Vertex;
 
 /// How pictures of a number of samples a pixel are drawn.
 pub struct Brush {
-    /// Triangles in all light.
+    /// Triangles in all light, cut, from both sides.
     pub surface: wgpu::RenderPipeline,
-    /// Their fronts, in the light that reaches them.
+    /// Their fronts.
+    pub front: wgpu::RenderPipeline,
+    /// The same, in the light that reaches them.
     pub lit: wgpu::RenderPipeline,
     /// Their backs beside these, of coarser ones.
     pub inside: wgpu::RenderPipeline,
@@ -92,6 +94,7 @@ impl Brush {
         let behind = ["paper", "paper_color"];
         Self {
             surface: made(&plain, ["corner", "shade"], None),
+            front: made(&plain, ["corner", "shade_front"], Some(wgpu::Face::Back)),
             lit: made(&lit, ["corner", "shade_lit"], Some(wgpu::Face::Back)),
             inside: made(&plain, ["corner_inside", "shade_inside"], Some(wgpu::Face::Front)),
             paper: pipeline(device, shader, &plain, behind, &[], None, samples),

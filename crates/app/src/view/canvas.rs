@@ -446,11 +446,16 @@ impl Canvas {
                 ..wgpu::RenderPassDescriptor::default()
             });
             pass.set_bind_group(0, &self.bindings, &[]);
-            let [plain, lit] = match besides.filter(|_| is_shared) {
+            let [surface, front, lit] = match besides.filter(|_| is_shared) {
                 Some(brushes) => brushes.shared.each_ref(),
-                None => [&brush.surface, &brush.lit],
+                None => [&brush.surface, &brush.front, &brush.lit],
             };
-            pass.set_pipeline(if is_lit { lit } else { plain });
+            let shows_insides = self.shows_insides(&look.camera);
+            pass.set_pipeline(match is_lit {
+                true => lit,
+                false if look.cut.is_none() && around.is_none() && !shows_insides => front,
+                false => surface,
+            });
             if let Some(light) = self.light_pass.bindings().filter(|_| is_lit) {
                 pass.set_bind_group(1, light, &[]);
             }
@@ -461,7 +466,7 @@ impl Canvas {
             if around.is_some() {
                 draw(&self.overlay.veil, seen, &mut pass, 0);
             }
-            if is_lit && self.shows_insides(&look.camera) {
+            if is_lit && shows_insides {
                 pass.set_pipeline(&brush.inside);
                 draw(shown.iter().copied(), Held::coarse, &mut pass, 0);
             }

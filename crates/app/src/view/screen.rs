@@ -13,6 +13,8 @@ use crate::cli::ceiling::of_bricks;
 
 /// Lights in the sky: more take longer than a picture should.
 pub const SKY: usize = 16;
+/// Most triangles of a scene: a processor in the place of a card shades the former in a tenth of a second; cards have the latter.
+pub const TRIANGLES: [usize; 2] = [500_000, 2_000_000];
 
 /// A picture for the window: see [`Drawn`].
 pub struct Shown {
@@ -28,6 +30,8 @@ pub struct Shown {
 pub struct Screen {
     /// What draws them.
     pub canvas: Canvas,
+    /// Most triangles of a scene.
+    pub triangles: usize,
     device: wgpu::Device,
     is_lost: Arc<AtomicBool>,
     layer: Layer,
@@ -44,8 +48,10 @@ impl Screen {
         state.device.set_device_lost_callback(move |_, _| {
             told.store(true, Ordering::Relaxed);
         });
+        let is_processor = state.adapter.get_info().device_type == wgpu::DeviceType::Cpu;
         Self {
             is_lost,
+            triangles: TRIANGLES[usize::from(!is_processor)],
             canvas: Canvas::new(&state.device, &state.queue, SKY, of_bricks()),
             device: state.device.clone(),
             layer: Layer::new(&state.device, state.target_format),

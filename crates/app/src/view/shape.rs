@@ -22,9 +22,15 @@ const ERROR: f64 = 8e-4;
 /// Most triangles while something moves: two cores draw these 20 times a second.
 const MOVING: usize = 150_000;
 /// Error and halvings of these that are tried first, and how many are: each takes a tenth of a second.
-const ROUGH: f64 = 8.0 * ERROR;
-const FEW: usize = 3;
+const ROUGH: (f64, usize) = (8.0 * ERROR, 2);
 const TRIES: usize = 4;
+/// Halvings that are given up at once where there are too many triangles, and the error that is given up before others.
+const SOON: usize = 3;
+const LATE: f64 = 8.0 * ERROR;
+/// Coefficients from which it takes seconds to find out that triangles are too many.
+const MANY: usize = 1_000_000;
+/// Most triangles of any surface: noise may have a hundred times as many as a picture has pixels.
+const MOST: usize = 1_000_000;
 /// Most triangles that lie in parts of the first blocks: each part takes as long to begin with as a thousand triangles do.
 const LARGE: usize = 500_000;
 /// Radius of curvature, over the diagonal of the box, at which a hollow is half as dark as it can be.
@@ -79,12 +85,23 @@ pub struct Shape {
 }
 
 impl Shape {
-    /// Of an object with an iso-value that stands at a place.
+    /// Of an object with an iso-value that stands at a place, of no more triangles than `most` unless the coarsest are.
     ///
     /// # Errors
     /// That the surface cannot be followed, such as for its size.
-    pub fn new(object: &Object, iso: f64, world_from_object: DAffine3) -> Result<Self, PolygonizeError> {
-        Ok(Self::of(fine(object, iso)?, object, iso, world_from_object))
+    pub fn new(
+        object: &Object,
+        iso: f64,
+        world_from_object: DAffine3,
+        most: usize,
+    ) -> Result<Self, PolygonizeError> {
+        let coarser = is_heavy(object).then(|| rough(object, iso));
+        let coarser = coarser.and_then(Result::ok);
+        let whole = fine(object, iso, most, coarser.as_ref())?;
+        Ok(Self {
+            rough: coarser,
+            ..Self::of(whole, object, iso, world_from_object)
+        })
     }
 
     /// For a first look: of no more triangles than are turned.
@@ -133,9 +150,11 @@ impl Shape {
         let count = self.whole.triangles();
         let halvings = halvings(count);
         self.whole.renew_all(&lying, halvings);
-        let coarser = (count > MOVING).then(|| rough(&self.object, self.iso));
         // A solid that has no coarser surface is turned as it is.
-        self.rough = coarser.and_then(Result::ok);
+        self.rough = match self.rough.take().filter(|_| count > MOVING) {
+            None if count > MOVING => rough(&self.object, self.iso).ok(),
+            known => known,
+        };
         self.rough
             .iter_mut()
             .for_each(|rough| rough.renew_all(&lying, halvings));
@@ -223,35 +242,68 @@ fn halvings(triangles: usize) -> u32 {
         .expect("numbers run out of bits")
 }
 
-/// Triangles as fine as an object, or as can be had of so many.
-fn fine(object: &Object, iso: f64) -> Result<Surface, PolygonizeError> {
-    let mut depth = depth(object);
+/// Whether its triangles take so long that coarse ones are seen first.
+pub fn is_heavy(object: &Object) -> bool {
+    object.field.coefficient_count() > MANY
+}
+
+/// Triangles as fine as an object, or as can be had of so many, which a coarser surface may tell.
+fn fine(
+    object: &Object,
+    iso: f64,
+    most: usize,
+    coarse: Option<&Surface>,
+) -> Result<Surface, PolygonizeError> {
+    let mut now = (ERROR, depth(object));
+    // Half the error has twice as many, of noise more.
+    let expected = |error| {
+        coarse.map_or(0.0, |coarse| {
+            2.0 * coarse.triangles() as f64 * coarse.error() / error
+        })
+    };
+    while expected(now.0) > most as f64 {
+        now = coarser(now);
+    }
     loop {
-        match Surface::new(object, iso, depth, ERROR) {
-            Err(PolygonizeError::TooManyBlocks { .. }) if depth > 1 => depth -= 1,
-            made => return made,
+        let made = Surface::new(object, iso, now, most);
+        if now.1 == 1 || count(&made).is_none_or(|count| count <= most) {
+            return made;
         }
+        now = coarser(now);
     }
 }
 
 /// Triangles for where something moves.
 fn rough(object: &Object, iso: f64) -> Result<Surface, PolygonizeError> {
-    let (mut error, mut depth) = (ROUGH, depth(object).min(FEW));
-    let mut found = Surface::new(object, iso, depth, error);
+    let mut now = (ROUGH.0, depth(object).min(ROUGH.1));
+    let mut found = Surface::new(object, iso, now, MOVING);
     for _ in 1..TRIES {
-        let count = found.as_ref().map_or(usize::MAX, Surface::triangles);
-        if count > MOVING {
-            // Of noise a larger error leaves as many: what smaller cells find stands alone.
-            (error, depth) = (2.0 * error, (depth - 1).max(1));
-        } else if 4 * count < MOVING && error > 2.0 * ERROR {
+        let (error, depth) = now;
+        now = match count(&found) {
+            None => break,
+            Some(count) if count > MOVING => coarser(now),
             // Half the error has four times as many at the most, nearly.
-            error *= 0.5;
-        } else {
-            break;
-        }
-        found = Surface::new(object, iso, depth, error);
+            Some(count) if 4 * count < MOVING && error > 2.0 * ERROR => (0.5 * error, depth),
+            Some(_) => break,
+        };
+        found = Surface::new(object, iso, now, MOVING);
     }
     found
+}
+
+/// How many triangles were made, or would be; none where it is not their number that cannot be had.
+fn count(made: &Result<Surface, PolygonizeError>) -> Option<usize> {
+    match made {
+        Ok(surface) => Some(surface.triangles()),
+        Err(PolygonizeError::TooManyBlocks { .. }) => Some(usize::MAX),
+        Err(_) => None,
+    }
+}
+
+/// Error and halvings that give fewer triangles. Of noise a larger error alone leaves as many: what smaller cells find stands alone.
+fn coarser((error, depth): (f64, usize)) -> (f64, usize) {
+    let gives_up = depth > SOON || error >= LATE;
+    (2.0 * error, (depth - usize::from(gives_up)).max(1))
 }
 
 /// Triangles of another density of an object, about as fine as those that are shown of it, but no more than `most`, unless the coarsest
@@ -271,7 +323,7 @@ pub fn second(
     let mut found = None;
     // The coarser ones take a third of the time of the last, as there are so many fewer of them.
     for depth in 1..=finest {
-        let mut finer = match Surface::new(object, iso, depth, ERROR) {
+        let mut finer = match Surface::new(object, iso, (ERROR, depth), MOST) {
             Err(PolygonizeError::TooManyBlocks { .. }) if found.is_some() => break,
             made => made?,
         };
@@ -332,7 +384,7 @@ mod tests {
         let object = Object::of(field.into(), formats::field::FieldMeta::default());
         let [volume, mirrored] = [1.0, -1.0].map(|side| {
             let placed = DAffine3::from_scale(DVec3::new(side, 1.0, 1.0));
-            let mut shape = Shape::new(&object, 0.0, placed).unwrap();
+            let mut shape = Shape::new(&object, 0.0, placed, MOST).unwrap();
             shape.all("ball", DVec3::ZERO);
             shape.area_and_volume()[1]
         });
@@ -356,12 +408,12 @@ mod tests {
         let object = Object::of(field.into(), formats::field::FieldMeta::default());
         let lying = Lying::new(&object, DAffine3::IDENTITY, DVec3::ZERO);
         let made = |depth, error| {
-            let mut surface = Surface::new(&object, 0.0, depth, error).unwrap();
+            let mut surface = Surface::new(&object, 0.0, (error, depth), MOST).unwrap();
             surface.renew_all(&lying, 2);
             surface
         };
         let mut shape = Shape::of(made(3, ERROR), &object, 0.0, DAffine3::IDENTITY);
-        shape.rough = Some(made(2, 4.0 * ROUGH));
+        shape.rough = Some(made(2, 32.0 * ERROR));
         let alone = shape.parts().len() - shape.whole.parts().count();
         assert!(alone > 0, "all parts have fine triangles");
         let patches: Vec<_> = shape

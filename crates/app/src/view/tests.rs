@@ -17,7 +17,8 @@ use glam::{DAffine3, DVec2, DVec3};
 
 use super::still::easel;
 use super::{
-    BUDGET, Camera, Canvas, Card, Look, MESH, Manner, Mode, Paper, SKY, Shape, Show, Solid, pick, read, still,
+    BUDGET, Camera, Canvas, Card, Look, MESH, Manner, Mode, Paper, SKY, Shape, Show, Solid, TRIANGLES, pick,
+    read, still,
 };
 use crate::picture::{Drawing, Scene, Surface, View, clay, depths};
 
@@ -388,7 +389,7 @@ fn of(field: HierarchicalSpline<f32>) -> Object {
 
 /// An object on the canvas of a window, and a look at it.
 fn on_canvas(card: &Card, object: &Object) -> (Canvas, Look) {
-    let mut shape = Shape::new(object, 0.0, DAffine3::IDENTITY).unwrap();
+    let mut shape = Shape::new(object, 0.0, DAffine3::IDENTITY, TRIANGLES[0]).unwrap();
     let bounds: Aabb = shape.bounding_box().unwrap();
     let origin = bounds.center();
     let radius = 0.5 * bounds.size().length();
@@ -431,7 +432,7 @@ fn many_triangles_are_fewer_while_something_moves() {
     };
     let field = balls();
     let object = of(field.clone());
-    let mut shape = Shape::new(&object, 0.0, DAffine3::IDENTITY).unwrap();
+    let mut shape = Shape::new(&object, 0.0, DAffine3::IDENTITY, TRIANGLES[0]).unwrap();
     let origin = object.field.world_box().center();
     let all = shape.all("solid", origin);
     let whole: usize = all.iter().map(|patch| patch.indices.len() / 3).sum();
@@ -466,12 +467,30 @@ fn many_triangles_are_fewer_while_something_moves() {
     let dented = of(field.edited_blocks(&[dent]).unwrap());
     let anew = shape.follow("solid", &dented, origin).unwrap();
     assert!(!anew.is_empty() && anew.len() < all.len());
-    let mut again = Shape::new(&dented, 0.0, DAffine3::IDENTITY).unwrap();
+    let mut again = Shape::new(&dented, 0.0, DAffine3::IDENTITY, TRIANGLES[0]).unwrap();
     let again = again.all("solid", origin);
     for patch in &anew {
         let same = again.iter().find(|p| p.part == patch.part).unwrap();
         assert_eq!((&patch.vertices, &patch.indices), (&same.vertices, &same.indices));
         assert_eq!(patch.rough, same.rough);
+    }
+}
+
+/// Where fewer triangles are wished, it is the error that grows.
+#[test]
+fn solids_have_no_more_triangles_than_are_wished() {
+    let object = of(balls());
+    let count = |most| {
+        let mut shape = Shape::new(&object, 0.0, DAffine3::IDENTITY, most).unwrap();
+        let patches = shape.all("solid", DVec3::ZERO);
+        let triangles: usize = patches.iter().map(|p| p.indices.len() / 3).sum();
+        (triangles, shape.area_and_volume()[0])
+    };
+    let (all, area) = count(TRIANGLES[1]);
+    for most in [all, all / 2, all / 3] {
+        let (fewer, less) = count(most);
+        assert!(fewer <= most && 5 * fewer > most, "{fewer} of {most}");
+        assert!((less / area - 1.0).abs() < 0.1, "{less} of {area}");
     }
 }
 
@@ -483,7 +502,7 @@ fn light_follows_what_changes() {
     let (object, size) = (of(field.clone()), SIZE.map(|n| n as u32));
     let (mut canvas, look) = on_canvas(&card, &object);
     let before = canvas.pixels(&look, size, false).unwrap();
-    let mut shape = Shape::new(&object, 0.0, DAffine3::IDENTITY).unwrap();
+    let mut shape = Shape::new(&object, 0.0, DAffine3::IDENTITY, TRIANGLES[0]).unwrap();
     let all = shape.all("solid", canvas.origin()).len();
     // A corner goes that the eye sees, and the shadows of its balls.
     let cut = BlockEdit {
@@ -512,7 +531,7 @@ fn what_the_box_cuts_off_has_the_normals_of_its_sides() {
     // Round a place beyond a side: the field's own normal there points back into the box.
     let ball = |p: DVec3| 11.0 - p.distance(DVec3::new(0.0, 0.0, 11.0));
     let field = HierarchicalSpline::schoenberg(lattice, 1.0, ball).unwrap();
-    let mut shape = Shape::new(&of(field), 0.0, DAffine3::IDENTITY).unwrap();
+    let mut shape = Shape::new(&of(field), 0.0, DAffine3::IDENTITY, TRIANGLES[0]).unwrap();
     let patches = shape.all("ball", DVec3::ZERO);
     let vertices = patches.iter().flat_map(|patch| &patch.vertices);
     let on_sides = vertices.filter(|v| v.at.iter().any(|x| x.abs() > 7.9999));

@@ -24,7 +24,7 @@ use super::orders::{News, Order};
 use super::tool::{Drawn, Tool};
 use super::touch::Wanted;
 use crate::cli::desk_files;
-use crate::view::{Ray, Shape};
+use crate::view::{Ray, Shape, TRIANGLES};
 
 /// Has the window look at the news, after a while at the latest.
 pub type Wake = Arc<dyn Fn(Duration) + Send + Sync>;
@@ -40,6 +40,8 @@ pub struct Desk {
     /// Where documents are kept that have no name yet.
     home: PathBuf,
     open: Option<Open>,
+    /// Triangles that are shown, at most.
+    most: usize,
     /// What is to be in the hand.
     wanted: Option<Wanted>,
     /// Where strokes of the palette may act.
@@ -95,6 +97,7 @@ impl Desk {
             cancel,
             home,
             open: None,
+            most: TRIANGLES[0],
             wanted: None,
             limits: Limits::default(),
             tried: None,
@@ -139,7 +142,8 @@ impl Desk {
             Order::Clay => {
                 desk_files::clay_block().and_then(|(name, object)| self.start(&name, object, false))
             }
-            Order::Show => {
+            Order::Show(most) => {
+                self.most = most;
                 self.show_again(true);
                 Ok(())
             }

@@ -35,7 +35,7 @@ use super::show::{Beside, Shown};
 use super::tool::{Kind, Settings, Tool};
 use crate::cli::{desk_files, interrupt};
 use crate::panels;
-use crate::view::{Camera, LINE, Look, Paper, Ray, Screen};
+use crate::view::{Camera, LINE, Look, Paper, Ray, Screen, TRIANGLES};
 
 /// The window.
 pub struct Modeler {
@@ -110,7 +110,16 @@ impl Modeler {
         // Its pictures were the old window's.
         self.bench.slices = self.bench.slices.take().map(|_| panels::Slices::new());
         self.moved = Instant::now();
-        self.bench.order(Order::Show);
+        self.show_all();
+    }
+
+    /// Has the desk show all, as the card can draw it.
+    fn show_all(&self) {
+        let triangles = self
+            .screen
+            .as_ref()
+            .map_or(TRIANGLES[0], |screen| screen.triangles);
+        self.bench.order(Order::Show(triangles));
     }
 
     /// Whether the graphics card is lost, so that the window has to be opened anew; as [`Screen::is_lost`].
@@ -145,7 +154,7 @@ impl Modeler {
             .name("desk".into())
             .spawn(move || desk.work(&received))
             .expect("the system has threads enough");
-        Self {
+        let modeler = Self {
             bench: Bench {
                 sheet: None,
                 tool: Tool {
@@ -235,7 +244,9 @@ impl Modeler {
             pen: pen::Moves::default(),
             #[cfg(test)]
             drawn_in: egui::Rect::ZERO,
-        }
+        };
+        modeler.show_all();
+        modeler
     }
 
     /// What panels show.

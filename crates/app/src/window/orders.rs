@@ -27,8 +27,8 @@ pub enum Order {
     Open(PathBuf),
     /// A new document with a block of clay.
     Clay,
-    /// All that is open is shown again.
-    Show,
+    /// All that is open is shown again, in so many triangles at most, as all that follows.
+    Show(usize),
     /// The document goes on under another name.
     Save(PathBuf),
     /// Writes the chosen object: a mesh, a field, or its scan with its edits.

@@ -1,35 +1,44 @@
-//! A coarse solid, seen while the whole fit goes on.
+//! Coarse solids, seen while a fit goes on or finer triangles are made.
 
 use std::path::Path;
 use std::sync::Arc;
 
-use document::{Object, State};
+use bspline::Aabb;
+use document::State;
 
 use super::orders::{News, Sheet, Thing};
 use crate::view::{Shape, Solid};
 
-/// What is told of an object that is only looked at.
+/// What is told of objects that are only looked at.
 ///
 /// # Errors
-/// That its surface cannot be shown.
-pub fn news(scan: &Path, name: &str, object: Object) -> Result<Vec<News>, String> {
-    let state = State::new().with(name, object).map_err(|e| e.to_string())?;
-    let object = state.object(name).map_err(|e| e.to_string())?;
-    let thing = Thing::of(&state, name).ok_or("it has no surface")?;
-    let mut shape = Shape::preview(object, thing.iso, thing.world_from_object).map_err(|e| e.to_string())?;
-    let origin = thing.own_box.center();
-    let scene = News::scene(origin, shape.bounding_box(), thing.is_volume, false);
-    let (thing_iso, placed) = (thing.iso, thing.world_from_object);
-    let sheet = Sheet {
-        path: scan.into(),
+/// That the surface of one cannot be shown.
+pub fn news(path: &Path, state: &State) -> Result<Vec<News>, String> {
+    let names = state.objects().keys();
+    let things: Vec<Thing> = names.filter_map(|name| Thing::of(state, name)).collect();
+    let boxes = things
+        .iter()
+        .map(|thing| thing.own_box.transformed(&thing.world_from_object));
+    let origin = boxes.reduce(Aabb::hull).ok_or("it has no surface")?.center();
+    let mut told = Vec::new();
+    let mut bounds = Vec::new();
+    for thing in &things {
+        let (object, iso, placed) = (&thing.object, thing.iso, thing.world_from_object);
+        let mut shape = Shape::preview(object, iso, placed).map_err(|e| e.to_string())?;
+        bounds.extend(shape.bounding_box());
+        told.push(News::Patches(shape.all(&thing.name, origin)));
+        let solid = Solid::of(object, iso, placed);
+        told.extend(solid.map(|solid| News::Solid(thing.name.clone(), Box::new(solid))));
+    }
+    let all = bounds.into_iter().reduce(Aabb::hull);
+    let scene = News::scene(origin, all, things[0].is_volume, false);
+    told.push(News::Sheet(Arc::new(Sheet {
+        path: path.into(),
         is_untitled: true,
-        objects: vec![thing],
+        objects: things,
         chosen: 0,
         history: Vec::new(),
         done: 0,
-    };
-    let patches = News::Patches(shape.all(name, origin));
-    let solid = Solid::of(object, thing_iso, placed).map(|solid| News::Solid(name.into(), Box::new(solid)));
-    let all = [scene, patches].into_iter().chain(solid);
-    Ok(all.chain([News::Sheet(Arc::new(sheet))]).collect())
+    })));
+    Ok([scene].into_iter().chain(told).collect())
 }

@@ -230,7 +230,8 @@ fn a_lost_card_loses_nothing() {
 #[test]
 fn a_coarse_solid_is_seen_under_the_name_of_its_scan() {
     let (name, object) = crate::cli::desk_files::clay_block().unwrap();
-    let told = super::preview::news(Path::new("scans/block.ply"), &name, object).unwrap();
+    let state = State::new().with(&name, object).unwrap();
+    let told = super::preview::news(Path::new("scans/block.ply"), &state).unwrap();
     let [
         News::Scene { radius, is_finer, .. },
         News::Patches(patches),

@@ -16,8 +16,8 @@ pub struct Brushes {
     pub cap: wgpu::RenderPipeline,
     /// Paint without light.
     pub paint: wgpu::RenderPipeline,
-    /// Surfaces whose colours tell shares of a scale, in all light, and their fronts in the light that reaches them.
-    pub shared: [wgpu::RenderPipeline; 2],
+    /// Surfaces whose colours tell shares of a scale, as [`crate::view::brush::Brush`] has surfaces, fronts and what is lit.
+    pub shared: [wgpu::RenderPipeline; 3],
 }
 
 /// How one of them draws.
@@ -96,6 +96,7 @@ impl Brushes {
             ),
             shared: [
                 (&plain, "shade_scale", None),
+                (&plain, "shade_scale_front", Some(wgpu::Face::Back)),
                 (&lit, "shade_scale_lit", Some(wgpu::Face::Back)),
             ]
             .map(|(layout, color, hides)| {

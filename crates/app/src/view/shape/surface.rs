@@ -15,8 +15,8 @@ use crate::view::pick::side;
 /// Fewest cells along the longest side of the box that triangles begin with; there are fewer than twice as many.
 const CELLS: u32 = 24;
 
-/// Most blocks that hold triangles, of about 250: noise may have a hundred times as many triangles as a picture has pixels.
-const BLOCKS: usize = 16_384;
+/// Fewest triangles of a block, of many: there are about 250.
+const OF_BLOCK: usize = 48;
 
 /// A place among blocks of one fineness, which holds blocks of all.
 pub type Part = [i32; 3];
@@ -32,6 +32,7 @@ pub struct Made {
 /// Triangles that follow an object.
 pub struct Surface {
     mesh: AdaptiveBlockMesh,
+    error: f64,
     /// Halvings of the first blocks that give parts.
     halvings: u32,
     /// Of each part the blocks with triangles.
@@ -58,8 +59,14 @@ impl<'a> Lying<'a> {
 }
 
 impl Surface {
-    /// With so many halvings of the first cells, at most, and an error over the diagonal of the box.
-    pub fn new(object: &Object, iso: f64, depth: usize, error: f64) -> Result<Self, PolygonizeError> {
+    /// With an error over the diagonal of the box and so many halvings of the first cells, at most. Where there would be far more triangles
+    /// than `most` there are none.
+    pub fn new(
+        object: &Object,
+        iso: f64,
+        (error, depth): (f64, usize),
+        most: usize,
+    ) -> Result<Self, PolygonizeError> {
         let world_box = object.field.world_box();
         let size = world_box.size();
         let edge = size.max_element() / f64::from(first_cells(object));
@@ -68,13 +75,14 @@ impl Surface {
             iso,
             depth,
             detection: depth - 1,
-            max_blocks: BLOCKS,
+            max_blocks: most / OF_BLOCK,
             ..AdaptiveOptions::default()
         };
         let frame = Frame::over(&world_box, cells);
         let field = object.field.as_field();
         Ok(Self {
             mesh: AdaptiveBlockMesh::new(field, &frame, &options, error * size.length(), false)?,
+            error,
             halvings: 0,
             parts: BTreeMap::new(),
         })
@@ -117,6 +125,11 @@ impl Surface {
         let pieces = blocks.filter_map(|block| self.mesh.piece(block));
         let boxes = pieces.filter_map(|piece| piece.bounding_box());
         boxes.reduce(Aabb::hull)
+    }
+
+    /// Over the diagonal of the box.
+    pub fn error(&self) -> f64 {
+        self.error
     }
 
     /// Parts that have triangles.

@@ -9,11 +9,13 @@ use document::{Document, Object, State};
 
 use super::{Desk, Open};
 use crate::cli::desk_files;
+use crate::view::is_heavy;
 use crate::window::orders::{News, Sheet, Thing};
 use crate::window::preview;
 
-/// Coefficients from which triangles take so long that it is said that they are made.
-const MANY: usize = 1_000_000;
+fn is_any_heavy(state: &State) -> bool {
+    state.objects().values().any(is_heavy)
+}
 
 impl Desk {
     /// Closes the document. One without a name in which nothing was done leaves no file.
@@ -32,6 +34,14 @@ impl Desk {
     /// Opens a document, or makes one of a field or a scan, by options of `fit`.
     pub(super) fn open(&mut self, path: &Path, options: Vec<OsString>) -> Result<(), String> {
         self.end();
+        let file = path.file_name().unwrap_or_default().to_string_lossy();
+        self.tell(News::Busy(Some((format!("{file}: opening"), 0.0))));
+        let opened = self.open_any(path, options);
+        self.tell(News::Busy(None));
+        opened
+    }
+
+    fn open_any(&mut self, path: &Path, options: Vec<OsString>) -> Result<(), String> {
         if desk_files::is_document(path) {
             let mut notes = Vec::new();
             let document = desk_files::open(path, &mut notes)?;
@@ -42,14 +52,10 @@ impl Desk {
         }
         let ((name, object), is_seen) = match desk_files::field(path) {
             Some(object) => (object?, false),
-            None => {
-                let fitted = self.fit(path, options);
-                self.tell(News::Busy(None));
-                fitted?
-            }
+            None => self.fit(path, options)?,
         };
         let started = self.start(&name, object, is_seen);
-        if started.is_err() && is_seen {
+        if started.is_err() {
             self.show_again(false);
         }
         started
@@ -75,9 +81,11 @@ impl Desk {
         }
         options.remove(0);
         // Whatever a few samples do not show may still be in all of them.
-        let seen = coarse.and_then(|(name, object)| preview::news(scan, &name, object));
-        let is_seen = seen.is_ok();
-        seen.into_iter().flatten().for_each(|news| self.tell(news));
+        let coarse = coarse.and_then(|(name, object)| {
+            let state = State::new().with(&name, object);
+            state.map_err(|e| e.to_string())
+        });
+        let is_seen = coarse.is_ok_and(|state| self.preview(scan, &state));
         let whole = match cancel.is_cancelled() {
             true => Err("cancelled".into()),
             false => {
@@ -89,6 +97,14 @@ impl Desk {
             self.show_again(false);
         }
         whole.map(|whole| (whole, is_seen))
+    }
+
+    /// Shows coarse triangles of objects that are not open yet; whether it could.
+    fn preview(&self, path: &Path, state: &State) -> bool {
+        let seen = preview::news(path, state);
+        let is_seen = seen.is_ok();
+        seen.into_iter().flatten().for_each(|news| self.tell(news));
+        is_seen
     }
 
     /// All that is open, on which the eye may be still.
@@ -109,6 +125,7 @@ impl Desk {
         self.end();
         let state = State::new().with(name, object).map_err(|e| e.to_string())?;
         let path = desk_files::untitled(&self.home, name)?;
+        let is_seen = is_seen || is_any_heavy(&state) && self.preview(&path, &state);
         let document = desk_files::create(&path, state)?;
         self.lay(document, path, true, is_seen)
     }
@@ -130,9 +147,9 @@ impl Desk {
             Some(object.field.world_box().transformed(&placed))
         });
         let all = boxes.reduce(bspline::Aabb::hull).ok_or("the document is empty")?;
-        let mut counts = state.objects().values().map(|o| o.field.coefficient_count());
-        if is_seen && counts.any(|count| count > MANY) {
-            self.tell(News::Note("the fit is done; its triangles are being made".into()));
+        let is_seen = is_seen || is_any_heavy(&state) && self.preview(&path, &state);
+        if is_seen && is_any_heavy(&state) {
+            self.tell(News::Note("finer triangles are being made".into()));
         }
         self.put_away();
         self.open = Some(Open {

@@ -13,6 +13,8 @@ impl Desk {
         let Some(open) = &mut self.open else { return };
         let is_new = open.shapes.is_empty();
         let mut told = Vec::new();
+        // What is shown together has as many as one solid alone.
+        let most = self.most / open.shown.objects().len().max(1);
         let names: Vec<String> = open.shapes.keys().cloned().collect();
         for name in names.iter().filter(|n| !open.shown.objects().contains_key(*n)) {
             open.shapes.remove(name);
@@ -29,7 +31,7 @@ impl Desk {
             let followed = match kept.map(|shape| shape.follow(name, object, open.origin)) {
                 Some(Ok(patches)) => Ok(patches),
                 // What became too large to follow is made anew, coarser.
-                _ => Shape::new(object, iso, placed).map(|mut shape| {
+                _ => Shape::new(object, iso, placed, most).map(|mut shape| {
                     told.push(News::Gone(name.clone()));
                     let all = shape.all(name, open.origin);
                     open.shapes.insert(name.clone(), shape);

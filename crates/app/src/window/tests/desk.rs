@@ -1,5 +1,11 @@
 //! The desk on its thread, without a window.
 
+use bspline::HierarchicalSpline;
+use bspline::hierarchical::Lattice;
+use document::Object;
+use formats::field::FieldMeta;
+use glam::DAffine3;
+
 use super::*;
 
 /// A desk on its thread, without a window.
@@ -301,6 +307,43 @@ fn patches_follow_the_surface() {
     // Closed across patches: every edge is gone along both ways.
     let open = edges.values().filter(|n| **n != 0).count();
     assert_eq!(open, 0, "of {} edges", edges.len());
+}
+
+/// What has triangles that take long is seen in coarse ones first; the eye stays where it is as the finer ones come.
+#[test]
+fn heavy_fields_are_seen_coarse_first() {
+    let home = tempfile::tempdir().unwrap();
+    let lattice = Lattice {
+        world_from_lattice: DAffine3::IDENTITY,
+        cells: [100; 3],
+    };
+    let ball = |p: DVec3| 40.0 - p.distance(DVec3::splat(50.0)) + 2.0 * p.x.sin() * p.y.sin();
+    let field = HierarchicalSpline::<f32>::schoenberg(lattice, 1.0, ball).unwrap();
+    let meta = FieldMeta {
+        iso: Some(0.0),
+        ..FieldMeta::default()
+    };
+    let state = State::new().with("ball", Object::of(field.into(), meta)).unwrap();
+    let path = home.path().join("ball.isoclay");
+    drop(crate::cli::desk_files::create(&path, state).unwrap());
+    let mut desk = Bare::new(home.path());
+    desk.order(Order::Open(path));
+    let scene = |wanted: bool| {
+        move |news: &News| match news {
+            News::Scene { is_finer, origin, .. } if *is_finer == wanted => Some(*origin),
+            _ => None,
+        }
+    };
+    let triangles = |news: &News| match news {
+        News::Patches(patches) => Some(patches.iter().map(|p| p.indices.len()).sum::<usize>()),
+        _ => None,
+    };
+    let first = desk.wait(scene(false));
+    let coarse = desk.wait(triangles);
+    assert_eq!(desk.wait(scene(true)), first);
+    let fine = desk.wait(triangles);
+    assert!(2 * coarse < fine, "{coarse}, then {fine}");
+    desk.sheet(0, 0);
 }
 
 /// The mouse as a device: what it presses is felt, its button is a stroke, undo takes the document back for a moment, and closing in the
