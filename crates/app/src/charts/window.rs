@@ -203,7 +203,9 @@ fn dabs(
 
 fn follow(shape: &mut Shape, object: &Object) -> Result<Vec<Patch>, String> {
     let origin = object.field.world_box().center();
-    shape.follow("ball", object, origin).map_err(|e| e.to_string())
+    shape
+        .follow("ball", object, origin, true)
+        .map_err(|e| e.to_string())
 }
 
 /// Steps a second of strokes by themselves.

@@ -5,11 +5,10 @@ mod surface;
 use std::collections::BTreeSet;
 
 use bspline::polygonize::PolygonizeError;
-use bspline::{Aabb, Field, Jet};
+use bspline::{Aabb, Jet};
 use document::Object;
 use formats::field::SourceKind;
 use glam::{DAffine3, DVec3};
-use tools::paint::Substance;
 
 use self::surface::{Lying, Part, Surface, first_cells};
 
@@ -164,7 +163,8 @@ impl Shape {
             .collect()
     }
 
-    /// Follows its object; what is to be drawn anew.
+    /// Follows its object; what is to be drawn anew. While a stroke lasts the coarser surface stays behind: nobody sees it where something
+    /// changed.
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -173,24 +173,19 @@ impl Shape {
         name: &str,
         object: &Object,
         origin: DVec3,
+        in_stroke: bool,
     ) -> Result<Vec<Patch>, PolygonizeError> {
-        let reshaped = object.field.changed_boxes(&self.object.field);
-        let mut boxes = reshaped.clone();
-        boxes.extend(painted(&self.object, object));
-        boxes.retain(|b| b.min.cmple(b.max).all());
         self.object = object.clone();
         let lying = Lying::new(&self.object, self.world_from_object, origin);
-        let mut parts = BTreeSet::from_iter(self.whole.follow(&lying, &reshaped, &boxes)?);
-        let coarser = self
-            .rough
-            .as_mut()
-            .map(|rough| rough.follow(&lying, &reshaped, &boxes));
-        match coarser.transpose() {
-            Ok(changed) => parts.extend(changed.into_iter().flatten()),
-            // Then it is turned as it is.
-            Err(_) => {
-                parts = self.parts();
-                self.rough = None;
+        let mut parts = BTreeSet::from_iter(self.whole.follow(&lying)?);
+        if let Some(rough) = self.rough.as_mut().filter(|_| !in_stroke) {
+            match rough.follow(&lying) {
+                Ok(changed) => parts.extend(changed),
+                // Then it is turned as it is.
+                Err(_) => {
+                    parts = self.parts();
+                    self.rough = None;
+                }
             }
         }
         Ok(parts.into_iter().map(|part| self.patch(name, part)).collect())
@@ -353,17 +348,6 @@ fn depth(object: &Object) -> usize {
         .max(0.0) as usize;
     let is_volume = object.meta.source == SourceKind::Volume;
     (level + FINER[usize::from(!is_volume)]).clamp(1, DEPTH)
-}
-
-/// Boxes that hold all places whose stiffness was painted anew.
-fn painted(before: &Object, now: &Object) -> Vec<Aabb> {
-    let whole = now.field.world_box();
-    let [before, now] = [before, now].map(|object| object.layers.get(&Substance::Stiffness));
-    match (before, now) {
-        (None, None) => Vec::new(),
-        (Some(before), Some(now)) => Field::changed_boxes(now.tree(), before.tree(), &whole),
-        _ => vec![whole],
-    }
 }
 
 #[cfg(test)]

@@ -17,8 +17,8 @@ use glam::{DAffine3, DVec2, DVec3};
 
 use super::still::easel;
 use super::{
-    BUDGET, Camera, Canvas, Card, Look, MESH, Manner, Mode, Paper, SKY, Shape, Show, Solid, TRIANGLES, pick,
-    read, still,
+    BUDGET, Camera, Canvas, Card, Look, MESH, Manner, Mode, Paper, Patch, SKY, Shape, Show, Solid, TRIANGLES,
+    pick, read, still,
 };
 use crate::picture::{Drawing, Scene, Surface, View, clay, depths};
 
@@ -465,11 +465,23 @@ fn many_triangles_are_fewer_while_something_moves() {
         change: Change::Add(vec![-0.5; 27]),
     };
     let dented = of(field.edited_blocks(&[dent]).unwrap());
-    let anew = shape.follow("solid", &dented, origin).unwrap();
-    assert!(!anew.is_empty() && anew.len() < all.len());
+    let mut anew = BTreeMap::new();
+    for in_stroke in [true, false] {
+        let patches = shape.follow("solid", &dented, origin, in_stroke).unwrap();
+        assert!(!patches.is_empty() && patches.len() < all.len());
+        if in_stroke {
+            let before = |patch: &Patch| all.iter().find(|p| p.part == patch.part).unwrap().rough.clone();
+            let same = |patch: &Patch| patch.rough.as_ref().map(Vec::len) == before(patch).map(|r| r.len());
+            assert!(
+                patches.iter().all(same),
+                "the coarser surface is seen by nobody yet"
+            );
+        }
+        anew.extend(patches.into_iter().map(|patch| (patch.part, patch)));
+    }
     let mut again = Shape::new(&dented, 0.0, DAffine3::IDENTITY, TRIANGLES[0]).unwrap();
     let again = again.all("solid", origin);
-    for patch in &anew {
+    for patch in anew.values() {
         let same = again.iter().find(|p| p.part == patch.part).unwrap();
         assert_eq!((&patch.vertices, &patch.indices), (&same.vertices, &same.indices));
         assert_eq!(patch.rough, same.rough);
@@ -512,7 +524,7 @@ fn light_follows_what_changes() {
         change: Change::Add(vec![-9.0; 8000]),
     };
     let less = of(field.edited_blocks(&[cut]).unwrap());
-    let patches = shape.follow("solid", &less, canvas.origin()).unwrap();
+    let patches = shape.follow("solid", &less, canvas.origin(), false).unwrap();
     assert!(!patches.is_empty() && 2 * patches.len() < all);
     patches.iter().for_each(|patch| canvas.put(patch));
     let followed = canvas.pixels(&look, size, false).unwrap();

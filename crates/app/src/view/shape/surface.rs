@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use bspline::polygonize::{AdaptiveBlock, AdaptiveBlockMesh, AdaptiveOptions, Mesh, PolygonizeError};
-use bspline::{Aabb, Frame};
+use bspline::{Aabb, Field, Frame};
 use document::Object;
 use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
@@ -32,6 +32,8 @@ pub struct Made {
 /// Triangles that follow an object.
 pub struct Surface {
     mesh: AdaptiveBlockMesh,
+    /// What it follows.
+    object: Object,
     error: f64,
     /// Halvings of the first blocks that give parts.
     halvings: u32,
@@ -82,6 +84,7 @@ impl Surface {
         let field = object.field.as_field();
         Ok(Self {
             mesh: AdaptiveBlockMesh::new(field, &frame, &options, error * size.length(), false)?,
+            object: object.clone(),
             error,
             halvings: 0,
             parts: BTreeMap::new(),
@@ -96,14 +99,15 @@ impl Surface {
         self.renew(&blocks, lying);
     }
 
-    /// Follows an object that has another shape in some boxes, and looks otherwise in these and more; parts that are others now.
-    pub fn follow(
-        &mut self,
-        lying: &Lying<'_>,
-        reshaped: &[Aabb],
-        boxes: &[Aabb],
-    ) -> Result<Vec<Part>, PolygonizeError> {
-        let update = self.mesh.update(lying.object.field.as_field(), reshaped)?;
+    /// Follows its object to another shape and other paint; parts that are others now.
+    pub fn follow(&mut self, lying: &Lying<'_>) -> Result<Vec<Part>, PolygonizeError> {
+        let now = lying.object;
+        let before = std::mem::replace(&mut self.object, now.clone());
+        let reshaped = now.field.changed_boxes(&before.field);
+        let mut boxes = reshaped.clone();
+        boxes.extend(painted(&before, now));
+        boxes.retain(|b| b.min.cmple(b.max).all());
+        let update = self.mesh.update(now.field.as_field(), &reshaped)?;
         let mut stale = update.changed;
         // Normals and paint are new there, even where triangles are not.
         let kept = self.parts.values().flat_map(BTreeMap::keys);
@@ -219,6 +223,17 @@ impl Surface {
             vertices: vertices.collect(),
             indices: triangles.into_iter().flat_map(around).collect(),
         }
+    }
+}
+
+/// Boxes that hold all places whose stiffness was painted anew.
+fn painted(before: &Object, now: &Object) -> Vec<Aabb> {
+    let whole = now.field.world_box();
+    let [before, now] = [before, now].map(|object| object.layers.get(&Substance::Stiffness));
+    match (before, now) {
+        (None, None) => Vec::new(),
+        (Some(before), Some(now)) => Field::changed_boxes(now.tree(), before.tree(), &whole),
+        _ => vec![whole],
     }
 }
 

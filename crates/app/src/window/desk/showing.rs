@@ -12,6 +12,7 @@ impl Desk {
     pub(super) fn show(&mut self) {
         let Some(open) = &mut self.open else { return };
         let is_new = open.shapes.is_empty();
+        let in_stroke = open.live.is_some();
         let mut told = Vec::new();
         // What is shown together has as many as one solid alone.
         let most = self.most / open.shown.objects().len().max(1);
@@ -28,7 +29,7 @@ impl Desk {
                 .shapes
                 .get_mut(name)
                 .filter(|shape| shape.follows(object, placed));
-            let followed = match kept.map(|shape| shape.follow(name, object, open.origin)) {
+            let followed = match kept.map(|shape| shape.follow(name, object, open.origin, in_stroke)) {
                 Some(Ok(patches)) => Ok(patches),
                 // What became too large to follow is made anew, coarser.
                 _ => Shape::new(object, iso, placed, most).map(|mut shape| {
