@@ -28,7 +28,7 @@ const SOON: usize = 3;
 const LATE: f64 = 8.0 * ERROR;
 /// Coefficients from which it takes seconds to find out that triangles are too many.
 const MANY: usize = 1_000_000;
-/// Most triangles of any surface: noise may have a hundred times as many as a picture has pixels.
+/// Most triangles of a second surface whose fineness is looked for.
 const MOST: usize = 1_000_000;
 /// Most triangles that lie in parts of the first blocks: each part takes as long to begin with as a thousand triangles do.
 const LARGE: usize = 500_000;

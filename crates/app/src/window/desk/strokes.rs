@@ -76,8 +76,13 @@ impl Desk {
 
     pub(in crate::window) fn end(&mut self) {
         self.untry();
+        let Some(hand) = self.open.as_mut().and_then(|open| open.live.take()) else {
+            return;
+        };
+        // The coarser surface follows before a whole picture is lit by it, which is before the edit is on the disk.
+        self.show();
         let Some(open) = &mut self.open else { return };
-        let (Some(hand), Some(document)) = (open.live.take(), &mut open.document) else {
+        let Some(document) = &mut open.document else {
             return;
         };
         let acted = hand.live.moving().is_some();

@@ -31,6 +31,8 @@ impl Modeler {
                 // It went nowhere: nothing is slower.
                 self.begin_waiting(waits, Some(1.0));
                 self.bench.order(Order::End);
+                // What the desk still shows of it comes first.
+                self.moved = Instant::now();
             }
             // The button may come up where no scene is, and nothing leads the tool.
             Some(Gesture::Hand) => self.release(),
