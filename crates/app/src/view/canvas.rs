@@ -451,10 +451,13 @@ impl Canvas {
                 None => [&brush.surface, &brush.front, &brush.lit],
             };
             let shows_insides = self.shows_insides(&look.camera);
-            pass.set_pipeline(match is_lit {
-                true => lit,
-                false if look.cut.is_none() && around.is_none() && !shows_insides => front,
-                false => surface,
+            let hides_backs = look.cut.is_none() && around.is_none() && !shows_insides;
+            pass.set_pipeline(if is_lit {
+                lit
+            } else if hides_backs {
+                front
+            } else {
+                surface
             });
             if let Some(light) = self.light_pass.bindings().filter(|_| is_lit) {
                 pass.set_bind_group(1, light, &[]);

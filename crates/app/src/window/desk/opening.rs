@@ -99,6 +99,11 @@ impl Desk {
         whole.map(|whole| (whole, is_seen))
     }
 
+    /// The same as [`preview`](Self::preview), where finer triangles take long.
+    fn preview_heavy(&self, path: &Path, state: &State) -> bool {
+        is_any_heavy(state) && self.preview(path, state)
+    }
+
     /// Shows coarse triangles of objects that are not open yet; whether it could.
     fn preview(&self, path: &Path, state: &State) -> bool {
         let seen = preview::news(path, state);
@@ -125,7 +130,7 @@ impl Desk {
         self.end();
         let state = State::new().with(name, object).map_err(|e| e.to_string())?;
         let path = desk_files::untitled(&self.home, name)?;
-        let is_seen = is_seen || is_any_heavy(&state) && self.preview(&path, &state);
+        let is_seen = is_seen || self.preview_heavy(&path, &state);
         let document = desk_files::create(&path, state)?;
         self.lay(document, path, true, is_seen)
     }
@@ -147,7 +152,7 @@ impl Desk {
             Some(object.field.world_box().transformed(&placed))
         });
         let all = boxes.reduce(bspline::Aabb::hull).ok_or("the document is empty")?;
-        let is_seen = is_seen || is_any_heavy(&state) && self.preview(&path, &state);
+        let is_seen = is_seen || self.preview_heavy(&path, &state);
         if is_seen && is_any_heavy(&state) {
             self.tell(News::Note("finer triangles are being made".into()));
         }
