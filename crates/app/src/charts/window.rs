@@ -15,7 +15,7 @@ use tools::live::Pose;
 use super::ball::{Ball, CELLS, median, middle};
 use super::{Chart, Series};
 use crate::view::{
-    BUDGET, Camera, Canvas, Card, LINE, Look, Mode, Paper, Patch, SKY, Shape, Show, Solid, TRIANGLES,
+    BUDGET, Budget, Camera, Canvas, Card, LINE, Look, Mode, Paper, Patch, SKY, Shape, Show, Solid,
 };
 use crate::window::tool::{Kind, Settings, Start, Tool};
 
@@ -79,7 +79,8 @@ fn measure(card: &Card, ball: &Ball) -> Result<WindowCosts, String> {
     let origin = within.center();
     let mut canvas = Canvas::new(&card.device, &card.queue, SKY, BUDGET);
     let start = Instant::now();
-    let mut shape = Shape::new(&object, 0.0, DAffine3::IDENTITY, TRIANGLES[0]).map_err(|e| e.to_string())?;
+    let mut shape =
+        Shape::new(&object, 0.0, DAffine3::IDENTITY, Budget::PROCESSOR).map_err(|e| e.to_string())?;
     let patches = shape.all("ball", origin);
     let meshed = start.elapsed().as_secs_f64() * 1e3;
     let size = shape.bounding_box().ok_or("the ball has no surface")?.size();
@@ -204,7 +205,7 @@ fn dabs(
 fn follow(shape: &mut Shape, object: &Object) -> Result<Vec<Patch>, String> {
     let origin = object.field.world_box().center();
     shape
-        .follow("ball", object, origin, true)
+        .follow_stroke("ball", object, origin)
         .map_err(|e| e.to_string())
 }
 

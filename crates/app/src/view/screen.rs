@@ -8,13 +8,11 @@ use eframe::egui_wgpu::{RenderState, wgpu};
 use super::canvas::Drawn;
 use super::laid::{Laid, Layer};
 use super::stereo::Eyes;
-use super::{Canvas, Look};
+use super::{Budget, Canvas, Look};
 use crate::cli::ceiling::of_bricks;
 
 /// Lights in the sky: more take longer than a picture should.
 pub const SKY: usize = 16;
-/// Most triangles of a scene: a processor in the place of a card shades the former in a tenth of a second; cards have the latter.
-pub const TRIANGLES: [usize; 2] = [500_000, 2_000_000];
 
 /// A picture for the window: see [`Drawn`].
 pub struct Shown {
@@ -31,7 +29,7 @@ pub struct Screen {
     /// What draws them.
     pub canvas: Canvas,
     /// Most triangles of a scene.
-    pub triangles: usize,
+    pub triangles: Budget,
     device: wgpu::Device,
     is_lost: Arc<AtomicBool>,
     layer: Layer,
@@ -48,10 +46,13 @@ impl Screen {
         state.device.set_device_lost_callback(move |_, _| {
             told.store(true, Ordering::Relaxed);
         });
-        let is_processor = state.adapter.get_info().device_type == wgpu::DeviceType::Cpu;
+        let triangles = match state.adapter.get_info().device_type {
+            wgpu::DeviceType::Cpu => Budget::PROCESSOR,
+            _ => Budget::CARD,
+        };
         Self {
             is_lost,
-            triangles: TRIANGLES[usize::from(!is_processor)],
+            triangles,
             canvas: Canvas::new(&state.device, &state.queue, SKY, of_bricks()),
             device: state.device.clone(),
             layer: Layer::new(&state.device, state.target_format),

@@ -1,5 +1,6 @@
 //! The triangles of an object, kept as it changes.
 
+mod budget;
 mod surface;
 
 use std::collections::BTreeSet;
@@ -10,6 +11,7 @@ use document::Object;
 use formats::field::SourceKind;
 use glam::{DAffine3, DVec3};
 
+pub use self::budget::Budget;
 use self::surface::{Lying, Part, Surface, first_cells};
 
 /// Halvings of the first cells, at most, and how many more than knots have: of a volume no cell is much finer than its voxels, tools add a level
@@ -18,14 +20,12 @@ const DEPTH: usize = 6;
 const FINER: [usize; 2] = [1, 2];
 /// Chord error over the diagonal of the box: half a pixel where the box fills a screen.
 const ERROR: f64 = 8e-4;
-/// Most triangles while something moves: two cores draw these 20 times a second.
-const MOVING: usize = 150_000;
-/// Error and halvings of these that are tried first, and how many are: each takes a tenth of a second.
+/// Error and halvings of the coarser surface that are tried first, and how many are: each takes a tenth of a second.
 const ROUGH: (f64, usize) = (8.0 * ERROR, 2);
 const TRIES: usize = 4;
-/// Halvings that are given up at once where there are too many triangles, and the error that is given up before others.
-const SOON: usize = 3;
-const LATE: f64 = 8.0 * ERROR;
+/// Where triangles are too many, cells of more halvings than these are given up as the error grows, and others from this error on.
+const SMALL: usize = 3;
+const COARSE: f64 = 8.0 * ERROR;
 /// Coefficients from which it takes seconds to find out that triangles are too many.
 const MANY: usize = 1_000_000;
 /// Most triangles of a second surface whose fineness is looked for.
@@ -81,10 +81,11 @@ pub struct Shape {
     object: Object,
     iso: f64,
     world_from_object: DAffine3,
+    budget: Budget,
 }
 
 impl Shape {
-    /// Of an object with an iso-value that stands at a place, of no more triangles than `most` unless the coarsest are.
+    /// Of an object with an iso-value that stands at a place, within a budget unless the coarsest triangles are more.
     ///
     /// # Errors
     /// That the surface cannot be followed, such as for its size.
@@ -92,14 +93,14 @@ impl Shape {
         object: &Object,
         iso: f64,
         world_from_object: DAffine3,
-        most: usize,
+        budget: Budget,
     ) -> Result<Self, PolygonizeError> {
-        let coarser = is_heavy(object).then(|| rough(object, iso));
+        let coarser = is_heavy(object).then(|| rough(object, iso, budget.moving));
         let coarser = coarser.and_then(Result::ok);
-        let whole = fine(object, iso, most, coarser.as_ref())?;
+        let whole = fine(object, iso, budget.still, coarser.as_ref())?;
         Ok(Self {
             rough: coarser,
-            ..Self::of(whole, object, iso, world_from_object)
+            ..Self::of(whole, object, iso, world_from_object, budget)
         })
     }
 
@@ -107,17 +108,24 @@ impl Shape {
     ///
     /// # Errors
     /// As [`new`](Self::new).
-    pub fn preview(object: &Object, iso: f64, world_from_object: DAffine3) -> Result<Self, PolygonizeError> {
-        Ok(Self::of(rough(object, iso)?, object, iso, world_from_object))
+    pub fn preview(
+        object: &Object,
+        iso: f64,
+        world_from_object: DAffine3,
+        budget: Budget,
+    ) -> Result<Self, PolygonizeError> {
+        let coarse = rough(object, iso, budget.moving)?;
+        Ok(Self::of(coarse, object, iso, world_from_object, budget))
     }
 
-    fn of(whole: Surface, object: &Object, iso: f64, world_from_object: DAffine3) -> Self {
+    fn of(whole: Surface, object: &Object, iso: f64, world_from_object: DAffine3, budget: Budget) -> Self {
         Self {
             whole,
             rough: None,
             object: object.clone(),
             iso,
             world_from_object,
+            budget,
         }
     }
 
@@ -136,6 +144,13 @@ impl Shape {
         [area, volume]
     }
 
+    /// Whether it is within another budget, and as fine as that allows.
+    pub fn fits(&self, budget: Budget) -> bool {
+        let moving = self.rough.as_ref().unwrap_or(&self.whole);
+        let may_be_finer = budget.still > self.budget.still && self.whole.error() > ERROR;
+        self.whole.triangles() <= budget.still && moving.triangles() <= budget.moving && !may_be_finer
+    }
+
     /// Whether it can follow to another state of its object.
     pub fn follows(&self, object: &Object, world_from_object: DAffine3) -> bool {
         self.object.field.world_box() == object.field.world_box()
@@ -150,21 +165,18 @@ impl Shape {
         let halvings = halvings(count);
         self.whole.renew_all(&lying, halvings);
         // A solid that has no coarser surface is turned as it is.
-        self.rough = match self.rough.take().filter(|_| count > MOVING) {
-            None if count > MOVING => rough(&self.object, self.iso).ok(),
+        let most = self.budget.moving;
+        self.rough = match self.rough.take().filter(|_| count > most) {
+            None if count > most => rough(&self.object, self.iso, most).ok(),
             known => known,
         };
         self.rough
             .iter_mut()
             .for_each(|rough| rough.renew_all(&lying, halvings));
-        self.parts()
-            .into_iter()
-            .map(|part| self.patch(name, part))
-            .collect()
+        self.patches(name, self.parts())
     }
 
-    /// Follows its object; what is to be drawn anew. While a stroke lasts the coarser surface stays behind: nobody sees it where something
-    /// changed.
+    /// Follows its object; what is to be drawn anew.
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -173,22 +185,39 @@ impl Shape {
         name: &str,
         object: &Object,
         origin: DVec3,
-        in_stroke: bool,
     ) -> Result<Vec<Patch>, PolygonizeError> {
-        self.object = object.clone();
+        let mut parts = self.follow_finely(object, origin)?;
         let lying = Lying::new(&self.object, self.world_from_object, origin);
-        let mut parts = BTreeSet::from_iter(self.whole.follow(&lying)?);
-        if let Some(rough) = self.rough.as_mut().filter(|_| !in_stroke) {
-            match rough.follow(&lying) {
-                Ok(changed) => parts.extend(changed),
-                // Then it is turned as it is.
-                Err(_) => {
-                    parts = self.parts();
-                    self.rough = None;
-                }
+        match self.rough.as_mut().map(|rough| rough.follow(&lying)) {
+            None => {}
+            Some(Ok(changed)) => parts.extend(changed),
+            // Then it is turned as it is.
+            Some(Err(_)) => {
+                parts = self.parts();
+                self.rough = None;
             }
         }
-        Ok(parts.into_iter().map(|part| self.patch(name, part)).collect())
+        Ok(self.patches(name, parts))
+    }
+
+    /// As [`follow`](Self::follow), while a stroke lasts: the coarser surface stays behind, as nobody sees it where something changed.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn follow_stroke(
+        &mut self,
+        name: &str,
+        object: &Object,
+        origin: DVec3,
+    ) -> Result<Vec<Patch>, PolygonizeError> {
+        let parts = self.follow_finely(object, origin)?;
+        Ok(self.patches(name, parts))
+    }
+
+    fn follow_finely(&mut self, object: &Object, origin: DVec3) -> Result<BTreeSet<Part>, PolygonizeError> {
+        self.object = object.clone();
+        let lying = Lying::new(&self.object, self.world_from_object, origin);
+        Ok(self.whole.follow(&lying)?.into_iter().collect())
     }
 
     /// A box round its surface, in the world.
@@ -202,8 +231,9 @@ impl Shape {
         self.whole.parts().chain(coarser).collect()
     }
 
-    fn patch(&self, name: &str, part: Part) -> Patch {
-        patch(name, part, &self.whole, self.rough.as_ref())
+    fn patches(&self, name: &str, parts: BTreeSet<Part>) -> Vec<Patch> {
+        let patch = |part| patch(name, part, &self.whole, self.rough.as_ref());
+        parts.into_iter().map(patch).collect()
     }
 }
 
@@ -268,20 +298,20 @@ fn fine(
     }
 }
 
-/// Triangles for where something moves.
-fn rough(object: &Object, iso: f64) -> Result<Surface, PolygonizeError> {
+/// No more triangles than `most`, for where something moves.
+fn rough(object: &Object, iso: f64, most: usize) -> Result<Surface, PolygonizeError> {
     let mut now = (ROUGH.0, depth(object).min(ROUGH.1));
-    let mut found = Surface::new(object, iso, now, MOVING);
+    let mut found = Surface::new(object, iso, now, most);
     for _ in 1..TRIES {
         let (error, depth) = now;
         now = match count(&found) {
             None => break,
-            Some(count) if count > MOVING => coarser(now),
+            Some(count) if count > most => coarser(now),
             // Half the error has four times as many at the most, nearly.
-            Some(count) if 4 * count < MOVING && error > 2.0 * ERROR => (0.5 * error, depth),
+            Some(count) if 4 * count < most && error > 2.0 * ERROR => (0.5 * error, depth),
             Some(_) => break,
         };
-        found = Surface::new(object, iso, now, MOVING);
+        found = Surface::new(object, iso, now, most);
     }
     found
 }
@@ -297,7 +327,7 @@ fn count(made: &Result<Surface, PolygonizeError>) -> Option<usize> {
 
 /// Error and halvings that give fewer triangles. Of noise a larger error alone leaves as many: what smaller cells find stands alone.
 fn coarser((error, depth): (f64, usize)) -> (f64, usize) {
-    let gives_up = depth > SOON || error >= LATE;
+    let gives_up = depth > SMALL || error >= COARSE;
     (2.0 * error, (depth - usize::from(gives_up)).max(1))
 }
 
@@ -368,7 +398,7 @@ mod tests {
         let object = Object::of(field.into(), formats::field::FieldMeta::default());
         let [volume, mirrored] = [1.0, -1.0].map(|side| {
             let placed = DAffine3::from_scale(DVec3::new(side, 1.0, 1.0));
-            let mut shape = Shape::new(&object, 0.0, placed, MOST).unwrap();
+            let mut shape = Shape::new(&object, 0.0, placed, Budget::PROCESSOR).unwrap();
             shape.all("ball", DVec3::ZERO);
             shape.area_and_volume()[1]
         });
@@ -396,15 +426,17 @@ mod tests {
             surface.renew_all(&lying, 2);
             surface
         };
-        let mut shape = Shape::of(made(3, ERROR), &object, 0.0, DAffine3::IDENTITY);
+        let mut shape = Shape::of(
+            made(3, ERROR),
+            &object,
+            0.0,
+            DAffine3::IDENTITY,
+            Budget::PROCESSOR,
+        );
         shape.rough = Some(made(2, 32.0 * ERROR));
         let alone = shape.parts().len() - shape.whole.parts().count();
         assert!(alone > 0, "all parts have fine triangles");
-        let patches: Vec<_> = shape
-            .parts()
-            .into_iter()
-            .map(|part| shape.patch("", part))
-            .collect();
+        let patches = shape.patches("", shape.parts());
         let count = |of: fn(&Patch) -> usize| patches.iter().map(of).sum::<usize>() / 3;
         assert_eq!(count(|patch| patch.indices.len()), shape.whole.triangles());
         let coarser = count(|patch| patch.rough.as_ref().unwrap().len());

@@ -15,9 +15,10 @@ use document::Object;
 use formats::field::FieldMeta;
 use glam::{DAffine3, DVec2, DVec3};
 
+use super::shape::Vertex;
 use super::still::easel;
 use super::{
-    BUDGET, Camera, Canvas, Card, Look, MESH, Manner, Mode, Paper, Patch, SKY, Shape, Show, Solid, TRIANGLES,
+    BUDGET, Budget, Camera, Canvas, Card, Look, MESH, Manner, Mode, Paper, Patch, SKY, Shape, Show, Solid,
     pick, read, still,
 };
 use crate::picture::{Drawing, Scene, Surface, View, clay, depths};
@@ -389,7 +390,7 @@ fn of(field: HierarchicalSpline<f32>) -> Object {
 
 /// An object on the canvas of a window, and a look at it.
 fn on_canvas(card: &Card, object: &Object) -> (Canvas, Look) {
-    let mut shape = Shape::new(object, 0.0, DAffine3::IDENTITY, TRIANGLES[0]).unwrap();
+    let mut shape = Shape::new(object, 0.0, DAffine3::IDENTITY, Budget::PROCESSOR).unwrap();
     let bounds: Aabb = shape.bounding_box().unwrap();
     let origin = bounds.center();
     let radius = 0.5 * bounds.size().length();
@@ -432,7 +433,7 @@ fn many_triangles_are_fewer_while_something_moves() {
     };
     let field = balls();
     let object = of(field.clone());
-    let mut shape = Shape::new(&object, 0.0, DAffine3::IDENTITY, TRIANGLES[0]).unwrap();
+    let mut shape = Shape::new(&object, 0.0, DAffine3::IDENTITY, Budget::PROCESSOR).unwrap();
     let origin = object.field.world_box().center();
     let all = shape.all("solid", origin);
     let whole: usize = all.iter().map(|patch| patch.indices.len() / 3).sum();
@@ -465,27 +466,46 @@ fn many_triangles_are_fewer_while_something_moves() {
         change: Change::Add(vec![-0.5; 27]),
     };
     let dented = of(field.edited_blocks(&[dent]).unwrap());
-    let mut anew = BTreeMap::new();
-    for in_stroke in [true, false] {
-        let patches = shape.follow("solid", &dented, origin, in_stroke).unwrap();
+    let of_stroke = shape.follow_stroke("solid", &dented, origin).unwrap();
+    let both = shape.follow("solid", &dented, origin).unwrap();
+    for patches in [&of_stroke, &both] {
         assert!(!patches.is_empty() && patches.len() < all.len());
-        if in_stroke {
-            let before = |patch: &Patch| all.iter().find(|p| p.part == patch.part).unwrap().rough.clone();
-            let same = |patch: &Patch| patch.rough.as_ref().map(Vec::len) == before(patch).map(|r| r.len());
-            assert!(
-                patches.iter().all(same),
-                "the coarser surface is seen by nobody yet"
-            );
-        }
-        anew.extend(patches.into_iter().map(|patch| (patch.part, patch)));
     }
-    let mut again = Shape::new(&dented, 0.0, DAffine3::IDENTITY, TRIANGLES[0]).unwrap();
+    let mut again = Shape::new(&dented, 0.0, DAffine3::IDENTITY, Budget::PROCESSOR).unwrap();
     let again = again.all("solid", origin);
-    for patch in anew.values() {
-        let same = again.iter().find(|p| p.part == patch.part).unwrap();
-        assert_eq!((&patch.vertices, &patch.indices), (&same.vertices, &same.indices));
-        assert_eq!(patch.rough, same.rough);
+    let same = |patches: &[Patch], patch: &Patch, corners: fn(&Patch) -> Vec<Vertex>| {
+        let other = patches.iter().find(|p| p.part == patch.part);
+        corners(patch) == other.map(corners).unwrap_or_default()
+    };
+    for patch in &of_stroke {
+        assert!(same(&again, patch, fine), "{:?}", patch.part);
+        assert!(
+            same(&all, patch, coarse),
+            "the coarser surface is seen by nobody yet"
+        );
     }
+    assert!(both.iter().any(|patch| !same(&all, patch, coarse)));
+    for patch in &both {
+        assert!(
+            same(&again, patch, fine) && same(&again, patch, coarse),
+            "{:?}",
+            patch.part
+        );
+    }
+}
+
+/// The corners of its triangles, one after another.
+fn fine(patch: &Patch) -> Vec<Vertex> {
+    corners(patch, &patch.indices)
+}
+
+/// Those of the coarser ones.
+fn coarse(patch: &Patch) -> Vec<Vertex> {
+    corners(patch, patch.rough.as_ref().expect("these are many"))
+}
+
+fn corners(patch: &Patch, indices: &[u32]) -> Vec<Vertex> {
+    indices.iter().map(|n| patch.vertices[*n as usize]).collect()
 }
 
 /// Where fewer triangles are wished, it is the error that grows.
@@ -493,12 +513,16 @@ fn many_triangles_are_fewer_while_something_moves() {
 fn solids_have_no_more_triangles_than_are_wished() {
     let object = of(balls());
     let count = |most| {
-        let mut shape = Shape::new(&object, 0.0, DAffine3::IDENTITY, most).unwrap();
+        let budget = Budget {
+            still: most,
+            ..Budget::PROCESSOR
+        };
+        let mut shape = Shape::new(&object, 0.0, DAffine3::IDENTITY, budget).unwrap();
         let patches = shape.all("solid", DVec3::ZERO);
         let triangles: usize = patches.iter().map(|p| p.indices.len() / 3).sum();
         (triangles, shape.area_and_volume()[0])
     };
-    let (all, area) = count(TRIANGLES[1]);
+    let (all, area) = count(Budget::CARD.still);
     for most in [all, all / 2, all / 3] {
         let (fewer, less) = count(most);
         assert!(fewer <= most && 5 * fewer > most, "{fewer} of {most}");
@@ -514,7 +538,7 @@ fn light_follows_what_changes() {
     let (object, size) = (of(field.clone()), SIZE.map(|n| n as u32));
     let (mut canvas, look) = on_canvas(&card, &object);
     let before = canvas.pixels(&look, size, false).unwrap();
-    let mut shape = Shape::new(&object, 0.0, DAffine3::IDENTITY, TRIANGLES[0]).unwrap();
+    let mut shape = Shape::new(&object, 0.0, DAffine3::IDENTITY, Budget::PROCESSOR).unwrap();
     let all = shape.all("solid", canvas.origin()).len();
     // A corner goes that the eye sees, and the shadows of its balls.
     let cut = BlockEdit {
@@ -524,7 +548,7 @@ fn light_follows_what_changes() {
         change: Change::Add(vec![-9.0; 8000]),
     };
     let less = of(field.edited_blocks(&[cut]).unwrap());
-    let patches = shape.follow("solid", &less, canvas.origin(), false).unwrap();
+    let patches = shape.follow("solid", &less, canvas.origin()).unwrap();
     assert!(!patches.is_empty() && 2 * patches.len() < all);
     patches.iter().for_each(|patch| canvas.put(patch));
     let followed = canvas.pixels(&look, size, false).unwrap();
@@ -543,7 +567,7 @@ fn what_the_box_cuts_off_has_the_normals_of_its_sides() {
     // Round a place beyond a side: the field's own normal there points back into the box.
     let ball = |p: DVec3| 11.0 - p.distance(DVec3::new(0.0, 0.0, 11.0));
     let field = HierarchicalSpline::schoenberg(lattice, 1.0, ball).unwrap();
-    let mut shape = Shape::new(&of(field), 0.0, DAffine3::IDENTITY, TRIANGLES[0]).unwrap();
+    let mut shape = Shape::new(&of(field), 0.0, DAffine3::IDENTITY, Budget::PROCESSOR).unwrap();
     let patches = shape.all("ball", DVec3::ZERO);
     let vertices = patches.iter().flat_map(|patch| &patch.vertices);
     let on_sides = vertices.filter(|v| v.at.iter().any(|x| x.abs() > 7.9999));

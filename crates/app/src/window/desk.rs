@@ -24,7 +24,7 @@ use super::orders::{News, Order};
 use super::tool::{Drawn, Tool};
 use super::touch::Wanted;
 use crate::cli::desk_files;
-use crate::view::{Ray, Shape, TRIANGLES};
+use crate::view::{Budget, Ray, Shape};
 
 /// Has the window look at the news, after a while at the latest.
 pub type Wake = Arc<dyn Fn(Duration) + Send + Sync>;
@@ -41,7 +41,7 @@ pub struct Desk {
     home: PathBuf,
     open: Option<Open>,
     /// Triangles that are shown, at most.
-    most: usize,
+    triangles: Budget,
     /// What is to be in the hand.
     wanted: Option<Wanted>,
     /// Where strokes of the palette may act.
@@ -66,6 +66,8 @@ struct Open {
     is_tried: bool,
     shown: State,
     shapes: BTreeMap<String, Shape>,
+    /// Triangles that each object may have.
+    shares: BTreeMap<String, Budget>,
     origin: DVec3,
     /// Titles of the edits, those undone too, and how many are done.
     history: (Vec<String>, usize),
@@ -97,7 +99,7 @@ impl Desk {
             cancel,
             home,
             open: None,
-            most: TRIANGLES[0],
+            triangles: Budget::PROCESSOR,
             wanted: None,
             limits: Limits::default(),
             tried: None,
@@ -142,8 +144,8 @@ impl Desk {
             Order::Clay => {
                 desk_files::clay_block().and_then(|(name, object)| self.start(&name, object, false))
             }
-            Order::Show(most) => {
-                self.most = most;
+            Order::Show(triangles) => {
+                self.triangles = triangles;
                 self.show_again(true);
                 Ok(())
             }

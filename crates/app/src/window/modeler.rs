@@ -35,7 +35,7 @@ use super::show::{Beside, Shown};
 use super::tool::{Kind, Settings, Tool};
 use crate::cli::{desk_files, interrupt};
 use crate::panels;
-use crate::view::{Camera, LINE, Look, Paper, Ray, Screen, TRIANGLES};
+use crate::view::{Budget, Camera, LINE, Look, Paper, Ray, Screen};
 
 /// The window.
 pub struct Modeler {
@@ -115,10 +115,8 @@ impl Modeler {
 
     /// Has the desk show all, as the card can draw it.
     fn show_all(&self) {
-        let triangles = self
-            .screen
-            .as_ref()
-            .map_or(TRIANGLES[0], |screen| screen.triangles);
+        let of_screen = self.screen.as_ref().map(|screen| screen.triangles);
+        let triangles = of_screen.unwrap_or(Budget::PROCESSOR);
         self.bench.order(Order::Show(triangles));
     }
 

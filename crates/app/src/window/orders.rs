@@ -18,7 +18,7 @@ use tools::session::Stroke;
 use super::limits::Limits;
 use super::tool::Tool;
 use super::touch::{self, Seen, Wanted};
-use crate::view::{Patch, Ray, Solid, pick};
+use crate::view::{Budget, Patch, Ray, Solid, pick};
 
 /// What the window asks. Lines are those under the mouse, in the world.
 #[derive(Clone, Debug)]
@@ -27,8 +27,8 @@ pub enum Order {
     Open(PathBuf),
     /// A new document with a block of clay.
     Clay,
-    /// All that is open is shown again, in so many triangles at most, as all that follows.
-    Show(usize),
+    /// All that is open is shown again, within so many triangles, as all that follows.
+    Show(Budget),
     /// The document goes on under another name.
     Save(PathBuf),
     /// Writes the chosen object: a mesh, a field, or its scan with its edits.

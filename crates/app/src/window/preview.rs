@@ -7,7 +7,7 @@ use bspline::Aabb;
 use document::State;
 
 use super::orders::{News, Sheet, Thing};
-use crate::view::{Shape, Solid};
+use crate::view::{Budget, Shape, Solid};
 
 /// What is told of objects that are only looked at.
 ///
@@ -22,9 +22,11 @@ pub fn news(path: &Path, state: &State) -> Result<Vec<News>, String> {
     let origin = boxes.reduce(Aabb::hull).ok_or("it has no surface")?.center();
     let mut told = Vec::new();
     let mut bounds = Vec::new();
+    let shares = Budget::PROCESSOR.shared(state.objects());
     for thing in &things {
         let (object, iso, placed) = (&thing.object, thing.iso, thing.world_from_object);
-        let mut shape = Shape::preview(object, iso, placed).map_err(|e| e.to_string())?;
+        let share = shares[&thing.name];
+        let mut shape = Shape::preview(object, iso, placed, share).map_err(|e| e.to_string())?;
         bounds.extend(shape.bounding_box());
         told.push(News::Patches(shape.all(&thing.name, origin)));
         let solid = Solid::of(object, iso, placed);

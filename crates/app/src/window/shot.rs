@@ -182,12 +182,12 @@ mod tests {
 
     use super::*;
     use crate::cli::desk_files;
-    use crate::view::{BUDGET, Camera, Card, LINE, Mode, Paper, SKY, Shape, Show, TRIANGLES};
+    use crate::view::{BUDGET, Budget, Camera, Card, LINE, Mode, Paper, SKY, Shape, Show};
 
     fn easel(card: &Card) -> (Canvas, Look) {
         let (_, Object { field, .. }) = desk_files::clay_block().unwrap();
         let object = Object::of(field, FieldMeta::default());
-        let mut shape = Shape::new(&object, 0.0, DAffine3::IDENTITY, TRIANGLES[0]).unwrap();
+        let mut shape = Shape::new(&object, 0.0, DAffine3::IDENTITY, Budget::PROCESSOR).unwrap();
         let mut canvas = Canvas::new(&card.device, &card.queue, SKY, BUDGET);
         canvas.begin(DVec3::ZERO, 40.0);
         shape

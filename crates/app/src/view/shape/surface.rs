@@ -62,7 +62,7 @@ impl<'a> Lying<'a> {
 
 impl Surface {
     /// With an error over the diagonal of the box and so many halvings of the first cells, at most. Where there would be far more triangles
-    /// than `most` there are none.
+    /// than `most` there are none, unless cells are halved once only.
     pub fn new(
         object: &Object,
         iso: f64,
@@ -77,7 +77,8 @@ impl Surface {
             iso,
             depth,
             detection: depth - 1,
-            max_blocks: most / OF_BLOCK,
+            // The coarsest are few, and there is nothing in their place.
+            max_blocks: if depth == 1 { usize::MAX } else { most / OF_BLOCK },
             ..AdaptiveOptions::default()
         };
         let frame = Frame::over(&world_box, cells);

@@ -305,7 +305,7 @@ fn colours_tell_shares() {
 fn paint_shows_by_rays_too() {
     let Some(card) = card("paint by rays") else { return };
     let (mut canvas, look, object) = easel(&card);
-    let mut shape = Shape::new(&object, 0.0, DAffine3::IDENTITY, TRIANGLES[0]).unwrap();
+    let mut shape = Shape::new(&object, 0.0, DAffine3::IDENTITY, Budget::PROCESSOR).unwrap();
     let middle = DVec3::new(1.5, 2.5, 5.0);
     for mut patch in shape.all("solid", canvas.origin()) {
         for vertex in &mut patch.vertices {

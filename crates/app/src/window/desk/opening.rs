@@ -118,6 +118,7 @@ impl Desk {
             None => self.tell(News::Empty),
             Some(open) => {
                 open.shapes.clear();
+                open.shares.clear();
                 open.is_seen = is_seen;
                 self.show();
                 self.lay_sheet();
@@ -168,6 +169,7 @@ impl Desk {
             is_tried: false,
             shown: state,
             shapes: BTreeMap::new(),
+            shares: BTreeMap::new(),
             origin: all.center(),
             history: (Vec::new(), 0),
             is_seen,

@@ -12,10 +12,18 @@ impl Desk {
     pub(super) fn show(&mut self) {
         let Some(open) = &mut self.open else { return };
         let is_new = open.shapes.is_empty();
-        let in_stroke = open.live.is_some();
+        let follow = match open.live {
+            Some(_) => Shape::follow_stroke,
+            None => Shape::follow,
+        };
         let mut told = Vec::new();
-        // What is shown together has as many as one solid alone.
-        let most = self.most / open.shown.objects().len().max(1);
+        if !open.shares.keys().eq(open.shown.objects().keys()) {
+            let shares = self.triangles.shared(open.shown.objects());
+            let fits =
+                |name: &String, shape: &mut Shape| shares.get(name).is_none_or(|share| shape.fits(*share));
+            open.shapes.retain(fits);
+            open.shares = shares;
+        }
         let names: Vec<String> = open.shapes.keys().cloned().collect();
         for name in names.iter().filter(|n| !open.shown.objects().contains_key(*n)) {
             open.shapes.remove(name);
@@ -25,14 +33,15 @@ impl Desk {
             let (Some(iso), Ok(placed)) = (object.iso(), open.shown.placement(name)) else {
                 continue;
             };
+            let share = open.shares[name];
             let kept = open
                 .shapes
                 .get_mut(name)
                 .filter(|shape| shape.follows(object, placed));
-            let followed = match kept.map(|shape| shape.follow(name, object, open.origin, in_stroke)) {
+            let followed = match kept.map(|shape| follow(shape, name, object, open.origin)) {
                 Some(Ok(patches)) => Ok(patches),
                 // What became too large to follow is made anew, coarser.
-                _ => Shape::new(object, iso, placed, most).map(|mut shape| {
+                _ => Shape::new(object, iso, placed, share).map(|mut shape| {
                     told.push(News::Gone(name.clone()));
                     let all = shape.all(name, open.origin);
                     open.shapes.insert(name.clone(), shape);

@@ -7,6 +7,7 @@ use formats::field::FieldMeta;
 use glam::DAffine3;
 
 use super::*;
+use crate::view::{Budget, Patch};
 
 /// A desk on its thread, without a window.
 pub struct Bare {
@@ -344,6 +345,69 @@ fn heavy_fields_are_seen_coarse_first() {
     let fine = desk.wait(triangles);
     assert!(2 * coarse < fine, "{coarse}, then {fine}");
     desk.sheet(0, 0);
+}
+
+/// Objects share the triangles that are drawn: one that is left alone has all of them.
+#[test]
+fn what_is_left_alone_has_all_triangles() {
+    let home = tempfile::tempdir().unwrap();
+    let lattice = Lattice {
+        world_from_lattice: DAffine3::IDENTITY,
+        cells: [40; 3],
+    };
+    let ball = |p: DVec3| 15.0 - p.distance(DVec3::splat(20.0)) + (2.0 * p.x).sin() * (2.0 * p.y).sin();
+    let field = HierarchicalSpline::<f32>::schoenberg(lattice, 1.0, ball).unwrap();
+    let meta = FieldMeta {
+        iso: Some(0.0),
+        ..FieldMeta::default()
+    };
+    let object = Object::of(field.into(), meta);
+    let state = State::new().with("left", object.clone()).unwrap();
+    let state = state.with("right", object).unwrap();
+    let path = home.path().join("two.isoclay");
+    drop(crate::cli::desk_files::create(&path, state).unwrap());
+    let mut desk = Bare::new(home.path());
+    let all = Budget {
+        still: 50_000,
+        moving: 24_000,
+    };
+    desk.order(Order::Show(all));
+    desk.order(Order::Open(path));
+    let of = |wanted: &'static str| {
+        move |news: &News| match news {
+            News::Patches(patches) if patches[0].object == wanted => {
+                let still = patches.iter().map(|p| p.indices.len() / 3).sum();
+                let rough = |patch: &Patch| patch.rough.as_ref().unwrap_or(&patch.indices).len() / 3;
+                let moving = patches.iter().map(rough).sum();
+                Some(Budget { still, moving })
+            }
+            _ => None,
+        }
+    };
+    let is_within = |found: Budget, all: Budget| {
+        assert!(
+            found.still > all.still / 4 && found.still <= all.still,
+            "{found:?}"
+        );
+        assert!(
+            found.moving > 0 && found.moving <= all.moving,
+            "{found:?} of {all:?}"
+        );
+    };
+    let half = Budget {
+        still: all.still / 2,
+        moving: all.moving / 2,
+    };
+    let left = desk.wait(of("left"));
+    is_within(left, half);
+    assert_eq!(desk.wait(of("right")), left);
+    desk.order(Order::Command(Box::new(Command::Remove {
+        object: "right".into(),
+    })));
+    desk.sheet(1, 1);
+    let alone = desk.wait(of("left"));
+    is_within(alone, all);
+    assert!(alone.still > left.still, "{alone:?} after {left:?}");
 }
 
 /// The mouse as a device: what it presses is felt, its button is a stroke, undo takes the document back for a moment, and closing in the
