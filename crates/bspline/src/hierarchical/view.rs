@@ -2,10 +2,12 @@
 
 use std::sync::Arc;
 
+use glam::DVec3;
+
 use super::brick::{BrickKey, Corrections, HALO_LEN};
 use super::node::Node;
 use super::spline::HierarchicalSpline;
-use crate::Real;
+use crate::{Aabb, Real};
 
 /// A brick of a field, to read.
 #[derive(Clone, Copy, Debug)]
@@ -65,6 +67,21 @@ impl<T: Real> HierarchicalSpline<T> {
             node.holds_cells()
         });
         found
+    }
+
+    /// Finest level with a brick that reaches a world box, 0 if none does. Takes time in proportion to the bricks there.
+    pub fn finest_in(&self, b: &Aabb) -> usize {
+        let local = b.transformed(self.lattice_from_world());
+        let mut finest = 0;
+        self.root.walk(&mut |node| {
+            let first = DVec3::from_array(node.key.0.map(f64::from)) * node.width();
+            let is_reached = first.cmple(local.max).all() && (first + node.width()).cmpge(local.min).all();
+            if is_reached && node.totals.is_some() {
+                finest = finest.max(node.level as usize);
+            }
+            is_reached && node.holds_cells()
+        });
+        finest
     }
 
     /// Bricks that `before` does not have, or has with other totals; at the cost of what the versions do not share.

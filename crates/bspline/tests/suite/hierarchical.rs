@@ -216,6 +216,32 @@ fn bricks_follow_the_functions_not_the_box() {
 }
 
 #[test]
+fn the_finest_brick_in_a_box_is_that_of_all_bricks() {
+    let mut met = [0; 3];
+    for seed in 0..20 {
+        let f = random_spline::<f32>(seed, oblique(), [40, 25, 12]);
+        let mut rng = Lcg(seed);
+        for _ in 0..50 {
+            let map = f.lattice().world_from_lattice;
+            let corner = map.transform_point3(rng.point(DVec3::splat(-4.0), f.lattice().extent() + 4.0));
+            let b = Aabb::new(corner, corner + rng.point(DVec3::ZERO, DVec3::splat(6.0)));
+            let local = b.transformed(f.lattice_from_world());
+            let reaches = |level: usize, key: BrickKey| {
+                let side = 8.0 / f64::from(1 << level);
+                let first = side * DVec3::from_array(key.0.map(f64::from));
+                first.cmple(local.max).all() && (first + side).cmpge(local.min).all()
+            };
+            let all = f.bricks().into_iter();
+            let levels = all.filter(|b| reaches(b.level(), b.key())).map(|b| b.level());
+            let finest = levels.max().unwrap_or(0);
+            assert_eq!(f.finest_in(&b), finest, "seed {seed}: {b:?}");
+            met[finest] += 1;
+        }
+    }
+    assert!(met.iter().all(|n| *n > 50), "{met:?}");
+}
+
+#[test]
 fn hash_covers_the_field_and_nothing_else() {
     let f = random_spline::<f64>(11, oblique(), [5, 4, 3]);
     assert_eq!(

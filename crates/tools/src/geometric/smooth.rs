@@ -78,7 +78,7 @@ impl Smooth {
         let (weight, reach) = band(&self.along, self.radius.0)?;
         let within = writer.within(&reach)?;
         // The kernel is as wide on finer knots.
-        let finest = writer.finest_in(&within).max(writer.detail());
+        let finest = writer.field.finest_in(&within).max(writer.detail());
         let deviation = usize::from(self.level) << (finest - writer.detail());
         let even = averaged(field, &within, finest, deviation, self.keep_volume, control)?;
         let mixed = Mixed {

@@ -4,7 +4,6 @@ use bspline::hierarchical::{Lattice, MAX_LEVELS};
 use bspline::{Aabb, Field, HierarchicalSpline, Real};
 use fitting::Control;
 use fitting::field::{Aim, FieldFitOptions, FieldFitReport, fit_field_where};
-use glam::DVec3;
 
 use super::GeometricError;
 use crate::face::Face;
@@ -90,18 +89,6 @@ impl<T: Real> Writer<'_, T> {
         fineness.tolerance.map_or(own, |t| t.0)
     }
 
-    /// Finest level with functions that reach a world box.
-    pub fn finest_in(&self, b: &Aabb) -> usize {
-        let local = b.transformed(self.field.lattice_from_world());
-        let bricks = self.field.bricks().into_iter();
-        let reached = bricks.filter(|brick| {
-            let scale = 1.0 / (1u64 << brick.level()) as f64;
-            let first = DVec3::from_array(brick.key().0.map(|k| 8.0 * f64::from(k))) * scale;
-            first.cmple(local.max).all() && (first + 8.0 * scale).cmpge(local.min).all()
-        });
-        reached.map(|brick| brick.level()).max().unwrap_or(0)
-    }
-
     /// The box in which a tool that acts in `reach` changes the field.
     ///
     /// # Errors
@@ -136,7 +123,7 @@ impl<T: Real> Writer<'_, T> {
     ) -> Result<(HierarchicalSpline<T>, FieldFitReport), GeometricError> {
         let finest = fineness.finest(self.field.lattice(), self.detail());
         // What is there already must not be left over; and nothing finer than a coarse edit may be.
-        let finest = finest.max(self.finest_in(within));
+        let finest = finest.max(self.field.finest_in(within));
         let finest = finest.min(self.limits.finest().unwrap_or(finest));
         let spacing = self.field.lattice().spacing(finest).min_element();
         let weight = self.limits.weight(self.spacing());
