@@ -6,10 +6,12 @@ use std::sync::Arc;
 use eframe::egui_wgpu::wgpu;
 use glam::{DVec3, Vec3};
 
-use super::canvas::{Canvas, Look, Target};
+use super::canvas::Canvas;
 use super::held::{Held, draw};
+use super::look::Look;
 use super::overlay::{Ink, Stretch};
 use super::shape::Vertex;
+use super::target::Target;
 use super::{Mode, Patch, read};
 
 /// Shares of a scale, from 0 to 1, at places of an object in the world; below 0 where nothing is known.

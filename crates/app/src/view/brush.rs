@@ -2,8 +2,8 @@
 
 use eframe::egui_wgpu::wgpu;
 
-use super::canvas::{COLOR, DEPTH};
 use super::shape::Vertex;
+use super::target::{COLOR, DEPTH};
 
 /// How pictures of a number of samples a pixel are drawn.
 pub struct Brush {

@@ -12,78 +12,16 @@ use super::cast::Cast;
 use super::held::{Held, draw};
 use super::light_pass::LightPass;
 use super::lights::{self, Lights};
+use super::look::{Look, Mode};
 use super::overlay::Overlay;
 use super::rays::Solid;
 use super::read;
 use super::shape::Patch;
-use super::{Camera, Show, Tint};
+use super::target::{Drawn, SAMPLES, Target};
+use super::{Camera, Tint};
 
-/// Samples of a pixel in a picture that stays.
-pub const SAMPLES: u32 = 4;
 /// Share of the pixels of a side that are drawn of triangles while something moves.
 const ROUGH: f32 = 0.5;
-/// Of all depths.
-pub const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
-/// Pictures are kept in linear light, and shown as the screen wants them.
-pub const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
-
-/// How the scene is looked at.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Look {
-    /// From where.
-    pub camera: Camera,
-    /// A place and a direction: what lies before it, that way, is cut off.
-    pub cut: Option<(DVec3, DVec3)>,
-    /// Whether painted stiffness shows.
-    pub paint: bool,
-    /// How solids become pixels.
-    pub mode: Mode,
-    /// Densities that are black and white, where densities are shown.
-    pub density: [f64; 2],
-    /// What is behind all.
-    pub paper: Paper,
-    /// What is shown beside the solids.
-    pub show: Show,
-    /// Width of lines, as a share of the picture's height.
-    pub line: f32,
-}
-
-/// Width of lines in pictures without a window, as a share of the height.
-pub const LINE: f32 = 1.25 / 800.0;
-
-/// How solids become pixels.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, clap::ValueEnum,
-)]
-#[serde(rename_all = "snake_case")]
-pub enum Mode {
-    /// By the triangles of their surfaces
-    #[default]
-    Mesh,
-    /// By lines to the surface of the spline itself
-    Rays,
-    /// As mist, denser where the density is higher
-    Volume,
-}
-
-/// What is behind all.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Paper {
-    /// Of the window.
-    Dark,
-    /// Of pictures.
-    Light,
-}
-
-impl Paper {
-    /// Linear light, above and below.
-    fn light(self) -> [[f32; 4]; 2] {
-        match self {
-            Self::Dark => [[0.10, 0.11, 0.125, 1.0], [0.035, 0.038, 0.045, 1.0]],
-            Self::Light => [[0.852, 0.873, 0.893, 1.0], [0.453, 0.463, 0.475, 1.0]],
-        }
-    }
-}
 
 /// See `shaders/surface.wgsl`.
 #[repr(C)]
@@ -98,27 +36,6 @@ struct Scene {
     picture: [f32; 4],
     density: [f32; 4],
     world_from_clip: [[f32; 4]; 4],
-}
-
-/// Where a picture is drawn to.
-pub(super) struct Target {
-    pub(super) size: [u32; 2],
-    /// Of several samples; without it the picture itself is drawn to.
-    rough: Option<wgpu::TextureView>,
-    pub(super) depth: wgpu::Texture,
-    pub(super) picture: wgpu::Texture,
-    /// What it shows.
-    drawn: Option<Look>,
-}
-
-/// A picture, or what there is of it.
-pub struct Drawn {
-    /// The pixels.
-    pub picture: wgpu::Texture,
-    /// Share of its rows, from the top, that are drawn.
-    pub rows: f32,
-    /// Whether it stays as it is.
-    pub is_done: bool,
 }
 
 /// The graphics card with what it holds of a scene.
@@ -341,7 +258,7 @@ impl Canvas {
         let which = usize::from(!is_rough);
         let target = match self.targets[which].take() {
             Some(target) if target.size == size => target,
-            _ => self.new_target(size, if is_rough { 1 } else { SAMPLES }),
+            _ => Target::new(&self.device, size, if is_rough { 1 } else { SAMPLES }),
         };
         if target.drawn != Some(*look) {
             self.prepare_caps(look, is_rough);
@@ -538,53 +455,6 @@ impl Canvas {
             Tint::Off => 0.0,
             _ if self.tinted.is_some() => 2.0,
             _ => 0.0,
-        }
-    }
-
-    pub(super) fn new_target(&self, size: [u32; 2], samples: u32) -> Target {
-        let texture = |format, samples, usage| {
-            self.device.create_texture(&wgpu::TextureDescriptor {
-                label: Some("picture"),
-                size: wgpu::Extent3d {
-                    width: size[0],
-                    height: size[1],
-                    depth_or_array_layers: 1,
-                },
-                mip_level_count: 1,
-                sample_count: samples,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage,
-                view_formats: &[wgpu::TextureFormat::Rgba8Unorm],
-            })
-        };
-        let attachment = wgpu::TextureUsages::RENDER_ATTACHMENT;
-        let picture = texture(
-            COLOR,
-            1,
-            attachment
-                | wgpu::TextureUsages::TEXTURE_BINDING
-                | wgpu::TextureUsages::COPY_SRC
-                | wgpu::TextureUsages::COPY_DST,
-        );
-        let whole = wgpu::TextureViewDescriptor::default();
-        let rough = (samples > 1).then(|| texture(COLOR, samples, attachment).create_view(&whole));
-        let depth = self.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("depth"),
-            size: picture.size(),
-            mip_level_count: 1,
-            sample_count: samples,
-            dimension: wgpu::TextureDimension::D2,
-            format: DEPTH,
-            usage: attachment | wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC,
-            view_formats: &[],
-        });
-        Target {
-            size,
-            rough,
-            depth,
-            picture,
-            drawn: None,
         }
     }
 

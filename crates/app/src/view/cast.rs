@@ -7,8 +7,10 @@ use std::time::Instant;
 
 use eframe::egui_wgpu::wgpu;
 
-use super::canvas::{Canvas, Drawn, Look, Mode, Target};
+use super::canvas::Canvas;
+use super::look::{Look, Mode};
 use super::rays::{Eye, Pass, Passes, Prepared, Rays};
+use super::target::{Drawn, Target};
 
 /// Time from one strip of rows to the next, ms, that of the panels included: as long as the window may be without an answer.
 const STRIP: f64 = 200.0;
@@ -209,7 +211,7 @@ impl Canvas {
     }
 
     fn new_sheet(&self, passes: &Passes, size: [u32; 2]) -> Sheet {
-        let [ground, first, last] = std::array::from_fn(|_| self.new_target(size, 1));
+        let [ground, first, last] = std::array::from_fn(|_| Target::new(&self.device, size, 1));
         let bindings = bindings(passes, [&ground, &first], None);
         Sheet {
             ground,
@@ -231,7 +233,7 @@ impl Canvas {
             return;
         }
         if sheet.paints.is_none() {
-            let paints = self.new_target(sheet.first.size, 1);
+            let paints = Target::new(&self.device, sheet.first.size, 1);
             sheet.bindings = bindings(passes, [&sheet.ground, &sheet.first], Some(&paints));
             sheet.paints = Some(paints);
         }

@@ -6,7 +6,7 @@ use std::cell::OnceCell;
 use eframe::egui_wgpu::wgpu;
 
 use super::brush::VERTEX;
-use super::canvas::DEPTH;
+use super::target::DEPTH;
 
 /// Outward normals, and 1 where there is a surface.
 const NORMALS: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;

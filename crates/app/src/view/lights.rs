@@ -5,8 +5,8 @@ use eframe::egui_wgpu::wgpu;
 use glam::{DMat3, DMat4, DVec2, DVec3};
 
 use super::brush::VERTEX;
-use super::canvas::DEPTH;
 use super::held::{Held, draw};
+use super::target::DEPTH;
 
 /// Most directions of the sky.
 pub const MOST: usize = 64;

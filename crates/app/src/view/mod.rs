@@ -11,6 +11,7 @@ mod histogram;
 mod laid;
 mod light_pass;
 mod lights;
+mod look;
 mod overlay;
 mod pick;
 mod rays;
@@ -22,14 +23,16 @@ mod show;
 mod slice;
 mod stereo;
 mod still;
+mod target;
 #[cfg(test)]
 mod tests;
 
 pub use beside::Tinted;
 pub use camera::{Camera, Ray};
-pub use canvas::{Canvas, LINE, Look, Mode, Paper};
+pub use canvas::Canvas;
 pub use card::{Card, DRIVERS};
 pub use histogram::Histogram;
+pub use look::{LINE, Look, Mode, Paper};
 pub use overlay::legend::Legend;
 pub use overlay::{Ink, Stretch, cells, floor};
 pub use pick::{leave, pick};

@@ -5,9 +5,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use eframe::egui_wgpu::{RenderState, wgpu};
 
-use super::canvas::Drawn;
 use super::laid::{Laid, Layer};
 use super::stereo::Eyes;
+use super::target::Drawn;
 use super::{Budget, Canvas, Look};
 use crate::cli::ceiling::of_bricks;
 

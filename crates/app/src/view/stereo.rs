@@ -5,8 +5,10 @@ use eframe::egui_wgpu::wgpu;
 use egui::{Pos2, Rect};
 use serde::{Deserialize, Serialize};
 
-use super::canvas::{COLOR, Canvas, Drawn, Look};
+use super::canvas::Canvas;
 use super::laid::Layer;
+use super::look::Look;
+use super::target::{COLOR, Drawn};
 use super::{Camera, Show};
 
 /// As what pictures are copied: as their bytes are.

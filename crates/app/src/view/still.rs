@@ -3,8 +3,9 @@
 use bspline::Jet;
 use glam::DVec3;
 
-use super::canvas::{Canvas, LINE, Look, Paper};
+use super::canvas::Canvas;
 use super::lights::MOST;
+use super::look::{LINE, Look, Paper};
 #[cfg(test)]
 use super::rays::BUDGET;
 use super::rays::Solid;

@@ -4,7 +4,7 @@ use eframe::egui_wgpu::wgpu;
 
 use super::lines::STRETCH;
 use crate::view::brush::VERTEX;
-use crate::view::canvas::{COLOR, DEPTH};
+use crate::view::target::{COLOR, DEPTH};
 
 /// Ways to draw pictures of a number of samples a pixel.
 pub struct Brushes {

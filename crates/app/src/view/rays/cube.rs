@@ -8,7 +8,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::Solid;
-use crate::view::canvas::{Look, Mode};
+use crate::view::{Look, Mode};
 
 /// Coefficients of a brick with those round it.
 pub type Totals = Arc<[f32; HALO_LEN]>;

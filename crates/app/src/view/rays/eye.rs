@@ -5,7 +5,7 @@ use glam::{DAffine3, DMat4, DVec3};
 
 use super::Solid;
 use super::cube::Cube;
-use crate::view::canvas::Look;
+use crate::view::Look;
 
 /// Radius of curvature, over the diagonal of the box, at which a hollow is half as dark as it can be.
 pub const HOLLOW: f64 = crate::view::shape::HOLLOW;

@@ -17,7 +17,7 @@ use document::Object;
 use eframe::egui_wgpu::wgpu;
 use glam::{DAffine3, DVec3};
 
-use super::canvas::{Look, Mode};
+use super::{Look, Mode};
 use atlas::Atlas;
 pub use eye::Eye;
 pub use passes::{Pass, Passes};

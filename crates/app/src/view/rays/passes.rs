@@ -6,7 +6,7 @@ use eframe::egui_wgpu::wgpu;
 
 use super::eye::Eye;
 use super::plan::Plan;
-use crate::view::canvas::{COLOR, DEPTH};
+use crate::view::target::{COLOR, DEPTH};
 
 /// What a pass finds, by the name that the shader has for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

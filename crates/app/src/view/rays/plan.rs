@@ -10,7 +10,7 @@ use super::Solid;
 use super::atlas::{Atlas, Slot};
 use super::cube::{Cube, Octant, Totals, Wish, make};
 use super::eye::Record;
-use crate::view::canvas::Look;
+use crate::view::Look;
 
 /// Bricks that come onto the card for one picture; more let a window wait.
 const AT_ONCE: usize = 6000;
