@@ -530,6 +530,19 @@ fn solids_have_no_more_triangles_than_are_wished() {
     }
 }
 
+/// What shares its triangles with a hundred others is seen, if in more than its share.
+#[test]
+fn the_coarsest_triangles_are_made_whatever_their_number() {
+    let budget = Budget {
+        still: 100,
+        moving: 100,
+    };
+    let mut shape = Shape::new(&of(balls()), 0.0, DAffine3::IDENTITY, budget).unwrap();
+    let patches = shape.all("solid", DVec3::ZERO);
+    let triangles: usize = patches.iter().map(|p| p.indices.len() / 3).sum();
+    assert!(triangles > 100, "{triangles}");
+}
+
 /// Where triangles change, the sky is drawn again as if it were drawn whole.
 #[test]
 fn light_follows_what_changes() {

@@ -310,21 +310,26 @@ fn patches_follow_the_surface() {
     assert_eq!(open, 0, "of {} edges", edges.len());
 }
 
-/// What has triangles that take long is seen in coarse ones first; the eye stays where it is as the finer ones come.
-#[test]
-fn heavy_fields_are_seen_coarse_first() {
-    let home = tempfile::tempdir().unwrap();
+/// An object of a formula, with so many cells of size 1 along each axis.
+fn solid(cells: u32, formula: impl Fn(DVec3) -> f64 + Sync) -> Object {
     let lattice = Lattice {
         world_from_lattice: DAffine3::IDENTITY,
-        cells: [100; 3],
+        cells: [cells; 3],
     };
-    let ball = |p: DVec3| 40.0 - p.distance(DVec3::splat(50.0)) + 2.0 * p.x.sin() * p.y.sin();
-    let field = HierarchicalSpline::<f32>::schoenberg(lattice, 1.0, ball).unwrap();
+    let field = HierarchicalSpline::<f32>::schoenberg(lattice, 1.0, formula).unwrap();
     let meta = FieldMeta {
         iso: Some(0.0),
         ..FieldMeta::default()
     };
-    let state = State::new().with("ball", Object::of(field.into(), meta)).unwrap();
+    Object::of(field.into(), meta)
+}
+
+/// What has triangles that take long is seen in coarse ones first; the eye stays where it is as the finer ones come.
+#[test]
+fn heavy_fields_are_seen_coarse_first() {
+    let home = tempfile::tempdir().unwrap();
+    let ball = |p: DVec3| 40.0 - p.distance(DVec3::splat(50.0)) + 2.0 * p.x.sin() * p.y.sin();
+    let state = State::new().with("ball", solid(100, ball)).unwrap();
     let path = home.path().join("ball.isoclay");
     drop(crate::cli::desk_files::create(&path, state).unwrap());
     let mut desk = Bare::new(home.path());
@@ -351,17 +356,8 @@ fn heavy_fields_are_seen_coarse_first() {
 #[test]
 fn what_is_left_alone_has_all_triangles() {
     let home = tempfile::tempdir().unwrap();
-    let lattice = Lattice {
-        world_from_lattice: DAffine3::IDENTITY,
-        cells: [40; 3],
-    };
     let ball = |p: DVec3| 15.0 - p.distance(DVec3::splat(20.0)) + (2.0 * p.x).sin() * (2.0 * p.y).sin();
-    let field = HierarchicalSpline::<f32>::schoenberg(lattice, 1.0, ball).unwrap();
-    let meta = FieldMeta {
-        iso: Some(0.0),
-        ..FieldMeta::default()
-    };
-    let object = Object::of(field.into(), meta);
+    let object = solid(40, ball);
     let state = State::new().with("left", object.clone()).unwrap();
     let state = state.with("right", object).unwrap();
     let path = home.path().join("two.isoclay");
