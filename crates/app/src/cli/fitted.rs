@@ -97,25 +97,29 @@ pub fn fit(input: &Input, choice: &Choice, control: &mut Control) -> Outcome<Fit
     let mut fitted = fit_as(input, choice, control)?;
     // Of meshes the fit itself tells it, with the share of the surface.
     if !matches!(input, Input::Mesh(_)) {
-        let notes = limits_met(&fitted.report);
+        let notes = limits_met(&fitted.report, choice);
         fitted.report.notes.extend(notes);
     }
     Ok(fitted)
 }
 
-/// What the user's limits left undone.
-fn limits_met(report: &FitReport) -> impl Iterator<Item = String> + use<> {
+/// What the limits, the user's or our own, left undone.
+fn limits_met(report: &FitReport, choice: &Choice) -> impl Iterator<Item = String> + use<> {
+    let budget = match choice.coefficients {
+        Some(_) => "--coefficients leaves no room for more",
+        None => "the coefficients of a default fit are spent, --tolerance or --coefficients allows more",
+    };
     let limits = [
-        ("--memory", StopReason::Memory),
-        ("--coefficients", StopReason::Budget),
+        ("--memory leaves no room for more", StopReason::Memory),
+        (budget, StopReason::Budget),
     ];
     let total = report.leaves.len();
-    let counts = limits.map(|(option, reason)| {
+    let counts = limits.map(|(why, reason)| {
         let stopped = report.leaves.iter().filter(|l| l.reason == reason).count();
-        (option, stopped)
+        (why, stopped)
     });
-    counts.into_iter().filter(|c| c.1 > 0).map(move |(option, stopped)| {
-        format!("{stopped} of {total} leaves are coarser than the tolerance asks for: {option} leaves no room for more")
+    counts.into_iter().filter(|c| c.1 > 0).map(move |(why, stopped)| {
+        format!("{stopped} of {total} leaves are coarser than the tolerance asks for: {why}")
     })
 }
 

@@ -12,6 +12,8 @@ use super::band::{BRICK, BRICK_LEN, Band, HALO, HALO_LEN, NONE};
 use super::cg::{Stop, System, conjugate_gradients};
 use super::laplacian::seven_point;
 use super::outcome::SolverOutcome;
+#[cfg(target_arch = "x86_64")]
+use super::pair::in_pairs;
 use super::stencil::{Spot, gather, scatter, scatter_squares};
 
 /// Strides of a brick with halo.
@@ -19,19 +21,32 @@ const STRIDES: [usize; 2] = [HALO * HALO, HALO];
 /// Bricks a thread takes at once; sums are over these chunks, whatever the number of threads.
 const CHUNK: usize = 128;
 
-/// Out of line, where its registers are its own: within the loop over bricks the whole fit takes a seventh longer, and so
-/// it does compiled for wider vectors, since rows have four coefficients.
+/// Adds what `f` makes of value and cell gradient at every sample.
+///
+/// Out of line, where its registers are its own: within the loop over bricks the whole fit takes a seventh longer.
 #[inline(never)]
 fn over_samples<T: Real>(
     samples: &[BandSample<T>],
     values: &[T; HALO_LEN],
-    out: &mut [T],
-    f: &impl Fn(&BandSample<T>, T, [T; 3], &mut [T]),
+    out: &mut [T; HALO_LEN],
+    f: &impl Fn(&BandSample<T>, T, [T; 3]) -> (T, [T; 3]),
 ) {
-    for sample in samples {
+    let alone = in_pairs(samples, values, out, f);
+    for sample in alone {
         let (v, g) = gather(values, sample.spot, STRIDES);
-        f(sample, v, g, out);
+        let (v, g) = f(sample, v, g);
+        scatter(out, sample.spot, STRIDES, v, g);
     }
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+fn in_pairs<'s, T: Real>(
+    samples: &'s [BandSample<T>],
+    _: &[T; HALO_LEN],
+    _: &mut [T; HALO_LEN],
+    _: &impl Fn(&BandSample<T>, T, [T; 3]) -> (T, [T; 3]),
+) -> &'s [BandSample<T>] {
+    samples
 }
 
 /// A sample of a band, in the cell coordinates of its brick.
@@ -55,7 +70,11 @@ impl<T: Real> BandSample<T> {
     fn weigh(&self, g: [T; 3]) -> [T; 3] {
         let n = self.normal;
         let along = (T::one() - self.tangential) * (n[0] * g[0] + n[1] * g[1] + n[2] * g[2]);
-        std::array::from_fn(|a| self.tangential * g[a] + along * n[a])
+        [
+            self.tangential * g[0] + along * n[0],
+            self.tangential * g[1] + along * n[1],
+            self.tangential * g[2] + along * n[2],
+        ]
     }
 }
 
@@ -145,11 +164,16 @@ impl<'a, T: Real> BandProblem<'a, T> {
     /// `Hx` on the active functions, for `x` given in bricks.
     fn apply(&self, dense: &[T], scratch: &mut Scratch<T>, out: &mut [T]) {
         let gw = self.gradient_weight();
-        self.data_halos(dense, &mut scratch.halos, |sample, v, g, out| {
-            let slope = sample.gradient_weight * gw;
-            let g = sample.weigh(g).map(|g| slope * g);
-            scatter(out, sample.spot, STRIDES, sample.weight * v, g);
-        });
+        self.data_halos(
+            dense,
+            &mut scratch.halos,
+            #[inline(always)]
+            |sample, v, g| {
+                let slope = sample.gradient_weight * gw;
+                let [x, y, z] = sample.weigh(g);
+                (sample.weight * v, [slope * x, slope * y, slope * z])
+            },
+        );
         self.laplacians(dense, &mut scratch.laplacians);
         self.gather(scratch, T::one(), out);
     }
@@ -158,42 +182,57 @@ impl<'a, T: Real> BandProblem<'a, T> {
     fn descent_direction(&self, scratch: &mut Scratch<T>) -> Vec<T> {
         let gw = self.gradient_weight();
         let h = T::from_f64(0.5f64.powi(self.band.depth as i32));
-        self.data_halos(&self.band.totals, &mut scratch.halos, |sample, v, g, out| {
-            let slope = sample.gradient_weight * gw;
-            let miss = std::array::from_fn(|a| g[a] + h * sample.normal[a]);
-            let miss = sample.weigh(miss).map(|m| slope * m);
-            scatter(
-                out,
-                sample.spot,
-                STRIDES,
-                sample.weight * (v - sample.target),
-                miss,
-            );
-        });
+        self.data_halos(
+            &self.band.totals,
+            &mut scratch.halos,
+            #[inline(always)]
+            |sample, v, [x, y, z]| {
+                let slope = sample.gradient_weight * gw;
+                let n = sample.normal;
+                let [x, y, z] = sample.weigh([x + h * n[0], y + h * n[1], z + h * n[2]]);
+                (
+                    sample.weight * (v - sample.target),
+                    [slope * x, slope * y, slope * z],
+                )
+            },
+        );
         self.laplacians(&self.band.totals, &mut scratch.laplacians);
         let mut out = vec![T::zero(); self.band.active_count()];
         self.gather(scratch, -T::one(), &mut out);
         out
     }
 
-    /// For every sample: value and cell gradient of `dense`, handed to `f` with the halo to add to.
+    /// What the samples of every brick add to its halo: `f` makes it of value and cell gradient of `dense` at a sample.
     fn data_halos(
         &self,
         dense: &[T],
         halos: &mut Vec<T>,
-        f: impl Fn(&BandSample<T>, T, [T; 3], &mut [T]) + Sync,
+        f: impl Fn(&BandSample<T>, T, [T; 3]) -> (T, [T; 3]) + Sync,
+    ) {
+        let (mut values, f) = ([T::zero(); HALO_LEN], &f);
+        self.halos(halos, move |brick, samples, out| {
+            self.band.halo(dense, brick, &mut values);
+            over_samples(samples, &values, out, f);
+        });
+    }
+
+    /// Fills the halo of every brick with samples by `fill`, which is given the brick, its samples and the halo, all zero.
+    fn halos(
+        &self,
+        halos: &mut Vec<T>,
+        fill: impl FnMut(usize, &[BandSample<T>], &mut [T; HALO_LEN]) + Clone + Sync + Send,
     ) {
         halos.resize(self.bricks.len() * HALO_LEN, T::zero());
         halos
             .par_chunks_mut(CHUNK * HALO_LEN)
             .zip(self.bricks.par_chunks(CHUNK))
             .for_each(|(halos, bricks)| {
-                let mut values = [T::zero(); HALO_LEN];
-                for (out, b) in halos.chunks_exact_mut(HALO_LEN).zip(bricks) {
+                let mut fill = fill.clone();
+                let (halos, _) = halos.as_chunks_mut::<HALO_LEN>();
+                for (out, b) in halos.iter_mut().zip(bricks) {
                     out.fill(T::zero());
-                    self.band.halo(dense, b.brick as usize, &mut values);
                     let samples = &self.samples[b.start as usize..b.end as usize];
-                    over_samples(samples, &values, out, &f);
+                    fill(b.brick as usize, samples, out);
                 }
             });
     }
@@ -252,11 +291,13 @@ impl<'a, T: Real> BandProblem<'a, T> {
 
     fn inverse_diagonal(&self, scratch: &mut Scratch<T>) -> Vec<T> {
         let gw = self.gradient_weight();
-        self.data_halos(&self.band.totals, &mut scratch.halos, |sample, _, _, out| {
-            let slope = sample.gradient_weight * gw;
-            let along = (T::one() - sample.tangential) * slope;
-            let squares = sample.normal.map(|n| sample.tangential * slope + along * n * n);
-            scatter_squares(out, sample.spot, STRIDES, sample.weight, squares);
+        self.halos(&mut scratch.halos, |_, samples, out| {
+            for sample in samples {
+                let slope = sample.gradient_weight * gw;
+                let along = (T::one() - sample.tangential) * slope;
+                let squares = sample.normal.map(|n| sample.tangential * slope + along * n * n);
+                scatter_squares(out, sample.spot, STRIDES, sample.weight, squares);
+            }
         });
         scratch.laplacians.resize(self.band.totals.len(), T::zero());
         let mut diagonal = vec![T::zero(); self.band.active_count()];

@@ -15,6 +15,8 @@ pub(crate) mod full_grid;
 pub(crate) mod full_operator;
 mod laplacian;
 pub(crate) mod outcome;
+#[cfg(target_arch = "x86_64")]
+mod pair;
 mod prolong;
 pub(crate) mod stencil;
 pub(crate) mod v_cycle;

@@ -37,9 +37,10 @@ use samples::Samples;
 /// What the caller may choose; `None` is chosen from the data.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PointOptions {
-    /// Rms distance per leaf, world units.
+    /// Rms distance per leaf, world units; 1e-4 of the diagonal if not given, 1.25 standard deviations of noise.
     pub tolerance: Option<f64>,
     /// Largest number of coefficients, at least [`LEAST_COEFFICIENTS`]. They are spent where the error is largest.
+    /// Of clean clouds 270 000, or 0.7 a point if that is more, if neither they nor a tolerance nor a depth are given.
     pub coefficients: Option<usize>,
     /// Deepest level: `2^max_depth` cells along the box, from 6 to 16.
     pub max_depth: Option<usize>,
@@ -189,7 +190,7 @@ pub fn fit_points<T: Real>(
             conditions.len()
         ));
     };
-    let (field, specks) = specks::remove(field, &samples, &cascade.still, options.coefficients);
+    let (field, specks) = specks::remove(field, &samples, &cascade.still, plan.coefficients);
     if specks > 0 {
         samples.notes.push(format!(
             "specks of solid or cavity without a point of their own taken out: {specks}"

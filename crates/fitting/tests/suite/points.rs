@@ -2,9 +2,9 @@
 
 use crate::common::{cloud, fit, oriented, to_depth};
 use bspline::{Aabb, Field, Frame, HierarchicalSpline, Real};
-use fitting::phantoms::{CloudOptions, Solid, SplitMix64};
+use fitting::phantoms::{CloudOptions, SampledCloud, Solid, SplitMix64};
 use fitting::points::PointOptions;
-use fitting::{StopReason, unsupported_components};
+use fitting::{FitReport, StopReason, unsupported_components};
 use glam::DVec3;
 
 /// Uniform points of the fit's box that lie at least `distance` from the solid's surface, where its field is a
@@ -49,6 +49,51 @@ fn a_ball_is_found_with_its_distance() {
             assert!((gradient + direction).length() < 0.05, "{gradient} at radius {r}");
         }
     }
+}
+
+/// Points of a sheet of 2 × 2 in folds of 45°, 24 along each axis.
+fn folded_sheet(across: usize) -> SampledCloud {
+    let fold = |x: f64| {
+        let turns = 12.0 * x;
+        let phase = turns.rem_euclid(2.0);
+        let (height, slope) = if phase < 1.0 {
+            (phase, 1.0)
+        } else {
+            (2.0 - phase, -1.0)
+        };
+        (height / 12.0, slope)
+    };
+    let mut sheet = SampledCloud::default();
+    for i in 0..across * across {
+        let at = |i: usize| (i as f64 + 0.5) / across as f64 * 2.0 - 1.0;
+        let (x, y) = (at(i / across), at(i % across));
+        let ((u, du), (v, dv)) = (fold(x), fold(y));
+        sheet.positions.push(DVec3::new(x, y, 0.5 * (u + v)));
+        sheet
+            .normals
+            .push(DVec3::new(-0.5 * du, -0.5 * dv, 1.0).normalize());
+    }
+    sheet
+}
+
+#[test]
+fn a_dense_cloud_with_creases_spends_no_more_than_its_budget_unless_a_tolerance_is_given() {
+    let samples = folded_sheet(350);
+    let (_, report) = fit::<f32>(&samples, &PointOptions::default()).expect("a clean cloud");
+    assert!(report.noise.is_none(), "{:?}", report.noise);
+    assert!(report.coefficients <= 270_000, "{}", report.coefficients);
+    let spent = |report: &FitReport| report.leaves.iter().any(|l| l.reason == StopReason::Budget);
+    assert!(spent(&report), "{}", report.coefficients);
+    let asked = PointOptions {
+        tolerance: Some(report.tolerance),
+        ..PointOptions::default()
+    };
+    let (_, report) = fit::<f32>(&samples, &asked).expect("a clean cloud");
+    assert!(
+        report.coefficients > 270_000 && !spent(&report),
+        "{}",
+        report.coefficients
+    );
 }
 
 #[test]
