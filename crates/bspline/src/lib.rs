@@ -25,6 +25,8 @@ pub mod hierarchical;
 pub mod insertion;
 mod interval;
 pub mod knots;
+#[cfg(target_arch = "x86_64")]
+pub mod pair;
 mod placed_box;
 pub mod polygonize;
 pub mod primitives;

@@ -49,11 +49,21 @@ pub(super) fn values_gradients<T: Real>(
 ) {
     assert_eq!(points.len(), out.len(), "one output slot per point");
     let mut last = None;
-    for (p, o) in points.iter().zip(out) {
+    let (pairs, alone) = points.as_chunks::<2>();
+    let (pairs_out, alone_out) = out.as_chunks_mut::<2>();
+    for ([p, r], [o, s]) in pairs.iter().zip(pairs_out) {
+        let ((q, beyond), (u, beyond_too)) = (f.place.clamp(*p), f.place.clamp(*r));
+        let a = f.place_after(last.as_ref(), q);
+        let b = f.place_after(Some(&a), u);
+        let [at_a, at_b] = kernel::values_gradients_of_two([a.cell_point(), b.cell_point()]);
+        *o = f.place.extend(a.in_world(&f.place, at_a), q, beyond);
+        *s = f.place.extend(b.in_world(&f.place, at_b), u, beyond_too);
+        last = Some(b);
+    }
+    for (p, o) in alone.iter().zip(alone_out) {
         let (q, beyond) = f.place.clamp(*p);
         let at = f.place_after(last.as_ref(), q);
         *o = f.place.extend(at.value_gradient(&f.place), q, beyond);
-        last = Some(at);
     }
 }
 

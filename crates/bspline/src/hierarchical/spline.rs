@@ -5,6 +5,7 @@ use glam::{DAffine3, DVec3};
 
 use super::brick::{BRICK, BRICK_LEN, DenseCorrections, HALO_LEN};
 use super::functions::{EditError, check_functions};
+use super::kernel::CellPoint;
 use super::node::{Node, octant};
 use super::{BrickKey, Corrections, Lattice, LevelCorrections, build, kernel};
 use crate::Real;
@@ -297,7 +298,19 @@ impl<'a, T: Real> Place<'a, T> {
     /// Value and gradient by world coordinates, before the fall outside.
     #[inline]
     pub fn value_gradient(&self, place: &PlacedBox) -> (f64, DVec3) {
-        let (value, g) = kernel::value_gradient(self.brick.own_totals(), self.cell, self.t);
+        let (totals, cell, t) = self.cell_point();
+        self.in_world(place, kernel::value_gradient(totals, cell, t))
+    }
+
+    /// What the kernels ask.
+    #[inline]
+    pub fn cell_point(&self) -> CellPoint<'a, T> {
+        (self.brick.own_totals(), self.cell, self.t)
+    }
+
+    /// Value and gradient by cell coordinates to those by world coordinates.
+    #[inline]
+    pub fn in_world(&self, place: &PlacedBox, (value, g): (T, [T; 3])) -> (f64, DVec3) {
         (value.as_f64(), self.world_gradient(place, g))
     }
 

@@ -1,22 +1,15 @@
-//! Two samples at once, in the eight lanes of AVX2, with the bits of [`stencil`](super::stencil).
-//!
-//! A row has four coefficients, so that a compiler left to itself stays at four lanes. A sample takes 15 ns to gather and
-//! 17 to scatter, where one by one it takes 34 and 30.
+//! Two samples of a band at once, with the bits of [`stencil`](super::stencil).
 
 use std::any::Any;
 
-use bspline::{Real, cubic, vectorized};
-use pulp::x86::V3;
-use pulp::{cast, f32x4, f32x8};
+use bspline::pair::{Avx2, CubicPair};
+use bspline::{Real, vectorized};
 
 use super::band::{HALO, HALO_LEN};
 use super::band_problem::BandSample;
-use super::stencil::Spot;
 
 /// Strides of a brick with halo.
 const STRIDES: [usize; 2] = [HALO * HALO, HALO];
-/// Length of the part of a halo that one sample reads.
-const REACH: usize = 3 * (STRIDES[0] + STRIDES[1]) + 4;
 
 /// Adds what `f` makes of value and gradient at a sample to the halo `out`, for as many samples as fill pairs. Returns the
 /// others: all of them in double precision, or where the processor has no AVX2.
@@ -29,7 +22,7 @@ pub(crate) fn in_pairs<'s, T: Real>(
 ) -> &'s [BandSample<T>] {
     let values = (values as &dyn Any).downcast_ref::<[f32; HALO_LEN]>();
     let out = (out as &mut dyn Any).downcast_mut::<[f32; HALO_LEN]>();
-    let (Some(values), Some(out), Some(simd)) = (values, out, V3::try_new()) else {
+    let (Some(values), Some(out), Some(avx2)) = (values, out, Avx2::new()) else {
         return samples;
     };
     vectorized(
@@ -37,9 +30,11 @@ pub(crate) fn in_pairs<'s, T: Real>(
         || {
             for pair in samples.chunks_exact(2) {
                 let (a, b) = (&pair[0], &pair[1]);
-                let weights = PairWeights::new(simd, [single(a.spot), single(b.spot)]);
-                let [at_a, at_b] = weights.gather(simd, values);
-                weights.scatter(simd, out, [answer(a, at_a, f), answer(b, at_b, f)]);
+                let start = [a.spot.start, b.spot.start];
+                let pair = CubicPair::new(avx2, [single(a.spot.t), single(b.spot.t)]);
+                let [at_a, at_b] = pair.gather([&values[start[0]..], &values[start[1]..]], STRIDES);
+                let amounts = [answer(a, at_a, f), answer(b, at_b, f)];
+                pair.scatter(out, start, STRIDES, amounts);
             }
         },
     );
@@ -47,12 +42,8 @@ pub(crate) fn in_pairs<'s, T: Real>(
 }
 
 #[inline(always)]
-fn single<T: Real>(spot: Spot<T>) -> Spot<f32> {
-    let [x, y, z] = spot.t;
-    Spot {
-        start: spot.start,
-        t: [x.as_f64() as f32, y.as_f64() as f32, z.as_f64() as f32],
-    }
+fn single<T: Real>([x, y, z]: [T; 3]) -> [f32; 3] {
+    [x.as_f64() as f32, y.as_f64() as f32, z.as_f64() as f32]
 }
 
 /// `f` of value and gradient at a sample.
@@ -63,150 +54,13 @@ fn answer<T: Real>(
     f: &impl Fn(&BandSample<T>, T, [T; 3]) -> (T, [T; 3]),
 ) -> (f32, [f32; 3]) {
     let wide = |x: f32| T::from_f64(f64::from(x));
-    let (v, [x, y, z]) = f(sample, wide(v), [wide(x), wide(y), wide(z)]);
-    (
-        v.as_f64() as f32,
-        [x.as_f64() as f32, y.as_f64() as f32, z.as_f64() as f32],
-    )
-}
-
-/// The weights of two samples along the three axes: the first one's in the low lanes.
-struct PairWeights {
-    start: [usize; 2],
-    x: [f32x8; 4],
-    dx: [f32x8; 4],
-    y: [f32x8; 4],
-    dy: [f32x8; 4],
-    z: f32x8,
-    dz: f32x8,
-}
-
-/// `low` four times, then `high`.
-#[inline(always)]
-fn each(simd: V3, [low, high]: [f32; 2]) -> f32x8 {
-    joined(simd, [simd.splat_f32x4(low), simd.splat_f32x4(high)])
-}
-
-#[inline(always)]
-fn joined(simd: V3, [low, high]: [f32x4; 2]) -> f32x8 {
-    cast(simd.avx._mm256_set_m128(cast(high), cast(low)))
-}
-
-/// Each weight of two samples, in all their lanes.
-#[inline(always)]
-fn rows(simd: V3, [low, high]: [[f32; 4]; 2]) -> [f32x8; 4] {
-    [
-        each(simd, [low[0], high[0]]),
-        each(simd, [low[1], high[1]]),
-        each(simd, [low[2], high[2]]),
-        each(simd, [low[3], high[3]]),
-    ]
-}
-
-#[inline(always)]
-fn row(values: &[f32], at: usize) -> f32x4 {
-    let row: [f32; 4] = values[at..at + 4].try_into().expect("four of a row");
-    cast(row)
-}
-
-#[inline(always)]
-fn product_added(simd: V3, sum: f32x8, a: f32x8, b: f32x8) -> f32x8 {
-    simd.add_f32x8(sum, simd.mul_f32x8(a, b))
-}
-
-impl PairWeights {
-    #[inline(always)]
-    fn new(simd: V3, spots: [Spot<f32>; 2]) -> Self {
-        let [low, high] = spots;
-        let values = |axis: usize| [cubic::values(low.t[axis]), cubic::values(high.t[axis])];
-        let slopes = |axis: usize| [cubic::first(low.t[axis]), cubic::first(high.t[axis])];
-        let ([wz, vz], [dz, ez]) = (values(2), slopes(2));
-        Self {
-            start: [low.start, high.start],
-            x: rows(simd, values(0)),
-            dx: rows(simd, slopes(0)),
-            y: rows(simd, values(1)),
-            dy: rows(simd, slopes(1)),
-            z: joined(simd, [cast(wz), cast(vz)]),
-            dz: joined(simd, [cast(dz), cast(ez)]),
-        }
-    }
-
-    /// [`gather`](super::stencil::gather) of both: value and gradient of each.
-    #[inline(always)]
-    fn gather(&self, simd: V3, values: &[f32; HALO_LEN]) -> [(f32, [f32; 3]); 2] {
-        let (low, high) = (
-            &values[self.start[0]..][..REACH],
-            &values[self.start[1]..][..REACH],
-        );
-        let zero = simd.splat_f32x8(0.0);
-        let (mut plane, mut plane_dx, mut plane_dy) = (zero, zero, zero);
-        for b in 0..4 {
-            let (mut line, mut line_dx) = (zero, zero);
-            for a in 0..4 {
-                let at = a * STRIDES[0] + b * STRIDES[1];
-                let row = joined(simd, [row(low, at), row(high, at)]);
-                line = product_added(simd, line, self.x[a], row);
-                line_dx = product_added(simd, line_dx, self.dx[a], row);
-            }
-            plane = product_added(simd, plane, self.y[b], line);
-            plane_dx = product_added(simd, plane_dx, self.y[b], line_dx);
-            plane_dy = product_added(simd, plane_dy, self.dy[b], line);
-        }
-        // Neighbours are added first, then the pairs, as `stencil::gather` does.
-        let sum = |a: f32x8, b: f32x8| -> f32x8 { cast(simd.avx._mm256_hadd_ps(cast(a), cast(b))) };
-        let first = sum(simd.mul_f32x8(self.z, plane), simd.mul_f32x8(self.z, plane_dx));
-        let second = sum(simd.mul_f32x8(self.z, plane_dy), simd.mul_f32x8(self.dz, plane));
-        let [[v, x, y, z], [w, r, s, t]]: [[f32; 4]; 2] = cast(sum(first, second));
-        [(v, [x, y, z]), (w, [r, s, t])]
-    }
-
-    /// [`scatter`](super::stencil::scatter) of both, the first one's first.
-    #[inline(always)]
-    fn scatter(&self, simd: V3, values: &mut [f32; HALO_LEN], amounts: [(f32, [f32; 3]); 2]) {
-        let [low, high] = amounts;
-        let v = each(simd, [low.0, high.0]);
-        let g = [
-            each(simd, [low.1[0], high.1[0]]),
-            each(simd, [low.1[1], high.1[1]]),
-            each(simd, [low.1[2], high.1[2]]),
-        ];
-        let along = product_added(simd, simd.mul_f32x8(v, self.z), g[2], self.dz);
-        let mut seconds = [simd.splat_f32x4(0.0); 16];
-        let out = &mut values[self.start[0]..][..REACH];
-        for b in 0..4 {
-            let even = product_added(
-                simd,
-                simd.mul_f32x8(self.y[b], along),
-                simd.mul_f32x8(self.dy[b], g[1]),
-                self.z,
-            );
-            let odd = simd.mul_f32x8(simd.mul_f32x8(self.y[b], g[0]), self.z);
-            for a in 0..4 {
-                let added = product_added(simd, simd.mul_f32x8(self.x[a], even), self.dx[a], odd);
-                let [first, second]: [f32x4; 2] = cast(added);
-                add(simd, out, a * STRIDES[0] + b * STRIDES[1], first);
-                seconds[4 * b + a] = second;
-            }
-        }
-        let out = &mut values[self.start[1]..][..REACH];
-        for b in 0..4 {
-            for a in 0..4 {
-                add(simd, out, a * STRIDES[0] + b * STRIDES[1], seconds[4 * b + a]);
-            }
-        }
-    }
-}
-
-#[inline(always)]
-fn add(simd: V3, out: &mut [f32], at: usize, added: f32x4) {
-    let sum: [f32; 4] = cast(simd.add_f32x4(row(out, at), added));
-    out[at..at + 4].copy_from_slice(&sum);
+    let (v, g) = f(sample, wide(v), [wide(x), wide(y), wide(z)]);
+    (v.as_f64() as f32, single(g))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::stencil::{gather, scatter};
+    use super::super::stencil::{Spot, gather, scatter};
     use super::*;
 
     fn answer(sample: &BandSample<f32>, v: f32, g: [f32; 3]) -> (f32, [f32; 3]) {
@@ -253,7 +107,7 @@ mod tests {
         }
         let mut found = [0.0; HALO_LEN];
         let rest = in_pairs(&samples, &values, &mut found, &answer);
-        if V3::try_new().is_some() {
+        if Avx2::new().is_some() {
             assert_eq!(rest.len(), 1);
         }
         for sample in rest {
