@@ -49,7 +49,9 @@ impl<T: Real> Basis<T> {
         for r in 0..=p {
             rows[0][r] = T::from_f64(table.ndu[r][p]);
         }
-        if order > 0 {
+        if order == 1 {
+            rows[1] = table.slopes(p).map(T::from_f64);
+        } else if order > 0 {
             let derivatives = table.derivatives(p, order.min(p));
             for k in 1..=order.min(p) {
                 rows[k] = derivatives[k].map(T::from_f64);
@@ -115,6 +117,18 @@ impl Table {
         Self { ndu }
     }
 
+    /// First derivatives, with the bits of [`Self::derivatives`]: a quotient that two functions share is taken once.
+    #[inline(always)]
+    fn slopes(&self, p: usize) -> [f64; ORDER] {
+        let mut slopes = [0.0; ORDER];
+        for s in 0..p {
+            let rise = 1.0 / self.ndu[p][s] * self.ndu[s][p - 1];
+            slopes[s] -= rise;
+            slopes[s + 1] += rise;
+        }
+        slopes.map(|slope| slope * p as f64)
+    }
+
     /// Derivatives `1 ..= order <= p`, [Piegl97 A2.3].
     #[inline(always)]
     fn derivatives(&self, p: usize, order: usize) -> [[f64; ORDER]; MAX_DERIVATIVE + 1] {
@@ -145,5 +159,26 @@ impl Table {
             out[k].iter_mut().for_each(|d| *d *= factor);
         }
         out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slopes_have_the_bits_of_first_derivatives() {
+        let knots = [0.0, 0.1, 0.1, 0.35, 0.7, 0.72, 0.9, 1.3, 1.3, 2.0];
+        for p in 1..=MAX_DEGREE {
+            let u = &knots[5 - p..5 + p];
+            for i in 0..=20 {
+                let t = u[p - 1] + (u[p] - u[p - 1]) * f64::from(i) / 20.0;
+                let table = Table::new(u, p, t);
+                assert_eq!(
+                    table.slopes(p).map(f64::to_bits),
+                    table.derivatives(p, 1)[1].map(f64::to_bits)
+                );
+            }
+        }
     }
 }

@@ -19,6 +19,14 @@ impl<T: Real> TensorSpline<T> {
         }
     }
 
+    /// Value and gradient by world coordinates at `q`, or beyond it.
+    #[inline]
+    fn in_world(&self, cell: &Cell<'_, T>, q: DVec3, beyond: DVec3) -> (f64, DVec3) {
+        let (value, gradient) = cell.value_gradient();
+        let gradient = self.place.local_from_world.matrix3.transpose() * vector(gradient);
+        self.place.extend((value.as_f64(), gradient), q, beyond)
+    }
+
     /// Value at parameter `q`, which is not clamped: the polynomials of the outermost spans continue.
     pub fn value_at_parameter(&self, q: DVec3) -> T {
         self.cell(q, 0).value()
@@ -37,9 +45,25 @@ impl<T: Real> Field for TensorSpline<T> {
 
     fn value_gradient(&self, p: DVec3) -> (f64, DVec3) {
         let (q, beyond) = self.place.clamp(p);
-        let (value, gradient) = self.cell(q, 1).value_gradient();
-        let gradient = self.place.local_from_world.matrix3.transpose() * vector(gradient);
-        self.place.extend((value.as_f64(), gradient), q, beyond)
+        self.in_world(&self.cell(q, 1), q, beyond)
+    }
+
+    /// Points on one line of a grid have the functions of two axes in common, which are found once.
+    fn values_gradients(&self, points: &[DVec3], out: &mut [(f64, DVec3)]) {
+        assert_eq!(points.len(), out.len(), "one output slot per point");
+        let Some(first) = points.first() else { return };
+        let mut last = self.place.clamp(*first).0;
+        let mut cell = self.cell(last, 1);
+        for (p, o) in points.iter().zip(out) {
+            let (q, beyond) = self.place.clamp(*p);
+            for a in 0..3 {
+                if q[a] != last[a] {
+                    cell.basis[a] = Basis::at(&self.knots[a], q[a], 1);
+                }
+            }
+            last = q;
+            *o = self.in_world(&cell, q, beyond);
+        }
     }
 
     fn jet(&self, p: DVec3) -> Jet {
