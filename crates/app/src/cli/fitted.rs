@@ -103,23 +103,21 @@ pub fn fit(input: &Input, choice: &Choice, control: &mut Control) -> Outcome<Fit
     Ok(fitted)
 }
 
-/// What the limits, the user's or our own, left undone.
+/// What the user's limits left undone.
 fn limits_met(report: &FitReport, choice: &Choice) -> impl Iterator<Item = String> + use<> {
-    let budget = match choice.coefficients {
-        Some(_) => "--coefficients leaves no room for more",
-        None => "the coefficients of a default fit are spent, --tolerance or --coefficients allows more",
-    };
-    let limits = [
-        ("--memory leaves no room for more", StopReason::Memory),
-        (budget, StopReason::Budget),
-    ];
+    // The fit itself tells of a budget that nobody asked for.
+    let budget = choice
+        .coefficients
+        .map(|_| ("--coefficients", StopReason::Budget));
+    let limits = [Some(("--memory", StopReason::Memory)), budget];
     let total = report.leaves.len();
-    let counts = limits.map(|(why, reason)| {
+    let counts = limits.map(|limit| {
+        let (option, reason) = limit?;
         let stopped = report.leaves.iter().filter(|l| l.reason == reason).count();
-        (why, stopped)
+        (stopped > 0).then_some((option, stopped))
     });
-    counts.into_iter().filter(|c| c.1 > 0).map(move |(why, stopped)| {
-        format!("{stopped} of {total} leaves are coarser than the tolerance asks for: {why}")
+    counts.into_iter().flatten().map(move |(option, stopped)| {
+        format!("{stopped} of {total} leaves are coarser than the tolerance asks for: {option} leaves no room for more")
     })
 }
 

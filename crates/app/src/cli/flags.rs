@@ -35,7 +35,7 @@ pub fn fault(fault: &Fault) -> String {
 }
 
 /// What the fitting library advises, and the option for it.
-const ADVICE: [(&str, &str); 10] = [
+const ADVICE: [(&str, &str); 11] = [
     ("fit them by the robust loss", "--robust"),
     ("fit it as a cloud", "--as cloud"),
     ("a mesh can be trimmed there", "isoclay mesh --trim"),
@@ -45,6 +45,10 @@ const ADVICE: [(&str, &str); 10] = [
     ),
     ("the coefficients allowed are spent", "--coefficients"),
     ("the memory allowed is spent", "--memory"),
+    (
+        "a tolerance or a number of coefficients allows more",
+        "--tolerance, --coefficients",
+    ),
     (
         "raise the coefficients and the depth allowed",
         "--coefficients, --max-depth",

@@ -29,7 +29,7 @@ mod support;
 use bspline::{HierarchicalSpline, Real};
 
 use crate::level::{BASE_DEPTH, MAX_DEPTH};
-use crate::{Control, FitError, FitReport};
+use crate::{Control, FitError, FitReport, Leaf, StopReason};
 use plan::{Plan, Smoothing};
 pub use samples::OrientedPoints;
 use samples::Samples;
@@ -88,6 +88,19 @@ pub(crate) fn check_limits(coefficients: Option<usize>, max_depth: Option<usize>
 const LEAST_POINTS: usize = 10;
 /// Rounds of conditions against pieces that no sample speaks for.
 const REPAIR_ROUNDS: i32 = 3;
+
+/// What a budget that the caller has not asked for left undone.
+fn budget_spent(report: &FitReport) -> Option<String> {
+    let total = report.leaves.len();
+    let spent = |l: &&Leaf| l.reason == StopReason::Budget;
+    let stopped = report.leaves.iter().filter(spent).count();
+    (stopped > 0).then(|| {
+        format!(
+            "{stopped} of {total} leaves are coarser than the tolerance asks for: the coefficients of a default fit are \
+             spent, a tolerance or a number of coefficients allows more"
+        )
+    })
+}
 
 /// Fits a signed distance, positive inside, to points with outward normals.
 ///
@@ -200,5 +213,8 @@ pub fn fit_points<T: Real>(
     let mut report = residual::report(&field, &samples, &cascade, cloud.positions, &plan, noise);
     solves.extend(&cascade.solves);
     report.told_solves(solves);
+    if options.coefficients.is_none() {
+        report.notes.extend(budget_spent(&report));
+    }
     Ok((field, report))
 }

@@ -84,11 +84,14 @@ fn a_dense_cloud_with_creases_spends_no_more_than_its_budget_unless_a_tolerance_
     assert!(report.coefficients <= 270_000, "{}", report.coefficients);
     let spent = |report: &FitReport| report.leaves.iter().any(|l| l.reason == StopReason::Budget);
     assert!(spent(&report), "{}", report.coefficients);
+    let told = |report: &FitReport| report.notes.iter().any(|n| n.contains("a tolerance or a number"));
+    assert!(told(&report), "{:?}", report.notes);
     let asked = PointOptions {
         tolerance: Some(report.tolerance),
         ..PointOptions::default()
     };
     let (_, report) = fit::<f32>(&samples, &asked).expect("a clean cloud");
+    assert!(!told(&report), "{:?}", report.notes);
     assert!(
         report.coefficients > 270_000 && !spent(&report),
         "{}",
