@@ -6,7 +6,7 @@
 use pulp::x86::V3;
 use pulp::{cast, f32x4, f32x8};
 
-use crate::cubic;
+use crate::{Real, cubic};
 
 /// The processor has AVX2. Called within [`vectorized`](crate::vectorized), what is here is compiled for it.
 #[derive(Clone, Copy, Debug)]
@@ -30,6 +30,12 @@ impl Avx2 {
     pub fn new() -> Option<Self> {
         V3::try_new().map(Self)
     }
+}
+
+/// A point in single precision, exact if it is.
+#[inline(always)]
+pub fn single<T: Real>([x, y, z]: [T; 3]) -> [f32; 3] {
+    [x.as_f64() as f32, y.as_f64() as f32, z.as_f64() as f32]
 }
 
 /// `low` four times, then `high`.

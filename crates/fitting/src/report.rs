@@ -115,6 +115,11 @@ pub struct FitReport {
 }
 
 impl FitReport {
+    /// Leaves that were not split for this reason.
+    pub fn stopped_by(&self, reason: StopReason) -> usize {
+        self.leaves.iter().filter(|l| l.reason == reason).count()
+    }
+
     /// Takes the outcomes of the solves, and tells where one missed the residual asked for.
     pub(crate) fn told_solves(&mut self, solves: Vec<SolverOutcome>) {
         self.notes.extend(note(&solves));

@@ -113,7 +113,7 @@ fn limits_met(report: &FitReport, choice: &Choice) -> impl Iterator<Item = Strin
     let total = report.leaves.len();
     let counts = limits.map(|limit| {
         let (option, reason) = limit?;
-        let stopped = report.leaves.iter().filter(|l| l.reason == reason).count();
+        let stopped = report.stopped_by(reason);
         (stopped > 0).then_some((option, stopped))
     });
     counts.into_iter().flatten().map(move |(option, stopped)| {

@@ -4,7 +4,7 @@ use super::brick::{HALO, HALO_LEN};
 use crate::Real;
 use crate::cubic::{first, second as curvatures, values};
 #[cfg(target_arch = "x86_64")]
-use crate::pair::{Avx2, CubicPair};
+use crate::pair::{Avx2, CubicPair, single};
 #[cfg(target_arch = "x86_64")]
 use crate::vectorized;
 
@@ -81,15 +81,14 @@ pub(crate) fn values_gradients_of_two<T: Real>(points: [CellPoint<'_, T>; 2]) ->
 #[cfg(target_arch = "x86_64")]
 #[inline]
 fn in_lanes<T: Real>([a, b]: [CellPoint<'_, T>; 2]) -> Option<[(T, [T; 3]); 2]> {
-    fn single<T: Real>(totals: &[T; HALO_LEN]) -> Option<&[f32; HALO_LEN]> {
+    fn singles<T: Real>(totals: &[T; HALO_LEN]) -> Option<&[f32; HALO_LEN]> {
         (totals as &dyn std::any::Any).downcast_ref()
     }
-    let (low, high, avx2) = (single(a.0)?, single(b.0)?, Avx2::new()?);
-    let place = |[x, y, z]: [T; 3]| [x.as_f64() as f32, y.as_f64() as f32, z.as_f64() as f32];
+    let (low, high, avx2) = (singles(a.0)?, singles(b.0)?, Avx2::new()?);
     let start = |[x, y, z]: [usize; 3]| (x * HALO + y) * HALO + z;
     let wide = |x: f32| T::from_f64(f64::from(x));
     let (t, rows) = (
-        [place(a.2), place(b.2)],
+        [single(a.2), single(b.2)],
         [&low[start(a.1)..], &high[start(b.1)..]],
     );
     let both = vectorized(

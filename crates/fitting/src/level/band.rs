@@ -3,7 +3,7 @@
 use bspline::Real;
 use rustc_hash::{FxHashMap, FxHashSet};
 
-pub(crate) use super::brick::{BRICK, BRICK_LEN, HALO, HALO_LEN, Key, halo_start, key_of, slot_of};
+pub(crate) use super::brick::{BRICK, BRICK_LEN, HALO, HALO_LEN, Key, STRIDES, halo_start, key_of, slot_of};
 use super::full_grid::FullGrid;
 use super::prolong::{PARENTS, SPAN, prolonged};
 

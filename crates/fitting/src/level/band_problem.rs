@@ -8,7 +8,7 @@
 use bspline::Real;
 use rayon::prelude::*;
 
-use super::band::{BRICK, BRICK_LEN, Band, HALO, HALO_LEN, NONE};
+use super::band::{BRICK, BRICK_LEN, Band, HALO_LEN, NONE, STRIDES};
 use super::cg::{Stop, System, conjugate_gradients};
 use super::laplacian::seven_point;
 use super::outcome::SolverOutcome;
@@ -16,8 +16,6 @@ use super::outcome::SolverOutcome;
 use super::pair::in_pairs;
 use super::stencil::{Spot, gather, scatter, scatter_squares};
 
-/// Strides of a brick with halo.
-const STRIDES: [usize; 2] = [HALO * HALO, HALO];
 /// Bricks a thread takes at once; sums are over these chunks, whatever the number of threads.
 const CHUNK: usize = 128;
 

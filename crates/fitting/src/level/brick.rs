@@ -9,6 +9,8 @@ pub(crate) const BRICK_LEN: usize = BRICK * BRICK * BRICK;
 pub(crate) const HALO: usize = BRICK + 3;
 /// Coefficients in a brick with halo.
 pub(crate) const HALO_LEN: usize = HALO * HALO * HALO;
+/// Coefficients of a brick with halo from one x to the next, and from one y to the next.
+pub(crate) const STRIDES: [usize; 2] = [HALO * HALO, HALO];
 
 /// Place of a brick on its level, in bricks.
 pub(crate) type Key = [u32; 3];

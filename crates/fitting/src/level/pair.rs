@@ -2,14 +2,11 @@
 
 use std::any::Any;
 
-use bspline::pair::{Avx2, CubicPair};
+use bspline::pair::{Avx2, CubicPair, single};
 use bspline::{Real, vectorized};
 
-use super::band::{HALO, HALO_LEN};
+use super::band::{HALO_LEN, STRIDES};
 use super::band_problem::BandSample;
-
-/// Strides of a brick with halo.
-const STRIDES: [usize; 2] = [HALO * HALO, HALO];
 
 /// Adds what `f` makes of value and gradient at a sample to the halo `out`, for as many samples as fill pairs. Returns the
 /// others: all of them in double precision, or where the processor has no AVX2.
@@ -41,11 +38,6 @@ pub(crate) fn in_pairs<'s, T: Real>(
     &samples[samples.len() & !1..]
 }
 
-#[inline(always)]
-fn single<T: Real>([x, y, z]: [T; 3]) -> [f32; 3] {
-    [x.as_f64() as f32, y.as_f64() as f32, z.as_f64() as f32]
-}
-
 /// `f` of value and gradient at a sample.
 #[inline(always)]
 fn answer<T: Real>(
@@ -62,6 +54,7 @@ fn answer<T: Real>(
 mod tests {
     use super::super::stencil::{Spot, gather, scatter};
     use super::*;
+    use crate::phantoms::SplitMix64;
 
     fn answer(sample: &BandSample<f32>, v: f32, g: [f32; 3]) -> (f32, [f32; 3]) {
         (
@@ -73,11 +66,8 @@ mod tests {
     /// Neighbours in the list read the same coefficients, or some of them, or none; the last of an odd number is left.
     #[test]
     fn pairs_have_the_bits_of_samples_one_by_one() {
-        let mut state = 1u64;
-        let mut random = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-            (state >> 40) as f32 / 16_777_216.0
-        };
+        let mut generator = SplitMix64::new(1);
+        let mut random = || generator.uniform() as f32;
         let values: [f32; HALO_LEN] = std::array::from_fn(|_| random() - 0.5);
         let samples: Vec<_> = (0..301)
             .map(|i| {

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::Plan;
 use super::judge::Quality;
 use super::probes::{Cell, Octants, Probe, cell_of};
-use crate::level::band::{BRICK, Band, HALO, HALO_LEN, Key, halo_start, key_of, slot_of};
+use crate::level::band::{BRICK, Band, HALO_LEN, Key, STRIDES, halo_start, key_of, slot_of};
 use crate::level::band_problem::{BandSample, BrickSamples};
 use crate::level::stencil::{Spot, gather, gather_value};
 
@@ -16,8 +16,6 @@ const MOST_WEIGHT: f32 = 8.0;
 /// Weight of a corner of the surface, where a smooth field errs most. On the bunny 95 % of the corners are within 1.5 u
 /// with 0.25, 1.0 u with 6, 0.9 u with 12, all of the surface within 0.82, 0.87 and 0.85 u; with 20 it gets worse.
 const CORNER_WEIGHT: f32 = 10.0;
-
-const STRIDES: [usize; 2] = [HALO * HALO, HALO];
 
 /// Conditions of one level, brick by brick.
 pub(super) struct Conditions<T> {

@@ -7,7 +7,7 @@ use super::plan::Plan;
 use super::samples::Samples;
 use crate::StopReason;
 use crate::level::BASE_DEPTH;
-use crate::level::band::{Band, HALO, HALO_LEN};
+use crate::level::band::{Band, HALO_LEN, STRIDES};
 use crate::level::band_problem::{BandSample, BrickSamples};
 use crate::level::stencil::gather;
 
@@ -203,7 +203,7 @@ pub(crate) fn cell_quality<T: Real>(
         band.halo(&band.totals, b.brick as usize, &mut values);
         for i in b.start as usize..b.end as usize {
             let sample = &list[i];
-            let (v, g) = gather(&values, sample.spot, [HALO * HALO, HALO]);
+            let (v, g) = gather(&values, sample.spot, STRIDES);
             let g = g.map(|g| g.as_f64() * n);
             let steepness: f64 = g.iter().map(|g| g * g).sum();
             // Conditions on the value alone are no points of the surface.

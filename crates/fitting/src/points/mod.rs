@@ -29,7 +29,7 @@ mod support;
 use bspline::{HierarchicalSpline, Real};
 
 use crate::level::{BASE_DEPTH, MAX_DEPTH};
-use crate::{Control, FitError, FitReport, Leaf, StopReason};
+use crate::{Control, FitError, FitReport, StopReason};
 use plan::{Plan, Smoothing};
 pub use samples::OrientedPoints;
 use samples::Samples;
@@ -92,8 +92,7 @@ const REPAIR_ROUNDS: i32 = 3;
 /// What a budget that the caller has not asked for left undone.
 fn budget_spent(report: &FitReport) -> Option<String> {
     let total = report.leaves.len();
-    let spent = |l: &&Leaf| l.reason == StopReason::Budget;
-    let stopped = report.leaves.iter().filter(spent).count();
+    let stopped = report.stopped_by(StopReason::Budget);
     (stopped > 0).then(|| {
         format!(
             "{stopped} of {total} leaves are coarser than the tolerance asks for: the coefficients of a default fit are \

@@ -82,7 +82,7 @@ fn a_dense_cloud_with_creases_spends_no_more_than_its_budget_unless_a_tolerance_
     let (_, report) = fit::<f32>(&samples, &PointOptions::default()).expect("a clean cloud");
     assert!(report.noise.is_none(), "{:?}", report.noise);
     assert!(report.coefficients <= 270_000, "{}", report.coefficients);
-    let spent = |report: &FitReport| report.leaves.iter().any(|l| l.reason == StopReason::Budget);
+    let spent = |report: &FitReport| report.stopped_by(StopReason::Budget) > 0;
     assert!(spent(&report), "{}", report.coefficients);
     let told = |report: &FitReport| report.notes.iter().any(|n| n.contains("a tolerance or a number"));
     assert!(told(&report), "{:?}", report.notes);

@@ -343,7 +343,12 @@ fn batches_equal_single_points(name: &str, field: &dyn Field, region: &Aabb, opt
         let b = random.small_box(region);
         (0..100).map(|_| random.point(&b)).collect::<Vec<_>>()
     });
-    let points: Vec<DVec3> = spread.into_iter().chain(clustered).collect();
+    // A grid: neighbours have two coordinates in common.
+    let grid = (0..216).map(|i| {
+        let share = DVec3::new((i / 36) as f64, (i / 6 % 6) as f64, (i % 6) as f64) / 5.0;
+        region.min + share * region.size()
+    });
+    let points: Vec<DVec3> = spread.into_iter().chain(clustered).chain(grid).collect();
     for start in [0, 1, 37, 2499] {
         let points = &points[start..];
         let mut batch = vec![(f64::NAN, DVec3::NAN); points.len()];
