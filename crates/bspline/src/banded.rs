@@ -45,8 +45,12 @@ impl<T: Real> BandedRows<T> {
     ) -> Self {
         let positions = positions.into_iter();
         let mut rows = Self::with_capacity(knots.coefficient_count(), knots.order(), positions.size_hint().0);
+        let mut last: Option<Basis<T>> = None;
         for t in positions {
-            let basis = Basis::<T>::at(knots, t, derivative);
+            let basis = last.insert(match &last {
+                Some(last) => last.moved_to(knots, t, derivative),
+                None => Basis::at(knots, t, derivative),
+            });
             rows.first.push(basis.first() as u32);
             rows.weights.extend(basis.derivative(derivative));
         }

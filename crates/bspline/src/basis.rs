@@ -28,22 +28,30 @@ impl<T: Real> Basis<T> {
     /// # Panics
     /// If `order > 3`.
     pub fn at(knots: &KnotVector, t: f64, order: usize) -> Self {
+        Self::on_span(knots, knots.span(t), t, order)
+    }
+
+    /// [`Self::at`] another parameter, soonest found if it is of the same span.
+    pub(crate) fn moved_to(&self, knots: &KnotVector, t: f64, order: usize) -> Self {
+        Self::on_span(knots, knots.span_near(t, self.span), t, order)
+    }
+
+    fn on_span(knots: &KnotVector, span: usize, t: f64, order: usize) -> Self {
         assert!(
             order <= MAX_DERIVATIVE,
             "derivative {order} of at most {MAX_DERIVATIVE}"
         );
         match (knots.degree(), order) {
             // Loops of known lengths, in the same arithmetic.
-            (3, 0) => Self::of_degree(knots, 3, t, 0),
-            (3, 1) => Self::of_degree(knots, 3, t, 1),
-            (3, 2) => Self::of_degree(knots, 3, t, 2),
-            (p, order) => Self::of_degree(knots, p, t, order),
+            (3, 0) => Self::of_degree(knots, span, 3, t, 0),
+            (3, 1) => Self::of_degree(knots, span, 3, t, 1),
+            (3, 2) => Self::of_degree(knots, span, 3, t, 2),
+            (p, order) => Self::of_degree(knots, span, p, t, order),
         }
     }
 
     #[inline(always)]
-    fn of_degree(knots: &KnotVector, p: usize, t: f64, order: usize) -> Self {
-        let span = knots.span(t);
+    fn of_degree(knots: &KnotVector, span: usize, p: usize, t: f64, order: usize) -> Self {
         let table = Table::new(&knots.knots()[span + 1 - p..=span + p], p, t);
         let mut rows = [[T::zero(); ORDER]; MAX_DERIVATIVE + 1];
         for r in 0..=p {

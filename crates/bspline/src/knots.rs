@@ -193,6 +193,15 @@ impl KnotVector {
         below_or_at - 1
     }
 
+    /// [`Self::span`], without a search if it is that of another parameter.
+    pub(crate) fn span_near(&self, t: f64, other: usize) -> usize {
+        if self.knots[other] <= t && t < self.knots[other + 1] {
+            other
+        } else {
+            self.span(t)
+        }
+    }
+
     /// Parameters on which function `i` is not zero, ends included.
     ///
     /// # Panics

@@ -13,6 +13,8 @@ use crate::{Aabb, Field, Frame};
 pub(super) const CELLS: usize = 8;
 /// Nodes along a block's edge, shared ones included.
 pub(super) const NODES: usize = CELLS + 1;
+/// Nodes of two layers of a block: values at so few, beyond which the frame ends, cost no more than bounds.
+const FEW_NODES: i64 = (2 * NODES * NODES) as i64;
 /// Most cells of a frame on an axis; positions keep 1e-9 of a cell in double precision.
 pub(super) const MAX_CELLS: u32 = 1 << 22;
 
@@ -120,6 +122,10 @@ impl Octant {
             octant.hi[a] = node_hi.min(grid.cells(a));
         }
         Some(octant)
+    }
+
+    fn nodes(&self) -> i64 {
+        (0..3).map(|a| self.hi[a] - self.lo[a] + 1).product()
     }
 
     /// Whether a node of it may be inside and another outside. An unknown bound (NaN) excludes nothing.
@@ -238,7 +244,11 @@ pub(super) fn find_blocks(
                 .with_min_len(16)
                 .filter(|key| dirty.is_none_or(|d| d.contains(level, **key)))
                 .filter_map(|&key| Some((key, Octant::new(grid, key, level)?)))
-                .map(|(key, octant)| (key, octant.may_hold_surface(field, grid.frame, options.iso)))
+                .map(|(key, octant)| {
+                    let is_unasked = level == 0 && octant.nodes() <= FEW_NODES;
+                    let keep = is_unasked || octant.may_hold_surface(field, grid.frame, options.iso);
+                    (key, keep)
+                })
                 .collect();
             queries += tested.len() as u64;
             kept.extend(tested.into_iter().filter_map(|(key, keep)| keep.then_some(key)));

@@ -57,8 +57,9 @@ impl BlockSurface {
         let skip = [0, 1, 2].map(|a| (lo[a] - origin[a]) as usize);
         let mut rows = [0u16; NODES * NODES];
         let mut nan_nodes = 0;
-        for (n, row) in scratch.values.chunks_exact(count[2]).enumerate() {
-            let (i, j) = (n / count[1] + skip[0], n % count[1] + skip[1]);
+        let places =
+            (skip[0]..skip[0] + count[0]).flat_map(|i| (skip[1]..skip[1] + count[1]).map(move |j| (i, j)));
+        for (row, (i, j)) in scratch.values.chunks_exact(count[2]).zip(places) {
             let mut bits = 0;
             for (k, &f) in row.iter().enumerate() {
                 bits |= ((f > options.iso) as u16) << k;
@@ -70,6 +71,9 @@ impl BlockSurface {
                     .map(|f| f.is_nan() as u32)
                     .sum::<u32>();
             }
+        }
+        if rows.iter().all(|row| *row == 0) {
+            return (None, nan_nodes);
         }
         let cells = grid.meshed_cells(key);
         let crossed = crossed_edges(&rows, cells);

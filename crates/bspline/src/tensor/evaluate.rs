@@ -58,7 +58,7 @@ impl<T: Real> Field for TensorSpline<T> {
             let (q, beyond) = self.place.clamp(*p);
             for a in 0..3 {
                 if q[a] != last[a] {
-                    cell.basis[a] = Basis::at(&self.knots[a], q[a], 1);
+                    cell.basis[a] = cell.basis[a].moved_to(&self.knots[a], q[a], 1);
                 }
             }
             last = q;
