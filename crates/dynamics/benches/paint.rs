@@ -127,6 +127,7 @@ fn strokes(n: usize, m: usize, settled: &Patch<f32>, count: u64) {
     for radius in [2.0, 4.0, 6.0] {
         for contrast in [10.0, 100.0, 1000.0] {
             let (mut means, mut paints) = (0.0, 0.0);
+            let mut usuals = Vec::new();
             let (mut medians, mut worst, mut iterations, mut error, mut made) =
                 (Vec::new(), 0.0_f64, 0, 0.0_f64, 0);
             for stroke in 0..count {
@@ -172,6 +173,7 @@ fn strokes(n: usize, m: usize, settled: &Patch<f32>, count: u64) {
                 }
                 made += p.factorizations() - settled.factorizations();
                 let usual = median(usual);
+                usuals.push(1e3 * usual);
                 worst = worst.max(times.iter().copied().fold(0.0, f64::max) / usual);
                 means += times.iter().sum::<f64>() / usual / DABS as f64;
                 paints += spent / usual / DABS as f64;
@@ -179,9 +181,10 @@ fn strokes(n: usize, m: usize, settled: &Patch<f32>, count: u64) {
             }
             let runs = count as f64;
             println!(
-                "{n}/{m} dabs of radius {radius}, contrast {contrast}: {:.2} steps (worst stroke {:.2}, worst dab {worst:.1}), mean {:.2}, of which painting {:.2}, \
+                "{n}/{m} dabs of radius {radius}, contrast {contrast}: {:.2} steps of {:.3} ms (worst stroke {:.2}, worst dab {worst:.1}), mean {:.2}, of which painting {:.2}, \
                  {:.1} iterations, {:.1} made a stroke, error {:.2} %",
                 median(medians.clone()),
+                median(usuals),
                 medians.iter().copied().fold(0.0, f64::max),
                 means / runs,
                 paints / runs,
@@ -199,9 +202,9 @@ fn pushed(p: &mut Patch<f32>, count: usize, dt: f64) -> (f64, usize) {
     timed(p, dt)
 }
 
-/// The first step after a change, and the longest of the next, in steps without it.
+/// The first step after a change, and the middle and the longest of the next, in steps without it.
 fn change(name: &str, settled: &Patch<f32>, dt: f64, change: impl Fn(&mut Patch<f32>)) {
-    let (mut first, mut later) = (Vec::new(), Vec::new());
+    let (mut first, mut later, mut longest) = (Vec::new(), Vec::new(), Vec::new());
     for _ in 0..AGAIN {
         let mut p = settled.clone();
         pushed(&mut p, 0, time_step());
@@ -210,13 +213,15 @@ fn change(name: &str, settled: &Patch<f32>, dt: f64, change: impl Fn(&mut Patch<
         change(&mut p);
         let changing = seconds() - begun;
         first.push((changing + pushed(&mut p, 6, dt).0) / usual);
-        let steps = (7..47).map(|k| pushed(&mut p, k, dt).0 / usual);
-        later.push(steps.fold(0.0, f64::max));
+        let steps: Vec<f64> = (7..47).map(|k| pushed(&mut p, k, dt).0 / usual).collect();
+        longest.push(steps.iter().copied().fold(0.0, f64::max));
+        later.push(median(steps));
     }
     println!(
-        "    {name}: {:.2} steps; the most of the next forty {:.2}",
+        "    {name}: {:.2} steps; of the next forty the middle {:.2}, the most {:.2}",
         median(first),
-        median(later)
+        median(later),
+        median(longest)
     );
 }
 

@@ -252,7 +252,7 @@ impl<T: Real> StepMatrix<T> {
         let c = &d[row * mz..(row + 1) * mz];
         let other = |sign: isize| {
             let (i, j) = (i.wrapping_add_signed(sign * dx), j.wrapping_add_signed(sign * dy));
-            (i < mx && j < my).then_some(i * my + j)
+            (i < mx && j < my).then(|| i * my + j)
         };
         // Of samples z of this row and z + shift of the other.
         let overlap = |shift: isize| {
