@@ -89,9 +89,7 @@ impl<T: Real> StepSolver<T> {
             let report = self.iterate(s, x, Some(dx), from, cap, tolerance);
             if solved_by == Method::Direct {
                 self.keep_up(s, report.iterations);
-            } else if report.iterations > self.options.quick
-                && let (Painted::Background(background), Method::VCycle) = (&mut self.painted, solved_by)
-            {
+            } else if let (Painted::Background(background), Method::VCycle) = (&mut self.painted, solved_by) {
                 let matrix = self
                     .painted_for
                     .as_ref()

@@ -20,9 +20,6 @@ pub struct SolverOptions {
     /// Free coefficients up to which a factor is made beside the steps, a V-cycle solving them until it is done: 5832
     /// take 33 MB in single precision, which is read twice a step.
     pub background_limit: usize,
-    /// Iterations with that V-cycle beside which no factor is made: so few take no more time than to read one of any size, and leave
-    /// no more than they may.
-    pub quick: usize,
     /// Of the V-cycle for more.
     pub v_cycle: VCycleOptions,
     /// How a patch with a mask is solved.
@@ -36,7 +33,6 @@ impl Default for SolverOptions {
             tolerance: None,
             direct_limit: 1000,
             background_limit: 6000,
-            quick: 2,
             v_cycle: VCycleOptions::default(),
             masked: MaskedWay::Best,
         }

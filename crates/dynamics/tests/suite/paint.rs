@@ -18,7 +18,6 @@ fn patch<T: Real>(m: usize, n: usize, neighbours: Neighbours, direct_limit: usiz
         .collect();
     let options = SolverOptions {
         direct_limit,
-        quick: 0,
         ..SolverOptions::default()
     };
     let law = Law::Linear { scale: 1.0 };
@@ -175,12 +174,9 @@ fn dabs_at_24_32_cost_no_factor_and_few_iterations() {
     }
 }
 
-/// Options of a V-cycle whose smoother never solves alone, with a factor made beside it.
+/// Options of a V-cycle whose smoother never solves alone.
 fn cycles() -> SolverOptions {
-    let mut options = SolverOptions {
-        quick: 0,
-        ..SolverOptions::default()
-    };
+    let mut options = SolverOptions::default();
     options.v_cycle.alone = 0.0;
     options
 }
@@ -367,7 +363,6 @@ fn what_follows_paint_is_what_is_made_anew() {
         let mut options = SolverOptions {
             direct_limit: 100,
             background_limit,
-            quick: 0,
             ..SolverOptions::default()
         };
         options.v_cycle.direct_limit = 300;
