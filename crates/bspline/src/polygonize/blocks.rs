@@ -13,7 +13,7 @@ use crate::{Aabb, Field, Frame};
 pub(super) const CELLS: usize = 8;
 /// Nodes along a block's edge, shared ones included.
 pub(super) const NODES: usize = CELLS + 1;
-/// Nodes of two layers of a block: values at so few, beyond which the frame ends, cost no more than bounds.
+/// Nodes up to which a block is sampled without asking for bounds, which cost as much: two layers, as the border of a frame leaves.
 const FEW_NODES: i64 = (2 * NODES * NODES) as i64;
 /// Most cells of a frame on an axis; positions keep 1e-9 of a cell in double precision.
 pub(super) const MAX_CELLS: u32 = 1 << 22;
