@@ -174,6 +174,25 @@ impl Table {
 mod tests {
     use super::*;
 
+    /// On every span, on knots, repeated ones among them, at the ends and beyond them.
+    #[test]
+    fn functions_are_the_same_wherever_one_comes_from() {
+        for p in 1..=MAX_DEGREE {
+            let inner = [0.1, 0.35, 0.35, 0.7, 0.9];
+            let ends = |t: f64| std::iter::repeat_n(t, p + 1);
+            let list = ends(0.0).chain(inner).chain(ends(1.0)).collect();
+            let knots = KnotVector::new(p, list).unwrap();
+            let mut places: Vec<f64> = (-2..=22).map(|i| f64::from(i) / 20.0).collect();
+            places.extend(inner);
+            for from in &places {
+                let basis = Basis::<f64>::at(&knots, *from, 1);
+                for to in &places {
+                    assert_eq!(basis.moved_to(&knots, *to, 1), Basis::at(&knots, *to, 1));
+                }
+            }
+        }
+    }
+
     #[test]
     fn slopes_have_the_bits_of_first_derivatives() {
         let knots = [0.0, 0.1, 0.1, 0.35, 0.7, 0.72, 0.9, 1.3, 1.3, 2.0];
