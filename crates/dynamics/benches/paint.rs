@@ -130,6 +130,7 @@ fn strokes(n: usize, m: usize, settled: &Patch<f32>, count: u64) {
             let mut usuals = Vec::new();
             let (mut medians, mut worst, mut iterations, mut error, mut made) =
                 (Vec::new(), 0.0_f64, 0, 0.0_f64, 0);
+            let mut added = Vec::new();
             for stroke in 0..count {
                 let mut p = settled.clone();
                 let mut seed = 17 * stroke + 3;
@@ -152,6 +153,11 @@ fn strokes(n: usize, m: usize, settled: &Patch<f32>, count: u64) {
                     let (step, used) = timed(&mut p, time_step());
                     times.push(painting + step);
                     spent += painting;
+                    if k % 4 == 2 {
+                        let mut after = p.clone();
+                        pushed(&mut after, k, time_step());
+                        added.push((painting + step) / pushed(&mut after, k, time_step()).0);
+                    }
                     iterations += used;
                     if let Some(exact) = &mut exact {
                         exact.set_matter(p.matter().clone()).expect("the same matter");
@@ -181,11 +187,12 @@ fn strokes(n: usize, m: usize, settled: &Patch<f32>, count: u64) {
             }
             let runs = count as f64;
             println!(
-                "{n}/{m} dabs of radius {radius}, contrast {contrast}: {:.2} steps of {:.3} ms (worst stroke {:.2}, worst dab {worst:.1}), mean {:.2}, of which painting {:.2}, \
+                "{n}/{m} dabs of radius {radius}, contrast {contrast}: {:.2} steps of {:.3} ms (worst stroke {:.2}, worst dab {worst:.1}), {:.2} of steps after it, mean {:.2}, of which painting {:.2}, \
                  {:.1} iterations, {:.1} made a stroke, error {:.2} %",
                 median(medians.clone()),
                 median(usuals),
                 medians.iter().copied().fold(0.0, f64::max),
+                median(added),
                 means / runs,
                 paints / runs,
                 iterations as f64 / (runs * DABS as f64),

@@ -138,10 +138,15 @@ impl<T: Real> Background<T> {
         !self.is_done() && self.cycle.is_alone()
     }
 
-    /// After a solve: the next part of the work on the factor of `matrix`, which it was prepared for. There is none where the
-    /// smoother solves alone, which takes less time than to read a factor.
-    pub fn advance(&mut self, matrix: &StepMatrix<T>) {
-        if !self.cycle.is_alone() {
+    /// Whether the factor may be begun.
+    pub fn is_ready(&self) -> bool {
+        self.work == Work::Wait(WAIT)
+    }
+
+    /// After a solve: the next part of the work on the factor of `matrix`, which it was prepared for. None is begun where the
+    /// smoother solves alone or the solve was `quick`, which takes less time than to read a factor.
+    pub fn advance(&mut self, matrix: &StepMatrix<T>, quick: bool) {
+        if !(self.cycle.is_alone() || quick && self.is_ready()) {
             self.work = self.next(matrix);
         }
     }

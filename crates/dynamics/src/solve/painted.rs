@@ -83,6 +83,11 @@ impl<T: Real> Painted<T> {
         }
     }
 
+    /// Whether a factor would be begun now, were the cycle not quick.
+    pub fn is_in_place_of_a_factor(&self) -> bool {
+        matches!(self, Self::Background(background) if background.is_ready())
+    }
+
     /// The factor on the coefficients, if there is one, and what assembles it.
     pub fn factor(&mut self) -> Option<(&mut Galerkin, &mut BandCholesky<T>)> {
         match self {

@@ -20,6 +20,9 @@ pub struct SolverOptions {
     /// Free coefficients up to which a factor is made beside the steps, a V-cycle solving them until it is done: 5832
     /// take 33 MB in single precision, which is read twice a step.
     pub background_limit: usize,
+    /// Iterations with that V-cycle, to a 64th of what others leave, beside which no factor is begun: so few take less time than to
+    /// read one.
+    pub quick: usize,
     /// Of the V-cycle for more.
     pub v_cycle: VCycleOptions,
     /// How a patch with a mask is solved.
@@ -33,6 +36,7 @@ impl Default for SolverOptions {
             tolerance: None,
             direct_limit: 1000,
             background_limit: 6000,
+            quick: 3,
             v_cycle: VCycleOptions::default(),
             masked: MaskedWay::Best,
         }

@@ -45,6 +45,7 @@ fn patch<T: Real>(n: usize, rim: Rim, painted: bool, direct_limit: usize, law: L
         .collect();
     let options = SolverOptions {
         direct_limit,
+        quick: 0,
         ..SolverOptions::default()
     };
     let mut p = Patch::new(lattice, matter(painted), law, Neighbours::Six, &d, options).unwrap();

@@ -59,6 +59,7 @@ impl Scene {
             samples_per_cell: [4.0 / 3.0; 3],
             solver: SolverOptions {
                 direct_limit: self.direct_limit,
+                quick: 0,
                 ..SolverOptions::default()
             },
             ..RegionOptions::of(field, 1)
@@ -391,6 +392,7 @@ fn recorded_scene(
     };
     let options = SolverOptions {
         direct_limit,
+        quick: 0,
         masked: masked.unwrap_or(MaskedWay::Best),
         ..SolverOptions::default()
     };

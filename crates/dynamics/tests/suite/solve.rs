@@ -160,7 +160,11 @@ fn a_factor_takes_over_when_it_is_made_and_is_renewed_when_it_is_old() {
     let lattice = Lattice::<f32>::cube(n, m, Rim::Free, 1.0).unwrap();
     let s: StepMatrix<f32> = matrix(Pattern::StiffBall, 100.0, m, Neighbours::Six, 30.0).convert();
     let steps: Vec<_> = s.springs.iter().map(|s| s.direction.step).collect();
-    let mut solver = StepSolver::new(lattice.clone(), &steps, SolverOptions::default());
+    let options = SolverOptions {
+        quick: 0,
+        ..SolverOptions::default()
+    };
+    let mut solver = StepSolver::new(lattice.clone(), &steps, options);
     solver.prepare(&s).unwrap();
     let g: Vec<f32> = (0..m * m * m).map(|i| (0.1 * i as f32).sin()).collect();
     let (mut x, mut dx) = (vec![0.0; n * n * n], vec![0.0; m * m * m]);
@@ -179,7 +183,7 @@ fn a_factor_takes_over_when_it_is_made_and_is_renewed_when_it_is_old() {
     let (iterations, by_parts) = solve(&mut solver, &s);
     assert_eq!(iterations, 1);
     // Made at once the factor has the same bits.
-    let mut settled = StepSolver::new(lattice, &steps, SolverOptions::default());
+    let mut settled = StepSolver::new(lattice, &steps, options);
     settled.prepare(&s).unwrap();
     settled.settle();
     let (iterations, at_once) = solve(&mut settled, &s);
@@ -202,6 +206,28 @@ fn a_factor_takes_over_when_it_is_made_and_is_renewed_when_it_is_old() {
     // The old one serves until the new one takes its place.
     assert!(used(parts, parts + 7, Method::Direct));
     assert_eq!(solver.factorizations(), 2);
+}
+
+/// By default. A cycle of one level is a factor, and quick; one of two is not at this contrast.
+#[test]
+fn beside_quick_solves_no_factor_is_made() {
+    let (n, m) = (11, 14);
+    let lattice = Lattice::<f32>::cube(n, m, Rim::Free, 1.0).unwrap();
+    let s: StepMatrix<f32> = matrix(Pattern::StiffBall, 1e4, m, Neighbours::Six, 30.0).convert();
+    let steps: Vec<_> = s.springs.iter().map(|s| s.direction.step).collect();
+    let g: Vec<f32> = (0..m * m * m).map(|i| (0.1 * i as f32).sin()).collect();
+    let (mut x, mut dx) = (vec![0.0; n * n * n], vec![0.0; m * m * m]);
+    for (direct_limit, is_quick) in [(1400, true), (300, false)] {
+        let mut options = SolverOptions::default();
+        options.v_cycle.direct_limit = direct_limit;
+        let mut solver = StepSolver::new(lattice.clone(), &steps, options);
+        solver.prepare(&s).unwrap();
+        let reports: Vec<_> = (0..80).map(|_| solver.solve(&s, &g, &mut x, &mut dx)).collect();
+        let (first, last) = (reports[0], reports[79]);
+        assert_eq!(first.method, Method::VCycle);
+        assert_eq!(first.iteration.iterations <= options.quick, is_quick);
+        assert_eq!(last.method == Method::VCycle, is_quick);
+    }
 }
 
 #[test]
