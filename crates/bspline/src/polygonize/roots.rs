@@ -49,10 +49,11 @@ impl Bracket {
     ///
     /// The next estimate is the root of the parabola that touches `g` at `t` and meets it at the end of the
     /// bracket across the root. The parabola changes sign between the two, so it always has a root there: Newton's
-    /// step, corrected for curvature, that cannot leave the bracket.
+    /// step, corrected for curvature, that cannot leave the bracket. A step of Newton's from there follows on the cubic
+    /// that meets the other end too.
     ///
-    /// The root is accepted without another evaluation once the correction to Newton's step is below `tolerance`:
-    /// on smooth fields that is at once, and the error left is of the next order.
+    /// The root is accepted without another evaluation once curvature hardly matters to the first step, and the second is
+    /// below four times `tolerance`: on smooth fields that is at once, and the error left is of the next order.
     pub fn advance(&mut self, t: f64, g: f64, slope: f64, tolerance: f64) -> Step {
         if g == 0.0 {
             return Step::Found(t);
@@ -60,6 +61,7 @@ impl Bracket {
         self.evaluations += 1;
         let inside = g > 0.0;
         let near = if (self.g[0] > 0.0) == inside { 0 } else { 1 };
+        let (behind, behind_g) = (self.t[near] - t, self.g[near]);
         let before = self.t[1] - self.t[0];
         (self.t[near], self.g[near]) = (t, g);
         let width = self.t[1] - self.t[0];
@@ -75,20 +77,25 @@ impl Bracket {
         let reach = far_t - t;
         let curvature = (far_g - g - slope * reach) / (reach * reach);
         let root = (slope * slope - 4.0 * curvature * g).max(0.0).sqrt();
-        let step = -2.0 * g
+        let parabola = -2.0 * g
             / if inside == (reach > 0.0) {
                 slope - root
             } else {
                 slope + root
             };
-        let newton = -g / slope;
+        let third = (curvature - (behind_g - g - slope * behind) / (behind * behind)) / (reach - behind);
+        let second = curvature - third * reach;
+        let value = g + parabola * (slope + parabola * (second + parabola * third));
+        let correction = value / (slope + parabola * (2.0 * second + 3.0 * parabola * third));
+        let step = parabola - correction;
         let next = t + step;
         let within = self.t[0] < next && next < self.t[1];
         // Not a number (from infinite or undefined values) fails this test too.
         if !within {
             return Step::Try(middle);
         }
-        if step.abs() <= tolerance || (step.abs() <= 0.1 && (step - newton).abs() <= tolerance) {
+        let is_straight = step.abs() <= 0.1 && (curvature * parabola * parabola).abs() <= 0.05 * g.abs();
+        if step.abs() <= tolerance || (is_straight && correction.abs() <= 4.0 * tolerance) {
             return Step::Found(next);
         }
         // Slow progress from one side: halve instead.
