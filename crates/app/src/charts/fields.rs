@@ -90,7 +90,8 @@ pub fn field_fit_costs(mut go_on: impl FnMut(f64) -> ControlFlow<()>) -> Option<
             all.push(cost((&ball.field, &shared), intervals, None, tool));
         }
     }
-    for (cells, across, paper) in TABLE_1 {
+    for (coefficients, across, paper) in TABLE_1 {
+        let cells = coefficients - 3;
         if go_on(0.9).is_break() {
             return None;
         }
