@@ -14,7 +14,7 @@ use crate::charts::{Chart, edit_costs};
 /// Arguments of `isoclay charts edits`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Coefficients of the largest field, about; 10 million take 1 GiB, 100 million 8 GiB
+    /// Coefficients of the largest field, about; 10 million take 2 GiB, 100 million 20 GiB
     #[arg(long, value_name = "N", default_value_t = 10_000_000, value_parser = between::<u32>(100_000, 1_000_000_000))]
     most: u32,
     /// Directory for the chart edits.svg; made if missing
