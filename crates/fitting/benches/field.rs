@@ -64,7 +64,10 @@ fn table_1(c: &mut Criterion) {
         let field = ball(coefficients - 3);
         let shared: Arc<dyn Field> = Arc::new(field.clone());
         for across in sizes {
-            let name = BenchmarkId::new(format!("{coefficients}³ coefficients"), format!("{across}³ samples"));
+            let name = BenchmarkId::new(
+                format!("{coefficients}³ coefficients"),
+                format!("{across}³ samples"),
+            );
             group.bench_function(name, |b| {
                 b.iter(|| black_box(carve(&field, &shared, f64::from(*across), 0)));
             });
