@@ -3,7 +3,8 @@
 //! Where nothing was edited a voxel stays. Elsewhere it changes by what the field changed, `v + f_new − f_fit`, so that what the
 //! fit had smoothed away stays in the scan. Matter that was taken out becomes another matter, mostly air: within one voxel of
 //! the new surface its density runs from the iso-value to that of the fill. The voxels that it had shared with what lay beside it
-//! become what lies there: else a ghost of the old surface would stay. What never was part of the solid stays. Moves carry along what
+//! become what lies there: else a ghost of the old surface would stay. What never was part of the solid stays. Matter that was added is
+//! like most of the solid: tools make it the denser the deeper it lies. Moves carry along what
 //! the fit had smoothed away: `v = f_new(x) + (v − f_fit)(w⁻¹(x))`.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -21,6 +22,9 @@ const TILE: usize = 8;
 
 /// Rounding of a field's values, in units of the largest of the volume: less is no change.
 const ROUNDING: f64 = 16.0 * f32::EPSILON as f64;
+
+/// Voxels that are looked at for the density of most matter, about.
+const PROBES: usize = 1 << 18;
 
 /// New densities of a scan, and what became of its voxels.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -43,7 +47,8 @@ impl VolumeRevision {
 }
 
 /// What the way from `fitted` to `now` means for the `volume` that `fitted` was fitted to. The surface lies at `iso`; what was
-/// carved gets the density `fill`, and no density rises above the largest of the volume. What was moved went on the `journey`.
+/// carved gets the density `fill`, what was added at most that of most matter, and no density rises above the largest of the volume.
+/// What was moved went on the `journey`.
 ///
 /// # Errors
 /// [`DiffError::Lattice`] if the two are no versions of one field.
@@ -185,6 +190,8 @@ struct Matter {
     /// Densities of the volume.
     least: f64,
     largest: f64,
+    /// The median of those that are solid.
+    usual: f64,
     /// A difference that is none.
     rounding: f64,
 }
@@ -196,9 +203,19 @@ impl Matter {
         let range = (f32::INFINITY, f32::NEG_INFINITY);
         let densities = volume.values.iter();
         let (least, largest) = densities.fold(range, |(lo, hi), v| (lo.min(*v), hi.max(*v)));
+        let probes = volume
+            .values
+            .iter()
+            .step_by(volume.values.len().div_ceil(PROBES).max(1));
+        let mut solid: Vec<f32> = probes.copied().filter(|v| f64::from(*v) >= iso).collect();
+        let usual = match solid.len() / 2 {
+            0 => largest,
+            middle => *solid.select_nth_unstable_by(middle, f32::total_cmp).1,
+        };
         Self {
             iso,
             fill,
+            usual: usual.into(),
             ramp: slope * steps.into_iter().fold(f64::INFINITY, f64::min),
             least: least.into(),
             largest: largest.into(),
@@ -233,11 +250,13 @@ impl Matter {
             let share = ((self.iso - now) / self.ramp).min(1.0);
             return Some(self.iso + share * (self.fill - self.iso));
         }
-        told.added += usize::from(is_in && !was_in);
+        let is_new = is_in && !was_in;
+        told.added += usize::from(is_new);
+        let most = if is_new { self.usual } else { self.largest };
         let moved = old + (now - fitted);
         // A tool's own density has no bounds far inside or outside of it; matter has.
         Some(match now > fitted {
-            true => moved.min(self.largest.max(old)),
+            true => moved.min(most.max(old)),
             false => moved.max(self.fill.min(old)),
         })
     }
