@@ -48,6 +48,21 @@ def test_many_files_are_fitted_and_bad_ones_named(client, data, tmp_path):
     assert here.field.sha256 == here.sha256 == outcomes[1].sha256
 
 
+def test_blocks_fall_as_steeply_as_one_piece(client):
+    volume = np.random.default_rng(4).normal(0, 12, SHAPE).astype(np.float32)
+    volume[8:40, 8:40, 8:40] += 1000
+    places = np.array([[0.0, 48, 50], [-10.0, 48, 50]])
+    slopes = [
+        -np.diff(field(places))[0] / 10
+        for field in (
+            isoclay.fit_volume(volume, method="interpolate"),
+            isoclay_dask.fit_volume_blocks(volume, client=client, method="interpolate", block=32, halo=16),
+        )
+    ]
+    assert slopes[0] > 100
+    assert slopes[1] == pytest.approx(slopes[0], rel=0.3)
+
+
 def test_blocks_interpolate_as_one_piece(client, volume):
     whole = isoclay.fit_volume(volume, method="interpolate")
     blocks = isoclay_dask.fit_volume_blocks(volume, client=client, method="interpolate", block=64, halo=16)

@@ -100,7 +100,10 @@ def _written(
         ends = _fitted(plan, job, runner, progress)
     found: list[Finished] = list(runner.each(ends))
     progress("writing the field", 0.9)
-    slopes = sorted(block.slope for block in found)
+    # That of the edges, as of a fit in one piece: most blocks may hold nothing but noise.
+    slopes = np.sort([block.slope for block in found])
+    squares = np.cumsum(slopes**2)
+    slope = float(slopes[np.searchsorted(squares, 0.5 * squares[-1])])
     counts = np.sum([block.counts for block in found], axis=0)
     story = {
         "program": f"isoclay {_isoclay.__version__} (Python)",
@@ -116,7 +119,7 @@ def _written(
         "shape": plan.shape,
         "affine": plan.rows,
         "level_count": max([level + 1 for level, count in enumerate(counts) if count], default=1),
-        "slope": slopes[len(slopes) // 2],
+        "slope": slope,
         "iso": iso,
         "unit": plan.unit,
         "tolerance": tolerance,
