@@ -145,6 +145,22 @@ mod tests {
     }
 
     #[test]
+    fn a_gentle_cubic_takes_one_evaluation() {
+        for n in 1..50 {
+            let root = n as f64 / 50.0;
+            let g = |t: f64| {
+                let x = t - root;
+                (x + 0.02 * x * x + 0.05 * x.powi(3), 1.0 + 0.04 * x + 0.15 * x * x)
+            };
+            let (step, count) = solve(g, 1e-4);
+            let Step::Found(t) = step else { panic!("{step:?}") };
+            assert_eq!(count, 1);
+            // The parabola alone leaves up to 5e-6.
+            assert!((t - root).abs() < 1e-9, "{t} {root}");
+        }
+    }
+
+    #[test]
     fn hard_functions_are_solved_within_tolerance() {
         // Root, function with slope: steep, flat at the root, flat away from the root, with a kink, wavy.
         let cases: [(f64, &dyn Fn(f64) -> (f64, f64)); 5] = [

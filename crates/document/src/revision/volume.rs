@@ -4,7 +4,7 @@
 //! fit had smoothed away stays in the scan. Matter that was taken out becomes another matter, mostly air: within one voxel of
 //! the new surface its density runs from the iso-value to that of the fill. The voxels that it had shared with what lay beside it
 //! become what lies there: else a ghost of the old surface would stay. What never was part of the solid stays. Matter that was added is
-//! like most of the solid: tools make it the denser the deeper it lies. Moves carry along what
+//! no denser than the median of the solid: tools make it the denser the deeper it lies. Moves carry along what
 //! the fit had smoothed away: `v = f_new(x) + (v − f_fit)(w⁻¹(x))`.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -23,7 +23,7 @@ const TILE: usize = 8;
 /// Rounding of a field's values, in units of the largest of the volume: less is no change.
 const ROUNDING: f64 = 16.0 * f32::EPSILON as f64;
 
-/// Voxels that are looked at for the density of most matter, about.
+/// Voxels that are looked at for the median density of the solid, about.
 const PROBES: usize = 1 << 18;
 
 /// New densities of a scan, and what became of its voxels.
@@ -47,7 +47,7 @@ impl VolumeRevision {
 }
 
 /// What the way from `fitted` to `now` means for the `volume` that `fitted` was fitted to. The surface lies at `iso`; what was
-/// carved gets the density `fill`, what was added at most that of most matter, and no density rises above the largest of the volume.
+/// carved gets the density `fill`, what was added at most the median of the solid, and no density rises above the largest of the volume.
 /// What was moved went on the `journey`.
 ///
 /// # Errors
@@ -190,8 +190,8 @@ struct Matter {
     /// Densities of the volume.
     least: f64,
     largest: f64,
-    /// The median of those that are solid.
-    usual: f64,
+    /// Median of those of the solid.
+    median_solid: f64,
     /// A difference that is none.
     rounding: f64,
 }
@@ -208,14 +208,14 @@ impl Matter {
             .iter()
             .step_by(volume.values.len().div_ceil(PROBES).max(1));
         let mut solid: Vec<f32> = probes.copied().filter(|v| f64::from(*v) >= iso).collect();
-        let usual = match solid.len() / 2 {
+        let median_solid = match solid.len() / 2 {
             0 => largest,
             middle => *solid.select_nth_unstable_by(middle, f32::total_cmp).1,
         };
         Self {
             iso,
             fill,
-            usual: usual.into(),
+            median_solid: median_solid.into(),
             ramp: slope * steps.into_iter().fold(f64::INFINITY, f64::min),
             least: least.into(),
             largest: largest.into(),
@@ -252,7 +252,7 @@ impl Matter {
         }
         let is_new = is_in && !was_in;
         told.added += usize::from(is_new);
-        let most = if is_new { self.usual } else { self.largest };
+        let most = if is_new { self.median_solid } else { self.largest };
         let moved = old + (now - fitted);
         // A tool's own density has no bounds far inside or outside of it; matter has.
         Some(match now > fitted {

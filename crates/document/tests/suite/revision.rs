@@ -181,7 +181,7 @@ fn what_lies_two_voxels_beside_the_tool_keeps_its_density() {
 fn what_is_added_is_no_denser_than_most_of_the_scan() {
     let centre = DVec3::new(12.0, 12.0, 18.0);
     let (now, revision) = edited(Operation::Add, &sphere(centre, 5.0));
-    let scan = scan();
+    let (before, scan) = (fitted(), scan());
     let mut solid: Vec<f64> = scan.values.iter().map(|v| f64::from(*v)).collect();
     solid.retain(|v| *v >= ISO);
     solid.sort_by(f64::total_cmp);
@@ -201,8 +201,7 @@ fn what_is_added_is_no_denser_than_most_of_the_scan() {
             "{place}"
         );
         assert!(change.density <= largest);
-        let [was, is] = [fitted().value(place), now.value(place)];
-        if was < ISO && is >= ISO {
+        if before.value(place) < ISO && now.value(place) >= ISO {
             assert!(change.density <= usual, "{place}: {}", change.density);
         }
         if now.value(place) > ISO + 25.0 && place.distance(centre) < 4.0 {

@@ -90,7 +90,7 @@ fn interpolate<T: Real>(
     control.step("totals", 0.8)?;
     let spline = HierarchicalSpline::from_corrections(
         lattice(view, domain.axes[0].spacing(0)),
-        view.typical_slope(overview),
+        view.edge_slope(overview),
         corrections,
     );
     let mut report = report(view, domain, &measured, samples.scale.as_f64(), |_| {
@@ -162,7 +162,7 @@ fn adapt<T: Real>(
     drop((active, coefficients));
     let spline = HierarchicalSpline::from_corrections(
         lattice(view, domain.axes[0].spacing(0)),
-        view.typical_slope(overview),
+        view.edge_slope(overview),
         trimmed(corrections, used_depth),
     );
     let clean = CLEAN_TOLERANCE * overview.range();

@@ -145,7 +145,7 @@ impl VolumeView<'_> {
     /// Fall of the density per world length at the edges of what the volume shows: half of the sum of `|∇d|²` is of voxels
     /// where `|∇d|` is less. Noise, though there are far more voxels of it, has little share in that sum. For a constant
     /// volume, 1.
-    pub(crate) fn typical_slope(&self, overview: &Overview) -> f64 {
+    pub(crate) fn edge_slope(&self, overview: &Overview) -> f64 {
         const PROBES: usize = 1 << 18;
         let [nx, ny, _] = self.dims;
         // Gradients are covectors: world gradient = inverse transpose · voxel gradient.
