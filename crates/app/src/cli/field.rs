@@ -16,6 +16,9 @@ use super::output::Output;
 use super::source::{FIELDS, Source};
 use super::summary::hex;
 
+/// Cells along the longest side at whose corners a field is looked at for its values.
+const LOOKED_AT: u32 = 64;
+
 /// Where a field is read from.
 #[derive(clap::Args)]
 pub struct FieldArgs {
@@ -292,12 +295,10 @@ impl OpenField {
     /// If there is neither.
     pub fn iso_or(&self, asked: Option<f64>, source: &Source) -> Outcome<f64> {
         asked.or(self.iso()).ok_or_else(|| {
-            let range = self.field().bounds(&self.lattice().world_box());
+            let [low, high] = self.values_met();
             Failure::input(format!(
-                "{}: the field names no surface of its own; choose one with --iso, between {:.6} and {:.6}",
+                "{}: the field names no surface of its own; choose one with --iso, between {low:.6} and {high:.6}",
                 source.name(),
-                range.lo,
-                range.hi
             ))
         })
     }
@@ -327,14 +328,24 @@ impl OpenField {
 
     /// The failure of a surface that is not there.
     pub fn no_surface(&self, source: &Source, iso: f64) -> Failure {
-        let range = self.field().bounds(&self.lattice().world_box());
+        let [low, high] = self.values_met();
         Failure::input(format!(
-            "{}: the surface f = {iso} does not meet the box, in which f stays between {:.6} and {:.6}; choose \
+            "{}: the surface f = {iso} does not meet the box, in which f runs from {low:.6} to {high:.6}; choose \
              another --iso",
             source.name(),
-            range.lo,
-            range.hi
         ))
+    }
+
+    /// The least and the largest value at the corners of some cells.
+    fn values_met(&self) -> [f64; 2] {
+        let frame = self.frame_of_resolution(LOOKED_AT);
+        let nodes = frame.cells.map(|n| n as usize + 1);
+        let mut values = vec![0.0; nodes.iter().product()];
+        self.field().frame_values(&frame, [0; 3], nodes, &mut values);
+        let range = [f64::INFINITY, f64::NEG_INFINITY];
+        values
+            .iter()
+            .fold(range, |[low, high], v| [low.min(*v), high.max(*v)])
     }
 }
 

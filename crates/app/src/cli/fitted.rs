@@ -5,7 +5,7 @@ use std::num::NonZeroUsize;
 use document::Solve;
 use fitting::mesh::{MeshDefects, MeshOptions, fit_mesh};
 use fitting::points::{NormalForm, PointOptions, fit_points};
-use fitting::volume::{VolumeMethod, VolumeOptions, VolumeView, fit_volume, otsu_threshold};
+use fitting::volume::{VolumeMethod, VolumeOptions, VolumeView, fit_volume, otsu_threshold, padding};
 use fitting::{Control, FitError, FitReport, StopReason};
 use formats::Unit;
 use formats::field::{AnyField, SourceKind, Stored};
@@ -315,6 +315,12 @@ fn fit_voxels<T: Stored>(volume: &Volume, choice: &Choice, control: &mut Control
         ));
     }
     let iso = otsu_threshold(&volume.values);
+    if let Some(value) = padding(&volume.values) {
+        report.notes.push(format!(
+            "the voxels of density {} were not measured, and do not count where the surface is looked for",
+            human_number(value)
+        ));
+    }
     Ok(Fitted {
         field: T::any(field),
         report,

@@ -2,7 +2,8 @@
 //!
 //! A point keeps its distance to the surface: noise of the scan stays. It goes where moves carried it, then along the gradient until
 //! the field is what it was. Where that leads elsewhere (the point would travel far, or face another way) there is no such point any
-//! more; where surface is bare there are new ones, as dense as the scan.
+//! more; where an edit bared surface there are new ones, as dense as the scan. Surface that had no points before, which the fit made up to close
+//! the solid, gets none.
 
 use std::collections::HashMap;
 
@@ -110,10 +111,20 @@ pub fn revise_cloud(
             (is_surface && is_new).then(|| (vertex, -gradient.normalize_or_zero()))
         })
         .collect();
+    let mut scanned = Cover::new(GAP * spacing);
+    for (row, point) in points.iter().enumerate() {
+        scanned.put(*point, row);
+    }
+    let was_bare = |vertex: DVec3, normal: DVec3| {
+        let before = surface_of(fitted, iso, journey.back(vertex), normal, least);
+        before.is_some_and(|before| scanned.is_bare(before, GAP * spacing))
+    };
     // Scans have gaps of their own: bare is what is farther from all points than those are wide, and what lies round it.
     let mut bare = Cover::new(GAP * spacing);
-    for (vertex, _) in surface.iter().filter(|(v, _)| cover.is_bare(*v, GAP * spacing)) {
-        bare.put(*vertex, 0);
+    for (vertex, normal) in &surface {
+        if cover.is_bare(*vertex, GAP * spacing) && !was_bare(*vertex, *normal) {
+            bare.put(*vertex, 0);
+        }
     }
     for (vertex, normal) in surface {
         if !bare.is_bare(vertex, GAP * spacing) && cover.is_bare(vertex, APART * spacing) {
@@ -170,6 +181,29 @@ fn fate(
         }
     }
     Fate::Goes
+}
+
+/// The place on a surface that lies along the gradient from `p` and faces as `normal` does.
+fn surface_of(
+    field: &HierarchicalSpline<f32>,
+    iso: f64,
+    p: DVec3,
+    normal: DVec3,
+    least: f64,
+) -> Option<DVec3> {
+    let mut q = p;
+    for _ in 0..STEPS {
+        let (value, gradient) = field.value_gradient(q);
+        let off = iso - value;
+        if off.abs() <= least {
+            return (normal.dot(-gradient.normalize_or_zero()) >= TURNED).then_some(q);
+        }
+        q += gradient * (off / gradient.length_squared().max(f64::MIN_POSITIVE));
+        if !q.is_finite() {
+            return None;
+        }
+    }
+    None
 }
 
 /// Edge of the square that a point of the scan has for itself: the median, from the distance of the sixth neighbour.

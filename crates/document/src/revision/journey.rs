@@ -1,47 +1,82 @@
+use std::collections::BTreeMap;
+
 use bspline::Aabb;
 use glam::{DAffine3, DVec3};
 use tools::geometric::{Origin, reflection};
 use tools::limits::Limits;
 use tools::others::Others;
+use tools::session::Stroke;
 
 use crate::Command;
 
 /// Where what is now at a place came from, through all moves of an object.
 #[derive(Default)]
-pub struct Journey(Vec<Leg>);
+pub struct Journey {
+    legs: Vec<Leg>,
+    /// Boxes of the brushes that carry densities along or mix them.
+    mixed: Vec<Aabb>,
+}
 
 /// One move.
 #[derive(Clone)]
 struct Leg {
-    origin: Origin,
+    way: Way,
     limits: Limits,
     /// A reflection in which all of it lies: the other side of a symmetric stroke.
     mirror: Option<DAffine3>,
 }
 
+/// How matter came to a place.
+#[derive(Clone)]
+enum Way {
+    Moved(Origin),
+    /// From a box, by a map, as it was after the first `since` legs. What was there is gone.
+    Pasted {
+        from: Aabb,
+        map: DAffine3,
+        since: usize,
+    },
+}
+
 impl Journey {
     /// The moves among commands in their order, of the object `name`, which lies in a box.
     pub fn new(commands: &[Command], name: &str, within: &Aabb) -> Self {
-        // What its name was when each was done.
-        let mut name = name;
-        let mut names: Vec<&str> = Vec::with_capacity(commands.len());
-        for command in commands.iter().rev() {
-            if let Command::Rename { object, to } = command
-                && to == name
-            {
-                name = object;
-            }
-            names.push(name);
-        }
-        let mut legs = Vec::new();
-        for (command, name) in commands.iter().zip(names.into_iter().rev()) {
+        let mut journey = Self::default();
+        // Copies of the object that are as they were made, and after how many legs.
+        let mut twins: BTreeMap<&str, usize> = BTreeMap::new();
+        for (command, name) in commands.iter().zip(names(commands, name)) {
+            twins.remove(command.object());
             let Command::Stroke { object, stroke } = command else {
                 continue;
             };
+            if object != name {
+                continue;
+            }
+            let done = journey.legs.len();
+            let cut = stroke.cut.as_ref().and_then(|cut| cut.to.as_deref());
+            let copy = stroke.copy.as_ref().map(|copy| copy.to.as_str()).or(cut);
+            twins.extend(copy.map(|to| (to, done)));
+            let plane = stroke.symmetry.as_ref();
+            let mirror = plane.and_then(|plane| reflection(plane.at.0, plane.normal.0).ok());
+            for mixed in mixed(stroke) {
+                journey.mixed.push(mixed);
+                journey
+                    .mixed
+                    .extend(mirror.map(|mirror| mixed.transformed(&mirror)));
+            }
+            let twins = &twins;
+            let pasted = stroke.paste.as_ref().and_then(|paste| {
+                let since = match paste.from == *object {
+                    true => done,
+                    false => *twins.get(paste.from.as_str())?,
+                };
+                let (from, map) = paste.carried().ok()?;
+                Some(Way::Pasted { from, map, since })
+            });
+            let moved = (stroke.motion.as_ref()).and_then(|m| m.motion.origin(within).ok());
             // What moves below a wall takes nothing of the scan's surface along, and the wall is known no more.
-            let is_ours = object == name && stroke.wall.is_none();
-            let motion = stroke.motion.as_ref().filter(|_| is_ours);
-            let Some(origin) = motion.and_then(|m| m.motion.origin(within).ok()) else {
+            let way = moved.map(Way::Moved).or(pasted);
+            let Some(way) = way.filter(|_| stroke.wall.is_none()) else {
                 continue;
             };
             // Masks by other objects are left out: these may have changed since.
@@ -52,20 +87,24 @@ impl Journey {
                 within,
             );
             let leg = Leg {
-                origin,
+                way,
                 limits: limits.unwrap_or_default(),
                 mirror: None,
             };
-            let plane = stroke.symmetry.as_ref();
-            let mirror = plane.and_then(|plane| reflection(plane.at.0, plane.normal.0).ok());
             let other = mirror.map(|_| Leg {
                 mirror,
                 ..leg.clone()
             });
-            legs.push(leg);
-            legs.extend(other);
+            journey.legs.push(leg);
+            journey.legs.extend(other);
         }
-        Self(legs)
+        journey
+    }
+
+    /// Whether a brush that mixes densities passed over a place.
+    pub(super) fn is_mixed(&self, place: DVec3) -> bool {
+        let holds = |b: &Aabb| place.cmpge(b.min).all() && place.cmple(b.max).all();
+        self.mixed.iter().any(holds)
     }
 
     /// Boxes in `within` outside which nothing was moved.
@@ -77,24 +116,91 @@ impl Journey {
                 max: reach.max.min(within.max),
             }
         };
-        self.0.iter().map(cut).filter(|b| b.min.cmple(b.max).all())
+        self.legs.iter().map(cut).filter(|b| b.min.cmple(b.max).all())
     }
 
     pub(super) fn back(&self, place: DVec3) -> DVec3 {
-        let legs = self.0.iter().rev();
-        legs.fold(place, |p, leg| leg.moved(p, Origin::back))
+        let (mut place, mut left) = (place, self.legs.len());
+        while let Some(n) = left.checked_sub(1) {
+            let leg = &self.legs[n];
+            let there = leg.moved(place, Way::back);
+            left = match leg.way {
+                Way::Pasted { since, .. } if there != place => since.min(n),
+                _ => n,
+            };
+            place = there;
+        }
+        place
     }
 
     /// Where what was at a place is now.
     pub(super) fn forth(&self, place: DVec3) -> DVec3 {
-        let legs = self.0.iter();
-        legs.fold(place, |p, leg| leg.moved(p, Origin::forth))
+        let legs = self.legs.iter();
+        legs.fold(place, |p, leg| leg.moved(p, Way::forth))
     }
+}
+
+/// The name of an object when each of the commands was done that led to `name`.
+pub(super) fn names<'a>(commands: &'a [Command], name: &'a str) -> Vec<&'a str> {
+    let mut name = name;
+    let mut names: Vec<&str> = Vec::with_capacity(commands.len());
+    for command in commands.iter().rev() {
+        if let Command::Rename { object, to } = command
+            && to == name
+        {
+            name = object;
+        }
+        names.push(name);
+    }
+    names.reverse();
+    names
+}
+
+impl Way {
+    fn reach(&self) -> Aabb {
+        match self {
+            Self::Moved(origin) => origin.reach(),
+            Self::Pasted { from, map, .. } => from.transformed(map),
+        }
+    }
+
+    fn back(&self, p: DVec3) -> DVec3 {
+        match self {
+            Self::Moved(origin) => origin.back(p),
+            Self::Pasted { from, map, .. } => {
+                let there = map.inverse().transform_point3(p);
+                let is_pasted = there.cmpge(from.min).all() && there.cmple(from.max).all();
+                if is_pasted { there } else { p }
+            }
+        }
+    }
+
+    /// What was pasted is where it was, too.
+    fn forth(&self, p: DVec3) -> DVec3 {
+        match self {
+            Self::Moved(origin) => origin.forth(p),
+            Self::Pasted { .. } => p,
+        }
+    }
+}
+
+/// Boxes of a brush that carries densities along or mixes them.
+fn mixed(stroke: &Stroke) -> impl Iterator<Item = Aabb> {
+    let smooth = stroke.smooth.as_ref().map(|tool| (&tool.along, tool.radius));
+    let inflate = stroke.inflate.as_ref().map(|tool| (&tool.along, tool.radius));
+    let push = stroke.push.as_ref().map(|tool| (&tool.along, tool.radius));
+    let brushes = [smooth, inflate, push].into_iter().flatten();
+    let passed = brushes.filter_map(|(along, radius)| {
+        let about = Aabb::about(along.iter().map(|p| p.0))?;
+        Some(about.widened(radius.0))
+    });
+    let pasted = stroke.paste.as_ref().and_then(|paste| paste.carried().ok());
+    passed.chain(pasted.map(|(from, map)| from.transformed(&map)))
 }
 
 impl Leg {
     fn reach(&self) -> Aabb {
-        let own = self.limits.cut(&self.origin.reach());
+        let own = self.limits.cut(&self.way.reach());
         match &self.mirror {
             None => own,
             // What has no end has none on the other side.
@@ -107,13 +213,13 @@ impl Leg {
     }
 
     /// A place before or after the move; the very same where nothing moved.
-    fn moved(&self, p: DVec3, way: impl Fn(&Origin, DVec3) -> DVec3) -> DVec3 {
+    fn moved(&self, p: DVec3, way: impl Fn(&Way, DVec3) -> DVec3) -> DVec3 {
         let mirrored = |p: DVec3| self.mirror.map_or(p, |mirror| mirror.transform_point3(p));
         let here = mirrored(p);
         if !self.limits.is_free(&Aabb { min: here, max: here }) {
             return p;
         }
-        match way(&self.origin, here) {
+        match way(&self.way, here) {
             there if there == here => p,
             there => mirrored(there),
         }

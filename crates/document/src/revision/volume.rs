@@ -3,8 +3,11 @@
 //! Where nothing was edited a voxel stays. Elsewhere it changes by what the field changed, `v + f_new − f_fit`, so that what the
 //! fit had smoothed away stays in the scan. Matter that was taken out becomes another matter, mostly air: within one voxel of
 //! the new surface its density runs from the iso-value to that of the fill. The voxels that it had shared with what lay beside it
-//! become what lies there: else a ghost of the old surface would stay. What never was part of the solid stays. Matter that was added is
-//! no denser than the median of the solid: tools make it the denser the deeper it lies. Moves carry along what
+//! become what lies there: else a ghost of the old surface would stay. What never was part of the solid stays, but for the
+//! voxels beside a new surface. Matter that was added is
+//! no denser than the median of the solid: tools make it the denser the deeper it lies. Brushes that
+//! carry densities along or mix them, as smoothing does, leave what they make of them. Moves, and pastes of what the object had
+//! elsewhere, carry along what
 //! the fit had smoothed away: `v = f_new(x) + (v − f_fit)(w⁻¹(x))`.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -25,6 +28,12 @@ const ROUNDING: f64 = 16.0 * f32::EPSILON as f64;
 
 /// Voxels that are looked at for the median density of the solid, about.
 const PROBES: usize = 1 << 18;
+
+/// Voxels outside of a surface that comes or goes over which densities pass into those of the scan: the first changes with the field.
+const BESIDE: f64 = 2.0;
+
+/// Share of what the field falls by in a voxel that is no edit: what is written back may be off by so much.
+const OFF: f64 = 0.1;
 
 /// New densities of a scan, and what became of its voxels.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -84,15 +93,27 @@ pub fn revise_volume(
                     let voxel = x + nx * (y + ny * z);
                     let place = DVec3::new(x as f64, y as f64, z as f64);
                     let place = world_from_voxel.transform_point3(place);
-                    let densities = [fitted.value(place), now.value(place)];
+                    let [was, is] = [fitted.value(place), now.value(place)];
+                    part.carved += usize::from(was >= iso && is < iso);
+                    part.added += usize::from(is >= iso && was < iso);
                     let origin = journey.back(place);
-                    let density = match origin == place {
-                        true => matter.revised(voxel, volume.values[voxel].into(), densities, &mut part),
-                        false => {
+                    let is_carried = origin != place;
+                    let (old, was) = match is_carried {
+                        true => {
                             let there = sampled(volume, voxel_from_world.transform_point3(origin));
-                            Some(matter.moved(densities, there - fitted.value(origin), &mut part))
+                            (there, fitted.value(origin))
                         }
+                        false => (volume.values[voxel].into(), was),
                     };
+                    let steep = || fitted.value_gradient(origin).1.length();
+                    let least = if is_carried {
+                        OFF * matter.ramp
+                    } else {
+                        matter.rounding
+                    };
+                    let how = (least, journey.is_mixed(place));
+                    let density = matter.revised(voxel, old, [was, is], how, steep, &mut part);
+                    let density = density.or(is_carried.then_some(old));
                     let change = density.map(|density| Change { voxel, density });
                     part.changes.extend(change);
                 }
@@ -185,6 +206,8 @@ fn neighbours(voxel: usize, [nx, ny, nz]: [usize; 3]) -> impl Iterator<Item = us
 struct Matter {
     iso: f64,
     fill: f64,
+    /// Least distance of voxels.
+    voxel: f64,
     /// Density over which what was carved becomes the fill.
     ramp: f64,
     /// Densities of the volume.
@@ -200,6 +223,7 @@ impl Matter {
     fn new(volume: &Volume, slope: f64, iso: f64, fill: f64) -> Self {
         let m = volume.header.world_from_voxel.matrix3;
         let steps = [m.x_axis, m.y_axis, m.z_axis].map(DVec3::length);
+        let voxel = steps.into_iter().fold(f64::INFINITY, f64::min);
         let range = (f32::INFINITY, f32::NEG_INFINITY);
         let densities = volume.values.iter();
         let (least, largest) = densities.fold(range, |(lo, hi), v| (lo.min(*v), hi.max(*v)));
@@ -216,48 +240,56 @@ impl Matter {
             iso,
             fill,
             median_solid: median_solid.into(),
-            ramp: slope * steps.into_iter().fold(f64::INFINITY, f64::min),
+            ramp: slope * voxel,
+            voxel,
             least: least.into(),
             largest: largest.into(),
             rounding: ROUNDING * f64::from(least.abs().max(largest.abs())),
         }
     }
 
-    /// The density of a voxel whose matter came from elsewhere: on what the field is here, what stood in the scan there less
-    /// what the fit made of it.
-    fn moved(&self, [fitted, now]: [f64; 2], residual: f64, told: &mut VolumeRevision) -> f64 {
-        let (was_in, is_in) = (fitted >= self.iso, now >= self.iso);
-        told.carved += usize::from(was_in && !is_in);
-        told.added += usize::from(is_in && !was_in);
-        (now + residual).clamp(self.least, self.largest)
-    }
-
-    /// The new density of a voxel, if it has one.
+    /// The new density of a voxel, if it has one: of what had `old` in the scan and `was` in its fit, which is as steep as `steep` there,
+    /// where the field is `now`. Changes up to `least` are none; `follows` says that all of the field's change is meant.
     fn revised(
         &self,
         voxel: usize,
         old: f64,
-        [fitted, now]: [f64; 2],
+        [was, now]: [f64; 2],
+        (least, follows): (f64, bool),
+        steep: impl Fn() -> f64,
         told: &mut VolumeRevision,
     ) -> Option<f64> {
-        if (now - fitted).abs() <= self.rounding {
+        let change = now - was;
+        if change.abs() <= least {
             return None;
         }
-        let (was_in, is_in) = (fitted >= self.iso, now >= self.iso);
-        if was_in && !is_in {
-            told.carved += 1;
-            told.emptied.push(voxel);
-            let share = ((self.iso - now) / self.ramp).min(1.0);
-            return Some(self.iso + share * (self.fill - self.iso));
+        let moved = old + change;
+        if follows {
+            return Some(moved.clamp(self.least, self.largest));
         }
-        let is_new = is_in && !was_in;
-        told.added += usize::from(is_new);
-        let most = if is_new { self.median_solid } else { self.largest };
-        let moved = old + (now - fitted);
         // A tool's own density has no bounds far inside or outside of it; matter has.
-        Some(match now > fitted {
-            true => moved.min(most.max(old)),
-            false => moved.max(self.fill.min(old)),
+        let raised = moved.min(self.median_solid.max(old));
+        let lowered = moved.max(self.fill.min(old));
+        Some(match (was >= self.iso, now >= self.iso) {
+            (true, false) if change.abs() <= OFF * self.ramp => lowered,
+            (true, false) => {
+                told.emptied.push(voxel);
+                let share = ((self.iso - now) / self.ramp).min(1.0);
+                self.iso + share * (self.fill - self.iso)
+            }
+            (false, false) if change.abs() <= OFF * self.ramp => return None,
+            (false, false) => {
+                // Voxels from the surface that comes, or from the one that goes.
+                let outside = match change > 0.0 {
+                    true => (self.iso - now) / self.ramp,
+                    false => (self.iso - was) / (steep() * self.voxel),
+                };
+                let share = (BESIDE - outside).clamp(0.0, 1.0);
+                let to = if change > 0.0 { raised } else { lowered };
+                return (share > 0.0).then_some(old + share * (to - old));
+            }
+            (_, true) if change > 0.0 => raised,
+            (_, true) => lowered,
         })
     }
 }

@@ -3,18 +3,17 @@
 use std::path::Path;
 
 use bspline::{Aabb, HierarchicalSpline};
+use fitting::volume::padding;
 use formats::field::FieldMeta;
 use formats::points::PointCloud;
 use formats::volumes::{Revision, Volume, VolumeOptions, save_revised};
 use formats::{Fault, FormatError, ReadLimits};
 
+use super::journey::names;
 use super::{CloudError, Journey, VolumeRevision, revise_cloud, revise_volume};
 use crate::{Command, Document, DocumentError, Object, human_count, human_number};
 
-/// Density of air in Hounsfield units.
-const AIR: f64 = -1000.0;
-
-/// Share of a volume's voxels that are taken for air where nothing names its unit.
+/// Share of a volume's voxels that are below what is taken for air.
 const THINNEST: f64 = 0.01;
 
 /// What became of an object since the document began.
@@ -74,17 +73,18 @@ impl Course {
             )));
         }
         let now = document.state().object(name)?.clone();
-        let first = document.first_state()?;
-        let fitted = first.objects().get(name).ok_or_else(|| {
-            WriteBackError::NoFit(format!(
-                "object {name:?} was not there when the document began; only what was fitted to a scan can be written back"
-            ))
-        })?;
         let mut commands: Vec<Command> = Vec::new();
         for n in 0..counts.done {
             // What another version of the program wrote is no move that this one knows.
             commands.extend(serde_json::from_value(document.command(n)?).ok());
         }
+        let first = document.first_state()?;
+        let begun_as = names(&commands, name).first().copied().unwrap_or(name);
+        let fitted = first.objects().get(begun_as).ok_or_else(|| {
+            WriteBackError::NoFit(format!(
+                "object {name:?} was not there when the document began; only what was fitted to a scan can be written back"
+            ))
+        })?;
         Ok(Self {
             journey: Journey::new(&commands, name, &now.field.world_box()),
             identity: document.state().sha256(),
@@ -153,8 +153,8 @@ impl Course {
         limits: &ReadLimits,
     ) -> Result<Vec<String>, WriteBackError> {
         let iso =
-            (self.now.meta.iso).ok_or_else(|| WriteBackError::NoFit("the object names no surface".into()))?;
-        let fill = fill.unwrap_or_else(|| air(&self.now.meta, volume));
+            (self.now.iso()).ok_or_else(|| WriteBackError::NoFit("the object names no surface".into()))?;
+        let fill = fill.unwrap_or_else(|| air(volume));
         let (fitted, now) = self.fields()?;
         let revision = revise_volume(fitted, now, volume, iso, fill, &self.journey)
             .map_err(|e| WriteBackError::Replaced(e.into()))?;
@@ -165,7 +165,11 @@ impl Course {
                     _ => WriteBackError::Reading(e),
                 }
             })?;
-        Ok(sentences(&revision, &told, volume, fill))
+        let mut notes = sentences(&revision, &told, volume, [fill, iso]);
+        if self.now.field.world_box() != self.extent {
+            notes.push("the object has grown beyond the scan; what lies there is not written".into());
+        }
+        Ok(notes)
     }
 
     /// The fields of an object that was fitted to a scan.
@@ -177,18 +181,22 @@ impl Course {
     }
 }
 
-/// The density of what is taken out.
-fn air(meta: &FieldMeta, volume: &Volume) -> f64 {
-    if meta.density_unit == "HU" {
-        return AIR;
-    }
+/// The density of what is taken out: one that few voxels are below, those left out that were not measured.
+fn air(volume: &Volume) -> f64 {
+    let padding = padding(&volume.values[..]);
     let mut values = volume.values.clone();
+    values.retain(|v| Some(f64::from(*v)) != padding);
     let rank = (values.len() as f64 * THINNEST) as usize;
     let (_, value, _) = values.select_nth_unstable_by(rank, f32::total_cmp);
     f64::from(*value)
 }
 
-fn sentences(revision: &VolumeRevision, told: &Revision, volume: &Volume, fill: f64) -> Vec<String> {
+fn sentences(
+    revision: &VolumeRevision,
+    told: &Revision,
+    volume: &Volume,
+    [fill, iso]: [f64; 2],
+) -> Vec<String> {
     let mut notes = vec![format!(
         "{} of {} voxels changed, {} left the solid and {} joined it",
         human_count(told.changed),
@@ -200,6 +208,12 @@ fn sentences(revision: &VolumeRevision, told: &Revision, volume: &Volume, fill: 
         notes.push(format!(
             "what was carved has density {} (fill)",
             human_number(fill)
+        ));
+    }
+    if revision.is_filled() && fill >= iso {
+        notes.push(format!(
+            "that is no less than {}, where the surface lies: what was carved is still solid; choose a smaller fill",
+            human_number(iso)
         ));
     }
     if told.rounding > 0.0 {

@@ -115,3 +115,27 @@ fn points_follow_their_surface_go_with_it_and_cover_what_is_new() {
         );
     }
 }
+
+/// The fit closed the solid below; that is no surface that anybody scanned, and an edit that moves it does not make it one.
+#[test]
+fn surface_without_points_gets_none_when_it_is_moved() {
+    let named = |_: Option<&str>| Ok::<_, document::CommandError>("ball".to_string());
+    let text = "[[stroke]]\ninflate = { along = [[20, 20, 4]], radius = 9, by = 1.5 }\n";
+    let commands = Command::of_script(text, named).unwrap();
+    let Command::Stroke { stroke, .. } = &commands[0] else {
+        unreachable!()
+    };
+    let before = large();
+    let inflate = stroke.inflate.as_ref().unwrap();
+    let (now, _) = inflate
+        .apply(&before, 0.0, &Limits::default(), &mut Control::default())
+        .unwrap();
+    let journey = Journey::default();
+    let whole = scan();
+    let open: Vec<DVec3> = whole.iter().copied().filter(|p| p.z > 12.0).collect();
+    let changes = revise_cloud(&before, &now, &open, 0.0, &journey).unwrap();
+    assert_eq!(changes.added.len(), 0);
+    // Where there are points they move along.
+    let changes = revise_cloud(&before, &now, &whole, 0.0, &journey).unwrap();
+    assert!(changes.moved.len() > 500, "{}", changes.moved.len());
+}

@@ -1,13 +1,14 @@
 //! Edits of an object in the scan that it was fitted to.
 
 use bspline::hierarchical::{HierarchicalSpline, Lattice};
-use bspline::{Aabb, Field};
+use bspline::{Aabb, AnyField, Field};
 
-use document::{Command, Journey, VolumeRevision, revise_volume};
+use document::{Command, Journey, Object, State, VolumeRevision, revise_volume};
 use fitting::Control;
 use fitting::volume::{VolumeOptions, VolumeView, fit_volume};
 use formats::Unit;
-use formats::volumes::{Orientation, Volume, VolumeHeader, VoxelType};
+use formats::field::FieldMeta;
+use formats::volumes::{Change, Orientation, Volume, VolumeHeader, VoxelType};
 use glam::{DAffine3, DMat3, DVec3};
 use tools::canvas::Canvas;
 use tools::geometric::{Geometric, Operation};
@@ -245,6 +246,161 @@ fn what_is_moved_takes_the_noise_of_its_scan_along() {
         }
     }
     assert!(checked > 50 && worst < 1.0, "{checked} {worst}");
+}
+
+/// What a script leaves of a field, and the way there.
+fn by_script(before: &HierarchicalSpline<f32>, text: &str) -> (HierarchicalSpline<f32>, Journey) {
+    let commands = Command::of_script(text, |_| Ok::<_, document::CommandError>("ball".to_string())).unwrap();
+    let meta = FieldMeta {
+        iso: Some(ISO),
+        ..FieldMeta::default()
+    };
+    let object = Object::new(&AnyField::F32(before.clone()), meta).unwrap();
+    let begun = State::default().with("ball", object).unwrap();
+    let state = commands.iter().fold(begun, |state, command| {
+        command.apply(&state, &mut Control::default()).unwrap().0
+    });
+    let now = state.object("ball").unwrap().field.levels().unwrap().clone();
+    (
+        now,
+        Journey::new(&commands, "ball", &before.lattice().world_box()),
+    )
+}
+
+/// The changes that a script makes: the voxel's place, what it was, what it became, and what the field became.
+fn changed_by(
+    before: &HierarchicalSpline<f32>,
+    scan: &Volume,
+    text: &str,
+) -> Vec<(DVec3, [f64; 2], [f64; 2])> {
+    let (now, journey) = by_script(before, text);
+    let revision = revise_volume(before, &now, scan, ISO, FILL, &journey).unwrap();
+    let change = |c: &Change| {
+        let place = scan.header.world_from_voxel.transform_point3(index(c.voxel));
+        let densities = [f64::from(scan.values[c.voxel]), c.density];
+        (place, densities, [before.value(place), now.value(place)])
+    };
+    revision.changes.iter().map(change).collect()
+}
+
+fn usual(scan: &Volume) -> f64 {
+    let mut solid: Vec<f64> = scan.values.iter().map(|v| f64::from(*v)).collect();
+    solid.retain(|v| *v >= ISO);
+    solid.sort_by(f64::total_cmp);
+    solid[solid.len() / 2]
+}
+
+#[test]
+fn what_was_moved_is_carved_and_added_to_like_what_was_not() {
+    let (before, scan) = (fitted(), scan());
+    let shift = "[[stroke]]\nmove = { motion = { shift = { region = { min = [0, 0, 0], max = [24, 24, 24] }, by = [1, 0, 0], blend = 9 } } }\n";
+    let carve = "[[stroke]]\ncarve = { shape = { sphere = { radius = 3 } }, along = [[13, 12, 12]] }\n";
+    let changes = changed_by(&before, &scan, &format!("{shift}{carve}"));
+    let hole = changes
+        .iter()
+        .filter(|(p, ..)| p.distance(DVec3::new(13.0, 12.0, 12.0)) < 1.4);
+    let hole: Vec<f64> = hole.map(|(_, [_, new], _)| *new).collect();
+    assert!(hole.len() > 10 && hole.iter().all(|d| *d == FILL), "{hole:?}");
+
+    let add = "[[stroke]]\nadd = { shape = { sphere = { radius = 4 } }, along = [[13, 12, 20]] }\n";
+    let changes = changed_by(&before, &scan, &format!("{shift}{add}"));
+    let usual = usual(&scan);
+    let joined = changes
+        .iter()
+        .filter(|(_, _, [was, now])| *was < ISO - 25.0 && *now > ISO + 25.0);
+    let joined: Vec<f64> = joined.map(|(_, [_, new], _)| *new).collect();
+    assert!(
+        joined.len() > 50 && joined.iter().all(|d| *d <= usual),
+        "{joined:?}"
+    );
+}
+
+/// Soft matter in a hard shell is no part of the solid of the shell.
+#[test]
+fn what_never_was_in_the_solid_stays_where_a_tool_passes() {
+    let mut scan = scan();
+    let matter = |p: DVec3| match p.distance(DVec3::splat(12.0)) {
+        r if r < 6.0 => ball(p) - 70.0 * (6.0 - r).min(1.0),
+        _ => ball(p),
+    };
+    let map = scan.header.world_from_voxel;
+    for (voxel, value) in scan.values.iter_mut().enumerate() {
+        *value +=
+            (matter(map.transform_point3(index(voxel))) - ball(map.transform_point3(index(voxel)))) as f32;
+    }
+    let lattice = *fitted().lattice();
+    let before = HierarchicalSpline::schoenberg(lattice, 50.0, matter).unwrap();
+    let carve = "[[stroke]]\ncarve = { shape = { sphere = { radius = 8 } }, along = [[12, 12, 18]] }\n";
+    let changes = changed_by(&before, &scan, carve);
+    let soft = changes
+        .iter()
+        .filter(|(p, ..)| p.distance(DVec3::splat(12.0)) < 3.0);
+    let soft: Vec<_> = soft.collect();
+    assert!(soft.is_empty(), "{soft:?}");
+    let hard = changes
+        .iter()
+        .filter(|(p, _, [was, _])| p.distance(DVec3::new(12.0, 12.0, 18.0)) < 6.0 && *was > ISO + 25.0);
+    let hard: Vec<f64> = hard.map(|(_, [_, new], _)| *new).collect();
+    assert!(hard.len() > 50 && hard.iter().all(|d| *d == FILL), "{hard:?}");
+}
+
+#[test]
+fn the_surface_that_something_is_added_to_becomes_no_denser_than_most() {
+    let (before, mut scan) = (fitted(), scan());
+    // Metal elsewhere.
+    scan.values[0] = 1000.0;
+    let add = "[[stroke]]\nadd = { shape = { sphere = { radius = 4 } }, along = [[12, 12, 19]] }\n";
+    let usual = usual(&scan);
+    let changes = changed_by(&before, &scan, add);
+    assert!(changes.len() > 100);
+    for (place, [old, new], _) in changes {
+        assert!(new <= usual.max(old), "{place}: {old} became {new}");
+    }
+}
+
+#[test]
+fn what_is_smoothed_follows_the_field() {
+    let (before, scan) = (fitted(), scan());
+    let smooth = "[[stroke]]\nsmooth = { along = [[12, 12, 21]], radius = 6, level = 3 }\n";
+    let changes = changed_by(&before, &scan, smooth);
+    let left = changes
+        .iter()
+        .filter(|(_, _, [was, now])| *was >= ISO && *now < ISO);
+    assert!(left.count() > 5);
+    let highest = scan.values.iter().fold(0.0, |m: f32, v| m.max(*v)).into();
+    for (place, [old, new], [was, now]) in changes {
+        let meant = (old + now - was).clamp(0.0, highest);
+        assert!(
+            (new - meant).abs() < 0.1,
+            "{place}: {old} became {new}, not {meant}"
+        );
+    }
+}
+
+#[test]
+fn what_is_pasted_keeps_the_densities_and_the_noise_of_its_scan() {
+    let (before, scan) = (fitted(), scan());
+    let paste = "[[stroke]]\npaste = { from = \"ball\", region = { min = [9, 9, 6], max = [15, 15, 10] }, by = [0, 0, 12], blend = 1 }\n";
+    let copy = "[[stroke]]\ncopy = { to = \"twin\" }\n";
+    for text in [
+        paste.to_string(),
+        format!("{copy}{}", paste.replace("\"ball\"", "\"twin\"")),
+    ] {
+        let (mut checked, mut squares) = (0, 0.0);
+        for (place, [_, new], _) in changed_by(&before, &scan, &text) {
+            let origin = place - DVec3::new(0.0, 0.0, 12.0);
+            let at = scan.header.world_from_voxel.inverse().transform_point3(origin);
+            let is_inside = origin.cmpgt(DVec3::new(10.0, 10.0, 7.0)).all()
+                && origin.cmplt(DVec3::new(14.0, 14.0, 9.0)).all();
+            if is_inside && at.cmpge(DVec3::ONE).all() && at.cmple(DVec3::splat(SIDE as f64 - 2.0)).all() {
+                squares += (new - trilinear(&scan, at)).powi(2);
+                checked += 1;
+            }
+        }
+        // The noise of another place is off by four.
+        let off = (squares / f64::from(checked)).sqrt();
+        assert!(checked > 20 && off < 1.5, "{checked} {off}");
+    }
 }
 
 /// Both halves of the ball go up, the second because of the symmetry alone.

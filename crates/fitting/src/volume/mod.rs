@@ -41,6 +41,6 @@ mod voxels;
 pub use again::{VolumeErrors, measure_volume};
 pub use fit::fit_volume;
 pub(crate) use interpolate::interpolate_voxels;
-pub use otsu::otsu_threshold;
+pub use otsu::{otsu_threshold, padding};
 pub use view::{VolumeMethod, VolumeOptions, VolumeView};
 pub use voxels::{Order, Voxels};

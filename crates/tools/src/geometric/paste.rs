@@ -113,7 +113,7 @@ impl Paste {
         let writer = Writer { field, iso, limits };
         let b = self.region.aabb().map_err(GeometricError::Shape)?;
         let (clip, _) = others.get(&self.from).map_err(GeometricError::Shape)?;
-        let (map, scale) = self.map(b.center());
+        let (map, scale) = self.map(b.center()).map_err(GeometricError::Shape)?;
         let solid = Cuboid::new(b.center(), 0.5 * b.size()).map_err(GeometricError::shape)?;
         let around = MARGIN * writer.spacing();
         let blend = self.blend.map_or(around, |blend| blend.0);
@@ -150,20 +150,30 @@ impl Paste {
         writer.written(&mixed, &within, &fineness, control)
     }
 
+    /// The box that is taken, and how it goes to its place.
+    ///
+    /// # Errors
+    /// [`GeometricError::Shape`] for a box without a size, or a turn that is no angle.
+    pub fn carried(&self) -> Result<(Aabb, DAffine3), GeometricError> {
+        let b = self.region.aabb().map_err(GeometricError::Shape)?;
+        let (map, _) = self.map(b.center()).map_err(GeometricError::Shape)?;
+        Ok((b, map))
+    }
+
     /// From where the box lies to where it goes, and by how much that stretches.
-    fn map(&self, center: DVec3) -> (DAffine3, f64) {
+    fn map(&self, center: DVec3) -> Result<(DAffine3, f64), String> {
         let scale = self.scale.map_or(1.0, |s| s.0);
         if self.turn.is_none() && scale == 1.0 {
             let by = self.by.map_or(DVec3::ZERO, |by| by.0);
-            return (DAffine3::from_translation(by), scale);
+            return Ok((DAffine3::from_translation(by), scale));
         }
-        let turn = rotation_of(self.turn.map_or(DVec3::ZERO, |t| t.0));
+        let turn = rotation_of(self.turn.map_or(DVec3::ZERO, |t| t.0))?;
         let matrix = DMat3::from_quat(turn) * scale;
         let to = center + self.by.map_or(DVec3::ZERO, |by| by.0);
-        (
+        Ok((
             DAffine3::from_mat3_translation(matrix, to - matrix * center),
             scale,
-        )
+        ))
     }
 }
 

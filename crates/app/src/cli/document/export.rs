@@ -30,7 +30,7 @@ pub struct Args {
     /// Scan that the object was fitted to: write it with the edits, untouched voxels as they are
     #[arg(long, value_name = "SCAN")]
     like: Option<PathBuf>,
-    /// Density of what was carved [default: air, -1000 HU; where the unit is not known, what 1 % of the voxels are below]
+    /// Density of what was carved [default: air, what 1 % of the voxels are below that a scanner measured]
     #[arg(long, value_name = "DENSITY", value_parser = finite, allow_negative_numbers = true, requires = "like")]
     fill: Option<f64>,
     /// DICOM: the series to write, by its number or its identifier, where there are several
