@@ -30,6 +30,8 @@ pub(crate) struct RawShape {
     pub unit: Unit,
     /// Step of the coordinates, where the file counts in steps.
     pub resolution: Option<f64>,
+    /// Names of what the points have beside positions and normals; only told for clouds.
+    pub left_out_attributes: Vec<String>,
     pub notes: Vec<String>,
 }
 

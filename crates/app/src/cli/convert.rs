@@ -195,12 +195,19 @@ fn points_or_faces(args: &Args, source: &Source, bar: &Bar) -> Outcome<(Summary,
         positions,
         file_count,
         notes: met,
+        left_out_attributes: left_out,
         ..
     } = cloud;
+    let left_out = (!left_out.is_empty()).then(|| {
+        format!(
+            "only positions and normals are converted; left out: {}",
+            left_out.join(", ")
+        )
+    });
     let summary = Summary {
         input_count: Some(file_count),
         used_count: Some(positions.len()),
-        notes: met.into_iter().chain(notes).collect(),
+        notes: met.into_iter().chain(left_out).chain(notes).collect(),
         ..Default::default()
     };
     Ok((summary, output))

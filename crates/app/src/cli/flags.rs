@@ -35,7 +35,8 @@ pub fn fault(fault: &Fault) -> String {
 }
 
 /// What the fitting library advises, and the option for it.
-const ADVICE: [(&str, &str); 11] = [
+const ADVICE: [(&str, &str); 12] = [
+    ("find the directions from the positions alone", "--unoriented"),
     ("fit them by the robust loss", "--robust"),
     ("fit it as a cloud", "--as cloud"),
     ("a mesh can be trimmed there", "isoclay mesh --trim"),

@@ -46,6 +46,19 @@ fn a_cloud_keeps_points_and_normals_through_every_format() {
 }
 
 #[test]
+fn what_a_cloud_loses_is_named() {
+    let bench = Bench::new();
+    bench.write(
+        "colours.xyz",
+        "x y z nx ny nz red intensity\n0 0 0 0 0 1 255 7\n1 0 0 0 0 1 9 8\n",
+    );
+    let run = bench.run("convert colours.xyz 1.ply");
+    assert!(run.stderr.contains("left out: red, intensity"), "{}", run.stderr);
+    let run = bench.run("convert 1.ply 2.ply");
+    assert!(!run.stderr.contains("left out"), "{}", run.stderr);
+}
+
+#[test]
 fn a_volume_keeps_voxels_type_and_place_through_every_format() {
     let bench = Bench::new();
     let head = data("head.nii.gz");

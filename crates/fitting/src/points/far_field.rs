@@ -31,6 +31,12 @@ const MARGIN: f64 = 0.5;
 const CLOSING: f64 = 0.2;
 /// Share of the samples' diagonal that noisy solid may reach beyond their box before it is asked away.
 const BEYOND: f64 = 0.01;
+/// Share of the area of a cloud that nothing faces away from, above which it is one side of something: half for a half sphere, all
+/// for a terrain, a tenth and less for scans with a hole or two. Its winding number fades with the distance on both sides.
+const ONE_SIDED: f64 = 0.25;
+/// Share of the volume of a ball of the cloud's area that it has to enclose with its normals inward before the user is told: thin walls
+/// enclose too little to tell.
+const INWARD: f64 = 0.1;
 /// Winding numbers below `OUTSIDE` and above `INSIDE` are sure.
 const OUTSIDE: f64 = 0.1;
 const INSIDE: f64 = 0.7;
@@ -46,8 +52,17 @@ pub(crate) fn settle(base: &mut FullGrid<f64>, samples: &Samples) -> usize {
     let data = clusters(samples, BASE_DEPTH);
     let sites = far_sites(data.iter().map(|c| c.position), base.n);
     let places: Vec<DVec3> = sites.iter().map(|&site| site_position(site, base.n)).collect();
-    let numbers = winding_numbers(&data, &places);
+    let areas = areas(&data);
+    let numbers = winding_numbers(&data, &areas, &places);
     let (low, high) = ends(data.iter().map(|c| c.position));
+    let is_beyond = |x: DVec3| (low - x).max(x - high).max_element() > -MARGIN / base.n as f64;
+    let m = base.width();
+    let mut behind = BTreeSet::new();
+    if is_one_sided(&data, &areas) {
+        let solid = sites.iter().zip(&places).zip(&numbers);
+        let solid = solid.filter(|((site, x), _)| base.values[**site] > 0.0 && is_beyond(**x));
+        behind = closing(solid.map(|((site, _), w)| ([site / (m * m), site / m % m, site % m], *w)));
+    }
     let mut turned = 0;
     for (site, w) in sites.into_iter().zip(numbers) {
         let value = base.values[site];
@@ -59,9 +74,9 @@ pub(crate) fn settle(base: &mut FullGrid<f64>, samples: &Samples) -> usize {
         let x = site_position(site, base.n);
         let (distance, facing) = way_to(&data, x, base.n);
         let sign = if is_outside { -1.0 } else { 1.0 };
-        let is_beyond = (low - x).max(x - high).max_element() > -MARGIN / base.n as f64;
         let is_sure = -sign * facing > FACING && (is_inside || w < OUTSIDE);
-        if is_sure || (is_beyond && is_outside) {
+        let is_behind = || behind.contains(&[site / (m * m), site / m % m, site % m]);
+        if is_sure || (is_outside && is_beyond(x) && !is_behind()) {
             base.values[site] = sign * SHARE * distance;
             turned += 1;
         }
@@ -140,9 +155,78 @@ pub(crate) fn beyond<T: Real>(field: &HierarchicalSpline<T>, samples: &Samples, 
     }
     let centre = |cell: &[usize; 3]| (DVec3::from_array(cell.map(|c| c as f64)) + 0.5) * h;
     let places: Vec<DVec3> = found.iter().map(centre).collect();
-    let numbers = winding_numbers(&clusters(samples, BASE_DEPTH), &places);
-    let open = places.into_iter().zip(numbers).filter(|(_, w)| *w < CLOSING);
-    open.map(|(place, _)| (place, -h as f32)).collect()
+    let data = clusters(samples, BASE_DEPTH);
+    let areas = areas(&data);
+    let numbers = winding_numbers(&data, &areas, &places);
+    let mut behind = BTreeSet::new();
+    if is_one_sided(&data, &areas) {
+        behind = closing(found.iter().copied().zip(numbers.iter().copied()));
+    }
+    let cells = found.iter().zip(places).zip(numbers);
+    cells
+        .filter(|((cell, _), w)| *w < CLOSING && !behind.contains(*cell))
+        .map(|((_, place), _)| (place, -h as f32))
+        .collect()
+}
+
+/// Whether the cloud is one side of something: most of what its areas face, nothing faces away from.
+fn is_one_sided(data: &[Cluster], areas: &[f64]) -> bool {
+    let unit = |c: &Cluster| c.normal.normalize_or_zero();
+    let facing: DVec3 = data.iter().zip(areas).map(|(c, a)| unit(c) * *a).sum();
+    facing.length() > ONE_SIDED * areas.iter().sum::<f64>()
+}
+
+/// A sentence about normals that face into a solid, if the cloud is closed and encloses a volume below zero,
+/// `V = ⅓ Σ a_j n_j·x_j`.
+pub(crate) fn doubt_of_inward(samples: &Samples) -> Option<String> {
+    let data = clusters(samples, BASE_DEPTH);
+    let areas = areas(&data);
+    if is_one_sided(&data, &areas) {
+        return None;
+    }
+    let total: f64 = areas.iter().sum();
+    let weighed = data.iter().zip(&areas);
+    let middle = weighed.clone().map(|(c, a)| c.position * *a).sum::<DVec3>() / total;
+    let volume: f64 = weighed
+        .map(|(c, a)| a / 3.0 * c.normal.normalize_or_zero().dot(c.position - middle))
+        .sum();
+    // A ball of this area.
+    let most = total.powf(1.5) / (6.0 * std::f64::consts::PI.sqrt());
+    (volume < -INWARD * most).then(|| {
+        "the normals of this closed cloud point into what it encloses, so the solid is what lies outside it: if they should \
+         point out of the solid, find the directions from the positions alone"
+            .to_owned()
+    })
+}
+
+/// Of cells and their winding numbers, those joined by faces to one that closes a hole. The solid behind a terrain goes on to
+/// the border of the box, where the winding number is that of the outside.
+fn closing(cells: impl Iterator<Item = ([usize; 3], f64)>) -> BTreeSet<[usize; 3]> {
+    let mut left = BTreeSet::new();
+    let mut joined = BTreeSet::new();
+    let mut next = Vec::new();
+    for (cell, w) in cells {
+        if w < CLOSING {
+            left.insert(cell);
+        } else {
+            joined.insert(cell);
+            next.push(cell);
+        }
+    }
+    while let Some(cell) = next.pop() {
+        for axis in 0..3 {
+            for at in [cell[axis].checked_sub(1), cell[axis].checked_add(1)] {
+                let mut beside = cell;
+                let Some(at) = at else { continue };
+                beside[axis] = at;
+                if left.remove(&beside) {
+                    joined.insert(beside);
+                    next.push(beside);
+                }
+            }
+        }
+    }
+    joined
 }
 
 /// Corners of the box of places.
@@ -194,12 +278,11 @@ fn far_sites(points: impl Iterator<Item = DVec3>, n: usize) -> Vec<usize> {
     (0..m * m * m).filter(|&s| !is_near[s]).collect()
 }
 
-fn winding_numbers(data: &[Cluster], places: &[DVec3]) -> Vec<f64> {
-    let areas = areas(data);
+fn winding_numbers(data: &[Cluster], areas: &[f64], places: &[DVec3]) -> Vec<f64> {
     let positions: Vec<[f32; 3]> = data.iter().map(|c| c.position.as_vec3().to_array()).collect();
     let strengths: Vec<[f32; 3]> = data
         .iter()
-        .zip(&areas)
+        .zip(areas)
         .map(|(c, a)| (c.normal * *a).as_vec3().to_array())
         .collect();
     let areas: Vec<f32> = areas.iter().map(|a| *a as f32).collect();

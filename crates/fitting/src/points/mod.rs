@@ -124,6 +124,7 @@ pub fn fit_points<T: Real>(
     } else if let Some(tree) = &tree {
         samples.notes.extend(support::doubt(&samples, tree));
     }
+    samples.notes.extend(far_field::doubt_of_inward(&samples));
     let noise = match (&tree, options.smoothing) {
         (Some(tree), None) => noise::estimate(&samples, tree, default_tolerance.min(tolerance)),
         _ => None,

@@ -90,6 +90,10 @@ const NOISE_FACTOR: f64 = 1.25;
 /// are averaged, `σ̂s/h`, is then at most `0.44 h`. On clouds of 0.25, 0.5 and 1 % noise one level deeper or shallower
 /// is no better.
 const NOISE_CELL: f64 = 1.5;
+/// Least knot spacing of a noisy cloud in spacings of its samples. Where the noise is below a fifth of the spacing, most cells by
+/// the rule above hold no sample: plates and hills with noise of 0.04 spacings took 320 000 coefficients, now 180 000, for what
+/// 50 000 tell without noise.
+const SPARSE_NOISE_CELL: f64 = 0.7;
 /// Width of the band that noise fills, in standard deviations.
 const NOISE_BAND: f64 = 3.0;
 /// Standard deviation, in knot spacings, above which the points are moved to their feet.
@@ -111,7 +115,7 @@ fn default_coefficients(samples: &Samples, options: &PointOptions) -> Option<usi
 
 impl Plan {
     /// Clean clouds: `β = 0.6 s` (`s` the mean spacing), refined by residual. Noisy ones: every occupied cell
-    /// down to the last spacing of at least `1.5 √(σ̂s)`, a first fit with `β = σ̂/2` and a second on the
+    /// down to the last spacing of at least `1.5 √(σ̂s)` and `0.7 s`, a first fit with `β = σ̂/2` and a second on the
     /// [feet](super::feet) with `β = 0.3 s`, or the second alone where the noise is below a quarter of a cell; `μ`
     /// left to cross-validation, begun at `0.05 (h/s)²`, and a tolerance of `1.25 σ̂` unless one is given.
     ///
@@ -144,7 +148,8 @@ impl Plan {
         };
         let Some(sigma) = noise else { return clean };
         let spacing = samples.mean_spacing(NOISE_BAND * sigma);
-        let justified = depth_of(NOISE_CELL * (sigma * spacing).sqrt());
+        let by_samples = SPARSE_NOISE_CELL * spacing;
+        let justified = depth_of((NOISE_CELL * (sigma * spacing).sqrt()).max(by_samples));
         let max_depth = asked.unwrap_or(justified);
         let h = 0.5f64.powi(max_depth as i32);
         let is_thick = sigma > THICK * h;

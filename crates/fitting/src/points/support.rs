@@ -33,6 +33,19 @@ const ASKED: usize = 4000;
 /// parts; 1.9 % with noise); 1 % of uniform outliers: 0.2 and 1 %.
 const DOUBTS: [f64; 2] = [1e-3, 0.03];
 
+/// Points below which none is doubted: so few neighbours reach round a corner, or round a whole ball.
+const LEAST_ASKED: usize = 8 * NEIGHBOURS;
+/// Cosine between normals below which two points face against each other; it is 0 at the edges of a cube.
+const AGAINST: f64 = -0.5;
+/// Neighbours beside a point that more than half of have to face against it.
+const LEAST_BESIDE: usize = 6;
+/// Mean height over the tangent plane, in distances, up to which points that face against each other lie on one sheet. It is the
+/// half of a point's own sheet that noise puts above and the half below; another sheet is on one side.
+const ONE_SHEET: f64 = 0.1;
+
+/// Share of pairs that face against each other from which the other side of a wall is no contradiction.
+const WALL: f64 = 0.02;
+
 /// Nearest neighbours among the points of a cloud.
 pub(crate) type Tree = ImmutableKdTree<f64, 3>;
 
@@ -104,23 +117,81 @@ pub(crate) fn weights(samples: &Samples, tree: &Tree) -> Vec<f32> {
     live.iter().map(|&l| f32::from(u8::from(l))).collect()
 }
 
-/// A sentence that advises a robust fit, if the data ask for one.
+/// What the neighbours of a point say.
+struct Asked {
+    is_isolated: bool,
+    is_contradicted: bool,
+    /// The same if those beside it that face against it are the other side of a wall.
+    is_without_wall: bool,
+    /// Whether most of those beside it face against it.
+    is_against: bool,
+    /// Sum and number of the heights, in distances, of those beside it that do, and how many are beside it.
+    heights: (f64, usize),
+    beside: usize,
+}
+
+impl Asked {
+    fn of(samples: &Samples, tree: &Tree, i: usize) -> Self {
+        let (near, reach) = neighbours(samples, tree, i);
+        let normal = |k: usize| DVec3::from(samples.normals[k].map(f64::from));
+        let reach_of = |k: usize| neighbours(samples, tree, near[k] as usize).1;
+        let (mut facing, mut beside) = (0, 0);
+        let mut heights = (0.0, 0);
+        for j in near.map(|j| j as usize) {
+            facing += usize::from(face_alike(samples, i, j));
+            let way = samples.positions[j] - samples.positions[i];
+            let height = way.dot(normal(i)) / way.length();
+            // Not so for two samples at one place.
+            if height.abs() <= BESIDE {
+                beside += 1;
+                if normal(i).dot(normal(j)) < AGAINST {
+                    heights = (heights.0 + height, heights.1 + 1);
+                }
+            }
+        }
+        Self {
+            is_isolated: is_isolated(reach, reach_of),
+            is_contradicted: facing < NEEDED,
+            is_without_wall: facing + heights.1 < NEEDED,
+            is_against: beside >= LEAST_BESIDE && 2 * heights.1 > beside,
+            heights,
+            beside,
+        }
+    }
+}
+
+/// A sentence that advises a robust fit, or directions from the positions, if the data ask for one.
 pub(crate) fn doubt(samples: &Samples, tree: &Tree) -> Option<String> {
     let n = samples.positions.len();
-    let asked: Vec<[bool; 2]> = (0..n)
+    if n < LEAST_ASKED {
+        return None;
+    }
+    let asked: Vec<Asked> = (0..n)
         .step_by(n.div_ceil(ASKED))
-        .map(|i| {
-            let (near, reach) = neighbours(samples, tree, i);
-            let facing = near
-                .iter()
-                .filter(|&&j| face_alike(samples, i, j as usize))
-                .count();
-            let reach_of = |k: usize| neighbours(samples, tree, near[k] as usize).1;
-            [is_isolated(reach, reach_of), facing < NEEDED]
-        })
+        .map(|i| Asked::of(samples, tree, i))
         .collect();
-    let share = |k: usize| asked.iter().filter(|a| a[k]).count() as f64 / asked.len().max(1) as f64;
-    let [isolated, contradicted] = [share(0), share(1)];
+    let share = |is: fn(&Asked) -> bool| asked.iter().filter(|a| is(a)).count() as f64 / asked.len() as f64;
+    let against = share(|a| a.is_against);
+    let (sum, count) = asked.iter().fold((0.0, 0), |(sum, count), a| {
+        (sum + a.heights.0, count + a.heights.1)
+    });
+    // Where a share p is turned at random, 2p (1 − p) of the pairs face against each other.
+    let pairs = count as f64 / asked.iter().map(|a| a.beside).sum::<usize>().max(1) as f64;
+    let turned = 0.5 - 0.5 * (1.0 - 2.0 * pairs).max(0.0).sqrt();
+    let is_one_sheet = sum.abs() <= ONE_SHEET * count as f64;
+    if against > DOUBTS[1] && is_one_sheet {
+        return Some(format!(
+            "the normals of about {:.0} % of the points are turned against those of the points beside them: find the directions \
+             from the positions alone",
+            100.0 * turned.max(against.min(0.5))
+        ));
+    }
+    let contradicted = if is_one_sheet || pairs < WALL {
+        share(|a| a.is_contradicted)
+    } else {
+        share(|a| a.is_without_wall)
+    };
+    let isolated = share(|a| a.is_isolated);
     (isolated > DOUBTS[0] || contradicted > DOUBTS[1]).then(|| {
         format!(
             "{:.1} % of the points stand apart from the others and {:.1} % are contradicted by their neighbours: if \

@@ -345,6 +345,136 @@ fn far_signs_of_noisy_walls_are_right_at_any_seed() {
     }
 }
 
+/// Behind a terrain the solid goes on to the border of the box, where the winding number is that of the outside. Asked away
+/// there, it came back as a slab, with 25 times the coefficients and errors of a hundred deviations.
+#[test]
+fn a_noisy_open_sheet_keeps_its_solid() {
+    let mut random = SplitMix64::new(3);
+    let spots: Vec<[f64; 2]> = (0..8000)
+        .map(|_| [5.0, 4.0].map(|l| l * random.uniform()))
+        .collect();
+    let fit_of = |height: f64, noise: f64, random: &mut SplitMix64| {
+        let [positions, normals]: [Vec<DVec3>; 2] = [0, 1].map(|is_normal| {
+            let at = |[x, y]: &[f64; 2]| {
+                let z = height * x.sin() * y.cos();
+                let slope = DVec3::new(-height * x.cos() * y.cos(), height * x.sin() * y.sin(), 1.0);
+                if is_normal == 1 {
+                    slope.normalize()
+                } else {
+                    DVec3::new(*x, *y, z + noise * random.normal3().x)
+                }
+            };
+            spots.iter().map(at).collect()
+        });
+        let cloud = OrientedPoints {
+            positions: &positions,
+            normals: &normals,
+            certainty: None,
+        };
+        fit_points::<f32>(&cloud, &PointOptions::default(), &mut Control::default()).expect("a sheet")
+    };
+    let noise = 0.004;
+    for height in [0.0, 0.2] {
+        let clean = fit_of(height, 0.0, &mut random).1;
+        let (field, report) = fit_of(height, noise, &mut random);
+        assert!(!says(&report, "turned over"), "{:?}", report.notes);
+        assert!(report.rms < 1.2 * noise && report.max < 8.0 * noise, "{report:?}");
+        let [many, few] = [report.coefficients, clean.coefficients];
+        assert!(many < 4 * few, "{many} coefficients, {few} without noise");
+        for depth in [0.3, 0.6, 1.2] {
+            assert!(
+                field.value(DVec3::new(2.5, 2.0, -depth)) > 0.0,
+                "hollow {depth} below"
+            );
+        }
+    }
+}
+
+/// Normals turned at random, all of them turned, and what looks like it and is not.
+#[test]
+fn turned_normals_are_told_with_their_remedy() {
+    let turned = "turned against";
+    let inward = "point into what it encloses";
+    let told = |samples: &SampledCloud, expected: Option<&str>, what: &str| {
+        let options = to_depth(6);
+        let (_, report) = fit::<f32>(samples, &options).expect(what);
+        for word in [turned, inward] {
+            assert_eq!(
+                says(&report, word),
+                expected == Some(word),
+                "{what}: {:?}",
+                report.notes
+            );
+        }
+        assert!(
+            expected.is_none() || says(&report, "from the positions alone"),
+            "{what}"
+        );
+        assert!(!says(&report, "robust loss"), "{what}: {:?}", report.notes);
+    };
+    for seed in 1..=3 {
+        for (noise, lean) in [(0.0, 0.0), (0.01, 0.2)] {
+            let options = CloudOptions {
+                count: 6000,
+                noise,
+                seed,
+                ..CloudOptions::default()
+            };
+            for solid in [Solid::Sphere, Solid::Torus] {
+                let mut samples = cloud(solid, &options);
+                let mut random = SplitMix64::new(seed);
+                for n in &mut samples.normals {
+                    *n = (*n + lean * random.normal3()).normalize();
+                }
+                told(&samples, None, "outward");
+                let mut some = samples.clone();
+                for step in [2, 20] {
+                    some.normals.clone_from(&samples.normals);
+                    some.normals.iter_mut().step_by(step).for_each(|n| *n = -*n);
+                    told(&some, Some(turned), "every second or twentieth turned");
+                }
+                samples.normals.iter_mut().for_each(|n| *n = -*n);
+                told(&samples, Some(inward), "all turned");
+            }
+        }
+        // A wall half as thick as its samples are apart, and a cube of faces without round edges.
+        let ball =
+            |radius: f64| -> Arc<dyn Field> { Arc::new(Sphere::new(DVec3::ZERO, radius).expect("a ball")) };
+        let wall = Csg::difference(ball(1.0), vec![ball(0.97)], 0.0).expect("a wall");
+        let options = CloudOptions {
+            count: 6000,
+            seed,
+            ..CloudOptions::default()
+        };
+        told(
+            &sample_cloud(&wall, &Solid::Sphere.within(), &options).expect("a wall"),
+            None,
+            "a thin wall",
+        );
+        let mut random = SplitMix64::new(seed);
+        let mut cube = cloud(Solid::Sphere, &options);
+        for (p, n) in cube.positions.iter_mut().zip(&mut cube.normals) {
+            let axis = (6.0 * random.uniform()) as usize;
+            let sign = if axis < 3 { 1.0 } else { -1.0 };
+            *n = sign * DVec3::AXES[axis % 3];
+            *p = 2.0 * random.uniform3() - 1.0;
+            p[axis % 3] = sign;
+        }
+        told(&cube, None, "a cube");
+    }
+}
+
+/// Neighbours of ten points reach round the whole ball.
+#[test]
+fn few_points_are_not_doubted() {
+    let options = CloudOptions {
+        count: 10,
+        ..CloudOptions::default()
+    };
+    let (_, report) = fit::<f32>(&cloud(Solid::Sphere, &options), &PointOptions::default()).expect("a ball");
+    assert!(!says(&report, "contradicted"), "{:?}", report.notes);
+}
+
 #[test]
 fn offset_pairs_do_not_cross_a_thin_wall() {
     let samples = cloud(

@@ -30,6 +30,9 @@ pub struct PointCloud {
     pub invalid_dropped: usize,
     /// Kept points whose normal is zero, not finite, or cancelled out between faces.
     pub zero_normals: usize,
+    /// Names of what the points of the file have beside positions and normals, in the order of the file. It is not read, nor
+    /// written. In LAS, where every point has a place for each, only what is not zero everywhere.
+    pub left_out_attributes: Vec<String>,
     /// Repairs and doubts, each a sentence with its figures.
     pub notes: Vec<String>,
 }

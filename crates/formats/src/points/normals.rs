@@ -28,6 +28,7 @@ pub(super) fn finish(raw: RawShape, budget: &mut Budget) -> Result<PointCloud, F
         short_faces,
         unit,
         resolution,
+        left_out_attributes,
         notes,
         ..
     } = raw;
@@ -40,6 +41,7 @@ pub(super) fn finish(raw: RawShape, budget: &mut Budget) -> Result<PointCloud, F
         invalid_dropped,
         unit,
         resolution,
+        left_out_attributes,
         notes,
         ..Default::default()
     };

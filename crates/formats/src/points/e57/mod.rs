@@ -98,6 +98,13 @@ pub(super) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<RawShape, Fault
             scans.len()
         ));
     }
+    for record in scans.iter().flat_map(|s| &s.prototype) {
+        if let Some(name) = attribute(&record.name, takes_normals)
+            && !raw.left_out_attributes.contains(&name)
+        {
+            raw.left_out_attributes.push(name);
+        }
+    }
     for (i, (scan, columns)) in scans.iter().zip(&columns).enumerate() {
         let before = (out.positions.items.len(), out.invalid);
         let pose = pose(scan);
@@ -177,6 +184,22 @@ pub(super) fn pose(scan: &e57::PointCloud) -> DAffine3 {
             DVec3::new(t.translation.x, t.translation.y, t.translation.z),
         ),
     }
+}
+
+/// Name of what a scan has beside positions and normals.
+fn attribute(name: &RecordName, takes_normals: bool) -> Option<String> {
+    let name = match name {
+        RecordName::Intensity => "intensity",
+        RecordName::ColorRed | RecordName::ColorGreen | RecordName::ColorBlue => "color",
+        RecordName::RowIndex => "row_index",
+        RecordName::ColumnIndex => "column_index",
+        RecordName::ReturnCount | RecordName::ReturnIndex => "returns",
+        RecordName::TimeStamp => "time_stamp",
+        RecordName::Unknown { namespace, .. } if namespace == "nor" && takes_normals => return None,
+        RecordName::Unknown { name, .. } => name,
+        _ => return None,
+    };
+    Some(name.to_owned())
 }
 
 /// Where in a row of a scan the wanted values stand.

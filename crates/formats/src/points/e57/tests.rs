@@ -123,13 +123,16 @@ fn whole_multiples_and_singles_are_numbers_too() {
         kind(RecordName::CartesianY, RecordDataType::F32),
         // All the same: no bits at all.
         kind(RecordName::CartesianZ, RecordDataType::Integer { min: 7, max: 7 }),
+        kind(RecordName::Intensity, RecordDataType::F32),
     ];
     let values = vec![
         RecordValue::ScaledInteger(-1),
         RecordValue::Single(0.5),
         RecordValue::Integer(7),
+        RecordValue::Single(0.25),
     ];
     let cloud = parse_e57(&file(vec![(prototype, None, vec![values])]), &LIMITS).unwrap();
+    assert_eq!(cloud.left_out_attributes, ["intensity"]);
     assert!((cloud.positions[0] - DVec3::new(999_999_999.0, 500.0, 7000.0)).length() < 1e-6);
 }
 

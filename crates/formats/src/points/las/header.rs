@@ -196,16 +196,11 @@ impl<'a> Header<'a> {
         point[15] & if self.format < 6 { 0x80 } else { 0x04 } != 0
     }
 
-    /// Where the components of a normal stand in a point, if it has any: 4-byte floats or 8-byte ones.
-    pub fn normal_columns(&self) -> Option<[(usize, bool); 3]> {
-        const NAMES: [[&[u8]; 3]; 3] = [
-            [b"normalx", b"normal_x", b"nx"],
-            [b"normaly", b"normal_y", b"ny"],
-            [b"normalz", b"normal_z", b"nz"],
-        ];
+    /// The extra bytes that the file names, as far as their sizes are known and a point holds them.
+    fn entries(&self) -> Vec<Extra> {
         let mut at = usize::from(LEAST_RECORD[usize::from(self.format)]);
-        let mut found = [None; 3];
-        for entry in self.record("LASF_Spec", 4)?.chunks_exact(192) {
+        let mut found = Vec::new();
+        for entry in self.record("LASF_Spec", 4).unwrap_or_default().chunks_exact(192) {
             let size = match entry[2] {
                 0 => usize::from(entry[3]),
                 1 | 2 => 1,
@@ -213,21 +208,57 @@ impl<'a> Header<'a> {
                 5 | 6 | 9 => 4,
                 7 | 8 | 10 => 8,
                 // Deprecated pairs and triples.
-                _ => return None,
+                _ => break,
             };
-            let name = entry[4..36]
-                .split(|b| *b == 0)
-                .next()
-                .unwrap_or(b"")
-                .to_ascii_lowercase();
-            if let (9 | 10, Some(axis)) = (entry[2], NAMES.iter().position(|n| n.contains(&&name[..]))) {
-                found[axis] = Some((at, entry[2] == 10));
+            let name = entry[4..36].split(|b| *b == 0).next().unwrap_or(b"");
+            if at + size > self.record_bytes {
+                break;
             }
+            found.push(Extra {
+                name: String::from_utf8_lossy(name).into_owned(),
+                kind: entry[2],
+                at,
+                size,
+            });
             at += size;
         }
-        let [Some(x), Some(y), Some(z)] = found else {
-            return None;
-        };
-        (at <= self.record_bytes).then_some([x, y, z])
+        found
     }
+
+    /// The extra bytes that are no normal.
+    pub fn extra_bytes(&self) -> Vec<Extra> {
+        let normal = self.normal_columns();
+        let is_normal = |e: &Extra| normal.is_some_and(|n| n.iter().any(|(at, _)| *at == e.at));
+        let mut entries = self.entries();
+        entries.retain(|e| !is_normal(e));
+        entries
+    }
+
+    /// Where the components of a normal stand in a point, if it has any: 4-byte floats or 8-byte ones.
+    pub fn normal_columns(&self) -> Option<[(usize, bool); 3]> {
+        const NAMES: [[&str; 3]; 3] = [
+            ["normalx", "normal_x", "nx"],
+            ["normaly", "normal_y", "ny"],
+            ["normalz", "normal_z", "nz"],
+        ];
+        let mut found = [None; 3];
+        for entry in self.entries() {
+            let name = entry.name.to_ascii_lowercase();
+            if let (9 | 10, Some(axis)) = (entry.kind, NAMES.iter().position(|n| n.contains(&&name[..]))) {
+                found[axis] = Some((entry.at, entry.kind == 10));
+            }
+        }
+        let [x, y, z] = found;
+        Some([x?, y?, z?])
+    }
+}
+
+/// A number that a point holds beyond its format.
+pub(in crate::points) struct Extra {
+    pub name: String,
+    /// Type of the number [ASPRS, LAS Specification 1.4-R15, table 24].
+    kind: u8,
+    /// First byte in a point, and how many.
+    pub at: usize,
+    pub size: usize,
 }

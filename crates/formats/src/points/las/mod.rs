@@ -3,6 +3,7 @@
 //! The header is read here, since every promise in it has to be checked before anything is made room for; the
 //! compression is crate laz.
 
+mod attributes;
 pub(super) mod header;
 pub(super) mod laz;
 pub(super) mod unit;
@@ -10,6 +11,7 @@ mod write;
 
 use glam::DVec3;
 
+use self::attributes::Attributes;
 use self::header::Header;
 use super::cloud::PointCloud;
 use super::normals;
@@ -44,6 +46,7 @@ pub(super) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<RawShape, Fault
         normal_columns: header.normal_columns(),
         positions: Counted::new("points"),
         normals: Counted::new("normals"),
+        attributes: Attributes::new(&header),
         withheld: 0,
     };
     if header.is_compressed {
@@ -62,6 +65,7 @@ pub(super) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<RawShape, Fault
         ));
     }
     Ok(RawShape {
+        left_out_attributes: out.attributes.names(&header),
         normals: out.normal_columns.map(|_| out.normals.items),
         positions: out.positions.items,
         unit: if unit == Unit::Unknown {
@@ -82,6 +86,7 @@ struct Out<'a> {
     normal_columns: Option<[(usize, bool); 3]>,
     positions: Counted<DVec3>,
     normals: Counted<DVec3>,
+    attributes: Attributes,
     withheld: u64,
 }
 
@@ -91,6 +96,7 @@ impl Out<'_> {
             self.withheld += 1;
             return Ok(());
         }
+        self.attributes.add(point);
         let x = |axis: usize| f64::from(header::u32_at(point, 4 * axis) as i32);
         let p = DVec3::new(x(0), x(1), x(2)) * self.header.scale + self.header.offset;
         self.positions.push(p * self.scale, budget)?;

@@ -85,6 +85,25 @@ fn a_step_leaves_room_for_any_cloud_and_keeps_decimals() {
     );
 }
 
+/// Of what every point has room for, only what some point has.
+#[test]
+fn attributes_are_named_where_they_are_not_zero() {
+    for compress in [false, true] {
+        let file = bytes(&cloud(10, Unit::Unknown, true), compress);
+        assert!(parse_las(&file, &LIMITS).unwrap().left_out_attributes.is_empty());
+    }
+    let mut file = bytes(&cloud(10, Unit::Unknown, true), false);
+    let (first, format) = (header::u32_at(&file, 96) as usize, file[104] & 0x3f);
+    let class = if format < 6 { 15 } else { 16 };
+    for (at, byte) in [(13, 4), (14, 2), (class, 6)] {
+        file[first + at] = byte;
+    }
+    assert_eq!(
+        parse_las(&file, &LIMITS).unwrap().left_out_attributes,
+        ["returns", "intensity", "classification"]
+    );
+}
+
 #[test]
 fn withheld_points_are_left_out_and_counted() {
     let mut file = bytes(&cloud(10, Unit::Unknown, false), false);

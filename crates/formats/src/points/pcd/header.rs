@@ -69,9 +69,13 @@ pub(in crate::points) struct Header {
     /// Byte at which the rows start, and the line of it.
     pub body: usize,
     pub line: u64,
+    /// Names of the other fields.
+    pub others: Vec<String>,
     pub notes: Vec<String>,
 }
 
+/// Fields of a position and a normal.
+const NAMES: [&str; 6] = ["x", "y", "z", "normal_x", "normal_y", "normal_z"];
 const FIELDS_REMEDY: &str = "FIELDS, SIZE, TYPE and COUNT have one word for each field";
 
 pub(in crate::points) fn read(bytes: &[u8]) -> Result<Header, Fault> {
@@ -136,6 +140,10 @@ pub(in crate::points) fn read(bytes: &[u8]) -> Result<Header, Fault> {
                 };
                 let mut sizes = Vec::new();
                 let layout = layout(&fields, &entries, &mut sizes)?;
+                let taken = &NAMES[..layout.0.len()];
+                let is_taken = |f: &str| taken.iter().any(|n| n.eq_ignore_ascii_case(f));
+                // Fields of that name are room between others.
+                fields.retain(|f| f != "_" && !is_taken(f));
                 return Ok(Header {
                     encoding,
                     points,
@@ -145,6 +153,7 @@ pub(in crate::points) fn read(bytes: &[u8]) -> Result<Header, Fault> {
                     sizes,
                     body: bytes.len() - lines.left(),
                     line: line + 1,
+                    others: fields,
                     notes,
                 });
             }
@@ -168,7 +177,6 @@ fn layout(
     entries: &[Option<(u64, Vec<&[u8]>)>; 3],
     sizes: &mut Vec<usize>,
 ) -> Result<(Vec<Column>, usize, usize), Fault> {
-    let names = ["x", "y", "z", "normal_x", "normal_y", "normal_z"];
     let mut found = [None; 6];
     let (mut stride, mut words) = (0usize, 0usize);
     // Files older than the three lines hold floats.
@@ -207,7 +215,7 @@ fn layout(
                     "a count is a whole number below 65536",
                 )
             })?;
-        if let (Some(slot), 1) = (names.iter().position(|n| n.eq_ignore_ascii_case(name)), count) {
+        if let (Some(slot), 1) = (NAMES.iter().position(|n| n.eq_ignore_ascii_case(name)), count) {
             found[slot] = found[slot].or(Some(Column {
                 kind,
                 offset: stride,

@@ -42,6 +42,7 @@ pub(super) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<RawShape, Fault
     let mut header = header::read(bytes)?;
     let mut raw = RawShape {
         notes: std::mem::take(&mut header.notes),
+        left_out_attributes: std::mem::take(&mut header.others),
         ..Default::default()
     };
     let body = &bytes[header.body..];

@@ -91,6 +91,14 @@ fn read_elements<V: Values>(
         })?;
     let columns = Columns::of(vertex, wanted)?;
     let mut raw = RawShape::default();
+    if wanted == Wanted::Cloud {
+        let unused = vertex
+            .properties
+            .iter()
+            .zip(&columns.slots)
+            .filter(|(_, s)| s.is_none());
+        raw.left_out_attributes = unused.map(|(p, _)| p.name.clone()).collect();
+    }
     let mut faces = Faces::new();
     for element in &header.elements {
         check_count(element, header, left(&values))?;

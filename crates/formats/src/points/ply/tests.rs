@@ -113,6 +113,20 @@ fn lists_among_the_coordinates_are_skipped() {
     assert_eq!(read(&file).unwrap().positions[1], DVec3::new(2.0, 20.0, 200.0));
 }
 
+#[test]
+fn properties_that_are_not_taken_are_named() {
+    let file = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float nx\nproperty float y\nproperty float z\n\
+                property uchar red\nproperty list uchar int seen\nend_header\n1 0 2 3 255 1 7\n";
+    let cloud = read(file.as_bytes()).unwrap();
+    assert_eq!(
+        cloud.left_out_attributes,
+        ["nx", "red", "seen"],
+        "nx alone is no normal"
+    );
+    let plain = read(&ascii(4, "", SQUARE)).unwrap();
+    assert!(plain.left_out_attributes.is_empty());
+}
+
 fn ascii(vertices: u64, rest: &str, body: &str) -> Vec<u8> {
     format!(
         "ply\nformat ascii 1.0\nelement vertex {vertices}\nproperty float x\nproperty float y\n\

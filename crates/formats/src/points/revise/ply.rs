@@ -5,6 +5,16 @@ use crate::points::ply::header::{self, Element, Encoding, Header, Scalar, Shape}
 /// Names of what is written of a point.
 const NAMES: [&str; 6] = ["x", "y", "z", "nx", "ny", "nz"];
 
+/// Whether rows of this element may name vertices by number: by a list, by a whole number called after a vertex, as the
+/// `vertex1` and `vertex2` of an edge, or by those of an edge under any name.
+fn names_vertices(element: &Element) -> bool {
+    element.properties.iter().any(|p| match p.shape {
+        Shape::List { .. } => true,
+        Shape::One(Scalar::F32 | Scalar::F64) => false,
+        Shape::One(_) => p.name.starts_with("vertex") || element.name == "edge",
+    })
+}
+
 /// The bytes of the file with its changes.
 pub fn revised(bytes: &[u8], changes: &CloudChanges) -> Result<Vec<u8>, Fault> {
     let header = header::read(bytes)?;
@@ -17,8 +27,9 @@ pub fn revised(bytes: &[u8], changes: &CloudChanges) -> Result<Vec<u8>, Fault> {
         );
     };
     let counts_change = !changes.removed.is_empty() || !changes.added.is_empty();
-    if counts_change && others.iter().any(|e| e.count > 0) {
-        let names: Vec<_> = others.iter().map(|e| e.name.as_str()).collect();
+    let naming = others.iter().filter(|e| e.count > 0 && names_vertices(e));
+    let names: Vec<_> = naming.map(|e| e.name.as_str()).collect();
+    if counts_change && !names.is_empty() {
         return not(
             "what names the vertices by number",
             names.join(", "),

@@ -279,6 +279,51 @@ fn rows_move_go_and_come_and_the_others_stay() {
     }
 }
 
+/// A camera and a material name no vertex; an edge does.
+#[test]
+fn elements_that_name_no_vertices_are_copied() {
+    for (format, body) in [
+        ("ascii", b"1 2 3\n4 5 6\n7 8 9.5\n0.5 0.25 7\n3 4 5\n".to_vec()),
+        ("binary_little_endian", {
+            let numbers = [1.0f32, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.5, 0.5, 0.25];
+            let mut out: Vec<u8> = numbers.iter().flat_map(|x| x.to_le_bytes()).collect();
+            out.extend(7i32.to_le_bytes());
+            out.extend([3, 4, 5]);
+            out
+        }),
+    ] {
+        let head = format!(
+            "ply\nformat {format} 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement camera 1\n\
+             property float view_px\nproperty float view_py\nproperty int viewportx\nelement material 1\nproperty uchar \
+             red\nproperty uchar green\nproperty uchar blue\nend_header\n"
+        );
+        let tail = if format == "ascii" { 17 } else { 15 };
+        let file = [head.as_bytes(), &body[..]].concat();
+        let (new, cloud) = revised("camera.ply", &file, &changes());
+        let places: Vec<_> = cloud.positions.iter().map(|p| p.to_array()).collect();
+        assert_eq!(
+            places,
+            [[7.0, 0.25, -1.5], [7.0, 8.0, 9.5], [9.0, 0.25, -1.5]],
+            "{format}"
+        );
+        assert!(new.ends_with(&body[body.len() - tail..]), "{format}");
+    }
+    let directory = tempfile::tempdir().unwrap();
+    for property in ["list uchar int of", "int vertex1", "int from"] {
+        let element = if property == "int from" { "edge" } else { "other" };
+        let row = if property.starts_with("list") { "1 0" } else { "0" };
+        let file = format!(
+            "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement {element} 1\n\
+             property {property}\nend_header\n0 0 0\n1 0 0\n0 1 0\n{row}\n"
+        );
+        let like = directory.path().join("like.ply");
+        fs::write(&like, file).unwrap();
+        let output = directory.path().join("out.ply");
+        let e = save_revised(&like, &changes(), &output, &ReadLimits::default()).unwrap_err();
+        assert!(e.to_string().contains("by number"), "{property}: {e}");
+    }
+}
+
 #[test]
 fn what_cannot_be_written_back_is_refused() {
     let directory = tempfile::tempdir().unwrap();

@@ -33,6 +33,7 @@ pub(in crate::points) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<RawS
     let mut normals = Counted::new("normals");
     let mut columns = 0;
     let mut promised = None;
+    let mut names = Vec::new();
     // Line of the first triple that is no unit vector.
     let mut not_unit = None;
     let mut has_negative = false;
@@ -53,15 +54,15 @@ pub(in crate::points) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<RawS
                     "line {line}: column names {} were skipped",
                     excerpt(text)
                 ));
+                names = words(text)
+                    .map(|w| String::from_utf8_lossy(w).into_owned())
+                    .collect();
                 continue;
             }
         }
         let mut row = [0.0; 6];
         let mut found = 0;
-        for word in text
-            .split(|c| matches!(c, b' ' | b'\t' | b',' | b';'))
-            .filter(|w| !w.is_empty())
-        {
+        for word in words(text) {
             if found < 6 {
                 row[found] = number(word, line)?;
             }
@@ -110,7 +111,13 @@ pub(in crate::points) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<RawS
         )),
         _ => {}
     }
+    let taken = if stored { 6 } else { 3 };
+    let name = |i: usize| match names.get(i) {
+        Some(name) if names.len() == columns => name.clone(),
+        _ => format!("column {}", i + 1),
+    };
     Ok(RawShape {
+        left_out_attributes: (taken..columns).map(name).collect(),
         positions: positions.items,
         normals: stored.then_some(normals.items),
         notes,
@@ -144,11 +151,14 @@ impl Line {
     }
 }
 
+fn words(text: &[u8]) -> impl Iterator<Item = &[u8]> + Clone {
+    text.split(|c| matches!(c, b' ' | b'\t' | b',' | b';'))
+        .filter(|w| !w.is_empty())
+}
+
 /// Whether a line holds words only, as `X,Y,Z` does.
 fn is_column_names(text: &[u8]) -> bool {
-    let mut words = text
-        .split(|c| matches!(c, b' ' | b'\t' | b',' | b';'))
-        .filter(|w| !w.is_empty());
+    let mut words = words(text);
     words.clone().count() >= 3
         && words.all(|w| {
             w.iter().any(u8::is_ascii_alphabetic)
@@ -210,6 +220,20 @@ mod tests {
         );
         let c = read("1 2 3 0 0 0\n4 5 6 0 0 0\n").unwrap();
         assert_eq!((c.zero_normals, c.normals.unwrap().len()), (2, 2));
+    }
+
+    #[test]
+    fn columns_that_are_not_taken_are_named() {
+        for (text, expected) in [
+            ("1 2 3\n", &[][..]),
+            ("1 2 3 0 0 1\n", &[]),
+            ("1 2 3 0.5\n", &["column 4"]),
+            ("x,y,z,nx,ny,nz,intensity\n1,2,3,0,0,1,9\n", &["intensity"]),
+            ("x y z r g b\n1 2 3 9 8 7\n", &["r", "g", "b"]),
+            ("x y z\n1 2 3 9\n", &["column 4"]),
+        ] {
+            assert_eq!(read(text).unwrap().left_out_attributes, expected, "{text}");
+        }
     }
 
     #[test]
