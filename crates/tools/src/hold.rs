@@ -16,6 +16,9 @@ const REACH: f64 = 0.1;
 const MOST: f64 = 1000.0;
 const APART: f64 = 0.5;
 
+/// Stiffest spring, over the stiffness of the solid: rounding in single precision leaves less of that beside it than steps need.
+const STIFFEST: f64 = 1e6;
+
 /// Puts a constraint on the object. Exactly one of `points`, `along` and `sketch` is given.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -96,6 +99,13 @@ impl Hold {
                 p.to_array(),
                 whole.min.to_array(),
                 whole.max.to_array()
+            ));
+        }
+        if let Some(spring) = self.spring.filter(|spring| spring.0 > STIFFEST) {
+            return Err(format!(
+                "a spring of {:e} is too stiff for steps in single precision; write {STIFFEST:e} at most, or leave it out, which holds \
+                 exactly what lies on the surface",
+                spring.0
             ));
         }
         if self.spring.is_none() {

@@ -56,7 +56,7 @@ impl Place {
         if self.is_turning() {
             let middle = after.map.transform_point3(canvas.field.whole().center());
             let about = self.about.map_or(middle, |p| p.0);
-            let turn = rotation_of(self.turn.map_or(DVec3::ZERO, |turn| turn.0));
+            let turn = rotation_of(self.turn.map_or(DVec3::ZERO, |turn| turn.0))?;
             let turn = DMat3::from_quat(turn) * self.scale.map_or(1.0, |scale| scale.0);
             after.map = DAffine3::from_mat3_translation(turn, about - turn * about) * after.map;
         }

@@ -2,16 +2,23 @@
 
 use std::collections::BTreeSet;
 
-use bspline::HierarchicalSpline;
+use bspline::hierarchical::DiffError;
+use bspline::{Field, HierarchicalSpline};
 use glam::{DAffine3, DVec3};
 use serde::{Deserialize, Serialize};
 
 use crate::canvas::Canvas;
-use crate::coefficients::{Functions, changed, coefficient, with_functions};
+use crate::coefficients::{Functions, changed, coefficient, support, with_functions};
 use crate::force::ForceError;
-use crate::geometric::{GeometricError, reflection};
+use crate::geometric::{GeometricError, TOLERANCE, reflection};
 use crate::number::Point;
 use crate::tool::{Tool, ToolError};
+
+/// Share of a finest knot interval that an even surface may be off by on the other side: a quarter of what tools are off by.
+const EVEN: f64 = 0.25 * TOLERANCE;
+
+/// Share of its largest change at which a stroke counts as acting on both sides at once.
+const OVERLAP: f64 = 0.25;
 
 /// A plane on both sides of which a stroke happens.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -40,6 +47,9 @@ impl Symmetry {
     /// plane is one of the lattice's and the field is even about it, the coefficients of one side are those of the other to the bit: they
     /// are copied. Holds are on their own side alone, so what they keep is not copied.
     ///
+    /// Tools whose changes would add up begin on both sides with the surface as the stroke found it; where both sides reach, the one that
+    /// changes more there counts. On fields that are not even, that is so where the stroke reaches over the plane.
+    ///
     /// # Errors
     /// Those of the tool; [`GeometricError`](crate::geometric::GeometricError) for a normal without direction.
     pub(crate) fn apply(
@@ -55,12 +65,27 @@ impl Symmetry {
             matches!(tool, Tool::Force(_) | Tool::Extrude(_) | Tool::Bend(_)) && !before.holds.is_empty();
         let plane = Plane::of(field, &mirror, self.normal.0).filter(|_| !is_held);
         let (one, notes) = once(before.clone())?;
-        let copied = plane.as_ref().and_then(|plane| plane.copied(field, &one.field));
         // Only fields are copied.
         let has_more = match tool {
             Tool::Move(_) => !(one.layers.is_empty() && one.holds.is_empty()),
             _ => paints,
         };
+        let adds_up = matches!(
+            tool,
+            Tool::Force(_)
+                | Tool::Extrude(_)
+                | Tool::Bend(_)
+                | Tool::Move(_)
+                | Tool::Smooth(_)
+                | Tool::Inflate(_)
+                | Tool::Push(_)
+        );
+        let copied = plane.as_ref().and_then(|plane| {
+            let copied = plane.copied(field, &one.field);
+            // What is carried along passes the plane twice, and so does the surface then.
+            let is_carried = matches!(tool, Tool::Move(_)) && has_more;
+            copied.or_else(|| (adds_up && !is_carried).then(|| plane.once(field, &one.field))?)
+        });
         if let (Some(field), false) = (&copied, has_more) {
             return Ok((
                 Canvas {
@@ -71,9 +96,24 @@ impl Symmetry {
             ));
         }
         let lattice = field.lattice().world_from_lattice;
-        let (other, notes) =
-            once(one.placed(mirror * lattice, &mirror)).map_err(|e| there(e, &mirror, field))?;
-        let mut both = other.placed(lattice, &mirror);
+        let mut other_side = |canvas: &Canvas| {
+            let (other, notes) =
+                once(canvas.placed(mirror * lattice, &mirror)).map_err(|e| there(e, &mirror, field))?;
+            Ok::<_, ToolError>((other.placed(lattice, &mirror), notes))
+        };
+        // A motion carries holds and paint on, so its sides follow each other; and so do those that lie apart, as each then finds what the
+        // other left beside it.
+        if adds_up
+            && !paints
+            && !matches!(tool, Tool::Move(_))
+            && overlaps(field, &one.field, &mirror).map_err(GeometricError::shape)?
+        {
+            let (other, more) = other_side(&before)?;
+            let field = larger(field, &one.field, &other.field).map_err(GeometricError::shape)?;
+            let new = more.into_iter().filter(|note| !notes.contains(note)).collect();
+            return Ok((Canvas { field, ..one }, [notes, new].concat()));
+        }
+        let (mut both, notes) = other_side(&one)?;
         if !matches!(tool, Tool::Move(_)) {
             both.holds = one.holds;
         }
@@ -83,6 +123,61 @@ impl Symmetry {
         }
         Ok((both, notes))
     }
+}
+
+/// Where functions have their knots.
+fn knots(field: &HierarchicalSpline<f32>, functions: &[(usize, [u32; 3])]) -> Vec<DVec3> {
+    let knot = |(level, function): &(usize, [u32; 3])| support(field, *level, *function).0;
+    functions.iter().map(knot).collect()
+}
+
+/// How much two versions of a field differ at places.
+fn differences(old: &HierarchicalSpline<f32>, new: &HierarchicalSpline<f32>, places: &[DVec3]) -> Vec<f64> {
+    let [old, new] = [old, new].map(|field| {
+        let mut values = vec![(0.0, DVec3::ZERO); places.len()];
+        field.values_gradients(places, &mut values);
+        values
+    });
+    old.iter()
+        .zip(&new)
+        .map(|(old, new)| (new.0 - old.0).abs())
+        .collect()
+}
+
+/// Whether a change is somewhere large on both sides of a mirror.
+fn overlaps(
+    old: &HierarchicalSpline<f32>,
+    new: &HierarchicalSpline<f32>,
+    mirror: &DAffine3,
+) -> Result<bool, DiffError> {
+    let functions = changed(old, new)?.into_keys();
+    let knots: Vec<DVec3> = functions.map(|(level, s)| support(old, level, s).0).collect();
+    let mirrored: Vec<DVec3> = knots.iter().map(|p| mirror.transform_point3(*p)).collect();
+    let [own, other] = [&knots, &mirrored].map(|places| differences(old, new, places));
+    let largest = own.iter().copied().fold(0.0, f64::max);
+    let both = own.iter().zip(&other).map(|(own, other)| own.min(*other));
+    Ok(both.fold(0.0, f64::max) > OVERLAP * largest)
+}
+
+/// Two changes of a field in one: each function is as in the version that changes more at its knot.
+fn larger(
+    old: &HierarchicalSpline<f32>,
+    one: &HierarchicalSpline<f32>,
+    other: &HierarchicalSpline<f32>,
+) -> Result<HierarchicalSpline<f32>, DiffError> {
+    let mut functions = changed(old, one)?;
+    functions.extend(changed(old, other)?);
+    let functions: Vec<_> = functions.into_keys().collect();
+    let places = knots(old, &functions);
+    let changes = differences(old, one, &places)
+        .into_iter()
+        .zip(differences(old, other, &places));
+    let of_other = functions
+        .iter()
+        .zip(changes)
+        .filter(|(_, (one, other))| other > one);
+    let of_other = of_other.map(|((level, s), _)| ((*level, *s), coefficient(other, *level, *s)));
+    with_functions(one, &of_other.collect())
 }
 
 /// An error of the other side, where that side is.
@@ -139,13 +234,15 @@ impl Plane {
         ((own - other).signum() * self.side, found)
     }
 
-    /// Whether `field` is even in all functions of a list; none if one of them has no partner in the lattice.
+    /// Whether `field` is even in all functions of a list, but for rounding; not if one of them has no partner in the lattice.
     fn is_even(&self, field: &HierarchicalSpline<f32>, functions: &Functions<f32>) -> bool {
+        let most = EVEN * field.slope() * field.finest_spacing();
         functions.keys().all(|(level, function)| {
             let count = field.lattice().cells_at(*level)[self.axis] + 3;
             match self.partner(*level, *function).1 {
                 Some(other) if other[self.axis] < count => {
-                    coefficient(field, *level, *function) == coefficient(field, *level, other)
+                    let value = |s| coefficient(field, *level, s).map_or(0.0, f64::from);
+                    (value(*function) - value(other)).abs() <= most
                 }
                 _ => false,
             }
@@ -177,6 +274,38 @@ impl Plane {
             ((*level, partner.expect("checked before")), *value)
         });
         with_functions(new, &mirrored.collect()).ok()
+    }
+
+    /// A change over the plane of an even field, on both: each function and its partner are as the one of them at whose knot the
+    /// field changes more.
+    fn once(
+        &self,
+        old: &HierarchicalSpline<f32>,
+        new: &HierarchicalSpline<f32>,
+    ) -> Option<HierarchicalSpline<f32>> {
+        let functions = changed(old, new).ok()?;
+        if !self.is_even(old, &functions) {
+            return None;
+        }
+        let mut pairs = BTreeSet::new();
+        for (level, function) in functions.keys() {
+            let (side, partner) = self.partner(*level, *function);
+            let partner = partner.expect("checked before");
+            pairs.insert(match side < 0 {
+                true => [(*level, partner), (*level, *function)],
+                false => [(*level, *function), (*level, partner)],
+            });
+        }
+        let functions: Vec<_> = pairs.iter().flatten().copied().collect();
+        let changes = differences(old, new, &knots(old, &functions));
+        let mut even = Functions::new();
+        for (pair, change) in pairs.iter().zip(changes.as_chunks::<2>().0) {
+            // Of equal ones the side of the normal counts.
+            let (level, function) = pair[usize::from(change[1] > change[0])];
+            let value = coefficient(new, level, function);
+            even.extend(pair.map(|function| (function, value)));
+        }
+        with_functions(new, &even).ok()
     }
 
     /// A change on both sides of an even field, the weaker side replaced by the other.

@@ -203,7 +203,7 @@ pub(super) struct Row {
     /// `(coefficient, weight)`, ascending.
     pub terms: Vec<(usize, f64)>,
     pub target: f64,
-    /// Size of the row as if nothing were fixed, and of the densities that make up its target.
+    /// Size of the row as if nothing were fixed, and of the densities that its target is known from.
     pub weight: f64,
     pub size: f64,
 }

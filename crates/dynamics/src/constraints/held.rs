@@ -33,6 +33,9 @@ impl<T: Real> Held<T> {
     ) -> Result<Self, ConstraintError> {
         let rows = constraints.iter().map(|c| Row::new(c, lattice, base));
         let mut rows: Vec<Row> = rows.collect::<Result<_, _>>()?;
+        // A field that is zero at a place is so but for the rounding of the densities about it.
+        let largest = base.iter().fold(0.0_f64, |most, d| most.max(d.as_f64().abs()));
+        rows.iter_mut().for_each(|row| row.size += row.weight * largest);
         if let Some(mask) = mask {
             let moves = |term: &(usize, f64)| mask.moving().binary_search(&term.0).is_ok();
             rows.iter_mut().for_each(|row| row.terms.retain(moves));

@@ -7,6 +7,8 @@ use crate::solve::OrthonormalRows;
 const RANK: f64 = 1e-7;
 /// Share of the densities that an implied row may be off by: that of single-precision input.
 const CONSISTENT: f64 = 1e-6;
+/// Share of the densities by which what is left of a row may move a coefficient, if its own is rounding.
+const MAGNIFIED: f64 = 1e-3;
 /// Share of its weight that a row has to have on free coefficients.
 const REACH: f64 = 1e-6;
 
@@ -118,8 +120,13 @@ impl Independent {
             }
             row.done = true;
             let q: Vec<f64> = row.rest.iter().map(|r| r / length).collect();
-            let c = row.c / length;
-            let shares: Vec<f64> = row.shares.iter().map(|s| s / length).collect();
+            // Over a short rest, rounding would move matter by far more than any density asked for.
+            let size = row.row.size / row.length;
+            let is_rounding = row.c.abs() <= CONSISTENT * size && row.c.abs() > MAGNIFIED * size * length;
+            let kept = if is_rounding { 0.0 } else { 1.0 / length };
+            out.dependent |= is_rounding;
+            let c = kept * row.c;
+            let shares: Vec<f64> = row.shares.iter().map(|s| kept * s).collect();
             let k = chosen.len();
             for other in left.iter_mut().filter(|r| !r.done) {
                 other.reduce(&q, c, &shares, k);
@@ -132,7 +139,7 @@ impl Independent {
         for row in left.iter().filter(|r| !r.done) {
             out.check(row, &left, &chosen)?;
         }
-        out.dependent = chosen.len() < rows.len();
+        out.dependent |= chosen.len() < rows.len();
         out.aim(rows.iter().map(|r| r.1.target));
         Ok(out)
     }

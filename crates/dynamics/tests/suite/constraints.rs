@@ -296,6 +296,44 @@ fn redundant_hard_constraints_change_nothing() {
     }
 }
 
+/// Points of the surface itself, at a tenth of a sample distance: their densities are zero but for rounding, and so is what one of them is off by
+/// when the others hold. What is off by more is still refused.
+#[test]
+fn finely_sampled_hard_curves_on_the_surface_agree_to_rounding() {
+    let line = |off: f64| {
+        let points = [[4.3, 4.4, 0.5], [4.3, 6.1, 8.5]];
+        let rounded = |at: [f64; 3]| field(at) + off * (1e3 * at[2]).sin();
+        curve("line", &points, 0.1, 0.0, Hold::Hard, rounded).unwrap()
+    };
+    let mut p = linear(true);
+    p.set_constraints(&line(3e-8)).unwrap();
+    for _ in 0..20 {
+        p.step(Integrator::TrBdf2, 1.0).unwrap();
+    }
+    let worst = p.constraint_gaps().fold(0.0_f64, |w, g| w.max(g.abs()));
+    assert!(worst < 1e-6, "{worst:.1e}");
+    // What is rounding moves nothing by itself.
+    let exact = {
+        let mut p = linear(true);
+        p.set_constraints(&line(0.0)).unwrap();
+        for _ in 0..20 {
+            p.step(Integrator::TrBdf2, 1.0).unwrap();
+        }
+        p.state().d.clone()
+    };
+    let moved = p.state().d.iter().zip(&exact);
+    let moved = moved.fold(0.0_f64, |w, (a, b)| w.max((a - b).abs()));
+    assert!(moved < 0.02, "{moved}");
+    let refused = p.set_constraints(&line(1e-3)).unwrap_err();
+    assert!(
+        matches!(
+            refused,
+            PatchError::Constraint(ConstraintError::Inconsistent { .. })
+        ),
+        "{refused}"
+    );
+}
+
 fn held_over_many_steps<T: Real>(
     (n, rim, painted, limit): (usize, Rim, bool, usize),
     law: Law,

@@ -1,6 +1,7 @@
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use bspline::hierarchical::Lattice;
+use bspline::hierarchical::{BRICK, BrickKey, DenseCorrections, Lattice};
 use bspline::primitives::Cuboid;
 use bspline::{Csg, Field, HierarchicalSpline};
 use fitting::Control;
@@ -22,12 +23,15 @@ const EDGE: f64 = 1.5;
 /// The same over the shortest edge, at most.
 const MOST_EDGE: f64 = 0.25;
 
+/// Shortest and longest length of a block: coefficients are in single precision, and so are squares of some lengths over others.
+const LENGTHS: [f64; 2] = [1e-30, 1e30];
+
 /// A block of clay to start from: a box about the origin with edges `size`, in knot intervals of `spacing`, both world lengths. Its
 /// field is the distance to its faces, positive inside, with the edges rounded by one and a half knot intervals; the field's own box
 /// leaves half the longest edge about it free.
 ///
 /// # Errors
-/// [`GeometricError::Shape`] if a length is not a positive number, or the block is less than two or more than 2²⁰ intervals
+/// [`GeometricError::Shape`] if a length is not a positive number or beyond single precision, or the block is less than two or more than 2²⁰ intervals
 /// wide; [`GeometricError::Fit`].
 pub fn block(
     size: DVec3,
@@ -35,11 +39,7 @@ pub fn block(
     control: &mut Control,
 ) -> Result<HierarchicalSpline<f32>, GeometricError> {
     let wrong = |why: String| Err(GeometricError::Shape(why));
-    if !(size.is_finite() && size.min_element() > 0.0 && spacing.is_finite() && spacing > 0.0) {
-        return wrong(format!(
-            "a block of {size} at {spacing} makes no sense; give lengths above 0"
-        ));
-    }
+    check_lengths(size, spacing)?;
     let across = size / spacing;
     if across.min_element() < 2.0 || across.max_element() > f64::from(1 << 20) {
         return wrong(format!(
@@ -73,7 +73,61 @@ pub fn block(
         look: false,
     };
     let (field, _, _) = fit_field(&solid, &coarse, &lattice.world_box(), &options, control)?;
-    Ok(field)
+    Ok((0..3).fold(field, |field, axis| evened(&field, axis)))
+}
+
+/// Refuses lengths that no block can have.
+///
+/// # Errors
+/// [`GeometricError::Shape`], which names them.
+pub(crate) fn check_lengths(size: DVec3, spacing: f64) -> Result<(), GeometricError> {
+    let lengths = [size.x, size.y, size.z, spacing];
+    if !lengths.iter().all(|length| length.is_finite() && *length > 0.0) {
+        return Err(GeometricError::Shape(format!(
+            "a block of {size} at {spacing} makes no sense; give lengths above 0"
+        )));
+    }
+    let [least, most] = LENGTHS;
+    match lengths.iter().find(|length| !(least..=most).contains(*length)) {
+        Some(length) => Err(GeometricError::Shape(format!(
+            "a length of {length:e} is beyond what single precision holds; choose from {least:e} to {most:e}"
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// The mean of a field and its mirror image about the middle of its box on an axis: even to the bit, where that of a fit to an even target
+/// is even to rounding.
+fn evened(field: &HierarchicalSpline<f32>, axis: usize) -> HierarchicalSpline<f32> {
+    let lattice = *field.lattice();
+    let even = |level: usize| {
+        let last = lattice.cells_at(level)[axis] + 2;
+        let mut bricks: BTreeMap<BrickKey, DenseCorrections<f32>> = BTreeMap::new();
+        for (key, functions) in field.corrections(level) {
+            for (slot, value) in functions.iter() {
+                let at = [slot / BRICK / BRICK, slot / BRICK % BRICK, slot % BRICK];
+                let own: [u32; 3] = std::array::from_fn(|a| key.0[a] * BRICK as u32 + at[a] as u32);
+                let mut other = own;
+                other[axis] = last - own[axis];
+                for function in [own, other] {
+                    let brick = bricks.entry(BrickKey::of(function));
+                    let brick = brick.or_insert_with(DenseCorrections::empty);
+                    let slot = function.map(|s| s as usize % BRICK);
+                    let before = brick.values[(slot[0] * BRICK + slot[1]) * BRICK + slot[2]];
+                    brick.set(slot, before + 0.5 * value);
+                }
+            }
+        }
+        let packed = bricks
+            .into_iter()
+            .map(|(key, brick)| (key, Arc::new(brick.pack())));
+        packed.collect()
+    };
+    HierarchicalSpline::from_corrections(
+        lattice,
+        field.slope(),
+        (0..field.level_count()).map(even).collect(),
+    )
 }
 
 /// The distance to the faces of a box about the origin, with its edges rounded for knot intervals of `spacing`.

@@ -28,7 +28,7 @@ use serde::{Deserialize, Serialize};
 
 pub(crate) use band::band;
 pub use block::block;
-pub(crate) use block::{ROOM, rounded};
+pub(crate) use block::{ROOM, check_lengths, rounded};
 pub use detail::{Refine, Simplify};
 pub use motion::{Motion, Move, Origin, reflection};
 pub use paste::{Copy, Cut, Paste};
@@ -37,8 +37,8 @@ pub use shape::Shape;
 pub use smooth::{Inflate, Smooth};
 pub use sweep::Sweep;
 use swept::Pose;
-pub(crate) use write::TOLERANCE;
 use write::{Fineness, Writer};
+pub(crate) use write::{TOLERANCE, affordable};
 
 use crate::face::Face;
 use crate::limits::Limits;
@@ -146,12 +146,13 @@ impl Geometric {
                 .map_or(DVec3::ZERO, |t| t.0)
         };
         let places = self.along.iter().enumerate();
-        Ok(places
-            .map(|(n, at)| Pose {
+        let pose = |(n, at): (usize, &Point)| {
+            Ok(Pose {
                 at: at.0,
-                turn: rotation_of(turn(n)),
+                turn: rotation_of(turn(n))?,
             })
-            .collect())
+        };
+        places.map(pose).collect()
     }
 
     /// What the tool leaves of a field whose surface lies at `iso`, and how close it is.
@@ -239,9 +240,23 @@ impl Combined {
 }
 
 /// A turn given by its axis, as long as the angle in degrees.
-pub(crate) fn rotation_of(turn: DVec3) -> DQuat {
+///
+/// # Errors
+/// A sentence for an angle beyond all numbers.
+pub(crate) fn rotation_of(turn: DVec3) -> Result<DQuat, String> {
     let angle = turn.length().to_radians();
+    if !angle.is_finite() {
+        return Err(format!(
+            "the turn {:?} is too long to be an angle; write the axis as long as the angle in degrees",
+            turn.to_array()
+        ));
+    }
     let axis = turn.normalize_or_zero();
     let (sine, cosine) = (libm::sin(0.5 * angle), libm::cos(0.5 * angle));
-    DQuat::from_xyzw(axis.x * sine, axis.y * sine, axis.z * sine, cosine)
+    Ok(DQuat::from_xyzw(
+        axis.x * sine,
+        axis.y * sine,
+        axis.z * sine,
+        cosine,
+    ))
 }

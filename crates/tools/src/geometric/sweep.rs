@@ -74,7 +74,7 @@ impl Sweep {
         };
         let lines = self.along.lines(&field.lattice().world_box());
         let chord = CHORD * writer.tolerance(&fineness);
-        let start = rotation_of(self.turn.map_or(DVec3::ZERO, |t| t.0));
+        let start = rotation_of(self.turn.map_or(DVec3::ZERO, |t| t.0)).map_err(GeometricError::Shape)?;
         let mut solids: Vec<Arc<dyn Field>> = Vec::new();
         let mut reach: Option<Aabb> = None;
         for line in lines.map_err(GeometricError::Shape)? {

@@ -35,7 +35,60 @@ const ACROSS: f64 = 3.0;
 /// Levels that are added for a feature, at most.
 const MOST_FINER: usize = 5;
 
+/// Functions that a fit may add before it is as fine as it is to become, at least, and over those that there are.
+const MOST_FUNCTIONS: usize = 1 << 22;
+const MOST_TIMES: usize = 4;
+/// Places at which it may ask its target meanwhile, over those functions.
+const MOST_SAMPLES: u64 = 32;
+
+/// Whether a fit down to `finest` within a box of a field of `count` functions ends in reasonable time: where it might not, fits that are less fine
+/// are tried first, which `fit` does.
+///
+/// # Errors
+/// [`GeometricError::Shape`] with the shortest knot interval and a `remedy`; those of `fit`.
+pub(crate) fn affordable(
+    lattice: &Lattice,
+    within: &Aabb,
+    finest: usize,
+    count: usize,
+    remedy: &str,
+    mut fit: impl FnMut(usize) -> Result<FieldFitReport, GeometricError>,
+) -> Result<(), GeometricError> {
+    let most = MOST_FUNCTIONS.max(MOST_TIMES.saturating_mul(count));
+    let size = within.size();
+    let area = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
+    let shortest = |level: usize| lattice.spacing(level).min_element();
+    // A surface as large as the box's, in functions of a level.
+    let may_be_many = |level: &usize| area / shortest(*level).powi(2) > most as f64;
+    let Some(first) = (1..=finest).find(may_be_many) else {
+        return Ok(());
+    };
+    for level in first - 1..finest {
+        let report = fit(level)?;
+        if report.functions > most || report.samples > MOST_SAMPLES.saturating_mul(most as u64) {
+            return Err(GeometricError::Shape(format!(
+                "knot intervals as short as {:e} would take too much: with {:e} they are {} functions already; {remedy}",
+                shortest(finest),
+                shortest(level),
+                report.functions
+            )));
+        }
+    }
+    Ok(())
+}
+
 impl Fineness {
+    /// Refuses levels that no field has on top of so much detail.
+    fn check(&self, detail: usize) -> Result<(), GeometricError> {
+        let most = MAX_LEVELS - 1 - detail.min(MAX_LEVELS - 1);
+        match self.finer {
+            Some(finer) if usize::from(finer) > most => Err(GeometricError::Shape(format!(
+                "finer is {finer}; write 0 to {most}"
+            ))),
+            _ => Ok(()),
+        }
+    }
+
     /// The finest level that a tool may use on an object of so much detail.
     fn finest(&self, lattice: &Lattice, detail: usize) -> usize {
         let shows = |feature: f64| {
@@ -121,6 +174,7 @@ impl<T: Real> Writer<'_, T> {
         fineness: &Fineness,
         control: &mut Control,
     ) -> Result<(HierarchicalSpline<T>, FieldFitReport), GeometricError> {
+        fineness.check(self.detail())?;
         let finest = fineness.finest(self.field.lattice(), self.detail());
         // What is there already must not be left over; and nothing finer than a coarse edit may be.
         let finest = finest.max(self.field.finest_in(within));
@@ -137,16 +191,25 @@ impl<T: Real> Writer<'_, T> {
         if !self.limits.is_inside() {
             self.stays_in_box(target, within)?;
         }
-        let options = FieldFitOptions {
-            aim: Aim::Surface {
-                iso: self.iso,
-                tolerance: fineness.tolerance.map_or(TOLERANCE * spacing, |t| t.0),
-            },
-            finest,
-            look: true,
-        };
+        let tolerance = fineness.tolerance.map_or(TOLERANCE * spacing, |t| t.0);
         let is_free = |support: &Aabb| self.limits.may_change(support);
-        let (field, _, report) = fit_field_where(target, self.field, within, &options, &is_free, control)?;
+        let mut fit = |finest: usize, look: bool| {
+            let options = FieldFitOptions {
+                aim: Aim::Surface {
+                    iso: self.iso,
+                    tolerance,
+                },
+                finest,
+                look,
+            };
+            fit_field_where(target, self.field, within, &options, &is_free, control)
+        };
+        let remedy = "give a lower finer, a larger tolerance, or an object whose knots lie farther apart";
+        let count = self.field.coefficient_count();
+        affordable(self.field.lattice(), within, finest, count, remedy, |level| {
+            Ok(fit(level, false)?.2)
+        })?;
+        let (field, _, report) = fit(finest, true)?;
         Ok((field, report))
     }
 

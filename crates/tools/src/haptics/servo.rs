@@ -8,6 +8,9 @@ use super::{
     StrokeForceOptions, StrokeStep, TickRecord, Workspace,
 };
 
+/// Largest scale of a workspace: beyond, nodes half a millimetre apart could not be numbered in 32 bits.
+const MOST_SCALE: f64 = 1e6;
+
 /// What a servo is set to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ServoOptions {
@@ -278,6 +281,13 @@ fn check(options: &ServoOptions) -> Result<(), GateError> {
             let must = "above 0";
             return Err(GateError { what, value, must });
         }
+    }
+    if options.workspace.scale > MOST_SCALE {
+        return Err(GateError {
+            what: "the scale of the workspace",
+            value: options.workspace.scale,
+            must: "1e6 at most",
+        });
     }
     for (what, value) in not_below {
         if !value.is_finite() || value < 0.0 {

@@ -1,7 +1,7 @@
 use bspline::{BandedRows, Field, KnotVector, TensorSpline};
 use glam::{DAffine3, DVec3};
 
-use crate::geometric::{GeometricError, ROOM, rounded};
+use crate::geometric::{GeometricError, ROOM, check_lengths, rounded};
 
 /// Degree on every axis: force tools leave what they move smooth to the second derivative.
 const DEGREE: usize = 3;
@@ -20,11 +20,7 @@ const ROUNDS: usize = 8;
 /// # Errors
 /// [`GeometricError::Shape`], which names the axis, the value and a remedy.
 pub fn block(size: DVec3, spacing: f64, knots: [&[f64]; 3]) -> Result<TensorSpline<f32>, GeometricError> {
-    if !(size.is_finite() && size.min_element() > 0.0 && spacing.is_finite() && spacing > 0.0) {
-        return Err(GeometricError::Shape(format!(
-            "a block of {size} at {spacing} makes no sense; give lengths above 0"
-        )));
-    }
+    check_lengths(size, spacing)?;
     let reach = 0.5 * size + ROOM * size.max_element();
     let axis = |a: usize| on_axis(["x", "y", "z"][a], knots[a], reach[a], spacing);
     let knots = [axis(0)?, axis(1)?, axis(2)?];

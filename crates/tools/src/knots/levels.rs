@@ -2,14 +2,14 @@ use bspline::{Field, HierarchicalSpline, TensorSpline};
 use fitting::Control;
 use fitting::field::{Aim, FieldFitOptions, fit_field};
 
-use crate::geometric::{GeometricError, TOLERANCE};
+use crate::geometric::{GeometricError, TOLERANCE, affordable};
 use crate::malleable::Malleable;
 
 /// A field on knots of its own written in levels, on the [grids](Malleable::grids) of its paint, and a sentence that says so.
 /// Its surface at `iso` is off by a fiftieth of its shortest knot interval at most.
 ///
 /// # Errors
-/// [`GeometricError::Fit`].
+/// [`GeometricError::Shape`] if that takes too many functions; [`GeometricError::Fit`].
 pub fn in_levels(
     field: &TensorSpline<f32>,
     iso: f64,
@@ -19,12 +19,25 @@ pub fn in_levels(
     let tolerance = TOLERANCE * field.shortest();
     let coarse = HierarchicalSpline::schoenberg(lattice, field.slope(), |p| field.value(p))
         .map_err(GeometricError::shape)?;
-    let options = FieldFitOptions {
-        aim: Aim::Surface { iso, tolerance },
-        finest,
-        look: false,
+    let whole = lattice.world_box();
+    let mut fit = |finest: usize| {
+        let options = FieldFitOptions {
+            aim: Aim::Surface { iso, tolerance },
+            finest,
+            look: false,
+        };
+        fit_field(field, &coarse, &whole, &options, control)
     };
-    let (levels, _, _) = fit_field(field, &coarse, &lattice.world_box(), &options, control)?;
+    let remedy = "this works by levels; give knots that lie farther apart";
+    affordable(
+        &lattice,
+        &whole,
+        finest,
+        field.coefficients().len(),
+        remedy,
+        |level| Ok(fit(level)?.2),
+    )?;
+    let (levels, _, _) = fit(finest)?;
     let note = format!(
         "this works by levels, so the object's knots were given up for {} of them; its surface is within {tolerance:.2e} of what it \
          was",

@@ -205,6 +205,18 @@ fn nothing_that_damps_is_an_error_and_the_ceiling_can_be_left_out() {
     };
     let why = Servo::new(&loose, options, make).err().unwrap();
     assert!(matches!(why, ServoError::NoStiffness { .. }), "{why}");
+    let far = ServoOptions {
+        workspace: Workspace {
+            scale: 1e30,
+            ..Workspace::default()
+        },
+        ..ServoOptions::default()
+    };
+    let why = Servo::new(&abilities(), far, make).err().unwrap();
+    assert!(
+        why.to_string().contains("scale") && why.to_string().contains("1e6 at most"),
+        "{why}"
+    );
     let unbound = ServoOptions {
         is_bound: false,
         ..options

@@ -6,6 +6,9 @@ use glam::{DAffine3, DQuat, DVec3};
 /// Nodes from one to the next of those that are always looked at. A grid begins and ends with one.
 pub const STEP: usize = 4;
 
+/// Largest number of a node at which a box ends.
+const FARTHEST: i64 = 1 << 30;
+
 /// A box of nodes `(i, j, k)·spacing`, z fastest. Grids of one spacing share their nodes, to the bit, wherever their boxes lie.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grid {
@@ -18,13 +21,16 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// The least box of nodes round a box of the world, from a multiple of [`STEP`] to another.
+    /// The least box of nodes round a box of the world, from a multiple of [`STEP`] to another. Boxes so far away that their nodes
+    /// cannot be numbered in 32 bits become one at the end of those that can.
     pub fn round(b: &Aabb, spacing: f64) -> Self {
         let step = STEP as i64;
+        let number = |v: f64| (v as i64).clamp(-FARTHEST, FARTHEST);
         let first = (b.min / spacing).floor().to_array();
-        let first = first.map(|v| (v as i64).div_euclid(step) * step);
+        let first = first.map(|v| number(v).div_euclid(step) * step);
         let last = (b.max / spacing).ceil().to_array();
-        let last = last.map(|v| (v as i64 + step - 1).div_euclid(step) * step);
+        let last = last.map(|v| (number(v) + step - 1).div_euclid(step) * step);
+        let last: [i64; 3] = std::array::from_fn(|a| last[a].max(first[a] + 2 * step));
         Self {
             first,
             count: std::array::from_fn(|a| (last[a] - first[a]) as usize + 1),
@@ -110,6 +116,23 @@ impl Grid {
         Frame {
             world_from_grid: *field_from_world * step,
             cells: self.count.map(|n| n as u32 - 1),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn boxes_beyond_all_numbers_have_nodes() {
+        for at in [0.0, 1e12, -1e30, 1e300] {
+            let grid = Grid::round(&Aabb::new(DVec3::splat(at), DVec3::splat(at)).widened(8.0), 0.5);
+            assert!(
+                grid.count.iter().all(|n| *n > 2 * STEP && *n < 64),
+                "{at}: {grid:?}"
+            );
+            assert_eq!(grid.find(grid.number([1, 2, 3])), Some([1, 2, 3]));
         }
     }
 }

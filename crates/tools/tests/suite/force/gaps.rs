@@ -2,6 +2,29 @@
 
 use super::*;
 
+/// A scan falls off within its edges: holes much wider than those still open, and reach as far as they are told to.
+#[test]
+fn holes_wider_than_the_edges_of_a_scan_open() {
+    // Air of 0 and a solid of 600, over about a length.
+    let scan = |p: DVec3| 300.0 / SLOPE * (1.5 * (12.0 - p.z)).tanh();
+    let field = field_of::<f32>(24, scan);
+    for radius in [1.5, 2.5] {
+        let drill: Drill = toml::from_str(&format!(
+            "along = [[12, 12, 12]]\nby = [0, 0, -5]\nradius = {radius}"
+        ))
+        .unwrap();
+        let (after, report) = finished(drill.begin(&field, ISO, false).unwrap());
+        assert!(
+            report.arrival.least > 0.9 && report.arrival.most < 1.1,
+            "{radius}: {report:?}"
+        );
+        for depth in [0.5, 2.0, 4.0] {
+            let value = after.value(DVec3::new(12.0, 12.0, 12.0 - depth));
+            assert!(value < ISO, "{radius} {depth}: {value}");
+        }
+    }
+}
+
 /// Growth closes a slit, even where the solid beyond outweighs it on the path, and carving opens a wall; what lies beyond
 /// stays as it was.
 #[test]

@@ -177,6 +177,10 @@ fn holds_that_make_no_sense_are_refused() {
             vec!["hold = { name = 'a', points = [[12, 12, 12]], depth = 1 }"],
             "asks for a spring",
         ),
+        (
+            vec!["hold = { name = 'a', points = [[12, 12, 12]], spring = 1e30 }"],
+            "write 1e6 at most",
+        ),
         (vec!["free = {}"], "no hold"),
         (
             vec![
@@ -206,6 +210,19 @@ fn holds_that_make_no_sense_are_refused() {
             .to_string();
         assert!(told.contains(word), "{script}: {told}");
     }
+}
+
+/// The stiffest spring that is accepted can be solved for.
+#[test]
+fn the_stiffest_springs_are_borne() {
+    let field = block::<f32>(24);
+    let script = "[[stroke]]\nhold = { name = 'a', points = [[17, 12, 12]], spring = 1e6 }\n\
+                  [[stroke]]\npull = { along = [[12, 12, 12]], lift = 1.5, radius = 1.2 }";
+    let (left, _) = played(&field, script).unwrap();
+    let risen = height(&left.field, 12.0, 12.0);
+    assert!((risen - 1.5).abs() < 0.03, "{risen}");
+    let held = height(&left.field, 17.0, 12.0);
+    assert!(held.abs() < 0.02, "{held}");
 }
 
 /// Paths that nothing gives way to: they stay, and it is said.

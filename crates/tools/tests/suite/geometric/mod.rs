@@ -20,6 +20,7 @@ use glam::{DAffine3, DVec3};
 use tools::canvas::Canvas;
 use tools::geometric::{Geometric, GeometricError, Operation, block as block_of};
 use tools::limits::Limits;
+use tools::malleable::Malleable;
 use tools::others::Others;
 use tools::session::{Session, Stroke};
 
@@ -406,6 +407,45 @@ fn a_blend_rounds_the_crease_within_its_width() {
     assert!(smooth.value(in_the_corner) > ISO && sharp.value(in_the_corner) < ISO);
 }
 
+/// Blocks, with knots of their own or not, have lengths that single precision holds.
+#[test]
+fn blocks_of_lengths_beyond_single_precision_are_refused() {
+    for (size, spacing, value) in [
+        (1e300, 1e299, "1e300"),
+        (1e-40, 1e-41, "1e-40"),
+        (1.0, 1e-31, "1e-31"),
+    ] {
+        let size = DVec3::splat(size);
+        let told = block_of(size, spacing, &mut Control::default())
+            .unwrap_err()
+            .to_string();
+        assert!(
+            told.contains(value) && told.contains("from 1e-30 to 1e30"),
+            "{told}"
+        );
+        let told = tools::knots::block(size, spacing, [&[], &[], &[]])
+            .unwrap_err()
+            .to_string();
+        assert!(told.contains(value), "{told}");
+    }
+    for size in [8e29, 4e-30] {
+        let left = block_of(DVec3::splat(size), 0.25 * size, &mut Control::default());
+        assert!(left.is_ok(), "{size}");
+    }
+}
+
+/// What works by levels on knots that lie close refuses levels that would be too many, in time.
+#[test]
+fn knots_too_close_for_levels_are_refused() {
+    let field = tools::knots::block(DVec3::new(4.0, 3.0, 2.0), 0.25, [&[0.0, 1e-4, 1.0], &[], &[]]).unwrap();
+    let (levels, _) = tools::knots::in_levels(&field, 0.0, &mut Control::default()).unwrap();
+    let carve = "carve = { shape = { sphere = { radius = 0.4 } }, along = [[0.5, 0.2, 1.0]] }";
+    let canvas = Canvas::alone(levels, 0.0, field.depth() - 1);
+    let left = stroke(carve).apply(canvas, &mut Control::default());
+    let told = left.expect_err(carve).to_string();
+    assert!(told.contains("farther apart"), "{told}");
+}
+
 #[test]
 fn tools_that_make_no_sense_are_refused() {
     let block = block();
@@ -436,6 +476,15 @@ fn tools_that_make_no_sense_are_refused() {
         "shape = { box = { size = [1, 1, 1] } }, along = [[9, 9, 9], [9, 9, 8], [9, 8, 8]], turn = [[0, 0, 9], [0, 0, 0]]",
     );
     assert!(error.to_string().contains("3 places and 2 turns"), "{error}");
+    let error = refused("shape = { sphere = { radius = 1.0 } }, along = [[9, 9, 9]], turn = [[0, 0, 1e300]]");
+    assert!(error.to_string().contains("to be an angle"), "{error}");
+    let error = refused("shape = { sphere = { radius = 1.0 } }, along = [[9, 9, 12]], finer = 30");
+    assert!(
+        error.to_string().contains("finer is 30; write 0 to 20"),
+        "{error}"
+    );
+    let error = refused("shape = { sphere = { radius = 3.0 } }, along = [[9, 9, 12]], finer = 20");
+    assert!(error.to_string().contains("lower finer"), "{error}");
     for text in [
         "shape = { sphere = { radius = -1.0 } }, along = [[9, 9, 9]]",
         "shape = { sphere = { radius = nan } }, along = [[9, 9, 9]]",

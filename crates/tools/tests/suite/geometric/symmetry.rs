@@ -7,21 +7,119 @@ use glam::DVec3;
 use tools::coefficients::coefficient;
 use tools::paint::{Substance, values};
 
-use super::{ISO, block, canvas, done, random, stroke};
+use super::{Canvas, ISO, block, block_of, canvas, done, random, stroke};
 
 /// Whether the field is even about the middle of its box along x, to the bit.
 fn is_even(field: &HierarchicalSpline<f32>) -> bool {
+    is_even_along(field, 0)
+}
+
+/// The same along an axis.
+fn is_even_along(field: &HierarchicalSpline<f32>, axis: usize) -> bool {
     (0..field.level_count()).all(|level| {
-        let last = field.lattice().cells_at(level)[0] + 2;
+        let last = field.lattice().cells_at(level)[axis] + 2;
         field.corrections(level).iter().all(|(key, functions)| {
             functions.iter().all(|(slot, value)| {
                 let at = [slot / 64, slot / 8 % 8, slot % 8];
                 let mut function: [u32; 3] = std::array::from_fn(|a| key.0[a] * 8 + at[a] as u32);
-                function[0] = last - function[0];
+                function[axis] = last - function[axis];
                 coefficient(field, level, function) == Some(value)
             })
         })
     })
+}
+
+/// New blocks are even about the middle of every axis, to the bit, whatever their lengths, and a stroke on both sides leaves them so.
+#[test]
+fn new_blocks_are_even_to_the_bit() {
+    for (size, spacing) in [([4.0, 3.0, 2.0], 0.25), ([4.0, 4.1, 4.3], 0.3), ([7.0; 3], 0.25)] {
+        let size = DVec3::from_array(size);
+        let field = block_of(size, spacing, &mut Control::default()).unwrap();
+        for axis in 0..3 {
+            assert!(is_even_along(&field, axis), "{size} {axis}");
+        }
+        let mut off = 0.0_f64;
+        let mut draw = random(5);
+        for _ in 0..2000 {
+            let p = 0.6 * size * DVec3::new(draw(-1.0, 1.0), draw(-1.0, 1.0), draw(-1.0, 1.0));
+            let b = 0.5 * size - p.abs();
+            // Away from the rounded edges it is the distance to the nearest face.
+            if p.abs().cmplt(0.5 * size).all() && b.min_element() < 2.0 * spacing {
+                let mut sides = b.to_array();
+                sides.sort_by(f64::total_cmp);
+                if sides[1] > 4.0 * spacing {
+                    off = off.max((field.value(p) - sides[0]).abs());
+                }
+            }
+        }
+        assert!(off < 0.05 * spacing, "{size}: {off}");
+        let text = format!(
+            "symmetry = {{ at = [0, 0, 0], normal = [1, 0, 0] }}\ninflate = {{ along = [[0.1, 0.2, {}]], radius = 0.8, by = 0.2 }}",
+            0.5 * size.z
+        );
+        let left = stroke(&text).apply(Canvas::alone(field, 0.0, 0), &mut Control::default());
+        assert!(is_even(&left.unwrap().0.field), "{size}");
+    }
+}
+
+/// Height of the surface above a place, where a solid ends within 3 of it.
+fn height(field: &HierarchicalSpline<f32>, x: f64, y: f64) -> f64 {
+    let (mut low, mut high) = (-0.5, 3.0);
+    for _ in 0..40 {
+        let middle = 0.5 * (low + high);
+        if field.value(DVec3::new(x, y, middle)) > 0.0 {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    low
+}
+
+/// A stroke over the plane acts once: its lengths are as told, on an object that is even, on one that is nearly so, and on one that is not;
+/// and one that lies on one side is the same on both.
+#[test]
+fn strokes_over_the_plane_act_once() {
+    let even = block_of(DVec3::new(4.0, 3.0, 2.0), 0.25, &mut Control::default()).unwrap();
+    let with = |field: &HierarchicalSpline<f32>, text: &str| {
+        let left = stroke(text).apply(Canvas::alone(field.clone(), 0.0, 0), &mut Control::default());
+        left.unwrap_or_else(|e| panic!("{text}: {e}")).0.field
+    };
+    let uneven = with(
+        &even,
+        "carve = { shape = { sphere = { radius = 0.3 } }, along = [[0.1, -0.9, 1.0]] }",
+    );
+    let rounding = |field: &HierarchicalSpline<f32>| {
+        let change = bspline::hierarchical::BlockEdit {
+            level: 0,
+            first: [12, 12, 12],
+            shape: [1; 3],
+            change: bspline::hierarchical::Change::Add(vec![2e-5]),
+        };
+        field.edited_blocks(&[change]).unwrap()
+    };
+    let near = rounding(&even);
+    for x in [0.0, 0.3] {
+        for tool in [
+            format!("pull = {{ along = [[{x}, 0.2, 1]], lift = 0.5, radius = 0.4 }}"),
+            format!("inflate = {{ along = [[{x}, 0.2, 1]], radius = 1, by = 0.3 }}"),
+            format!("chisel = {{ along = [[{x}, -0.3, 1], [{x}, 0.6, 1]], depth = 0.2, radius = 0.3 }}"),
+            format!("push = {{ along = [[{x}, 0.2, 1]], radius = 1, speed = 0.2, force = -1 }}"),
+        ] {
+            let both = format!("symmetry = {{ at = [0, 0, 0], normal = [1, 0, 0] }}\n{tool}");
+            for (name, field) in [("even", &even), ("near", &near), ("uneven", &uneven)] {
+                let (one, two) = (with(field, &tool), with(field, &both));
+                let once = height(&one, x, 0.2) - height(field, x, 0.2);
+                let twice = height(&two, x, 0.2) - height(field, x, 0.2);
+                let other = height(&two, -x, 0.2) - height(field, -x, 0.2);
+                let most = 0.03 * once.abs();
+                assert!(once.abs() > 0.15, "{name} {tool}: {once}");
+                assert!((twice - once).abs() < most, "{name} {tool}: {once} {twice}");
+                assert!((other - twice).abs() < most, "{name} {tool}: {twice} {other}");
+                assert!(name != "even" || is_even(&two), "{tool}");
+            }
+        }
+    }
 }
 
 /// About a plane of the lattice an even field stays even to the bit, beside the plane and over it, whatever the tool.
