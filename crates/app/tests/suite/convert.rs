@@ -53,9 +53,9 @@ fn what_a_cloud_loses_is_named() {
         "x y z nx ny nz red intensity\n0 0 0 0 0 1 255 7\n1 0 0 0 0 1 9 8\n",
     );
     let run = bench.run("convert colours.xyz 1.ply");
-    assert!(run.stderr.contains("left out: red, intensity"), "{}", run.stderr);
+    assert!(run.stdout.contains("left out: red, intensity"), "{}", run.stdout);
     let run = bench.run("convert 1.ply 2.ply");
-    assert!(!run.stderr.contains("left out"), "{}", run.stderr);
+    assert!(!run.stdout.contains("left out"), "{}", run.stdout);
 }
 
 #[test]
