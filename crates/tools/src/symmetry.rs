@@ -276,6 +276,25 @@ impl Plane {
         with_functions(new, &mirrored.collect()).ok()
     }
 
+    /// Functions of a change of an even field with their partners, that on the side of the normal first.
+    fn pairs(
+        &self,
+        old: &HierarchicalSpline<f32>,
+        new: &HierarchicalSpline<f32>,
+    ) -> Option<BTreeSet<[(usize, [u32; 3]); 2]>> {
+        let functions = changed(old, new).ok()?;
+        let is_even = self.is_even(old, &functions);
+        let pairs = functions.keys().map(|(level, function)| {
+            let (side, partner) = self.partner(*level, *function);
+            let partner = partner.expect("checked before");
+            match side < 0 {
+                true => [(*level, partner), (*level, *function)],
+                false => [(*level, *function), (*level, partner)],
+            }
+        });
+        is_even.then(|| pairs.collect())
+    }
+
     /// A change over the plane of an even field, on both: each function and its partner are as the one of them at whose knot the
     /// field changes more.
     fn once(
@@ -283,19 +302,7 @@ impl Plane {
         old: &HierarchicalSpline<f32>,
         new: &HierarchicalSpline<f32>,
     ) -> Option<HierarchicalSpline<f32>> {
-        let functions = changed(old, new).ok()?;
-        if !self.is_even(old, &functions) {
-            return None;
-        }
-        let mut pairs = BTreeSet::new();
-        for (level, function) in functions.keys() {
-            let (side, partner) = self.partner(*level, *function);
-            let partner = partner.expect("checked before");
-            pairs.insert(match side < 0 {
-                true => [(*level, partner), (*level, *function)],
-                false => [(*level, *function), (*level, partner)],
-            });
-        }
+        let pairs = self.pairs(old, new)?;
         let functions: Vec<_> = pairs.iter().flatten().copied().collect();
         let changes = differences(old, new, &knots(old, &functions));
         let mut even = Functions::new();
@@ -314,21 +321,8 @@ impl Plane {
         old: &HierarchicalSpline<f32>,
         new: &HierarchicalSpline<f32>,
     ) -> Option<HierarchicalSpline<f32>> {
-        let functions = changed(old, new).ok()?;
-        if !self.is_even(old, &functions) {
-            return None;
-        }
-        let mut even = Functions::new();
-        for (level, function) in functions.keys() {
-            let (side, partner) = self.partner(*level, *function);
-            let partner = partner.expect("checked before");
-            let (first, second) = if side < 0 {
-                (partner, *function)
-            } else {
-                (*function, partner)
-            };
-            even.insert((*level, second), coefficient(new, *level, first));
-        }
-        with_functions(new, &even).ok()
+        let pairs = self.pairs(old, new)?.into_iter();
+        let even = pairs.map(|[(level, first), second]| (second, coefficient(new, level, first)));
+        with_functions(new, &even.collect()).ok()
     }
 }
