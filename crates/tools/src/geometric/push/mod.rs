@@ -3,7 +3,7 @@
 //! Each step makes an intermediate surface: what lies under the brush moves along the normal at its place, and the next step begins on
 //! what that one left. The paper lets densities approach those of a ball at the tool's tip; here the way of a step is a length, speed times force.
 
-mod moved;
+mod cover;
 mod way;
 
 use bspline::{Aabb, Field, HierarchicalSpline, Real};
@@ -14,11 +14,12 @@ use serde::{Deserialize, Serialize};
 
 use super::GeometricError;
 use super::band::FULL;
+use super::moved::Moved;
 use super::write::{Fineness, TOLERANCE, Writer};
 use crate::force::nearest_surface;
 use crate::limits::Limits;
 use crate::number::{Numbers, Point, Positive};
-use moved::{Cover, Moved};
+use cover::Cover;
 use way::Way;
 
 /// Radii in which a place has to have the surface.
@@ -120,8 +121,9 @@ impl Push {
                 share: 1.0 / places as f64,
                 places: drawn,
                 radius: self.radius.0,
+                by,
             };
-            left = self.stepped(&writer, cover, by, control)?;
+            left = self.stepped(&writer, cover, control)?;
         }
         Ok(left)
     }
@@ -155,21 +157,20 @@ impl Push {
         &self,
         writer: &Writer<T>,
         cover: Cover,
-        by: f64,
         control: &mut Control,
     ) -> Result<(HierarchicalSpline<T>, FieldFitReport), GeometricError> {
         let within = writer.within(&cover.within().expect("a place"))?;
-        let moved = Moved {
-            field: writer.field,
-            by,
-            cover,
-        };
         let tolerance = self.tolerance.map_or(TOLERANCE * writer.spacing(), |t| t.0);
         let fineness = writer.shown(&Fineness {
-            tolerance: Some(Positive(tolerance.min(LOST * by.abs()))),
+            tolerance: Some(Positive(tolerance.min(LOST * cover.by.abs()))),
             finer: self.finer,
             feature: Some(BEND * self.radius.0),
         });
+        let moved = Moved {
+            field: writer.field,
+            by: cover,
+            step: 1e-4 * self.radius.0,
+        };
         writer.written(&moved, &within, &fineness, control)
     }
 }
@@ -199,8 +200,9 @@ mod tests {
                     places,
                     share,
                     radius,
+                    by: 1.0,
                 };
-                cover.at(p).z / f64::from(count)
+                cover.share_at(p).z / f64::from(count)
             });
             steps.sum()
         };

@@ -100,6 +100,41 @@ fn inflating_adds_and_deflating_takes() {
     assert!(top.abs() < 0.02 * SLOPE, "{top}");
 }
 
+/// The edge of a scan is a few voxels wide, and beside it there is noise only.
+#[test]
+fn inflating_moves_the_edge_of_a_scan_by_what_was_asked() {
+    let middle = DVec3::new(12.0, 12.0, 4.0);
+    let ways = [
+        [0.0, 0.0, 1.0],
+        [0.2, 0.0, 1.0],
+        [0.0, -0.2, 1.0],
+        [-0.15, 0.15, 1.0],
+    ];
+    for seed in 0..3 {
+        let noise = std::cell::RefCell::new(random(seed));
+        let inside = |p: DVec3| ((8.0 - p.distance(middle)) / 0.8).tanh();
+        let scan = |p: DVec3| 300.0 * inside(p) + ISO + noise.borrow_mut()(-15.0, 15.0);
+        let scan = HierarchicalSpline::schoenberg(*block().lattice(), 300.0, scan).unwrap();
+        for by in [-3.0, -1.5, -0.4, 0.4, 1.5, 3.0] {
+            let text = format!("inflate = {{ along = [[12, 12, 12]], radius = 7.5, by = {by} }}");
+            let left = done(&scan, &text);
+            for way in ways {
+                let way = DVec3::from(way).normalize();
+                let radius = |field: &HierarchicalSpline<f32>| {
+                    let steps = (0..1200).rev().map(|n| 0.01 * f64::from(n));
+                    let mut met = steps.filter(|r| field.value(middle + *r * way) > ISO);
+                    met.next().unwrap()
+                };
+                let moved = radius(&left) - radius(&scan);
+                assert!(
+                    (moved - by).abs() <= 0.05 * by.abs() + 0.05,
+                    "{text} {way}: {moved}"
+                );
+            }
+        }
+    }
+}
+
 /// Knots put in change nothing; with the tolerance of rounding they go again.
 #[test]
 fn knots_come_and_go_without_a_change() {
