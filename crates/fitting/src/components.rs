@@ -40,17 +40,27 @@ pub fn unsupported_components(
     frame: &Frame,
     samples: impl Iterator<Item = DVec3>,
 ) -> Vec<UnsupportedComponent> {
+    unsupported_by(field, iso, frame, samples.map(|p| (p, None)))
+}
+
+/// [`unsupported_components`], of samples some of which speak for the solid only (`true`), or for its complement only.
+pub(crate) fn unsupported_by(
+    field: &dyn Field,
+    iso: f64,
+    frame: &Frame,
+    samples: impl Iterator<Item = (DVec3, Option<bool>)>,
+) -> Vec<UnsupportedComponent> {
     let (mut runs, rows) = runs_of_sign(field, iso, frame);
     let [nx, ny, nz] = frame.cells;
     let row = |x: u32, y: u32| rows[(x * ny + y) as usize] as usize..rows[(x * ny + y) as usize + 1] as usize;
     let grid_from_world = frame.world_from_grid.inverse();
-    for p in samples {
+    for (p, side) in samples {
         let q = grid_from_world.transform_point3(p).floor();
         let limit = DVec3::new(nx as f64, ny as f64, nz as f64);
         if q.cmpge(DVec3::ZERO).all() && q.cmplt(limit).all() {
             let here = &mut runs[row(q.x as u32, q.y as u32)];
             let at = here.partition_point(|r| r.end <= q.z as u32);
-            here[at].has_sample = true;
+            here[at].has_sample |= side.is_none_or(|inside| inside == here[at].is_inside);
         }
     }
     for x in 0..nx {

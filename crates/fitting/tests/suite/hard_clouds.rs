@@ -81,6 +81,38 @@ fn dense_noise_is_averaged_in_cells_no_larger_than_itself() {
     assert!(pieces.iter().all(|p| p.cells.len() <= 1), "{}", pieces.len());
 }
 
+/// All samples of a face along a plane of cells lie in cells of one sign; they speak for both sides of it.
+#[test]
+fn boxes_along_the_cells_are_whole() {
+    let mut random = SplitMix64::new(3);
+    let corners: Vec<DVec3> = (0..64)
+        .map(|i| DVec3::new(f64::from(i / 16), f64::from(i / 4 % 4), f64::from(i % 4)))
+        .collect();
+    let (mut positions, mut normals) = (Vec::new(), Vec::new());
+    for n in 0..20_000 {
+        let axis = n % 3;
+        let is_top = n / 3 % 2 == 0;
+        let mut at = 0.8 * random.uniform3();
+        at[axis] = if is_top { 0.8 } else { 0.0 };
+        positions.push(corners[n / 6 % 64] + at);
+        normals.push(DVec3::AXES[axis] * if is_top { 1.0 } else { -1.0 });
+    }
+    let samples = SampledCloud {
+        positions,
+        normals,
+        holes: Vec::new(),
+    };
+    let (field, report) = fit::<f32>(&samples, &PointOptions::default()).expect("boxes");
+    assert!(!says(&report, "no sample speaks"), "{:?}", report.notes);
+    for corner in corners {
+        assert!(field.value(corner + 0.4) > 0.0, "no solid at {corner}");
+        assert!(
+            field.value(corner + DVec3::new(0.9, 0.4, 0.4)) < 0.0,
+            "solid beside {corner}"
+        );
+    }
+}
+
 /// Where a patch of normals leans away from its middle, the fit continues it as a tube, to the corner of the box if nothing
 /// ends it.
 #[test]
