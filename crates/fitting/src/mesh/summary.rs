@@ -93,7 +93,7 @@ fn notes(above: &[Above], area: f64) -> Vec<String> {
     let reasons = [
         (
             StopReason::Crease,
-            "at edges of the surface, which a smooth field rounds off: half the error there costs twice the coefficients",
+            "where it falls slowly with finer knots, as at edges, which a smooth field rounds off: it is left there, however many coefficients are allowed",
         ),
         (StopReason::Depth, "at the deepest level allowed"),
         (StopReason::Budget, "because the coefficients allowed are spent"),

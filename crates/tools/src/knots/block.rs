@@ -36,7 +36,14 @@ pub fn block(size: DVec3, spacing: f64, knots: [&[f64]; 3]) -> Result<TensorSpli
     let wanted: Vec<f64> = places.map(|p| solid.value(p)).collect();
     let coefficients = interpolating(&knots, shape, &wanted);
     let single = coefficients.into_iter().map(|c| c as f32).collect();
-    TensorSpline::new(knots, single, DAffine3::IDENTITY, 1.0).map_err(GeometricError::shape)
+    let block = TensorSpline::new(knots, single, DAffine3::IDENTITY, 1.0).map_err(GeometricError::shape)?;
+    match block.value(DVec3::ZERO) > 0.0 {
+        true => Ok(block),
+        false => Err(GeometricError::Shape(
+            "the block is too thin for knots so far apart: no solid is left; give more knots within it"
+                .into(),
+        )),
+    }
 }
 
 /// The knots of an axis: those given, and more on both sides until they reach `reach`.
@@ -105,4 +112,18 @@ fn interpolating(knots: &[KnotVector; 3], shape: [usize; 3], wanted: &[f64]) -> 
         }
     }
     coefficients
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_block_between_two_knots_is_refused() {
+        let wide = [-20.0, 20.0];
+        let refused = block(DVec3::splat(4.0), 1.0, [&wide; 3]).unwrap_err().to_string();
+        assert!(refused.contains("no solid is left"), "{refused}");
+        let within = [-2.0, 0.0, 2.0];
+        assert!(block(DVec3::splat(4.0), 1.0, [&within; 3]).is_ok());
+    }
 }
