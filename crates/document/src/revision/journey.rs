@@ -13,8 +13,16 @@ use crate::Command;
 #[derive(Default)]
 pub struct Journey {
     legs: Vec<Leg>,
-    /// Boxes of the brushes that carry densities along or mix them.
-    mixed: Vec<Aabb>,
+    mixes: Vec<Mix>,
+}
+
+/// A brush that carries densities along or mixes them.
+#[derive(Clone, Copy)]
+pub(super) struct Mix {
+    /// It changes nothing outside, and takes nothing from there.
+    pub reach: Aabb,
+    /// Where what it brings comes from, if it does not lie there already.
+    pub brought: Option<Aabb>,
 }
 
 /// One move.
@@ -58,13 +66,14 @@ impl Journey {
             twins.extend(copy.map(|to| (to, done)));
             let plane = stroke.symmetry.as_ref();
             let mirror = plane.and_then(|plane| reflection(plane.at.0, plane.normal.0).ok());
-            for mixed in mixed(stroke) {
-                journey.mixed.push(mixed);
-                journey
-                    .mixed
-                    .extend(mirror.map(|mirror| mixed.transformed(&mirror)));
-            }
             let twins = &twins;
+            for mix in mixes(stroke, |from| from == object || twins.contains_key(from)) {
+                journey.mixes.push(mix);
+                journey.mixes.extend(mirror.map(|mirror| Mix {
+                    reach: mix.reach.transformed(&mirror),
+                    ..mix
+                }));
+            }
             let pasted = stroke.paste.as_ref().and_then(|paste| {
                 let since = match paste.from == *object {
                     true => done,
@@ -101,10 +110,8 @@ impl Journey {
         journey
     }
 
-    /// Whether a brush that mixes densities passed over a place.
-    pub(super) fn is_mixed(&self, place: DVec3) -> bool {
-        let holds = |b: &Aabb| place.cmpge(b.min).all() && place.cmple(b.max).all();
-        self.mixed.iter().any(holds)
+    pub(super) fn mixes(&self) -> &[Mix] {
+        &self.mixes
     }
 
     /// Boxes in `within` outside which nothing was moved.
@@ -184,18 +191,34 @@ impl Way {
     }
 }
 
-/// Boxes of a brush that carries densities along or mixes them.
-fn mixed(stroke: &Stroke) -> impl Iterator<Item = Aabb> {
-    let smooth = stroke.smooth.as_ref().map(|tool| (&tool.along, tool.radius));
-    let inflate = stroke.inflate.as_ref().map(|tool| (&tool.along, tool.radius));
-    let push = stroke.push.as_ref().map(|tool| (&tool.along, tool.radius));
+/// The brushes of a stroke that carry densities along or mix them; `is_own` tells objects that hold what this one held.
+fn mixes(stroke: &Stroke, is_own: impl Fn(&str) -> bool) -> impl Iterator<Item = Mix> {
+    let smooth = stroke.smooth.as_ref().map(|tool| (&tool.along, tool.radius.0));
+    let inflate = stroke.inflate.as_ref().map(|tool| (&tool.along, tool.radius.0));
+    // Along its axis it reaches two radii far.
+    let push = stroke
+        .push
+        .as_ref()
+        .map(|tool| (&tool.along, 2.0 * tool.radius.0));
     let brushes = [smooth, inflate, push].into_iter().flatten();
     let passed = brushes.filter_map(|(along, radius)| {
-        let about = Aabb::about(along.iter().map(|p| p.0))?;
-        Some(about.widened(radius.0))
+        Some(Mix {
+            reach: Aabb::about(along.iter().map(|p| p.0))?.widened(radius),
+            brought: None,
+        })
     });
-    let pasted = stroke.paste.as_ref().and_then(|paste| paste.carried().ok());
-    passed.chain(pasted.map(|(from, map)| from.transformed(&map)))
+    let everywhere = Aabb {
+        min: DVec3::NEG_INFINITY,
+        max: DVec3::INFINITY,
+    };
+    let pasted = stroke.paste.as_ref().and_then(|paste| {
+        let (from, map) = paste.carried().ok()?;
+        Some(Mix {
+            reach: from.transformed(&map),
+            brought: Some(if is_own(&paste.from) { from } else { everywhere }),
+        })
+    });
+    passed.chain(pasted)
 }
 
 impl Leg {

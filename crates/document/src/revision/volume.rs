@@ -6,7 +6,7 @@
 //! become what lies there: else a ghost of the old surface would stay. What never was part of the solid stays, but for the
 //! voxels beside a new surface. Matter that was added is
 //! no denser than the median of the solid: tools make it the denser the deeper it lies. Brushes that
-//! carry densities along or mix them, as smoothing does, leave what they make of them. Moves, and pastes of what the object had
+//! carry densities along or mix them, as smoothing does, leave what they make of them, between the densities that were there and the fill. Moves, and pastes of what the object had
 //! elsewhere, carry along what
 //! the fit had smoothed away: `v = f_new(x) + (v − f_fit)(w⁻¹(x))`.
 
@@ -19,6 +19,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::Journey;
+use super::journey::Mix;
 
 /// Voxels on an edge of the tiles in which changed voxels are looked for.
 const TILE: usize = 8;
@@ -83,6 +84,7 @@ pub fn revise_volume(
     let reaches = boxes.map(|b| b.transformed(&voxel_from_world));
     let tiles = tiles(reaches, last);
     let matter = Matter::new(volume, fitted.slope(), iso, fill);
+    let mixed = Mixed::new(volume, journey);
     let [nx, ny, nz] = header.dims;
     let parts = tiles.par_iter().map(|[tz, ty, tx]| {
         let along = |tile: &usize, count: usize| tile * TILE..count.min((tile + 1) * TILE);
@@ -111,7 +113,7 @@ pub fn revise_volume(
                     } else {
                         matter.rounding
                     };
-                    let how = (least, journey.is_mixed(place));
+                    let how = (least, mixed.most(place));
                     let density = matter.revised(voxel, old, [was, is], how, steep, &mut part);
                     let density = density.or(is_carried.then_some(old));
                     let change = density.map(|density| Change { voxel, density });
@@ -202,6 +204,56 @@ fn neighbours(voxel: usize, [nx, ny, nz]: [usize; 3]) -> impl Iterator<Item = us
     })
 }
 
+/// Brushes that mix densities, and the largest densities that they met.
+struct Mixed<'a> {
+    mixes: &'a [Mix],
+    /// In the solid, and outside of it, where only what was brought can be denser than what a tool adds.
+    most: Vec<[f64; 2]>,
+}
+
+impl<'a> Mixed<'a> {
+    fn new(volume: &Volume, journey: &'a Journey) -> Self {
+        let mixes = journey.mixes();
+        let most = mixes.iter().map(|mix| {
+            let brought = mix
+                .brought
+                .map_or(f64::NEG_INFINITY, |from| largest(volume, &from));
+            [brought.max(largest(volume, &mix.reach)), brought]
+        });
+        Self {
+            mixes,
+            most: most.collect(),
+        }
+    }
+
+    /// The largest densities that brushes met that passed over a place, if any did.
+    fn most(&self, place: DVec3) -> Option<[f64; 2]> {
+        let holds = |b: &Aabb| place.cmpge(b.min).all() && place.cmple(b.max).all();
+        let met = self.mixes.iter().zip(&self.most);
+        met.filter(|(mix, _)| holds(&mix.reach))
+            .map(|(_, most)| *most)
+            .reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])])
+    }
+}
+
+/// The largest density of the voxels in a box, if it holds any.
+fn largest(volume: &Volume, within: &Aabb) -> f64 {
+    let dims = volume.header.dims;
+    let last = DVec3::from_array(dims.map(|n| (n - 1) as f64));
+    let to_world = volume.header.world_from_voxel;
+    let whole = Aabb::new(DVec3::ZERO, last).transformed(&to_world);
+    let [min, max] = [within.min.max(whole.min), within.max.min(whole.max)];
+    if min.cmpgt(max).any() {
+        return f64::NEG_INFINITY;
+    }
+    let reach = Aabb::new(min, max).transformed(&to_world.inverse());
+    let [from, to] = [reach.min.ceil().max(DVec3::ZERO), reach.max.floor().min(last)];
+    let along = |a: usize| (from[a] as usize..).take((to[a] - from[a] + 1.0).max(0.0) as usize);
+    let rows = along(2).flat_map(|z| along(1).map(move |y| dims[0] * (y + dims[1] * z)));
+    let values = rows.flat_map(|row| along(0).map(move |x| volume.values[row + x]));
+    values.fold(f32::NEG_INFINITY, f32::max).into()
+}
+
 /// What voxels are made of.
 struct Matter {
     iso: f64,
@@ -210,9 +262,6 @@ struct Matter {
     voxel: f64,
     /// Density over which what was carved becomes the fill.
     ramp: f64,
-    /// Densities of the volume.
-    least: f64,
-    largest: f64,
     /// Median of those of the solid.
     median_solid: f64,
     /// A difference that is none.
@@ -242,20 +291,19 @@ impl Matter {
             median_solid: median_solid.into(),
             ramp: slope * voxel,
             voxel,
-            least: least.into(),
-            largest: largest.into(),
             rounding: ROUNDING * f64::from(least.abs().max(largest.abs())),
         }
     }
 
     /// The new density of a voxel, if it has one: of what had `old` in the scan and `was` in its fit, which is as steep as `steep` there,
-    /// where the field is `now`. Changes up to `least` are none; `follows` says that all of the field's change is meant.
+    /// where the field is `now`. Changes up to `least` are none. Where brushes have passed that mix densities, all of the field's change is meant, up to the `most`
+    /// that they met in the solid and outside of it.
     fn revised(
         &self,
         voxel: usize,
         old: f64,
         [was, now]: [f64; 2],
-        (least, follows): (f64, bool),
+        (least, most): (f64, Option<[f64; 2]>),
         steep: impl Fn() -> f64,
         told: &mut VolumeRevision,
     ) -> Option<f64> {
@@ -264,12 +312,20 @@ impl Matter {
             return None;
         }
         let moved = old + change;
-        if follows {
-            return Some(moved.clamp(self.least, self.largest));
-        }
         // A tool's own density has no bounds far inside or outside of it; matter has.
         let raised = moved.min(self.median_solid.max(old));
         let lowered = moved.max(self.fill.min(old));
+        if let Some([inside, outside]) = most {
+            if was >= self.iso && now < self.iso && moved <= self.fill {
+                told.emptied.push(voxel);
+            }
+            let most = if was >= self.iso { inside } else { outside };
+            return Some(if change < 0.0 {
+                lowered
+            } else {
+                raised.max(moved.min(most))
+            });
+        }
         Some(match (was >= self.iso, now >= self.iso) {
             (true, false) if change.abs() <= OFF * self.ramp => lowered,
             (true, false) => {

@@ -369,11 +369,48 @@ fn what_is_smoothed_follows_the_field() {
     assert!(left.count() > 5);
     let highest = scan.values.iter().fold(0.0, |m: f32, v| m.max(*v)).into();
     for (place, [old, new], [was, now]) in changes {
-        let meant = (old + now - was).clamp(0.0, highest);
+        let meant = (old + now - was).clamp(FILL.min(old), highest);
         assert!(
             (new - meant).abs() < 0.1,
             "{place}: {old} became {new}, not {meant}"
         );
+    }
+}
+
+/// The density of a tool grows with the depth in it; what a brush that mixes meets of it is no matter.
+#[test]
+fn beside_a_brush_that_mixes_tools_leave_the_fill_and_the_usual() {
+    let (before, mut scan) = (fitted(), scan());
+    // Metal and padding elsewhere.
+    scan.values[0] = 1000.0;
+    scan.values[1] = -3000.0;
+    let smooth = "[[stroke]]\nsmooth = { along = [[15, 12, 19]], radius = 6, level = 2 }\n";
+    let push = "[[stroke]]\npush = { along = [[15, 12, 20]], radius = 4, speed = 0.5 }\n";
+    let top = DVec3::new(12.0, 12.0, 18.0);
+    let tool = |verb: &str| {
+        format!(
+            "[[stroke]]\n{verb} = {{ shape = {{ sphere = {{ radius = 4 }} }}, along = [[12, 12, 18]] }}\n"
+        )
+    };
+    for brush in [smooth, push] {
+        for verb in ["carve", "add"] {
+            for text in [tool(verb) + brush, brush.to_string() + &tool(verb)] {
+                let changes = changed_by(&before, &scan, &text);
+                let (mut holes, mut clay) = (0, 0);
+                for (place, [old, new], [was, now]) in changes {
+                    assert!(
+                        (0.0..=110.0).contains(&new),
+                        "{text}: {place}: {old} became {new}"
+                    );
+                    if place.distance(top) < 2.0 {
+                        holes += usize::from(was > ISO && now < 0.0 && new == FILL);
+                        clay += usize::from(now > ISO + 50.0);
+                    }
+                }
+                let told = if verb == "carve" { holes } else { clay };
+                assert!(told > 5, "{text}: {told}");
+            }
+        }
     }
 }
 
