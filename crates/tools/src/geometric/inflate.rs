@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::GeometricError;
 use super::band::band;
-use super::mean::averaged;
+use super::mean::{REACH, averaged, sampled};
 use super::moved::{Displacement, Moved};
 use super::write::{Fineness, Writer};
 use crate::limits::Limits;
@@ -18,6 +18,9 @@ use crate::number::{Finite, Point, Positive};
 /// Standard deviation of the mean whose slope tells the way, over the way's length: a surface is found from as far as it is to go, where the density
 /// of a scan itself is even but for noise.
 const BLUR: f64 = 0.5;
+
+/// Places that such a mean is taken from, at most.
+const PLACES: f64 = (1u64 << 24) as f64;
 
 /// Lifts a surface by a length, or lowers it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -63,15 +66,20 @@ impl Inflate {
         let (weight, reach) = band(&self.along, self.radius.0)?;
         let within = writer.within(&reach)?;
         let finest = field.finest_in(&within).max(writer.detail());
-        let deviation = field
-            .lattice()
-            .spacing(finest)
-            .to_array()
-            .map(|spacing| BLUR * self.by.0.abs() / spacing);
+        let spacing = field.lattice().spacing(finest);
+        let deviation = BLUR * self.by.0.abs();
+        let knots = within.widened(REACH * deviation).size() / spacing;
+        let mean = match knots.x * knots.y * knots.z > PLACES {
+            true => sampled(field, &within, deviation, PLACES, control)?,
+            false => {
+                let deviation = spacing.to_array().map(|spacing| deviation / spacing);
+                averaged(field, &within, finest, deviation, false, control)?
+            }
+        };
         let lifted = Moved {
             field,
             by: Lift {
-                mean: averaged(field, &within, finest, deviation, false, control)?,
+                mean,
                 weight,
                 by: self.by.0,
             },

@@ -1,12 +1,13 @@
 //! Means of a field over a Gaussian.
 
-use bspline::{Aabb, HierarchicalSpline, KnotVector, Real, TensorSpline};
+use bspline::{Aabb, Field, Frame, HierarchicalSpline, KnotVector, Real, TensorSpline};
 use fitting::Control;
+use glam::{DAffine3, DQuat, DVec3};
 
 use super::GeometricError;
 
 /// Standard deviations of the kernel on each side of its middle.
-const REACH: f64 = 3.0;
+pub(super) const REACH: f64 = 3.0;
 
 /// The mean of a field over a Gaussian of `deviation` knot intervals of level `finest` on each axis, in a box: `K f`, or `2K f - K K f`, which also
 /// keeps what is quadratic, so that a ball loses none of its volume to first order.
@@ -63,6 +64,47 @@ pub(super) fn averaged<T: Real>(
     });
     TensorSpline::new(knots, coefficients, lattice.world_from_lattice, field.slope())
         .map_err(GeometricError::shape)
+}
+
+/// The mean of a field over a Gaussian as wide as `deviation`, a length, in a box, from its values at `count` places, about: for boxes in which the
+/// knots are too many.
+pub(super) fn sampled<T: Real>(
+    field: &HierarchicalSpline<T>,
+    within: &Aabb,
+    deviation: f64,
+    count: f64,
+    control: &mut Control,
+) -> Result<TensorSpline<f64>, GeometricError> {
+    // A node more than cubic splines reach.
+    const RIM: f64 = 2.0;
+    let size = within.widened(REACH * deviation).size();
+    let step = libm::cbrt(size.x * size.y * size.z / count);
+    let weights = kernel(deviation / step);
+    let reach = weights.len() - 1;
+    let first = within.min - (reach as f64 + RIM) * step;
+    let shape = ((within.size() / step).ceil() + 2.0 * (reach as f64 + RIM) + 1.0)
+        .to_array()
+        .map(|n| n as usize);
+    let nodes: usize = shape.iter().product();
+    control.reserve(32 * nodes as u64)?;
+    let frame = Frame {
+        world_from_grid: DAffine3::from_scale_rotation_translation(
+            DVec3::splat(step),
+            DQuat::IDENTITY,
+            first,
+        ),
+        cells: shape.map(|n| n as u32 - 1),
+    };
+    let mut values = vec![0.0; nodes];
+    field.frame_values(&frame, [0; 3], shape, &mut values);
+    let even = convolved(&values, shape, &std::array::from_fn(|_| weights.clone()));
+    let coefficients = inner(&even, shape, [reach; 3]);
+    let knots = std::array::from_fn(|a| {
+        let from = first[a] + (reach as f64 - 2.0) * step;
+        let all = (0..shape[a] - 2 * reach + 4).map(|i| from + i as f64 * step);
+        KnotVector::new(3, all.collect()).expect("knots in order")
+    });
+    TensorSpline::new(knots, coefficients, DAffine3::IDENTITY, field.slope()).map_err(GeometricError::shape)
 }
 
 /// Half of a Gaussian kernel from its middle on; its sum is 1 with the other half.
@@ -162,4 +204,35 @@ fn inner(block: &[f64], shape: [usize; 3], rim: [usize; 3]) -> Vec<f64> {
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use bspline::hierarchical::Lattice;
+
+    use super::*;
+
+    #[test]
+    fn means_of_places_are_those_of_knots() {
+        let lattice = Lattice {
+            world_from_lattice: DAffine3::from_scale(DVec3::new(0.5, 0.5, 0.75)),
+            cells: [48, 48, 32],
+        };
+        let middle = DVec3::splat(12.0);
+        let ball = |p: DVec3| 300.0 * libm::tanh(6.0 - p.distance(middle));
+        let field = HierarchicalSpline::<f32>::schoenberg(lattice, 300.0, ball).unwrap();
+        let within = Aabb::new(DVec3::splat(9.0), DVec3::splat(20.0));
+        let deviation = DVec3::new(2.0, 2.0, 4.0 / 3.0).to_array();
+        let mut control = Control::default();
+        let knots = averaged(&field, &within, 0, deviation, false, &mut control).unwrap();
+        let places = sampled(&field, &within, 1.0, 20_000.0, &mut control).unwrap();
+        for n in 0..1000 {
+            let at = DVec3::new((n / 100) as f64, (n / 10 % 10) as f64, (n % 10) as f64);
+            let p = within.min + at / 9.0 * within.size();
+            let [(value, slope), (same, other)] = [&knots, &places].map(|mean| mean.value_gradient(p));
+            // Between places the spline evens out a little more.
+            assert!((value - same).abs() < 10.0, "{p}: {value} {same}");
+            assert!(slope.distance(other) < 10.0, "{p}: {slope} {other}");
+        }
+    }
 }
