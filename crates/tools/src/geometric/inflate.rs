@@ -20,7 +20,7 @@ use crate::number::{Finite, Point, Positive};
 const BLUR: f64 = 0.5;
 
 /// Places that such a mean is taken from, at most.
-const PLACES: f64 = (1u64 << 24) as f64;
+const PLACES: f64 = (1u64 << 25) as f64;
 
 /// Lifts a surface by a length, or lowers it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
