@@ -6,9 +6,9 @@
 //! become what lies there: else a ghost of the old surface would stay. What never was part of the solid stays, but for the
 //! voxels beside a new surface. Matter that was added is
 //! no denser than the median of the solid: tools make it the denser the deeper it lies. Brushes that
-//! carry densities along or mix them, as smoothing does, leave what they make of them, between the densities that were there and the fill. Moves, and pastes of what the object had
-//! elsewhere, carry along what
-//! the fit had smoothed away: `v = f_new(x) + (v − f_fit)(w⁻¹(x))`.
+//! carry densities along or mix them, as smoothing does, leave what they make of them, between the fill and the densest
+//! voxel that they met. Moves, and pastes of what the object had elsewhere, carry along what the fit had smoothed away:
+//! `v = f_new(x) + (v − f_fit)(w⁻¹(x))`.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -296,8 +296,8 @@ impl Matter {
     }
 
     /// The new density of a voxel, if it has one: of what had `old` in the scan and `was` in its fit, which is as steep as `steep` there,
-    /// where the field is `now`. Changes up to `least` are none. Where brushes have passed that mix densities, all of the field's change is meant, up to the `most`
-    /// that they met in the solid and outside of it.
+    /// where the field is `now`. Changes up to `least` are none. Where brushes have passed that mix densities, all of the field's
+    /// change is meant, up to the `most` that they met in the solid and outside of it.
     fn revised(
         &self,
         voxel: usize,

@@ -12,7 +12,7 @@ const DEPTH: usize = 7;
 /// Components of one cell are left: on thin parts a cell's centre may be inside while the samples of its walls lie
 /// in the cells beside it.
 const CELLS_TO_ACT: usize = 2;
-/// Nor is anything larger than this share of the box, whatever samples say.
+/// Nor is anything larger than this share of the box: a piece so large is more likely right than not.
 const LARGEST_SHARE: f64 = 0.1;
 /// Cells along its normal from a sample to where it speaks for the solid, and against it for the complement: a face along a plane of cells has all
 /// its samples in cells of one sign.
