@@ -57,7 +57,7 @@ fn placement(state: &State, object: &Object) -> Result<Placement, CommandError> 
 }
 
 /// All objects that have a surface, as they lie to the one of a name.
-fn others(state: &State, name: &str) -> Result<Others, CommandError> {
+pub fn others(state: &State, name: &str) -> Result<Others, CommandError> {
     let own = state.placement(name)?;
     let mut others = Others::default();
     for (other, object) in state.objects() {

@@ -282,7 +282,7 @@ impl Document {
     }
 
     /// The state with that many edits done, by way of the changes from the one at hand.
-    fn state_at(&mut self, done: usize) -> Result<State, DocumentError> {
+    pub(crate) fn state_at(&mut self, done: usize) -> Result<State, DocumentError> {
         let journal = self
             .journal
             .as_mut()

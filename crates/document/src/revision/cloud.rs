@@ -116,7 +116,7 @@ pub fn revise_cloud(
         scanned.put(*point, row);
     }
     let was_bare = |vertex: DVec3, normal: DVec3| {
-        let before = surface_of(fitted, iso, journey.back(vertex), normal, least);
+        let before = surface_of(fitted, iso, journey.back(vertex).0, normal, least);
         before.is_some_and(|before| scanned.is_bare(before, GAP * spacing))
     };
     // Scans have gaps of their own: bare is what is farther from all points than those are wide, and what lies round it.

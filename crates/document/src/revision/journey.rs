@@ -30,6 +30,8 @@ pub(super) struct Mix {
 struct Leg {
     way: Way,
     limits: Limits,
+    /// Whether there are any: at their border what came mixes with what was there.
+    is_limited: bool,
     /// A reflection in which all of it lies: the other side of a symmetric stroke.
     mirror: Option<DAffine3>,
 }
@@ -47,12 +49,18 @@ enum Way {
 }
 
 impl Journey {
-    /// The moves among commands in their order, of the object `name`, which lies in a box.
-    pub fn new(commands: &[Command], name: &str, within: &Aabb) -> Self {
+    /// The moves among commands in their order, of the object `name`, which lies in a box. `others` tells the objects that there
+    /// were when a command was done, of its place among them; only masks by objects ask for them.
+    pub fn new(
+        commands: &[Command],
+        name: &str,
+        within: &Aabb,
+        mut others: impl FnMut(usize) -> Option<Others>,
+    ) -> Self {
         let mut journey = Self::default();
         // Copies of the object that are as they were made, and after how many legs.
         let mut twins: BTreeMap<&str, usize> = BTreeMap::new();
-        for (command, name) in commands.iter().zip(names(commands, name)) {
+        for (n, (command, name)) in commands.iter().zip(names(commands, name)).enumerate() {
             twins.remove(command.object());
             let Command::Stroke { object, stroke } = command else {
                 continue;
@@ -88,16 +96,13 @@ impl Journey {
             let Some(way) = way.filter(|_| stroke.wall.is_none()) else {
                 continue;
             };
-            // Masks by other objects are left out: these may have changed since.
-            let limits = Limits::new(
-                stroke.within.as_ref(),
-                stroke.mask.as_ref(),
-                &Others::default(),
-                within,
-            );
+            let mask = stroke.mask.as_ref();
+            let beside = mask.filter(|mask| mask.object.is_some()).and_then(|_| others(n));
+            let limits = Limits::new(stroke.within.as_ref(), mask, &beside.unwrap_or_default(), within);
             let leg = Leg {
                 way,
                 limits: limits.unwrap_or_default(),
+                is_limited: stroke.within.is_some() || mask.is_some(),
                 mirror: None,
             };
             let other = mirror.map(|_| Leg {
@@ -126,18 +131,20 @@ impl Journey {
         self.legs.iter().map(cut).filter(|b| b.min.cmple(b.max).all())
     }
 
-    pub(super) fn back(&self, place: DVec3) -> DVec3 {
-        let (mut place, mut left) = (place, self.legs.len());
+    /// Where what is at a place was at first, and whether it may have come only in part.
+    pub(super) fn back(&self, place: DVec3) -> (DVec3, bool) {
+        let (mut place, mut left, mut in_part) = (place, self.legs.len(), false);
         while let Some(n) = left.checked_sub(1) {
             let leg = &self.legs[n];
             let there = leg.moved(place, Way::back);
+            in_part |= leg.is_limited && there != place;
             left = match leg.way {
                 Way::Pasted { since, .. } if there != place => since.min(n),
                 _ => n,
             };
             place = there;
         }
-        place
+        (place, in_part)
     }
 
     /// Where what was at a place is now.

@@ -54,6 +54,18 @@ impl VolumeRevision {
     pub fn is_filled(&self) -> bool {
         !self.emptied.is_empty()
     }
+
+    /// Goes on with what was done to the voxels as this one leaves them.
+    pub(super) fn follow(&mut self, next: Self) {
+        // Of the changes of a voxel the new one stands first, and stays.
+        let earlier = std::mem::replace(&mut self.changes, next.changes);
+        self.changes.extend(earlier);
+        self.changes.sort_by_key(|c| c.voxel);
+        self.changes.dedup_by_key(|c| c.voxel);
+        self.emptied.extend(next.emptied);
+        self.carved += next.carved;
+        self.added += next.added;
+    }
 }
 
 /// What the way from `fitted` to `now` means for the `volume` that `fitted` was fitted to. The surface lies at `iso`; what was
@@ -98,24 +110,30 @@ pub fn revise_volume(
                     let [was, is] = [fitted.value(place), now.value(place)];
                     part.carved += usize::from(was >= iso && is < iso);
                     part.added += usize::from(is >= iso && was < iso);
-                    let origin = journey.back(place);
+                    let (origin, in_part) = journey.back(place);
                     let is_carried = origin != place;
-                    let (old, was) = match is_carried {
+                    let stayed = [f64::from(volume.values[voxel]), was];
+                    let came = match is_carried {
                         true => {
                             let there = sampled(volume, voxel_from_world.transform_point3(origin));
-                            (there, fitted.value(origin))
+                            [there, fitted.value(origin)]
                         }
-                        false => (volume.values[voxel].into(), was),
+                        false => stayed,
                     };
-                    let steep = || fitted.value_gradient(origin).1.length();
-                    let least = if is_carried {
-                        OFF * matter.ramp
-                    } else {
-                        matter.rounding
-                    };
-                    let how = (least, mixed.most(place));
-                    let density = matter.revised(voxel, old, [was, is], how, steep, &mut part);
-                    let density = density.or(is_carried.then_some(old));
+                    let mingled = in_part.then(|| matter.mingled(stayed, came, is)).flatten();
+                    let density = mingled.or_else(|| {
+                        let [old, was] = came;
+                        let steep = || fitted.value_gradient(origin).1.length();
+                        let least = if is_carried {
+                            OFF * matter.ramp
+                        } else {
+                            matter.rounding
+                        };
+                        let how = (least, mixed.most(place));
+                        let density = matter.revised(voxel, old, [was, is], how, steep, &mut part);
+                        density.or(is_carried.then_some(old))
+                    });
+                    let density = density.filter(|density| *density != stayed[0]);
                     let change = density.map(|density| Change { voxel, density });
                     part.changes.extend(change);
                 }
@@ -132,7 +150,12 @@ pub fn revise_volume(
         all.added += part.added;
     }
     all.changes.sort_unstable_by_key(|c| c.voxel);
-    without_ghosts(&mut all, volume, iso);
+    let is_touched = |voxel: usize| {
+        let place = DVec3::from_array([voxel % nx, voxel / nx % ny, voxel / (nx * ny)].map(|i| i as f64));
+        let place = world_from_voxel.transform_point3(place);
+        now.value(place) != fitted.value(place)
+    };
+    without_ghosts(&mut all, volume, iso, is_touched);
     Ok(all)
 }
 
@@ -155,8 +178,13 @@ fn tiles(boxes: impl Iterator<Item = Aabb>, last: DVec3) -> Vec<[usize; 3]> {
     tiles.into_iter().collect()
 }
 
-/// Gives voxels beside what was carved, and beside no solid that is left, the least density that stood round them.
-fn without_ghosts(revision: &mut VolumeRevision, volume: &Volume, iso: f64) {
+/// Gives voxels that the field changed beside what was carved, and beside no solid that is left, the least density that stood round them.
+fn without_ghosts(
+    revision: &mut VolumeRevision,
+    volume: &Volume,
+    iso: f64,
+    is_touched: impl Fn(usize) -> bool,
+) {
     let (old, dims, iso) = (&volume.values, volume.header.dims, iso as f32);
     let mut new: BTreeMap<usize, f64> = revision.changes.iter().map(|c| (c.voxel, c.density)).collect();
     let is_solid = |v: usize| new.get(&v).map_or(old[v], |d| *d as f32) >= iso;
@@ -165,8 +193,10 @@ fn without_ghosts(revision: &mut VolumeRevision, volume: &Volume, iso: f64) {
         .flat_map(|v| neighbours(*v, dims))
         .filter(|v| old[*v] < iso && !is_solid(*v))
         .collect();
-    let freed = beside.into_iter().filter(|v| !neighbours(*v, dims).any(is_solid));
+    let mut freed: Vec<usize> = beside.into_iter().collect();
+    freed.retain(|v| is_touched(*v) && !neighbours(*v, dims).any(is_solid));
     let cleared: Vec<(usize, f64)> = freed
+        .into_iter()
         .map(|voxel| {
             let outside = neighbours(voxel, dims).map(|v| old[v]).filter(|d| *d < iso);
             let least = f64::from(outside.fold(old[voxel], f32::min));
@@ -293,6 +323,18 @@ impl Matter {
             voxel,
             rounding: ROUNDING * f64::from(least.abs().max(largest.abs())),
         }
+    }
+
+    /// The density of a voxel at the border of where matter may move: what was there and what came, each with its density in
+    /// the scan and in the fit, have mixed as the field `now` says. None if it says something else.
+    fn mingled(&self, [stayed, was]: [f64; 2], [came, brought]: [f64; 2], now: f64) -> Option<f64> {
+        if (now - was).abs() <= self.rounding {
+            return Some(stayed);
+        }
+        let share = (now - was) / (brought - was);
+        let off = (now - now.clamp(was.min(brought), was.max(brought))).abs();
+        (off <= OFF * self.ramp && share.is_finite())
+            .then(|| stayed + share.clamp(0.0, 1.0) * (came - stayed))
     }
 
     /// The new density of a voxel, if it has one: of what had `old` in the scan and `was` in its fit, which is as steep as `steep` there,

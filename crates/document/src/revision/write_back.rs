@@ -1,5 +1,7 @@
 //! A scan written with the edits of the object that was fitted to it.
 
+use std::borrow::Cow;
+use std::ops::Range;
 use std::path::Path;
 
 use bspline::{Aabb, HierarchicalSpline};
@@ -11,6 +13,7 @@ use formats::{Fault, FormatError, ReadLimits};
 
 use super::journey::names;
 use super::{CloudError, Journey, VolumeRevision, revise_cloud, revise_volume};
+use crate::canvas::others;
 use crate::{Command, Document, DocumentError, Object, human_count, human_number};
 
 /// Share of a volume's voxels that are below what is taken for air.
@@ -18,16 +21,23 @@ const THINNEST: f64 = 0.01;
 
 /// What became of an object since the document began.
 pub struct Course {
-    /// As it was then, in the box that it has now.
-    fitted: Object,
-    /// As it is.
-    now: Object,
-    /// What was moved since.
-    journey: Journey,
+    whole: Span,
+    /// Where strokes said that another density is the surface: what was done between them. An edit means the surface of its time.
+    spans: Vec<Span>,
     /// Names the document's state.
     identity: [u8; 32],
     /// The box that it had.
     extent: Aabb,
+}
+
+/// Edits one after the other.
+struct Span {
+    /// The object before them, in the box that it has now.
+    before: Object,
+    /// The object behind them.
+    after: Object,
+    /// What they moved.
+    journey: Journey,
 }
 
 /// Why a scan is not written with edits.
@@ -58,6 +68,89 @@ pub enum WriteBackError {
     Writing(FormatError),
 }
 
+/// The edits of a document, with a way back to what there was before each.
+struct Past<'a> {
+    document: &'a mut Document,
+    /// Those that this version of the program knows.
+    commands: Vec<Command>,
+    /// How many edits were done before each of them, and after the last.
+    done: Vec<usize>,
+    /// The name of the object before each of them, and after the last.
+    names: Vec<String>,
+}
+
+impl<'a> Past<'a> {
+    fn of(document: &'a mut Document, name: &str, count: usize) -> Result<Self, DocumentError> {
+        let (mut commands, mut done): (Vec<Command>, Vec<usize>) = Default::default();
+        for n in 0..count {
+            // What another version of the program wrote is no move that this one knows.
+            if let Ok(command) = serde_json::from_value(document.command(n)?) {
+                commands.push(command);
+                done.push(n);
+            }
+        }
+        done.push(count);
+        let names = names(&commands, name).into_iter().chain([name]).map(String::from);
+        Ok(Self {
+            names: names.collect(),
+            document,
+            commands,
+            done,
+        })
+    }
+
+    /// Where strokes said that another density is the surface, the beginning, and the end; nothing where none did.
+    fn turns(&self) -> Vec<usize> {
+        let all = self.commands.iter().zip(&self.names).enumerate();
+        let turns = all.filter(|(_, (command, name))| match command {
+            Command::Stroke { object, stroke } => object == *name && stroke.surface.is_some(),
+            _ => false,
+        });
+        let turns: Vec<usize> = turns.map(|(n, _)| n).collect();
+        match turns.is_empty() {
+            true => turns,
+            false => [0]
+                .into_iter()
+                .chain(turns)
+                .chain([self.commands.len()])
+                .collect(),
+        }
+    }
+
+    /// What some of the edits did.
+    fn span(&mut self, edits: Range<usize>, now: &Object) -> Result<Span, WriteBackError> {
+        let mut object = |n: usize| -> Result<Object, DocumentError> {
+            let state = self.document.state_at(self.done[n])?;
+            // The box may have grown since.
+            Ok(state.object(&self.names[n])?.in_box_of(now))
+        };
+        let (before, after) = (object(edits.start)?, object(edits.end)?);
+        let others = |n: usize| {
+            let n = edits.start + n;
+            let state = self.document.state_at(self.done[n]).ok()?;
+            others(&state, &self.names[n]).ok()
+        };
+        let commands = &self.commands[edits.clone()];
+        let journey = Journey::new(commands, &self.names[edits.end], &now.field.world_box(), others);
+        Ok(Span {
+            before,
+            after,
+            journey,
+        })
+    }
+}
+
+impl Span {
+    /// The fields of an object that was fitted to a scan.
+    fn fields(&self) -> Result<[&HierarchicalSpline<f32>; 2], WriteBackError> {
+        let both = self.before.field.levels().zip(self.after.field.levels());
+        both.map(|(before, after)| [before, after])
+            .ok_or(WriteBackError::NoScan(
+                "the object is a block on knots of its own, fitted to no scan; export its field, or mesh it",
+            ))
+    }
+}
+
 impl Course {
     /// Looks back to the beginning of a document.
     ///
@@ -73,31 +166,28 @@ impl Course {
             )));
         }
         let now = document.state().object(name)?.clone();
-        let mut commands: Vec<Command> = Vec::new();
-        for n in 0..counts.done {
-            // What another version of the program wrote is no move that this one knows.
-            commands.extend(serde_json::from_value(document.command(n)?).ok());
-        }
-        let first = document.first_state()?;
-        let begun_as = names(&commands, name).first().copied().unwrap_or(name);
-        let fitted = first.objects().get(begun_as).ok_or_else(|| {
+        let mut past = Past::of(document, name, counts.done)?;
+        let begun_as = past.names[0].clone();
+        let first = past.document.first_state()?;
+        let fitted = first.objects().get(&begun_as).ok_or_else(|| {
             WriteBackError::NoFit(format!(
-                "object {name:?} was not there when the document began; only what was fitted to a scan can be written back"
+                "object {begun_as:?} was not there when the document began; only what was fitted to a scan can be written back"
             ))
         })?;
+        let turns = past.turns();
+        let spans = turns.windows(2).map(|ends| past.span(ends[0]..ends[1], &now));
+        let spans = spans.collect::<Result<Vec<_>, _>>()?;
         Ok(Self {
-            journey: Journey::new(&commands, name, &now.field.world_box()),
+            whole: past.span(0..past.commands.len(), &now)?,
+            spans,
             identity: document.state().sha256(),
             extent: fitted.field.world_box(),
-            // The box may have grown since.
-            fitted: fitted.in_box_of(&now),
-            now,
         })
     }
 
     /// What stood beside the field of the fit.
     pub fn meta(&self) -> &FieldMeta {
-        &self.fitted.meta
+        &self.whole.before.meta
     }
 
     /// The box of the fit.
@@ -120,9 +210,9 @@ impl Course {
         if left_out > 0 {
             return Err(WriteBackError::LeftOut(human_count(left_out)));
         }
-        let iso = self.now.iso().unwrap_or(0.0);
-        let (fitted, now) = self.fields()?;
-        let changes = revise_cloud(fitted, now, &cloud.positions, iso, &self.journey)
+        let iso = self.whole.after.iso().unwrap_or(0.0);
+        let [fitted, now] = self.whole.fields()?;
+        let changes = revise_cloud(fitted, now, &cloud.positions, iso, &self.whole.journey)
             .map_err(WriteBackError::Replaced)?;
         formats::points::save_revised(scan, &changes, output, limits).map_err(|e| match e.fault {
             Fault::Io { .. } => WriteBackError::Writing(e),
@@ -152,12 +242,9 @@ impl Course {
         output: &Path,
         limits: &ReadLimits,
     ) -> Result<Vec<String>, WriteBackError> {
-        let iso =
-            (self.now.iso()).ok_or_else(|| WriteBackError::NoFit("the object names no surface".into()))?;
+        let iso = surface(&self.whole.after)?;
         let fill = fill.unwrap_or_else(|| air(volume));
-        let (fitted, now) = self.fields()?;
-        let revision = revise_volume(fitted, now, volume, iso, fill, &self.journey)
-            .map_err(|e| WriteBackError::Replaced(e.into()))?;
+        let revision = self.revised(volume, fill)?;
         let told =
             save_revised(scan, options, &revision.changes, &self.identity, output, limits).map_err(|e| {
                 match e.fault {
@@ -166,19 +253,38 @@ impl Course {
                 }
             })?;
         let mut notes = sentences(&revision, &told, volume, [fill, iso]);
-        if self.now.field.world_box() != self.extent {
+        if self.whole.after.field.world_box() != self.extent {
             notes.push("the object has grown beyond the scan; what lies there is not written".into());
         }
         Ok(notes)
     }
 
-    /// The fields of an object that was fitted to a scan.
-    fn fields(&self) -> Result<(&HierarchicalSpline<f32>, &HierarchicalSpline<f32>), WriteBackError> {
-        let both = self.fitted.field.levels().zip(self.now.field.levels());
-        both.ok_or(WriteBackError::NoScan(
-            "the object is a block on knots of its own, fitted to no scan; export its field, or mesh it",
-        ))
+    /// What all edits mean for the scan.
+    fn revised(&self, volume: &Volume, fill: f64) -> Result<VolumeRevision, WriteBackError> {
+        let spans = match self.spans.is_empty() {
+            true => std::slice::from_ref(&self.whole),
+            false => &self.spans,
+        };
+        let mut scan = Cow::Borrowed(volume);
+        let mut all = VolumeRevision::default();
+        for span in spans {
+            let [before, after] = span.fields()?;
+            let iso = surface(&span.after)?;
+            let part = revise_volume(before, after, &scan, iso, fill, &span.journey)
+                .map_err(|e| WriteBackError::Replaced(e.into()))?;
+            for change in part.changes.iter().filter(|_| !self.spans.is_empty()) {
+                scan.to_mut().values[change.voxel] = change.density as f32;
+            }
+            all.follow(part);
+        }
+        Ok(all)
     }
+}
+
+/// Density at the surface of an object.
+fn surface(object: &Object) -> Result<f64, WriteBackError> {
+    let iso = object.iso();
+    iso.ok_or_else(|| WriteBackError::NoFit("the object names no surface".into()))
 }
 
 /// The density of what is taken out: one that few voxels are below, those left out that were not measured.

@@ -84,7 +84,7 @@ fn points_follow_their_surface_go_with_it_and_cover_what_is_new() {
             _ => unreachable!(),
         };
         let points = scan();
-        let journey = Journey::new(&commands, "ball", &before.lattice().world_box());
+        let journey = Journey::new(&commands, "ball", &before.lattice().world_box(), |_| None);
         let changes = revise_cloud(&before, &now, &points, 0.0, &journey).unwrap();
         assert!(!changes.moved.is_empty(), "{text}");
         assert_eq!(

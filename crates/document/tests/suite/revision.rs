@@ -227,7 +227,7 @@ fn what_is_moved_takes_the_noise_of_its_scan_along() {
     let (now, _) = tool
         .apply(&before, ISO, &limits, &mut Control::default())
         .unwrap();
-    let journey = Journey::new(&commands, "ball", &before.lattice().world_box());
+    let journey = Journey::new(&commands, "ball", &before.lattice().world_box(), |_| None);
     let (scan, mut checked, mut worst) = (scan(), 0, 0.0f64);
     let revision = revise_volume(&before, &now, &scan, ISO, FILL, &journey).unwrap();
     let value = |p: DVec3| ball(p);
@@ -256,15 +256,26 @@ fn by_script(before: &HierarchicalSpline<f32>, text: &str) -> (HierarchicalSplin
         ..FieldMeta::default()
     };
     let object = Object::new(&AnyField::F32(before.clone()), meta).unwrap();
-    let begun = State::default().with("ball", object).unwrap();
-    let state = commands.iter().fold(begun, |state, command| {
-        command.apply(&state, &mut Control::default()).unwrap().0
-    });
-    let now = state.object("ball").unwrap().field.levels().unwrap().clone();
-    (
-        now,
-        Journey::new(&commands, "ball", &before.lattice().world_box()),
-    )
+    let mut states = vec![State::default().with("ball", object).unwrap()];
+    for command in &commands {
+        states.push(
+            command
+                .apply(&states[states.len() - 1], &mut Control::default())
+                .unwrap()
+                .0,
+        );
+    }
+    let others = |n: usize| {
+        let mut others = Others::default();
+        for (name, object) in states[n].objects() {
+            let put = others.put(name, &object.field, ISO, DAffine3::IDENTITY);
+            put.unwrap();
+        }
+        Some(others)
+    };
+    let journey = Journey::new(&commands, "ball", &before.lattice().world_box(), others);
+    let now = states[commands.len()].object("ball").unwrap();
+    (now.field.levels().unwrap().clone(), journey)
 }
 
 /// The changes that a script makes: the voxel's place, what it was, what it became, and what the field became.
@@ -446,7 +457,7 @@ fn a_move_on_both_sides_takes_the_noise_of_both_along() {
     let before = fitted();
     let text = "[[stroke]]\nsymmetry = { at = [12, 0, 0], normal = [1, 0, 0] }\nmove = { motion = { shift = { region = { min = [15, -9, -9], max = [33, 33, 33] }, by = [0, 1, 0], blend = 3 } } }\n";
     let commands = Command::of_script(text, |_| Ok::<_, document::CommandError>("ball".to_string())).unwrap();
-    let journey = Journey::new(&commands, "ball", &before.lattice().world_box());
+    let journey = Journey::new(&commands, "ball", &before.lattice().world_box(), |_| None);
     let Command::Stroke { stroke, .. } = &commands[0] else {
         unreachable!()
     };
@@ -469,6 +480,55 @@ fn a_move_on_both_sides_takes_the_noise_of_both_along() {
         }
     }
     assert!(checked.iter().all(|n| *n > 20), "{checked:?}");
+}
+
+/// The ball moves under a mask: what the mask keeps stays, and at its border the scan follows the field.
+#[test]
+fn a_move_under_a_mask_keeps_what_is_masked() {
+    let (before, scan) = (fitted(), scan());
+    let half = "{ min = [-9, -9, -9], max = [33, 33, 12] }";
+    let keep = format!(
+        "[[stroke]]\ncopy = {{ to = \"keep\" }}\n[[stroke]]\nobject = \"keep\"\ncut = {{ region = {} }}\n",
+        half.replace("33, 33, 12", "33, 33, 33")
+            .replace("-9, -9, -9", "-9, -9, 12")
+    );
+    let shift = "move = { motion = { shift = { region = { min = [0, 0, 0], max = [24, 24, 24] }, by = [3, 0, 0], blend = 9 } } }\n";
+    let place = |voxel: usize| scan.header.world_from_voxel.transform_point3(index(voxel));
+    let left_by_fit = (0..scan.values.len())
+        .map(|v| f64::from(scan.values[v]) - before.value(place(v)))
+        .fold((0.0f64, 0.0f64), |(lo, hi), off| (lo.min(off), hi.max(off)));
+    for (before_it, limits) in [
+        ("", format!("within = {half}")),
+        ("", format!("mask = {{ boxes = [{half}] }}")),
+        ("", format!("mask = {{ boxes = [{half}], soft = 4 }}")),
+        (keep.as_str(), "mask = { object = \"keep\" }".to_string()),
+    ] {
+        let text = format!("{before_it}[[stroke]]\n{limits}\n{shift}");
+        let (now, journey) = by_script(&before, &text);
+        let revision = revise_volume(&before, &now, &scan, ISO, FILL, &journey).unwrap();
+        let mut moved = 0;
+        for change in &revision.changes {
+            let place = place(change.voxel);
+            let (was, is) = (before.value(place), now.value(place));
+            assert_ne!(was, is, "{limits}: {place} was changed");
+            let came_from = scan
+                .header
+                .world_from_voxel
+                .inverse()
+                .transform_point3(place - 3.0 * DVec3::X);
+            if came_from.cmplt(DVec3::ZERO).any() || came_from.cmpgt(DVec3::splat(SIDE as f64 - 1.0)).any() {
+                continue;
+            }
+            let off = change.density - is;
+            assert!(
+                left_by_fit.0 - 3.0 < off && off < left_by_fit.1 + 3.0,
+                "{limits}: {place}: {was} became {is}, in the scan {}",
+                change.density
+            );
+            moved += usize::from((is - was).abs() > 20.0);
+        }
+        assert!(moved > 20, "{limits}: {moved}");
+    }
 }
 
 fn trilinear(scan: &Volume, at: DVec3) -> f64 {

@@ -27,7 +27,7 @@ pub(super) struct Judge {
     is_first: bool,
 }
 
-/// What is left between the knots, where it matters.
+/// What is left between the knots, where it matters and all functions may change.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Left {
     /// Largest rest: a world length, or a density.

@@ -73,7 +73,7 @@ impl<T: Real> LevelFit<'_, T> {
         let spread = tiles.map(|i| tiles.spread(i, &exceeding, 1));
         let (first, last) = self.region.allowed();
         let takes_part: Vec<Mask> = (spread.iter().zip(&tiles.keys))
-            .map(|(spread, key)| self.free(*key, and(spread, &between(*key, first, last))))
+            .map(|(spread, key)| self.free(*key, and(spread, &between(*key, first, last)), [0, 0]))
             .collect();
         let open = self.open(&samples, &judge, &spread);
         let Samples {
@@ -91,21 +91,25 @@ impl<T: Real> LevelFit<'_, T> {
         })
     }
 
-    /// Those of the functions `asked` of a tile that may change.
-    fn free(&self, key: TileKey, asked: Mask) -> Mask {
+    /// Those of the places `asked` of a tile about which all functions may change, from so many knots before to so many behind.
+    fn free(&self, key: TileKey, asked: Mask, [before, behind]: [i64; 2]) -> Mask {
+        let are_free = |lo: [i64; 3], hi: [i64; 3]| {
+            self.region
+                .are_free(lo.map(|k| k - before), hi.map(|k| k + behind))
+        };
         let ends = [0, TILE * TILE * TILE - 1].map(|place| knot_of(key, place));
-        if is_none(&asked) || self.region.are_free(ends[0], ends[1]) {
+        if is_none(&asked) || are_free(ends[0], ends[1]) {
             return asked;
         }
         let mut free = NONE;
         for place in places(&asked) {
             let knot = knot_of(key, place);
-            free[place / 64] |= u64::from(self.region.are_free(knot, knot)) << (place % 64);
+            free[place / 64] |= u64::from(are_free(knot, knot)) << (place % 64);
         }
         free
     }
 
-    /// What is left at the middles of cells in `keys`; with the number of samples.
+    /// What is left at the middles of cells in `keys` that no function reaches which has to stay; with the number of samples.
     pub fn look(&self, keys: Vec<TileKey>) -> Result<(Left, u64), FitError> {
         let Samples {
             tiles,
@@ -116,7 +120,7 @@ impl<T: Real> LevelFit<'_, T> {
         let judge = self.judge();
         let (lo, hi) = self.region.judged();
         let left = tiles.map(|i| {
-            let judged = between(tiles.keys[i], lo, hi);
+            let judged = self.free(tiles.keys[i], between(tiles.keys[i], lo, hi), [1, 2]);
             judge.left(&tiles, i, &judged, &target, &rest)
         });
         let add = |all: Left, one: Left| Left {

@@ -372,7 +372,12 @@ fn a_scan_comes_back_with_the_edits_of_its_object() {
     assert_eq!(old.len(), new.len());
     assert_eq!(old[..352], new[..352]);
     assert_ne!(old, new);
-    bench.json("undo clay.isoclay");
+    // What was done while another density was the surface stays done.
+    bench.write("bone.toml", "[[stroke]]\nsurface = { iso = 700 }\n");
+    bench.json("sculpt clay.isoclay --script bone.toml");
+    bench.json("export clay.isoclay --like head.nii -o later.nii --fill -7");
+    assert_eq!(bytes("later.nii"), new);
+    bench.json("undo clay.isoclay 2");
     bench.json("export clay.isoclay --like head.nii -o back.nii.gz");
     bench.json("export clay.isoclay --like head.nii -o back.nii");
     assert_eq!(bytes("back.nii"), old);
