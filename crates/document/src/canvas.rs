@@ -13,6 +13,7 @@ pub fn canvas(state: &State, name: &str) -> Result<Canvas<Body>, CommandError> {
     let iso = object.iso();
     Ok(Canvas {
         detail: object.detail(),
+        density: object.density(),
         field: object.field.clone(),
         iso: iso.ok_or_else(|| CommandError::NoSurface(name.into()))?,
         layers: object.layers.clone(),

@@ -3,7 +3,7 @@ use std::sync::Arc;
 use bspline::hierarchical::EditError;
 use bspline::{AnyField, HierarchicalSpline};
 use fitting::Control;
-use formats::field::FieldMeta;
+use formats::field::{FieldMeta, SourceKind};
 use glam::{DAffine3, DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -15,6 +15,9 @@ use tools::paint::Layers;
 use tools::tool::ToolError;
 
 use crate::CommandError;
+
+/// Share of a voxel by which tools may displace the densities of a fit that interpolates.
+const INTERPOLATED: f64 = 0.02;
 
 /// A solid of a document. Cheap to copy.
 #[derive(Clone, Debug)]
@@ -173,6 +176,19 @@ impl Object {
     pub fn detail(&self) -> usize {
         let finest = self.field.level_count() - 1;
         self.properties.detail.unwrap_or(finest)
+    }
+
+    /// What tools may leave of its densities off the surface, if they are those of a volume: what its fit left.
+    pub fn density(&self) -> Option<f64> {
+        if self.meta.source != SourceKind::Volume {
+            return None;
+        }
+        let report: serde_json::Value = serde_json::from_str(&self.meta.report).unwrap_or_default();
+        let tolerance = report["tolerance"].as_f64();
+        // A fit that interpolates names none.
+        let spacing = self.field.lattice().spacing(self.detail()).min_element();
+        let least = INTERPOLATED * spacing * self.field.slope();
+        Some(tolerance.filter(|tolerance| *tolerance > 0.0).unwrap_or(least))
     }
 
     /// Names field, properties and layers; what came with the field does not enter.

@@ -279,7 +279,9 @@ impl CoreField {
             let around = grids.lattice.world_box();
             let (made, ..) = fit_field(&*field, &start, &around, &options, control)?;
             let tolerance = match aim {
-                Aim::Density { tolerance } | Aim::Surface { tolerance, .. } => tolerance,
+                Aim::Density { tolerance }
+                | Aim::Surface { tolerance, .. }
+                | Aim::SurfaceAndDensity { tolerance, .. } => tolerance,
             };
             Ok((made, tolerance))
         })?;

@@ -20,6 +20,9 @@ pub struct Canvas<F = HierarchicalSpline<f32>> {
     pub iso: f64,
     /// Level of the field that the object is shaped to.
     pub detail: usize,
+    /// What its densities off the surface may be off by after a stroke that carries matter along, if they count: of a scan
+    /// what its fit left.
+    pub density: Option<f64>,
     /// What is painted on it.
     pub layers: Layers,
     /// Its constraints.
@@ -41,6 +44,7 @@ impl Canvas {
             field,
             iso,
             detail,
+            density: None,
             layers: Layers::new(),
             holds: Vec::new(),
             placement: Placement::default(),
@@ -74,6 +78,7 @@ impl<F> Canvas<F> {
         let Self {
             iso,
             detail,
+            density,
             layers,
             holds,
             placement,
@@ -86,6 +91,7 @@ impl<F> Canvas<F> {
             field,
             iso,
             detail,
+            density,
             layers,
             holds,
             placement,

@@ -67,6 +67,8 @@ pub struct Limits {
     finest: Option<usize>,
     /// Level that the object is shaped to.
     detail: Option<usize>,
+    /// What densities off the surface may be off by, where they count.
+    density: Option<f64>,
 }
 
 impl Region {
@@ -178,6 +180,16 @@ impl Limits {
             detail: Some(level),
             ..self
         }
+    }
+
+    /// With what densities off the surface may be off by, of an object where they count.
+    pub fn at_density(self, density: Option<f64>) -> Self {
+        Self { density, ..self }
+    }
+
+    /// What densities off the surface may be off by, of an object where they count.
+    pub fn density(&self) -> Option<f64> {
+        self.density
     }
 
     /// Finest level that may change.

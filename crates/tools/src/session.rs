@@ -251,7 +251,9 @@ impl Stroke {
     pub(crate) fn prepared(&self, canvas: &Canvas) -> Result<(Canvas, Limits), ToolError> {
         let whole = canvas.field.lattice().world_box();
         let limits = Limits::new(self.within.as_ref(), self.mask.as_ref(), &canvas.others, &whole);
-        let mut limits = limits.map_err(ToolError::Stroke)?.at_detail(canvas.detail);
+        let mut limits = (limits.map_err(ToolError::Stroke)?)
+            .at_detail(canvas.detail)
+            .at_density(canvas.density);
         if let Some(wall) = self.wall {
             let mirror = self.symmetry.map(|plane| reflection(plane.at.0, plane.normal.0));
             let below = limits.below(&canvas.field, canvas.iso, wall.0, mirror.transpose()?);

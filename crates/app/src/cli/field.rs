@@ -19,6 +19,9 @@ use super::summary::hex;
 /// Cells along the longest side at whose corners a field is looked at for its values.
 const LOOKED_AT: u32 = 64;
 
+/// Differences of values, over the values, that are roundings of single precision.
+const FLAT: f64 = 16.0 * f32::EPSILON as f64;
+
 /// Where a field is read from.
 #[derive(clap::Args)]
 pub struct FieldArgs {
@@ -296,10 +299,13 @@ impl OpenField {
     pub fn iso_or(&self, asked: Option<f64>, source: &Source) -> Outcome<f64> {
         asked.or(self.iso()).ok_or_else(|| {
             let [low, high] = self.values_met();
-            Failure::input(format!(
-                "{}: the field names no surface of its own; choose one with --iso, between {low:.6} and {high:.6}",
-                source.name(),
-            ))
+            let name = source.name();
+            Failure::input(match high - low > FLAT * low.abs().max(high.abs()) {
+                true => format!(
+                    "{name}: the field names no surface of its own; choose one with --iso, between {low:.6} and {high:.6}"
+                ),
+                false => format!("{name}: the field is {low:.6} all over and has no surface"),
+            })
         })
     }
 

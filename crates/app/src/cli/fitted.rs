@@ -121,20 +121,25 @@ fn limits_met(report: &FitReport, choice: &Choice) -> impl Iterator<Item = Strin
     })
 }
 
-/// A doubt about a tolerance that the user gave, on `what` of this `size` whose numbers are as large as `magnitude`.
+/// Roundings of a coefficient within the tolerance from which the errors told are those of the field too.
+const ROUNDINGS: f64 = 4.0;
+
+/// A doubt about a tolerance, on `what` of this `size` whose numbers are as large as `magnitude`.
 fn tolerance_doubt(choice: &Choice, tolerance: f64, what: &str, size: f64, magnitude: f64) -> Option<String> {
-    choice.tolerance?;
-    let finest = magnitude * f64::from(f32::EPSILON) / 2.0;
-    if tolerance >= size && size > 0.0 {
+    let rounding = magnitude * f64::from(f32::EPSILON) / 2.0;
+    let is_rough = tolerance > 0.0 && tolerance < ROUNDINGS * rounding;
+    if choice.tolerance.is_some() && tolerance >= size && size > 0.0 {
         let (t, s) = (human_number(tolerance), human_number(size));
         Some(format!(
             "--tolerance {t} is larger than {what} ({s}): the field may miss it altogether"
         ))
-    } else if tolerance < finest && choice.precision == Precision::F32 {
+    } else if is_rough && choice.precision == Precision::F32 {
         Some(format!(
-            "--tolerance {} is finer than 32-bit coefficients can be ({}): use --precision f64",
+            "32-bit coefficients as large as {} are rounded by up to {}, and the tolerance is {}: the field is farther off \
+             than told; use --precision f64",
+            human_number(magnitude),
+            human_number(rounding),
             human_number(tolerance),
-            human_number(finest)
         ))
     } else {
         None
@@ -298,22 +303,18 @@ fn fit_voxels<T: Stored>(volume: &Volume, choice: &Choice, control: &mut Control
     };
     let (field, mut report) = fit_volume::<T>(&view, &options, control).map_err(|e| explain(e, control))?;
     report.notes.splice(0..0, volume.notes.iter().cloned());
-    if choice.tolerance.is_some() {
-        let [low, high] = volume
-            .values
-            .iter()
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
-                [low.min(f64::from(*v)), high.max(f64::from(*v))]
-            });
-        let magnitude = low.abs().max(high.abs());
-        report.notes.extend(tolerance_doubt(
-            choice,
-            report.tolerance,
-            "the range of the densities",
-            high - low,
-            magnitude,
-        ));
-    }
+    let range = [f64::INFINITY, f64::NEG_INFINITY];
+    let densities = volume.values.iter().map(|v| f64::from(*v));
+    let [low, high] = densities.fold(range, |[low, high], v| [low.min(v), high.max(v)]);
+    let (size, magnitude) = (high - low, low.abs().max(high.abs()));
+    let doubt = tolerance_doubt(
+        choice,
+        report.tolerance,
+        "the range of the densities",
+        size,
+        magnitude,
+    );
+    report.notes.extend(doubt);
     let iso = otsu_threshold(&volume.values);
     if let Some(value) = padding(&volume.values) {
         report.notes.push(format!(

@@ -2,8 +2,9 @@
 //!
 //! A point keeps its distance to the surface: noise of the scan stays. It goes where moves carried it, then along the gradient until
 //! the field is what it was. Where that leads elsewhere (the point would travel far, or face another way) there is no such point any
-//! more; where an edit bared surface there are new ones, as dense as the scan. Surface that had no points before, which the fit made up to close
-//! the solid, gets none.
+//! more: only tools that push the surface along, as brushes and forces do, bring a point farther than the scan's spacing. Where an
+//! edit bared surface there are new ones, as dense as the scan. Surface that had no points before, which the fit made up to close the
+//! solid, gets none.
 
 use std::collections::HashMap;
 
@@ -160,7 +161,10 @@ fn fate(
     if carried == p && (now.value(p) - level).abs() <= least {
         return Fate::Stays;
     }
-    let far = (2.0 * (now.value(carried) - level).abs() / fitted.slope()).max(spacing);
+    let far = match journey.pushes(carried) {
+        true => (2.0 * (now.value(carried) - level).abs() / fitted.slope()).max(spacing),
+        false => spacing,
+    };
     let mut q = carried;
     for _ in 0..STEPS {
         let (value, gradient) = now.value_gradient(q);

@@ -6,6 +6,7 @@ use tools::geometric::{Origin, reflection};
 use tools::limits::Limits;
 use tools::others::Others;
 use tools::session::Stroke;
+use tools::tool::Tool;
 
 use crate::Command;
 
@@ -14,6 +15,8 @@ use crate::Command;
 pub struct Journey {
     legs: Vec<Leg>,
     mixes: Vec<Mix>,
+    /// Whether forces have acted: they reach anywhere.
+    is_forced: bool,
 }
 
 /// A brush that carries densities along or mixes them.
@@ -23,6 +26,13 @@ pub(super) struct Mix {
     pub reach: Aabb,
     /// Where what it brings comes from, if it does not lie there already.
     pub brought: Option<Aabb>,
+}
+
+impl Mix {
+    /// Whether it may have changed a place.
+    pub(super) fn holds(&self, place: DVec3) -> bool {
+        place.cmpge(self.reach.min).all() && place.cmple(self.reach.max).all()
+    }
 }
 
 /// One move.
@@ -62,12 +72,15 @@ impl Journey {
         let mut twins: BTreeMap<&str, usize> = BTreeMap::new();
         for (n, (command, name)) in commands.iter().zip(names(commands, name)).enumerate() {
             twins.remove(command.object());
-            let Command::Stroke { object, stroke } = command else {
-                continue;
-            };
-            if object != name {
+            if command.object() != name {
                 continue;
             }
+            let Command::Stroke { object, stroke } = command else {
+                journey.is_forced |= matches!(command, Command::Scene { .. });
+                continue;
+            };
+            let tool = stroke.tool();
+            journey.is_forced |= matches!(tool, Ok(Tool::Force(_) | Tool::Extrude(_) | Tool::Bend(_)));
             let done = journey.legs.len();
             let cut = stroke.cut.as_ref().and_then(|cut| cut.to.as_deref());
             let copy = stroke.copy.as_ref().map(|copy| copy.to.as_str()).or(cut);
@@ -113,6 +126,12 @@ impl Journey {
             journey.legs.extend(other);
         }
         journey
+    }
+
+    /// Whether a tool may have passed a place that pushes the surface along, instead of putting another one in its place.
+    pub(super) fn pushes(&self, place: DVec3) -> bool {
+        let mut brushes = self.mixes.iter().filter(|mix| mix.brought.is_none());
+        self.is_forced || brushes.any(|mix| mix.holds(place))
     }
 
     pub(super) fn mixes(&self) -> &[Mix] {

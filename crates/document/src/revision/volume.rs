@@ -258,9 +258,8 @@ impl<'a> Mixed<'a> {
 
     /// The largest densities that brushes met that passed over a place, if any did.
     fn most(&self, place: DVec3) -> Option<[f64; 2]> {
-        let holds = |b: &Aabb| place.cmpge(b.min).all() && place.cmple(b.max).all();
         let met = self.mixes.iter().zip(&self.most);
-        met.filter(|(mix, _)| holds(&mix.reach))
+        met.filter(|(mix, _)| mix.holds(place))
             .map(|(_, most)| *most)
             .reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])])
     }

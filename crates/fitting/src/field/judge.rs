@@ -17,7 +17,10 @@ const OPEN: f64 = 2.5;
 /// The aim on one level, in units in which its knots are one apart.
 #[derive(Clone, Copy)]
 pub(super) struct Judge {
-    aim: Aim,
+    /// Value on the surface and the length that may be left there, if it counts.
+    surface: Option<(f64, f64)>,
+    /// What may be left anywhere.
+    density: f64,
     /// `MᵀM` of the map from slopes by knots to slopes in the world.
     metric: DMat3,
     /// World lengths: of the level's cells, and of what a crease may be rounded by.
@@ -42,12 +45,11 @@ impl Judge {
     /// `world_from_knot` takes slopes by knots to those in the world; `cell` and `finest` are the widths of a cell of the
     /// level and of the finest one.
     pub fn new(aim: Aim, world_from_knot: DMat3, cell: f64, finest: f64, is_first: bool) -> Self {
-        let rounding = match aim {
-            Aim::Surface { tolerance, .. } => tolerance + finest,
-            Aim::Density { .. } => 0.0,
-        };
+        let surface = aim.surface();
+        let rounding = surface.map_or(0.0, |(_, tolerance)| tolerance + finest);
         Self {
-            aim,
+            surface,
+            density: aim.density().unwrap_or(f64::INFINITY),
             metric: world_from_knot.transpose() * world_from_knot,
             cell,
             rounding,
@@ -74,13 +76,14 @@ impl Judge {
         if is_none(judged) {
             return NONE;
         }
-        match self.aim {
-            Aim::Density { tolerance } => mask(
+        let density = self.density;
+        match self.surface {
+            None => mask(
                 judged,
                 #[inline(always)]
-                |i| rests[i].abs() > tolerance,
+                |i| rests[i].abs() > density,
             ),
-            Aim::Surface { iso, tolerance } => {
+            Some((iso, tolerance)) => {
                 let slopes = self.slopes_squared(tiles, tile, judged, target);
                 let (tolerance, near) = (tolerance * tolerance, (TAKEN * self.cell).powi(2));
                 let rounding = self.rounding * self.rounding;
@@ -92,7 +95,7 @@ impl Judge {
                         let (t, r, s) = (target[i], rests[i], slopes[i]);
                         let height = (t - iso) * (t - iso);
                         let is_over = (r * r > tolerance * s) & (self.is_first | (height <= near * s));
-                        is_over | is_wrong(t, r, iso, rounding * s)
+                        is_over | (r.abs() > density) | is_wrong(t, r, iso, rounding * s)
                     },
                 )
             }
@@ -101,7 +104,7 @@ impl Judge {
 
     /// Those of the knots `asked` of a tile about which the next level has to look if anything changes there.
     pub fn near(&self, tiles: &Tiles, tile: usize, asked: &Mask, target: &[Values], rest: &[Values]) -> Mask {
-        let Aim::Surface { iso, .. } = self.aim else {
+        let (Some((iso, _)), f64::INFINITY) = (self.surface, self.density) else {
             return *asked;
         };
         let slopes = self.slopes_squared(tiles, tile, asked, target);
@@ -128,14 +131,14 @@ impl Judge {
     ) -> Left {
         let mut left = Left::default();
         let exceeding = self.exceeding(tiles, tile, judged, target, rest);
-        let (slopes, iso) = match self.aim {
-            Aim::Surface { iso, .. } => (self.slopes_squared(tiles, tile, judged, target), iso),
-            Aim::Density { .. } => ([1.0; TILE * TILE * TILE], 0.0),
+        let (slopes, iso) = match self.surface {
+            Some((iso, _)) => (self.slopes_squared(tiles, tile, judged, target), iso),
+            None => ([1.0; TILE * TILE * TILE], 0.0),
         };
         let (near, rounding) = ((NEAR * self.cell).powi(2), self.rounding * self.rounding);
         for i in places(judged) {
             let (t, r, s) = (target[tile][i], rest[tile][i], slopes[i]);
-            let is_surface = matches!(self.aim, Aim::Surface { .. });
+            let is_surface = self.surface.is_some();
             let is_wrong = is_surface && is_wrong(t, r, iso, rounding * s);
             let counts = !is_surface || is_wrong || (t - iso) * (t - iso) <= near * s;
             if counts && s > 0.0 {

@@ -49,6 +49,15 @@ pub enum Aim {
         /// World length, `> 0`.
         tolerance: f64,
     },
+    /// Both: what [`Aim::Surface`] asks for, and that the field is nowhere off by more than `density`.
+    SurfaceAndDensity {
+        /// Value of the field on the surface.
+        iso: f64,
+        /// World length, `> 0`.
+        tolerance: f64,
+        /// In the unit of the field, `> 0`.
+        density: f64,
+    },
     /// The density: everywhere in the box it may be off by `tolerance`. Creases are followed down to the finest level.
     Density {
         /// In the unit of the field, `> 0`.
@@ -141,8 +150,9 @@ pub fn fit_field_where<T: Real>(
         }
         open = round.open;
     }
-    if let Aim::Surface { iso, .. } = options.aim {
-        let dead = dead_functions(onto, &field, iso, first, |level| region(level, false));
+    if let Some((iso, _)) = options.aim.surface() {
+        let most = options.aim.density().unwrap_or(f64::INFINITY);
+        let dead = dead_functions(onto, &field, (iso, most), first, |level| region(level, false));
         let before = field.coefficient_count();
         field = field.edited_blocks(&dead).map_err(not_added)?;
         report.taken_out = before - field.coefficient_count();
@@ -164,8 +174,28 @@ pub fn fit_field_where<T: Real>(
     Ok((field, difference, report))
 }
 
+impl Aim {
+    /// Value on the surface and the length that it may be off by, if it counts.
+    fn surface(&self) -> Option<(f64, f64)> {
+        match *self {
+            Self::Surface { iso, tolerance } | Self::SurfaceAndDensity { iso, tolerance, .. } => {
+                Some((iso, tolerance))
+            }
+            Self::Density { .. } => None,
+        }
+    }
+
+    /// What the field may be off by anywhere, if it counts.
+    fn density(&self) -> Option<f64> {
+        match *self {
+            Self::Surface { .. } => None,
+            Self::SurfaceAndDensity { density, .. } => Some(density),
+            Self::Density { tolerance } => Some(tolerance),
+        }
+    }
+}
+
 fn check(options: &FieldFitOptions, shortest: f64) -> Result<(), FitError> {
-    let (Aim::Surface { tolerance, .. } | Aim::Density { tolerance }) = options.aim;
     let bad = |option, value, requirement| {
         Err(FitError::Option {
             option,
@@ -173,8 +203,11 @@ fn check(options: &FieldFitOptions, shortest: f64) -> Result<(), FitError> {
             requirement,
         })
     };
-    if !(tolerance.is_finite() && tolerance > 0.0) {
-        return bad("the tolerance", tolerance, "it has to be above 0");
+    let lengths = options.aim.surface().map(|(_, tolerance)| tolerance);
+    for tolerance in lengths.into_iter().chain(options.aim.density()) {
+        if !(tolerance.is_finite() && tolerance > 0.0) {
+            return bad("the tolerance", tolerance, "it has to be above 0");
+        }
     }
     if options.finest >= MAX_LEVELS {
         return bad("the finest level", options.finest as f64, "it can be 20 at most");

@@ -9,14 +9,14 @@ use super::region::Region;
 const KEPT: f64 = 5.0;
 
 /// Edits that take functions finer than level `first` out of `field` where the surface of `old` passed and the one at
-/// `iso` no longer does. `region` says which functions of a level may change.
+/// `iso` no longer does. `region` says which functions of a level may change; taken out change the field by no more than `density`.
 ///
 /// The hulls of the coefficients decide, so no sign changes: what a level's functions weigh at a point is no more than the
 /// largest of them there, and each is less than a half, a quarter, … of the way to the iso-value, from the finest on.
 pub(super) fn dead_functions<'a, T: Real>(
     old: &HierarchicalSpline<T>,
     field: &HierarchicalSpline<T>,
-    iso: f64,
+    (iso, density): (f64, f64),
     first: usize,
     region: impl Fn(usize) -> Region<'a>,
 ) -> Vec<BlockEdit<T>> {
@@ -39,7 +39,7 @@ pub(super) fn dead_functions<'a, T: Real>(
             let now = field.brick(level, key).and_then(|b| b.corrections());
             let values = now.map_or(&[][..], |c| c.values()).iter();
             let most = values.fold(0.0f64, |most, c| most.max(c.as_f64().abs()));
-            if most < share * (clearance - kept) {
+            if most < share * (clearance - kept).min(density) {
                 dead.extend(deactivated(&region, key));
             }
         }

@@ -62,6 +62,9 @@ pub(crate) struct Entry {
     pub source: u32,
 }
 
+/// Length of the mean of unit normals from which points at one place are one point.
+const AGREED: f64 = 0.5;
+
 /// Source of a condition that is no point of the cloud.
 pub(crate) const ADDED: u32 = u32::MAX;
 
@@ -100,8 +103,8 @@ impl Samples {
 
     /// Checks, scales and sorts.
     ///
-    /// Left out, with a note: points that are not finite, points without a usable normal, and lone points
-    /// farther than ten times the robust extent of the rest.
+    /// Left out, with a note: points that are not finite, points without a usable normal, lone points
+    /// farther than ten times the robust extent of the rest, and points told twice.
     ///
     /// # Errors
     /// [`FitError::Degenerate`] if no normal is usable or the points span no volume or area;
@@ -161,12 +164,16 @@ impl Samples {
             .map(|&i| (morton((cloud.positions[i as usize] - origin) / scale), i))
             .collect();
         sort_by_morton(&mut keyed);
+        let sorted = keyed.len();
+        let (keyed, normals) = without_repeats(keyed, &cloud);
+        note(
+            sorted - keyed.len(),
+            "they lie where another point does, which takes the mean of their normals",
+        );
         let positions = keyed
             .iter()
             .map(|k| (cloud.positions[k.1 as usize] - origin) / scale)
             .collect();
-        let unit = |n: DVec3| (n / n.abs().max_element()).normalize().as_vec3().to_array();
-        let normals = keyed.iter().map(|k| unit(cloud.normals[k.1 as usize])).collect();
         let targets = vec![0.0; keyed.len()];
         let certainty = keyed
             .iter()
@@ -392,6 +399,42 @@ pub(crate) fn is_collinear(positions: &[DVec3], kept: &[u32], longest: f64) -> b
 }
 
 /// Sorts by key, those of one key as they come: digit by digit, the last first.
+/// The points of a cloud in Morton order, one where several lie at one place and face about the same way, with their normals. A
+/// point told twice is no second measurement: it would pass its noise off as certain.
+fn without_repeats(
+    mut keyed: Vec<(u64, u32)>,
+    cloud: &OrientedPoints<'_>,
+) -> (Vec<(u64, u32)>, Vec<[f32; 3]>) {
+    let unit = |n: DVec3| (n / n.abs().max_element()).normalize();
+    let normal = |k: &(u64, u32)| unit(cloud.normals[k.1 as usize]);
+    let place = |k: &(u64, u32)| cloud.positions[k.1 as usize].to_array();
+    let (mut kept, mut normals) = (Vec::with_capacity(keyed.len()), Vec::with_capacity(keyed.len()));
+    for near in keyed.chunk_by_mut(|a, b| a.0 == b.0) {
+        if let [only] = near {
+            normals.push(normal(only).as_vec3().to_array());
+            kept.push(*only);
+            continue;
+        }
+        near.sort_unstable_by(|a, b| {
+            let axes = place(a).into_iter().zip(place(b));
+            let order = axes.map(|(a, b)| a.total_cmp(&b)).find(|o| o.is_ne());
+            order.unwrap_or(a.1.cmp(&b.1))
+        });
+        for same in near.chunk_by(|a, b| place(a) == place(b)) {
+            let sum: DVec3 = same.iter().map(normal).sum();
+            let agree = sum.length() > AGREED * same.len() as f64;
+            if agree {
+                kept.push(same[0]);
+                normals.push(unit(sum).as_vec3().to_array());
+            } else {
+                kept.extend(same);
+                normals.extend(same.iter().map(|k| normal(k).as_vec3().to_array()));
+            }
+        }
+    }
+    (kept, normals)
+}
+
 fn sort_by_morton(keyed: &mut Vec<(u64, u32)>) {
     const BITS: usize = 12;
     let mut sorted = vec![(0, 0); keyed.len()];

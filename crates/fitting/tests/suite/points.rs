@@ -212,6 +212,37 @@ fn noise_is_found_and_smoothed_away() {
     }
 }
 
+/// Told twice, noise looks like detail that two measurements agree on.
+#[test]
+fn points_told_twice_count_once() {
+    let samples = cloud(
+        Solid::Sphere,
+        &CloudOptions {
+            noise: 0.01,
+            ..CloudOptions::default()
+        },
+    );
+    let fit = |times: usize| {
+        let told = |all: &[DVec3]| all.iter().flat_map(|p| std::iter::repeat_n(*p, times)).collect();
+        let repeated = SampledCloud {
+            positions: told(&samples.positions),
+            normals: told(&samples.normals),
+            ..samples.clone()
+        };
+        fit::<f32>(&repeated, &PointOptions::default()).expect("a noisy cloud")
+    };
+    let ((once, report), (thrice, told)) = (fit(1), fit(3));
+    assert_eq!(once.sha256(), thrice.sha256());
+    assert!(report.noise.is_some() && told.noise == report.noise);
+    assert!(
+        told.notes
+            .iter()
+            .any(|note| note.contains("40000 of 60000 points")),
+        "{:?}",
+        told.notes
+    );
+}
+
 #[test]
 fn a_loose_tolerance_does_not_hide_the_noise() {
     let samples = cloud(

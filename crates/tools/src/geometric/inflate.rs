@@ -90,7 +90,7 @@ impl Inflate {
             finer: self.finer,
             feature: None,
         };
-        writer.written(&lifted, &within, &fineness, control)
+        writer.carried(&lifted, &within, &fineness, control)
     }
 }
 

@@ -117,7 +117,7 @@ impl Move {
         let warp = self.motion.warp(&field.lattice().world_box())?;
         let within = writer.within(&warp.reach())?;
         let warped = Warped::new(Arc::new(field.clone()), warp);
-        writer.written(&warped, &within, &fineness, control)
+        writer.carried(&warped, &within, &fineness, control)
     }
 }
 
@@ -246,7 +246,7 @@ fn mirrored<T: Real>(
     };
     let whole = field.lattice().world_box();
     let within = writer.within(&part_behind(&whole, at, normal, width))?;
-    writer.written(&mixed, &within, fineness, control)
+    writer.carried(&mixed, &within, fineness, control)
 }
 
 /// A box about the part of `b` behind a plane, or up to `margin` before it.

@@ -147,7 +147,7 @@ impl Paste {
             finer: self.finer,
             feature: None,
         };
-        writer.written(&mixed, &within, &fineness, control)
+        writer.carried(&mixed, &within, &fineness, control)
     }
 
     /// The box that is taken, and how it goes to its place.

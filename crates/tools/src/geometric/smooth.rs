@@ -76,7 +76,7 @@ impl Smooth {
             finer: Some(0),
             feature: None,
         };
-        let (smooth, report) = writer.written(&mixed, &within, &fineness, control)?;
+        let (smooth, report) = writer.carried(&mixed, &within, &fineness, control)?;
         let tolerance = self.tolerance.map_or(TOLERANCE * writer.spacing(), |t| t.0);
         let slim = simplified(&smooth, &reach, tolerance, limits)?;
         Ok((slim, report))

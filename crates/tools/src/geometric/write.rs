@@ -174,6 +174,31 @@ impl<T: Real> Writer<'_, T> {
         fineness: &Fineness,
         control: &mut Control,
     ) -> Result<(HierarchicalSpline<T>, FieldFitReport), GeometricError> {
+        self.close_to(target, within, fineness, None, control)
+    }
+
+    /// The same of a target that carries matter along: of a scan also the densities that lie off the surface.
+    ///
+    /// # Errors
+    /// As [`written`](Self::written).
+    pub fn carried(
+        &self,
+        target: &dyn Field,
+        within: &Aabb,
+        fineness: &Fineness,
+        control: &mut Control,
+    ) -> Result<(HierarchicalSpline<T>, FieldFitReport), GeometricError> {
+        self.close_to(target, within, fineness, self.limits.density(), control)
+    }
+
+    fn close_to(
+        &self,
+        target: &dyn Field,
+        within: &Aabb,
+        fineness: &Fineness,
+        density: Option<f64>,
+        control: &mut Control,
+    ) -> Result<(HierarchicalSpline<T>, FieldFitReport), GeometricError> {
         fineness.check(self.detail())?;
         let finest = fineness.finest(self.field.lattice(), self.detail());
         // What is there already must not be left over; and nothing finer than a coarse edit may be.
@@ -193,15 +218,17 @@ impl<T: Real> Writer<'_, T> {
         }
         let tolerance = fineness.tolerance.map_or(TOLERANCE * spacing, |t| t.0);
         let is_free = |support: &Aabb| self.limits.may_change(support);
+        let iso = self.iso;
+        let aim = match density {
+            None => Aim::Surface { iso, tolerance },
+            Some(density) => Aim::SurfaceAndDensity {
+                iso,
+                tolerance,
+                density,
+            },
+        };
         let mut fit = |finest: usize, look: bool| {
-            let options = FieldFitOptions {
-                aim: Aim::Surface {
-                    iso: self.iso,
-                    tolerance,
-                },
-                finest,
-                look,
-            };
+            let options = FieldFitOptions { aim, finest, look };
             fit_field_where(target, self.field, within, &options, &is_free, control)
         };
         let remedy = "give a lower finer, a larger tolerance, or an object whose knots lie farther apart";

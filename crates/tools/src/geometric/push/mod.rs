@@ -171,7 +171,7 @@ impl Push {
             by: cover,
             step: 1e-4 * self.radius.0,
         };
-        writer.written(&moved, &within, &fineness, control)
+        writer.carried(&moved, &within, &fineness, control)
     }
 }
 
