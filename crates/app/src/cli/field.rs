@@ -315,6 +315,12 @@ impl OpenField {
         self.frame(self.lattice().cells_at(finest).map(|c| c.saturating_mul(n)))
     }
 
+    /// Cells of the finest level along the longest side of the box.
+    pub fn finest_cells(&self) -> u32 {
+        let cells = self.lattice().cells_at(self.level_count() - 1);
+        cells.into_iter().max().expect("three axes")
+    }
+
     /// The grid with `n` cells along the longest side of the box and as many on the others as their lengths ask.
     pub fn frame_of_resolution(&self, n: u32) -> Frame {
         let sides = self.lattice().spacing(0) * self.lattice().extent();

@@ -160,7 +160,15 @@ pub fn draw(args: &Args, another: Draw, turns: Option<usize>) -> Outcome {
         cancel: &cancel,
         bar: &bar,
     };
-    let (whole, ..) = mesher.on(open.frame_of_resolution(shading_cells(args.size)))?;
+    // Solids that are small in their box are between coarse cells.
+    let mut cells = shading_cells(args.size);
+    let whole = loop {
+        let (whole, ..) = mesher.on(open.frame_of_resolution(cells))?;
+        if !whole.triangles.is_empty() || cells >= open.finest_cells() {
+            break whole;
+        }
+        cells *= 4;
+    };
     if whole.triangles.is_empty() {
         return Err(open.no_surface(&source, options.iso));
     }
