@@ -253,7 +253,7 @@ fn empty_and_constant_volumes() {
     let run = bench.run("mesh out.iclay -o out.ply");
     assert_eq!(run.code, 3, "{}", run.stderr);
     assert!(
-        run.stderr.contains("--iso") && !bench.path("out.ply").exists(),
+        run.stderr.contains("7.000000 all over") && !bench.path("out.ply").exists(),
         "{}",
         run.stderr
     );

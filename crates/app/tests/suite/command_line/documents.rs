@@ -373,7 +373,7 @@ fn a_scan_comes_back_with_the_edits_of_its_object() {
     assert_eq!(old[..352], new[..352]);
     assert_ne!(old, new);
     // What was done while another density was the surface stays done.
-    bench.write("bone.toml", "[[stroke]]\nsurface = { iso = 700 }\n");
+    bench.write("bone.toml", "[[stroke]]\nsurface = { iso = 2 }\n");
     bench.json("sculpt clay.isoclay --script bone.toml");
     bench.json("export clay.isoclay --like head.nii -o later.nii --fill -7");
     assert_eq!(bytes("later.nii"), new);
