@@ -171,7 +171,7 @@ impl Course {
         let first = past.document.first_state()?;
         let fitted = first.objects().get(&begun_as).ok_or_else(|| {
             WriteBackError::NoFit(format!(
-                "object {begun_as:?} was not there when the document began; only what was fitted to a scan can be written back"
+                "object {name:?} was not there when the document began; only what was fitted to a scan can be written back"
             ))
         })?;
         let turns = past.turns();
