@@ -89,8 +89,9 @@ impl Inflate {
             tolerance: self.tolerance,
             finer: self.finer,
             feature: None,
+            densities: true,
         };
-        writer.carried(&lifted, &within, &fineness, control)
+        writer.written(&lifted, &within, &fineness, control)
     }
 }
 

@@ -181,6 +181,7 @@ impl Geometric {
             tolerance: self.tolerance,
             finer: self.finer,
             feature: Some(self.shape.feature()),
+            densities: false,
         };
         let combined = Combined {
             operation,

@@ -110,6 +110,7 @@ impl Move {
             tolerance: self.tolerance,
             finer: self.finer,
             feature: None,
+            densities: true,
         };
         if let Motion::Mirror { at, normal, blend } = &self.motion {
             return mirrored(&writer, at.0, normal.0, *blend, &fineness, control);
@@ -117,7 +118,7 @@ impl Move {
         let warp = self.motion.warp(&field.lattice().world_box())?;
         let within = writer.within(&warp.reach())?;
         let warped = Warped::new(Arc::new(field.clone()), warp);
-        writer.carried(&warped, &within, &fineness, control)
+        writer.written(&warped, &within, &fineness, control)
     }
 }
 
@@ -246,7 +247,7 @@ fn mirrored<T: Real>(
     };
     let whole = field.lattice().world_box();
     let within = writer.within(&part_behind(&whole, at, normal, width))?;
-    writer.carried(&mixed, &within, fineness, control)
+    writer.written(&mixed, &within, fineness, control)
 }
 
 /// A box about the part of `b` behind a plane, or up to `margin` before it.

@@ -146,8 +146,9 @@ impl Paste {
             tolerance: self.tolerance,
             finer: self.finer,
             feature: None,
+            densities: true,
         };
-        writer.carried(&mixed, &within, &fineness, control)
+        writer.written(&mixed, &within, &fineness, control)
     }
 
     /// The box that is taken, and how it goes to its place.

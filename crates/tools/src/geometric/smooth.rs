@@ -75,8 +75,9 @@ impl Smooth {
             tolerance: self.tolerance,
             finer: Some(0),
             feature: None,
+            densities: true,
         };
-        let (smooth, report) = writer.carried(&mixed, &within, &fineness, control)?;
+        let (smooth, report) = writer.written(&mixed, &within, &fineness, control)?;
         let tolerance = self.tolerance.map_or(TOLERANCE * writer.spacing(), |t| t.0);
         let slim = simplified(&smooth, &reach, tolerance, limits)?;
         Ok((slim, report))

@@ -27,6 +27,8 @@ pub(super) struct Fineness {
     pub finer: Option<u8>,
     /// Smallest length that the tool shapes, if it has one.
     pub feature: Option<f64>,
+    /// Whether the tool carries matter along: of a scan the densities off the surface too.
+    pub densities: bool,
 }
 
 /// Knot intervals across a feature that show it.
@@ -174,31 +176,6 @@ impl<T: Real> Writer<'_, T> {
         fineness: &Fineness,
         control: &mut Control,
     ) -> Result<(HierarchicalSpline<T>, FieldFitReport), GeometricError> {
-        self.close_to(target, within, fineness, None, control)
-    }
-
-    /// The same of a target that carries matter along: of a scan also the densities that lie off the surface.
-    ///
-    /// # Errors
-    /// As [`written`](Self::written).
-    pub fn carried(
-        &self,
-        target: &dyn Field,
-        within: &Aabb,
-        fineness: &Fineness,
-        control: &mut Control,
-    ) -> Result<(HierarchicalSpline<T>, FieldFitReport), GeometricError> {
-        self.close_to(target, within, fineness, self.limits.density(), control)
-    }
-
-    fn close_to(
-        &self,
-        target: &dyn Field,
-        within: &Aabb,
-        fineness: &Fineness,
-        density: Option<f64>,
-        control: &mut Control,
-    ) -> Result<(HierarchicalSpline<T>, FieldFitReport), GeometricError> {
         fineness.check(self.detail())?;
         let finest = fineness.finest(self.field.lattice(), self.detail());
         // What is there already must not be left over; and nothing finer than a coarse edit may be.
@@ -219,7 +196,7 @@ impl<T: Real> Writer<'_, T> {
         let tolerance = fineness.tolerance.map_or(TOLERANCE * spacing, |t| t.0);
         let is_free = |support: &Aabb| self.limits.may_change(support);
         let iso = self.iso;
-        let aim = match density {
+        let aim = match self.limits.density().filter(|_| fineness.densities) {
             None => Aim::Surface { iso, tolerance },
             Some(density) => Aim::SurfaceAndDensity {
                 iso,

@@ -165,13 +165,14 @@ impl Push {
             tolerance: Some(Positive(tolerance.min(LOST * cover.by.abs()))),
             finer: self.finer,
             feature: Some(BEND * self.radius.0),
+            densities: true,
         });
         let moved = Moved {
             field: writer.field,
             by: cover,
             step: 1e-4 * self.radius.0,
         };
-        writer.carried(&moved, &within, &fineness, control)
+        writer.written(&moved, &within, &fineness, control)
     }
 }
 
