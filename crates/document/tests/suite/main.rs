@@ -4,6 +4,7 @@ mod any_order;
 mod clay;
 mod cloud;
 mod common;
+mod densities;
 mod family;
 mod killed;
 mod knots;
