@@ -8,6 +8,7 @@ use glam::{DAffine3, DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use tools::body::Body;
+use tools::geometric::TOLERANCE;
 use tools::hold::Held;
 use tools::knots;
 use tools::material::Material;
@@ -15,9 +16,6 @@ use tools::paint::Layers;
 use tools::tool::ToolError;
 
 use crate::CommandError;
-
-/// Share of a voxel by which tools may displace the densities of a fit that interpolates.
-const INTERPOLATED: f64 = 0.02;
 
 /// A solid of a document. Cheap to copy.
 #[derive(Clone, Debug)]
@@ -185,9 +183,9 @@ impl Object {
         }
         let report: serde_json::Value = serde_json::from_str(&self.meta.report).unwrap_or_default();
         let tolerance = report["tolerance"].as_f64();
-        // A fit that interpolates names none.
+        // A fit that interpolates names none: then that of the surface, in densities.
         let spacing = self.field.lattice().spacing(self.detail()).min_element();
-        let least = INTERPOLATED * spacing * self.field.slope();
+        let least = TOLERANCE * spacing * self.field.slope();
         Some(tolerance.filter(|tolerance| *tolerance > 0.0).unwrap_or(least))
     }
 

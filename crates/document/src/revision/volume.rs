@@ -120,8 +120,8 @@ pub fn revise_volume(
                         }
                         false => stayed,
                     };
-                    let mingled = in_part.then(|| matter.mingled(stayed, came, is)).flatten();
-                    let density = mingled.or_else(|| {
+                    let blended = in_part.then(|| matter.blended(stayed, came, is)).flatten();
+                    let density = blended.or_else(|| {
                         let [old, was] = came;
                         let steep = || fitted.value_gradient(origin).1.length();
                         let least = if is_carried {
@@ -326,7 +326,7 @@ impl Matter {
 
     /// The density of a voxel at the border of where matter may move: what was there and what came, each with its density in
     /// the scan and in the fit, have mixed as the field `now` says. None if it says something else.
-    fn mingled(&self, [stayed, was]: [f64; 2], [came, brought]: [f64; 2], now: f64) -> Option<f64> {
+    fn blended(&self, [stayed, was]: [f64; 2], [came, brought]: [f64; 2], now: f64) -> Option<f64> {
         if (now - was).abs() <= self.rounding {
             return Some(stayed);
         }

@@ -41,8 +41,9 @@ pub use shape::Shape;
 pub use smooth::Smooth;
 pub use sweep::Sweep;
 use swept::Pose;
+pub use write::TOLERANCE;
+pub(crate) use write::affordable;
 use write::{Fineness, Writer};
-pub(crate) use write::{TOLERANCE, affordable};
 
 use crate::face::Face;
 use crate::limits::Limits;

@@ -12,7 +12,7 @@ use crate::mix::Mixed;
 use crate::number::Positive;
 
 /// Tolerance over the finest knot interval where none is asked for.
-pub(crate) const TOLERANCE: f64 = 0.02;
+pub const TOLERANCE: f64 = 0.02;
 
 /// Knot intervals of the finest level that a tool's box reaches beyond the tool and its blend: the supports of what changes.
 pub(super) const MARGIN: f64 = 4.0;
