@@ -13,6 +13,8 @@ const NEAR: f64 = 3.0;
 const TAKEN: f64 = NEAR + 1.0;
 /// Those in which the next level looks: half of what it takes, and what lies between the surface and a knot beside it.
 const OPEN: f64 = 2.5;
+/// What an interpolant may be off by between the knots, over what the quasi-interpolant leaves at them.
+const BETWEEN: f64 = 2.0;
 
 /// The aim on one level, in units in which its knots are one apart.
 #[derive(Clone, Copy)]
@@ -102,10 +104,26 @@ impl Judge {
         }
     }
 
-    /// Those of the knots `asked` of a tile about which the next level has to look if anything changes there.
+    /// Whether something is asked for off the surface too.
+    pub fn is_for_density(&self) -> bool {
+        self.density.is_finite()
+    }
+
+    /// Those of the knots `asked` of a tile between which the interpolant of what its knots hold may be off, by `left`, what the quasi-interpolant
+    /// leaves at the knots: a ninth of fourth differences.
+    pub fn between(&self, asked: &Mask, left: &Values) -> Mask {
+        let most = self.density / BETWEEN;
+        mask(
+            asked,
+            #[inline(always)]
+            |i| left[i].abs() > most,
+        )
+    }
+
+    /// Those of the knots `asked` of a tile at which the surface is so near that the next level has to look if anything changes there.
     pub fn near(&self, tiles: &Tiles, tile: usize, asked: &Mask, target: &[Values], rest: &[Values]) -> Mask {
-        let (Some((iso, _)), f64::INFINITY) = (self.surface, self.density) else {
-            return *asked;
+        let Some((iso, _)) = self.surface.filter(|_| !is_none(asked)) else {
+            return NONE;
         };
         let slopes = self.slopes_squared(tiles, tile, asked, target);
         let (near, rounding) = ((OPEN * self.cell).powi(2), self.rounding * self.rounding);

@@ -13,6 +13,7 @@ use super::masks::{ALL, Mask, NONE, Rows, between, is_none, places};
 use super::region::Region;
 use super::room::Room;
 use super::sample::sample;
+use super::slabs::{Slab, slabs};
 use super::tiles::{TILE, TileKey, Tiles, Values};
 use crate::FitError;
 
@@ -29,7 +30,14 @@ pub(super) struct LevelFit<'a, T> {
     pub options: &'a FieldFitOptions,
     /// Whether no coarser level was fitted: then all of the box counts.
     pub is_first: bool,
+    /// Whether the target holds nothing finer than this level as far as is known: then its knots tell what lies between.
+    pub is_resolved: bool,
+    /// Tiles of a slab from which on the next one begins.
+    pub slab: usize,
 }
+
+/// What bricks add, as it is gathered.
+type Bricks<T> = BTreeMap<BrickKey, DenseCorrections<T>>;
 
 /// What one level adds, and where the next has to look.
 pub(super) struct Round<T> {
@@ -39,9 +47,11 @@ pub(super) struct Round<T> {
     pub samples: u64,
 }
 
-/// Target and rest at the knots of some tiles.
+/// Target and rest at the knots of a slab.
 struct Samples {
     tiles: Tiles,
+    /// The slab's own tiles.
+    own: Range<usize>,
     target: Room,
     rest: Room,
     count: u64,
@@ -58,37 +68,76 @@ impl<T: Real> LevelFit<'_, T> {
     }
 
     /// Compares target and field in `keys` and says what the functions there should add.
-    pub fn run(&self, keys: Vec<TileKey>) -> Result<Round<T>, FitError> {
-        let samples = self.samples(keys)?;
+    pub fn run(&self, keys: &[TileKey]) -> Result<Round<T>, FitError> {
+        let mut round = Round {
+            edits: Vec::new(),
+            open: Vec::new(),
+            samples: 0,
+        };
+        let mut bricks = BTreeMap::new();
+        for slab in slabs(keys, self.slab) {
+            // Those of the last slab that this one reaches, too.
+            let reached = bricks.split_off(&BrickKey([slab.start.max(0) as u32, 0, 0]));
+            round
+                .edits
+                .extend(self.edits(std::mem::replace(&mut bricks, reached)));
+            round.samples += self.run_slab(slab, &mut bricks, &mut round.open)?;
+        }
+        round.edits.extend(self.edits(bricks));
+        round.open.sort_unstable();
+        round.open.dedup();
+        Ok(round)
+    }
+
+    /// The same of one slab: adds to `bricks` and `open`, and gives the number of samples.
+    fn run_slab(&self, slab: Slab, bricks: &mut Bricks<T>, open: &mut Vec<TileKey>) -> Result<u64, FitError> {
         let Samples {
-            tiles, target, rest, ..
-        } = &samples;
+            tiles,
+            own,
+            target,
+            rest,
+            count,
+        } = self.samples(slab)?;
         let judge = self.judge();
         let (lo, hi) = self.region.judged();
         let exceeding = tiles.map(|i| {
             let judged = between(tiles.keys[i], lo, hi);
-            judge.exceeding(tiles, i, &judged, target, rest)
+            judge.exceeding(&tiles, i, &judged, &target, &rest)
         });
         // A function takes part where a knot beside its own exceeds the tolerance.
-        let spread = tiles.map(|i| tiles.spread(i, &exceeding, 1));
+        let mut spread = tiles.map(|i| tiles.spread(i, &exceeding, 1));
         let (first, last) = self.region.allowed();
-        let takes_part: Vec<Mask> = (spread.iter().zip(&tiles.keys))
-            .map(|(spread, key)| self.free(*key, and(spread, &between(*key, first, last)), [0, 0]))
-            .collect();
-        let open = self.open(&samples, &judge, &spread);
-        let Samples {
-            tiles,
-            target,
-            rest,
-            count,
-        } = samples;
+        let takes_part = tiles.map(|i| match own.contains(&i) {
+            true => {
+                let allowed = and(&spread[i], &between(tiles.keys[i], first, last));
+                self.free(tiles.keys[i], allowed, [0, 0])
+            }
+            false => NONE,
+        });
+        let reached = tiles.map(|i| match own.contains(&i) {
+            true => self.reached(&tiles, i, &spread),
+            false => NONE,
+        });
+        let mut near = tiles.map(|i| judge.near(&tiles, i, &reached[i], &target, &rest));
         // What was asked of the target makes room.
-        let coefficients = self.coefficients(&tiles, &rest, &takes_part, target);
-        Ok(Round {
-            edits: self.edits(&tiles.keys, &takes_part, &coefficients),
-            open,
-            samples: count,
-        })
+        let (coefficients, left) = self.coefficients(&tiles, &rest, &takes_part, target);
+        if judge.is_for_density() {
+            for i in own.clone() {
+                let is_known = self.is_resolved && !is_none(&takes_part[i]);
+                let open = match is_known {
+                    true => judge.between(&reached[i], &left[i]),
+                    false => reached[i],
+                };
+                near[i] = std::array::from_fn(|x| near[i][x] | open[x]);
+            }
+        }
+        gather(&tiles.keys, &takes_part, &coefficients, bricks);
+        // What lies beside the slab's own tiles is for its neighbours.
+        for i in (0..own.start).chain(own.end..tiles.keys.len()) {
+            spread[i] = NONE;
+        }
+        open.extend(self.open(&tiles, &near, &spread));
+        Ok(count)
     }
 
     /// Those of the places `asked` of a tile about which all functions may change, from so many knots before to so many behind.
@@ -110,25 +159,33 @@ impl<T: Real> LevelFit<'_, T> {
     }
 
     /// What is left at the middles of cells in `keys` that no function reaches which has to stay; with the number of samples.
-    pub fn look(&self, keys: Vec<TileKey>) -> Result<(Left, u64), FitError> {
-        let Samples {
-            tiles,
-            target,
-            rest,
-            count,
-        } = self.samples(keys)?;
+    pub fn look(&self, keys: &[TileKey]) -> Result<(Left, u64), FitError> {
         let judge = self.judge();
         let (lo, hi) = self.region.judged();
-        let left = tiles.map(|i| {
-            let judged = self.free(tiles.keys[i], between(tiles.keys[i], lo, hi), [1, 2]);
-            judge.left(&tiles, i, &judged, &target, &rest)
-        });
-        let add = |all: Left, one: Left| Left {
-            worst: all.worst.max(one.worst),
-            over_tolerance: all.over_tolerance + one.over_tolerance,
-            wrong_signs: all.wrong_signs + one.wrong_signs,
-        };
-        Ok((left.into_iter().fold(Left::default(), add), count))
+        let (mut all, mut samples) = (Left::default(), 0);
+        for slab in slabs(keys, self.slab) {
+            let Samples {
+                tiles,
+                own,
+                target,
+                rest,
+                count,
+            } = self.samples(slab)?;
+            let left = tiles.map(|i| match own.contains(&i) {
+                true => {
+                    let judged = self.free(tiles.keys[i], between(tiles.keys[i], lo, hi), [1, 2]);
+                    judge.left(&tiles, i, &judged, &target, &rest)
+                }
+                false => Left::default(),
+            });
+            all = left.into_iter().fold(all, |all, one| Left {
+                worst: all.worst.max(one.worst),
+                over_tolerance: all.over_tolerance + one.over_tolerance,
+                wrong_signs: all.wrong_signs + one.wrong_signs,
+            });
+            samples += count;
+        }
+        Ok((all, samples))
     }
 
     fn judge(&self) -> Judge {
@@ -144,10 +201,11 @@ impl<T: Real> LevelFit<'_, T> {
         )
     }
 
-    fn samples(&self, mut keys: Vec<TileKey>) -> Result<Samples, FitError> {
+    fn samples(&self, mut slab: Slab) -> Result<Samples, FitError> {
         let (lo, hi) = self.region.sampled();
-        keys.retain(|key| !is_none(&between(*key, lo, hi)));
-        let tiles = Tiles::new(keys);
+        slab.keys.retain(|key| !is_none(&between(*key, lo, hi)));
+        let own = slab.own();
+        let tiles = Tiles::new(slab.keys);
         let fields = [self.target, self.field as &dyn Field];
         let (target, rest, counts) = tiles
             .fill_runs(|run, target, rest, room| sample(fields, &self.region, run[0], target, rest, room));
@@ -164,6 +222,7 @@ impl<T: Real> LevelFit<'_, T> {
         let count = counts.into_iter().sum();
         Ok(Samples {
             tiles,
+            own,
             target,
             rest,
             count,
@@ -182,8 +241,14 @@ impl<T: Real> LevelFit<'_, T> {
     /// The quasi-interpolant of the rest, and of what that leaves at the knots, in the functions that take part.
     ///
     /// Only the sum is cut off where functions do not take part: where all that reach a point do, it is interpolated as
-    /// if there were no cut. `left` is room.
-    fn coefficients(&self, tiles: &Tiles, rest: &[Values], takes_part: &[Mask], mut left: Room) -> Room {
+    /// if there were no cut. With them what the first leaves, in tiles about functions that take part. `left` is room.
+    fn coefficients(
+        &self,
+        tiles: &Tiles,
+        rest: &[Values],
+        takes_part: &[Mask],
+        mut left: Room,
+    ) -> (Room, Room) {
         let (first, last) = self.region.sampled();
         let rows = |i: usize| Rows::of(&between(tiles.keys[i], first, last));
         let mut once = tiles.fill(|i, out| {
@@ -211,72 +276,36 @@ impl<T: Real> LevelFit<'_, T> {
                 tiles.convolved(i, &rows, &left, QUASI, out, |to, _, value| *to += value);
             }
         });
-        once
+        (once, left)
     }
 
-    /// Coefficients of the functions that take part, brick by brick.
-    fn edits(&self, keys: &[TileKey], takes_part: &[Mask], coefficients: &[Values]) -> Vec<BrickEdit<T>> {
-        // Function `k + 1` is centred on knot `k`: the last knots of a tile are the first functions of the next bricks.
-        const PARTS: [Range<usize>; 2] = [0..TILE - 1, TILE - 1..TILE];
-        let mut bricks: BTreeMap<BrickKey, DenseCorrections<T>> = BTreeMap::new();
-        for ((key, mask), values) in keys.iter().zip(takes_part).zip(coefficients) {
-            if is_none(mask) {
-                continue;
-            }
-            for n in 0..8 {
-                let [xs, ys, zs] = [n >> 2, n >> 1 & 1, n & 1].map(|part: usize| PARTS[part].clone());
-                let in_part = ((1u64 << zs.len()) - 1) << zs.start;
-                let rows = xs.flat_map(|x| ys.clone().map(move |y| [x, y]));
-                let taken = |[x, y]: [usize; 2]| mask[x] >> (TILE * y) & in_part;
-                let mut rows = rows.filter(|row| taken(*row) != 0).peekable();
-                let Some([x, y]) = rows.peek() else { continue };
-                let function = |at| knot_of(*key, at).map(|k| (k + 1).max(0) as u32);
-                let start = |[x, y]: [usize; 2]| (x * TILE + y) * TILE + zs.start;
-                let brick = bricks.entry(BrickKey::of(function(start([*x, *y]))));
-                let brick = brick.or_insert_with(DenseCorrections::empty);
-                for row in rows {
-                    let (at, taken) = (start(row), taken(row) >> zs.start);
-                    let [i, j, k] = [row[0], row[1], zs.start].map(|place| (place + 1) % BRICK);
-                    brick.mask[i] |= taken << (BRICK * j + k);
-                    // Nobody reads those of functions that do not take part.
-                    let to = &mut brick.values[(i * BRICK + j) * BRICK + k..];
-                    match zs.len() {
-                        1 => to[0] = T::from_f64(values[at]),
-                        _ => copied::<T, { TILE - 1 }>(&values[at..], to),
-                    }
-                }
-            }
-        }
+    /// What the bricks add.
+    fn edits(&self, bricks: Bricks<T>) -> impl Iterator<Item = BrickEdit<T>> {
         let level = self.region.level;
-        let edit = |(key, brick): (BrickKey, DenseCorrections<T>)| BrickEdit {
+        bricks.into_iter().map(move |(key, brick)| BrickEdit {
             level,
             key,
             add: brick.pack(),
-        };
-        bricks.into_iter().map(edit).collect()
+        })
     }
 
-    /// Where something changed, or should have, as far as the surface is near.
-    fn open(&self, samples: &Samples, judge: &Judge, spread: &[Mask]) -> Vec<TileKey> {
+    /// Those places of a tile that a change reaches, two knots further, if anybody is to look there.
+    fn reached(&self, tiles: &Tiles, tile: usize, spread: &[Mask]) -> Mask {
+        let is_last = self.region.level == self.options.finest;
+        match (self.is_first, is_last) {
+            (_, true) if !self.options.look => NONE,
+            (true, false) => ALL,
+            _ => tiles.spread(tile, spread, 2),
+        }
+    }
+
+    /// Tiles in which the next level looks, or the last one between its knots: about those that are `near`, and beside the tiles.
+    fn open(&self, tiles: &Tiles, near: &[Mask], spread: &[Mask]) -> Vec<TileKey> {
         let is_last = self.region.level == self.options.finest;
         if is_last && !self.options.look {
             return Vec::new();
         }
-        let Samples {
-            tiles, target, rest, ..
-        } = samples;
-        let own = tiles.map(|i| {
-            // A change reaches two knots further.
-            let reached = match self.is_first && !is_last {
-                true => ALL,
-                false => tiles.spread(i, spread, 2),
-            };
-            if is_none(&reached) {
-                return NONE;
-            }
-            judge.near(tiles, i, &reached, target, rest)
-        });
-        let mut open: Vec<(TileKey, Mask)> = tiles.keys.iter().copied().zip(own).collect();
+        let mut open: Vec<(TileKey, Mask)> = tiles.keys.iter().copied().zip(near.iter().copied()).collect();
         // Beside the tiles nothing is known but that a change reaches there.
         let mut beside: Vec<TileKey> = (tiles.keys.iter().zip(spread))
             .filter(|(_, mask)| !is_none(mask))
@@ -293,6 +322,40 @@ impl<T: Real> LevelFit<'_, T> {
         match is_last {
             true => between_knots(&open),
             false => children(&open),
+        }
+    }
+}
+
+/// Adds the coefficients of the functions that take part to their bricks.
+fn gather<T: Real>(keys: &[TileKey], takes_part: &[Mask], coefficients: &[Values], bricks: &mut Bricks<T>) {
+    // Function `k + 1` is centred on knot `k`: the last knots of a tile are the first functions of the next bricks.
+    const PARTS: [Range<usize>; 2] = [0..TILE - 1, TILE - 1..TILE];
+    for ((key, mask), values) in keys.iter().zip(takes_part).zip(coefficients) {
+        if is_none(mask) {
+            continue;
+        }
+        for n in 0..8 {
+            let [xs, ys, zs] = [n >> 2, n >> 1 & 1, n & 1].map(|part: usize| PARTS[part].clone());
+            let in_part = ((1u64 << zs.len()) - 1) << zs.start;
+            let rows = xs.flat_map(|x| ys.clone().map(move |y| [x, y]));
+            let taken = |[x, y]: [usize; 2]| mask[x] >> (TILE * y) & in_part;
+            let mut rows = rows.filter(|row| taken(*row) != 0).peekable();
+            let Some([x, y]) = rows.peek() else { continue };
+            let function = |at| knot_of(*key, at).map(|k| (k + 1).max(0) as u32);
+            let start = |[x, y]: [usize; 2]| (x * TILE + y) * TILE + zs.start;
+            let brick = bricks.entry(BrickKey::of(function(start([*x, *y]))));
+            let brick = brick.or_insert_with(DenseCorrections::empty);
+            for row in rows {
+                let (at, taken) = (start(row), taken(row) >> zs.start);
+                let [i, j, k] = [row[0], row[1], zs.start].map(|place| (place + 1) % BRICK);
+                brick.mask[i] |= taken << (BRICK * j + k);
+                // Nobody reads those of functions that do not take part.
+                let to = &mut brick.values[(i * BRICK + j) * BRICK + k..];
+                match zs.len() {
+                    1 => to[0] = T::from_f64(values[at]),
+                    _ => copied::<T, { TILE - 1 }>(&values[at..], to),
+                }
+            }
         }
     }
 }
@@ -315,4 +378,73 @@ fn copied<T: Real, const N: usize>(values: &[f64], to: &mut [T]) {
 
 fn and(a: &Mask, b: &Mask) -> Mask {
     std::array::from_fn(|x| a[x] & b[x])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::field::Aim;
+    use bspline::Aabb;
+    use bspline::hierarchical::Lattice;
+    use bspline::primitives::Sphere;
+    use glam::DAffine3;
+
+    /// What slabs of a plane of tiles find is what all tiles together find.
+    #[test]
+    fn slabs_change_nothing() {
+        let lattice = Lattice {
+            world_from_lattice: DAffine3::from_translation(DVec3::splat(-20.0)),
+            cells: [40; 3],
+        };
+        let flat = HierarchicalSpline::<f32>::from_corrections(lattice, 1.0, vec![Default::default()]);
+        let ball = Sphere::new(DVec3::new(0.3, -0.2, 0.1), 13.0).unwrap();
+        let within = Aabb::new(DVec3::splat(3.0), DVec3::new(36.0, 35.0, 34.0));
+        let (iso, tolerance) = (0.0, 0.001);
+        let aims = [
+            Aim::Surface { iso, tolerance },
+            Aim::SurfaceAndDensity {
+                iso,
+                tolerance,
+                density: 0.001,
+            },
+        ];
+        for aim in aims {
+            let options = FieldFitOptions {
+                aim,
+                finest: 2,
+                look: true,
+            };
+            let fit = |level, slab| LevelFit {
+                target: &ball,
+                field: &flat,
+                region: Region {
+                    lattice: flat.lattice(),
+                    level,
+                    finest: 2,
+                    within: &within,
+                    is_between: false,
+                    is_free: &|_| true,
+                },
+                options: &options,
+                is_first: level == 0,
+                is_resolved: level > 0,
+                slab,
+            };
+            let mut keys = fit(0, 1).all_tiles();
+            for level in 0..3 {
+                let [whole, planes] = [usize::MAX, 1].map(|slab| fit(level, slab).run(&keys).unwrap());
+                assert!(
+                    whole.edits.len() > 20 && whole.edits == planes.edits,
+                    "level {level}"
+                );
+                assert!(
+                    !whole.open.is_empty() && whole.open == planes.open,
+                    "level {level}"
+                );
+                keys = whole.open;
+            }
+            let [whole, planes] = [usize::MAX, 1].map(|slab| fit(2, slab).look(&keys).unwrap().0);
+            assert!(whole.worst > 0.0 && whole == planes, "{whole:?}, {planes:?}");
+        }
+    }
 }

@@ -13,6 +13,7 @@ mod prune;
 mod region;
 mod room;
 mod sample;
+mod slabs;
 mod tiles;
 
 use std::time::Instant;
@@ -127,6 +128,8 @@ pub fn fit_field_where<T: Real>(
         is_between,
         is_free,
     };
+    let detail = onto.finest_in(within);
+    let is_resolved = |level: usize| level >= detail && level + 1 >= options.finest;
     let across = |level: &usize| extent.min_element() * (1u64 << *level) as f64 >= ACROSS;
     let first = (0..options.finest).find(across).unwrap_or(options.finest);
     let mut open = Vec::new();
@@ -139,9 +142,11 @@ pub fn fit_field_where<T: Real>(
             region: region(level, false),
             options,
             is_first: level == first,
+            is_resolved: is_resolved(level),
+            slab: SLAB,
         };
         let keys = if level == first { fit.all_tiles() } else { open };
-        let round = in_pool(keys.len(), || fit.run(keys))?;
+        let round = in_pool(keys.len(), || fit.run(&keys))?;
         report.samples += round.samples;
         if !round.edits.is_empty() {
             report.levels.push(level);
@@ -164,8 +169,10 @@ pub fn fit_field_where<T: Real>(
             region: region(options.finest, true),
             options,
             is_first: false,
+            is_resolved: true,
+            slab: SLAB,
         };
-        let (left, samples) = in_pool(open.len(), || fit.look(open))?;
+        let (left, samples) = in_pool(open.len(), || fit.look(&open))?;
         report.samples += samples;
         report.left = Some(left);
     }
@@ -224,6 +231,9 @@ fn check(options: &FieldFitOptions, shortest: f64) -> Result<(), FitError> {
 fn not_added(error: EditError) -> FitError {
     FitError::Degenerate(format!("the field cannot take the target: {error}"))
 }
+
+/// Tiles of a slab from which on the next one begins: some 12 KiB each while they are looked at.
+const SLAB: usize = 1 << 14;
 
 /// Functions of the coarsest level used along the box's shortest side.
 const ACROSS: f64 = 8.0;
