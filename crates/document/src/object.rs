@@ -17,6 +17,9 @@ use tools::tool::ToolError;
 
 use crate::CommandError;
 
+/// Errors that a fit leaves at many places, over their root mean square.
+const OFTEN: f64 = 2.0;
+
 /// A solid of a document. Cheap to copy.
 #[derive(Clone, Debug)]
 pub struct Object {
@@ -176,17 +179,18 @@ impl Object {
         self.properties.detail.unwrap_or(finest)
     }
 
-    /// What tools may leave of its densities off the surface, if they are those of a volume: what its fit left.
+    /// What tools may leave of its densities anywhere, if they are those of a volume: what its fit left at many places.
     pub fn density(&self) -> Option<f64> {
         if self.meta.source != SourceKind::Volume {
             return None;
         }
         let report: serde_json::Value = serde_json::from_str(&self.meta.report).unwrap_or_default();
         let tolerance = report["tolerance"].as_f64();
-        // A fit that interpolates names none: then that of the surface, in densities.
+        // A fit that interpolates names none: then what is asked for at the surface, in densities.
         let spacing = self.field.lattice().spacing(self.detail()).min_element();
         let least = TOLERANCE * spacing * self.field.slope();
-        Some(tolerance.filter(|tolerance| *tolerance > 0.0).unwrap_or(least))
+        let left = tolerance.map(|tolerance| OFTEN * tolerance);
+        Some(left.filter(|left| *left > 0.0).unwrap_or(least))
     }
 
     /// Names field, properties and layers; what came with the field does not enter.

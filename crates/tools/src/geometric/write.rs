@@ -193,10 +193,13 @@ impl<T: Real> Writer<'_, T> {
         if !self.limits.is_inside() {
             self.stays_in_box(target, within)?;
         }
-        let tolerance = fineness.tolerance.map_or(TOLERANCE * spacing, |t| t.0);
+        let density = self.limits.density().filter(|_| fineness.densities);
+        // A scan knows its surface as well as its densities.
+        let usual = density.map_or(TOLERANCE * spacing, |_| spacing);
+        let tolerance = fineness.tolerance.map_or(usual, |t| t.0);
         let is_free = |support: &Aabb| self.limits.may_change(support);
         let iso = self.iso;
-        let aim = match self.limits.density().filter(|_| fineness.densities) {
+        let aim = match density {
             None => Aim::Surface { iso, tolerance },
             Some(density) => Aim::SurfaceAndDensity {
                 iso,
