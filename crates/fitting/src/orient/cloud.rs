@@ -3,7 +3,8 @@
 use glam::DVec3;
 
 use crate::FitError;
-use crate::points::samples::{drop_far_outliers, extent, finite, is_collinear, morton};
+use crate::points::far_points::drop_far_outliers;
+use crate::points::samples::{extent, finite, is_collinear, morton};
 
 /// Usable points in Morton order.
 #[derive(Debug)]

@@ -56,7 +56,7 @@ pub(crate) fn run<T: Real>(
             Vec::new()
         },
     };
-    let mut split = root_cells(samples);
+    let mut split = root_cells(samples, plan);
     let mut worth: Vec<f64> = split.iter().map(|(c, _)| f64::from(c.end - c.start)).collect();
     let mut coarser: Option<Band<T>> = None;
     let mut coefficients = base.values.len();
@@ -201,8 +201,8 @@ fn band_samples<T: Real>(
                 });
             }
         }
-        // What no active function reaches says nothing.
-        if !current.1.is_some_and(|brick| band.is_touched(brick, cell.at)) {
+        // What no active function reaches says nothing, nor what a deeper level shows first.
+        if depth < cell.shown_from || !current.1.is_some_and(|brick| band.is_touched(brick, cell.at)) {
             continue;
         }
         let start = halo_start(cell.at);

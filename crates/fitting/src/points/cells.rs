@@ -33,6 +33,8 @@ pub(crate) struct Cell {
     pub above: u32,
     /// Whether a sample has weight.
     pub is_live: bool,
+    /// First level on which its samples count.
+    pub shown_from: usize,
 }
 
 impl Cell {
@@ -59,7 +61,7 @@ pub(crate) struct LeafCell {
 }
 
 /// Cells of the base level, all of them to be split.
-pub(crate) fn root_cells(samples: &Samples) -> Vec<(Cell, bool)> {
+pub(crate) fn root_cells(samples: &Samples, plan: &Plan) -> Vec<(Cell, bool)> {
     let whole = Cell {
         at: [0; 3],
         start: 0,
@@ -67,6 +69,7 @@ pub(crate) fn root_cells(samples: &Samples) -> Vec<(Cell, bool)> {
         refined: true,
         above: u32::MAX,
         is_live: true,
+        shown_from: 0,
     };
     let mut level = vec![(whole, true)];
     for depth in 1..=BASE_DEPTH {
@@ -74,6 +77,9 @@ pub(crate) fn root_cells(samples: &Samples) -> Vec<(Cell, bool)> {
             .into_iter()
             .map(|c| (c, true))
             .collect();
+    }
+    for (cell, _) in &mut level {
+        cell.shown_from = plan.shown_from.get(&cell.at).copied().unwrap_or(0);
     }
     level
 }
@@ -99,6 +105,7 @@ pub(crate) fn children(samples: &Samples, above: &[(Cell, bool)], depth: usize) 
                     refined: *split,
                     above: count,
                     is_live,
+                    shown_from: parent.shown_from,
                 }),
             }
         }
@@ -148,6 +155,9 @@ pub(crate) fn judge(
 ) -> Result<(), StopReason> {
     if !cell.is_live {
         return Err(StopReason::NoData);
+    }
+    if depth < cell.shown_from {
+        return Ok(());
     }
     let is_carried = f64::from(spacing) <= CELLS_BETWEEN * 0.5f64.powi(depth as i32 + 1);
     let fits = q.distance() <= plan.tolerance && q.turn() <= GRADIENT_LIMIT;

@@ -15,6 +15,7 @@ use glam::{DAffine3, DQuat, DVec3};
 
 use super::clusters::clusters;
 use super::samples::Samples;
+use super::small_parts::{SmallPart, small_parts};
 use crate::level::BASE_DEPTH;
 use crate::level::full_grid::FullGrid;
 use crate::level::full_operator::Cluster;
@@ -47,12 +48,40 @@ const SAMPLES_PER_CELL: f64 = 6.0;
 /// Coefficient sites whose winding numbers are summed together.
 const RUN: usize = 16;
 
-/// Turns over the coefficients of the full level `base` that contradict both witnesses; returns how many.
-pub(crate) fn settle(base: &mut FullGrid<f64>, samples: &Samples) -> usize {
+/// Turns over the coefficients of the full level `base` that contradict both witnesses; returns how many, and the parts that are too small
+/// for it.
+pub(crate) fn settle(base: &mut FullGrid<f64>, samples: &Samples) -> (usize, Vec<SmallPart>) {
     let data = clusters(samples, BASE_DEPTH);
+    let small = small_parts(&data, base.n);
+    let areas = areas(&data);
+    let mut is_small = vec![false; data.len()];
+    small
+        .iter()
+        .flat_map(|part| &part.clusters)
+        .for_each(|i| is_small[*i] = true);
+    let about: Vec<Vec<usize>> = small.iter().map(|part| part.sites(base.n)).collect();
+    let places: Vec<DVec3> = about
+        .iter()
+        .flatten()
+        .map(|&site| site_position(site, base.n))
+        .collect();
+    let mut numbers = &mut winding_numbers(&data, &areas, &places)[..];
+    for (part, sites) in small.iter().zip(&about) {
+        let own = numbers
+            .split_off_mut(..sites.len())
+            .expect("a number for each site");
+        // A site may lie in the part.
+        let usual = *own.select_nth_unstable_by(sites.len() / 2, f64::total_cmp).1;
+        if !(OUTSIDE..=INSIDE).contains(&usual) {
+            let sign = if usual > INSIDE { 1.0 } else { -1.0 };
+            for &site in sites {
+                let distance = part.distance(&data, site_position(site, base.n), base.n);
+                base.values[site] = sign * (SHARE * distance).max(base.values[site].abs());
+            }
+        }
+    }
     let sites = far_sites(data.iter().map(|c| c.position), base.n);
     let places: Vec<DVec3> = sites.iter().map(|&site| site_position(site, base.n)).collect();
-    let areas = areas(&data);
     let numbers = winding_numbers(&data, &areas, &places);
     let (low, high) = ends(data.iter().map(|c| c.position));
     let is_beyond = |x: DVec3| (low - x).max(x - high).max_element() > -MARGIN / base.n as f64;
@@ -72,16 +101,21 @@ pub(crate) fn settle(base: &mut FullGrid<f64>, samples: &Samples) -> usize {
             continue;
         }
         let x = site_position(site, base.n);
-        let (distance, facing) = way_to(&data, x, base.n);
+        let Way {
+            nearest,
+            distance,
+            facing,
+        } = way_to(&data, x, base.n);
         let sign = if is_outside { -1.0 } else { 1.0 };
-        let is_sure = -sign * facing > FACING && (is_inside || w < OUTSIDE);
+        // What closes on itself has no hole to fill.
+        let is_sure = (-sign * facing > FACING || is_small[nearest]) && (is_inside || w < OUTSIDE);
         let is_behind = || behind.contains(&[site / (m * m), site / m % m, site % m]);
         if is_sure || (is_outside && is_beyond(x) && !is_behind()) {
             base.values[site] = sign * SHARE * distance;
             turned += 1;
         }
     }
-    turned
+    (turned, small)
 }
 
 /// Turns over the coefficients of the full level `base` that lie in the cells of `conditions` (position and value asked for),
@@ -236,15 +270,23 @@ fn ends(places: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
     })
 }
 
-/// Distance from `x` to the nearest cluster, and the mean cosine between the ways to `x` from the clusters that are hardly
-/// farther and their normals: near 1 before the outside of a closed surface, -1 before its inside, and 0 in a hole.
-fn way_to(data: &[Cluster], x: DVec3, n: usize) -> (f64, f64) {
-    let nearest = data
-        .iter()
-        .map(|c| c.position.distance_squared(x))
-        .fold(f64::INFINITY, f64::min)
-        .sqrt();
-    let reach = nearest + ROUND / n as f64;
+/// The way to a place from the clusters near it.
+struct Way {
+    /// Nearest cluster, and how far it is.
+    nearest: usize,
+    distance: f64,
+    /// Mean cosine between the ways from the clusters that are hardly farther and their normals: near 1 before the outside of a closed
+    /// surface, -1 before its inside, and 0 in a hole.
+    facing: f64,
+}
+
+fn way_to(data: &[Cluster], x: DVec3, n: usize) -> Way {
+    let squares = data.iter().map(|c| c.position.distance_squared(x)).enumerate();
+    let (nearest, square) = squares
+        .reduce(|a, b| if b.1 < a.1 { b } else { a })
+        .expect("a cloud has clusters");
+    let distance = square.sqrt();
+    let reach = distance + ROUND / n as f64;
     let (mut along, mut count) = (0.0, 0.0);
     for c in data {
         let way = x - c.position;
@@ -254,7 +296,11 @@ fn way_to(data: &[Cluster], x: DVec3, n: usize) -> (f64, f64) {
             count += c.weight;
         }
     }
-    (nearest, along / count)
+    Way {
+        nearest,
+        distance,
+        facing: along / count,
+    }
 }
 
 /// Knot of coefficient `site` of a level of `n` cells, unit box.

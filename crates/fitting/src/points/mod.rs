@@ -8,6 +8,7 @@ mod coarse;
 mod cross_validation;
 mod directions;
 mod far_field;
+pub(crate) mod far_points;
 mod feet;
 mod invented;
 #[cfg(test)]
@@ -22,6 +23,7 @@ pub use measure::{LeafError, PointError, PointErrors, crossing, measure_points, 
 pub use residual::newton_distance;
 mod robust;
 pub(crate) mod samples;
+mod small_parts;
 mod specks;
 mod still;
 mod support;
@@ -114,16 +116,24 @@ pub fn fit_points<T: Real>(
     control.step("sorting points", 0.0)?;
     control.reserve(cascade::level_bytes::<T>(0, cloud.positions.len()))?;
     let mut samples = Samples::prepare(*cloud)?;
+    let mut tree = support::tree(&samples.positions);
+    if let Some(all) = tree.as_ref().filter(|_| options.robust) {
+        control.step("weighing points", 0.03)?;
+        robust::weigh_by_support(&mut samples, all);
+        if let Some(near) = far_points::without_far(&samples, *cloud)? {
+            samples = near;
+            tree = support::tree(&samples.positions);
+            if let Some(near) = &tree {
+                robust::weigh_by_support(&mut samples, near);
+            }
+        }
+    } else if let Some(tree) = &tree {
+        let doubt = far_points::doubt(&samples).or_else(|| support::doubt(&samples, tree));
+        samples.notes.extend(doubt);
+    }
     // Below the default tolerance noise does not matter; above, it does even to a caller who asks for less.
     let default_tolerance = 1e-4 * samples.diagonal / samples.scale;
     let tolerance = options.tolerance.map_or(default_tolerance, |t| t / samples.scale);
-    let tree = support::tree(&samples.positions);
-    if let Some(tree) = tree.as_ref().filter(|_| options.robust) {
-        control.step("weighing points", 0.03)?;
-        robust::weigh_by_support(&mut samples, tree);
-    } else if let Some(tree) = &tree {
-        samples.notes.extend(support::doubt(&samples, tree));
-    }
     samples.notes.extend(far_field::doubt_of_inward(&samples));
     let noise = match (&tree, options.smoothing) {
         (Some(tree), None) => noise::estimate(&samples, tree, default_tolerance.min(tolerance)),
@@ -143,7 +153,8 @@ pub fn fit_points<T: Real>(
     if options.robust {
         samples.notes.push(robust::account(&samples));
     }
-    let turned = far_field::settle(&mut base, &samples);
+    let (turned, small) = far_field::settle(&mut base, &samples);
+    plan.shows(&small);
     if turned > 0 {
         samples.notes.push(format!(
             "the sign of {turned} coefficients far from all points was turned over: the winding number of the points \

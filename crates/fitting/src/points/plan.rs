@@ -1,6 +1,9 @@
 //! The one rule that turns data and options into depths and weights.
 
+use std::collections::BTreeMap;
+
 use super::samples::Samples;
+use super::small_parts::SmallPart;
 use super::{NormalForm, PointOptions};
 use crate::StopReason;
 use crate::level::band_problem::Weights;
@@ -40,6 +43,8 @@ pub(crate) struct Plan {
     pub form: NormalForm,
     /// Whether cells that an extremum near the surface may lie in are told.
     pub seeks_extrema: bool,
+    /// Cells of the first grid whose samples only some level shows, and which.
+    pub shown_from: BTreeMap<[u32; 3], usize>,
     /// Value targets in the place of 0, and no normals: for the trace of the smoother.
     pub probe: Option<Vec<f32>>,
 }
@@ -144,6 +149,7 @@ impl Plan {
             robust: options.robust,
             form: NormalForm::Gradient,
             seeks_extrema: false,
+            shown_from: BTreeMap::new(),
             probe: None,
         };
         let Some(sigma) = noise else { return clean };
@@ -175,6 +181,15 @@ impl Plan {
                 StopReason::Noise
             },
             ..clean
+        }
+    }
+
+    /// Leaves the samples of small parts to the levels that show them.
+    pub fn shows(&mut self, small: &[SmallPart]) {
+        for part in small {
+            let from = part.shown_from().min(self.max_depth);
+            let cells = part.cells.iter().map(|cell| cell.map(|c| c as u32));
+            self.shown_from.extend(cells.map(|cell| (cell, from)));
         }
     }
 

@@ -4,6 +4,7 @@ use bspline::{HierarchicalSpline, Real};
 use glam::DVec3;
 
 use super::LEAST_POINTS;
+use super::far_points::drop_far_outliers;
 use crate::FitError;
 use crate::level::MAX_DEPTH;
 use crate::level::assemble::{Level, assemble};
@@ -39,9 +40,7 @@ impl OrientedPoints<'_> {
 }
 
 /// Margin of the box round the points, as a multiple of their longest side.
-const BOX_SCALE: f64 = 1.15;
-/// Share of the points that may lie outside the robust extent before they count as part of the scan.
-const OUTLIER_SHARE: f64 = 1e-3;
+pub(crate) const BOX_SCALE: f64 = 1.15;
 
 /// One sample.
 #[derive(Clone, Copy, Debug)]
@@ -113,11 +112,7 @@ impl Samples {
         assert_eq!(cloud.positions.len(), cloud.normals.len(), "one normal per point");
         let total = cloud.positions.len();
         let mut notes = Vec::new();
-        let mut note = |count: usize, what: &str| {
-            if count > 0 {
-                notes.push(format!("{count} of {total} points left out: {what}"));
-            }
-        };
+        let mut note = |count: usize, what: &str| note_left_out(&mut notes, count, total, what);
         let mut kept: Vec<u32> = (0..total as u32)
             .filter(|&i| finite(&cloud.positions[i as usize]))
             .collect();
@@ -143,7 +138,12 @@ impl Samples {
                 needed: LEAST_POINTS,
             });
         }
-        let (min, max) = extent(cloud.positions, &kept);
+        Self::boxed(cloud, &kept, notes)
+    }
+
+    /// Those points of a cloud whose indices are `kept`, in their box.
+    fn boxed(cloud: OrientedPoints<'_>, kept: &[u32], mut notes: Vec<String>) -> Result<Self, FitError> {
+        let (min, max) = extent(cloud.positions, kept);
         let size = max - min;
         let longest = size.max_element();
         if longest <= 1e-12 * min.abs().max(max.abs()).max_element() || longest == 0.0 {
@@ -152,7 +152,7 @@ impl Samples {
                 kept.len()
             )));
         }
-        if is_collinear(cloud.positions, &kept, longest) {
+        if is_collinear(cloud.positions, kept, longest) {
             return Err(FitError::Degenerate(
                 "the points lie on one line: a solid needs a surface around it".into(),
             ));
@@ -166,8 +166,10 @@ impl Samples {
         sort_by_morton(&mut keyed);
         let sorted = keyed.len();
         let (keyed, normals) = without_repeats(keyed, &cloud);
-        note(
+        note_left_out(
+            &mut notes,
             sorted - keyed.len(),
+            cloud.positions.len(),
             "they lie where another point does, which takes the mean of their normals",
         );
         let positions = keyed
@@ -192,6 +194,30 @@ impl Samples {
             diagonal: size.length(),
             notes,
         })
+    }
+
+    /// The samples without those beyond the corners `low` and `high`, unit box, in a box of their own.
+    ///
+    /// # Errors
+    /// As [`Self::prepare`].
+    pub fn cut_to(&self, cloud: OrientedPoints<'_>, low: DVec3, high: DVec3) -> Result<Self, FitError> {
+        let is_within = |i: &usize| {
+            (low - self.positions[*i])
+                .max(self.positions[*i] - high)
+                .max_element()
+                <= 0.0
+        };
+        let all = 0..self.positions.len();
+        let mut kept: Vec<u32> = all.filter(is_within).map(|i| self.source[i]).collect();
+        kept.sort_unstable();
+        let mut notes = self.notes.clone();
+        note_left_out(
+            &mut notes,
+            self.positions.len() - kept.len(),
+            cloud.positions.len(),
+            "they lie far from all points that their neighbours speak for",
+        );
+        Self::boxed(cloud, &kept, notes)
     }
 
     /// Whether sample `index` is a condition on the sign of the field away from the surface, not a point of it.
@@ -352,33 +378,9 @@ pub(crate) fn extent(positions: &[DVec3], kept: &[u32]) -> (DVec3, DVec3) {
         })
 }
 
-/// Removes points far beyond the bulk, when they are few: one such point would take all resolution away.
-pub(crate) fn drop_far_outliers(positions: &[DVec3], kept: &mut Vec<u32>) {
-    if kept.len() < 100 {
-        return;
-    }
-    // The extent of the bulk: of a strided choice of points, without its outermost few.
-    let stride = kept.len().div_ceil(4096);
-    let (mut low, mut high) = (DVec3::ZERO, DVec3::ZERO);
-    for a in 0..3 {
-        let mut axis: Vec<f64> = kept
-            .iter()
-            .step_by(stride)
-            .map(|&i| positions[i as usize][a])
-            .collect();
-        let trim = (axis.len() as f64 * OUTLIER_SHARE).ceil() as usize;
-        let last = axis.len() - 1;
-        low[a] = *axis.select_nth_unstable_by(trim, f64::total_cmp).1;
-        high[a] = *axis.select_nth_unstable_by(last - trim, f64::total_cmp).1;
-    }
-    let reach = 10.0 * (high - low).max_element();
-    let within = |i: &u32| {
-        let p = positions[*i as usize];
-        (low - p).max(p - high).max_element() <= reach
-    };
-    let outside = kept.iter().filter(|i| !within(i)).count();
-    if reach > 0.0 && outside as f64 <= OUTLIER_SHARE * kept.len() as f64 + 1.0 {
-        kept.retain(within);
+fn note_left_out(notes: &mut Vec<String>, count: usize, total: usize, why: &str) {
+    if count > 0 {
+        notes.push(format!("{count} of {total} points left out: {why}"));
     }
 }
 

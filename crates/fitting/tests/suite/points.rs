@@ -422,3 +422,87 @@ fn a_level_that_does_not_converge_is_told() {
     assert!(last.goal.is_some_and(|goal| last.residual > goal), "{last:?}");
     assert!(says_so(&stiff.notes), "{:?}", stiff.notes);
 }
+
+/// Two unit balls, so far apart that they are a half to an eighth of a cell of the first grid: 9.7 of 4.19 in volume, or nothing, before.
+#[test]
+fn small_parts_far_apart_keep_their_shape() {
+    let one = cloud(
+        Solid::Sphere,
+        &CloudOptions {
+            count: 5000,
+            ..CloudOptions::default()
+        },
+    );
+    for apart in [100.0, 200.0, 400.0] {
+        let shift = DVec3::new(1.0, 0.7, 0.3) * apart;
+        let moved = one.positions.iter().map(|p| *p + shift);
+        let both = SampledCloud {
+            positions: one.positions.iter().copied().chain(moved).collect(),
+            normals: one.normals.repeat(2),
+            ..one.clone()
+        };
+        let (field, report) = fit::<f32>(&both, &PointOptions::default()).expect("a clean cloud");
+        assert!(report.rms < report.tolerance, "{apart}: {}", report.rms);
+        for ball in [DVec3::ZERO, shift] {
+            let radius = |way: DVec3| {
+                let inside = |r: f64| field.value(ball + way * r) > 0.0;
+                (1..300)
+                    .map(|i| 0.01 * f64::from(i))
+                    .find(|r| !inside(*r))
+                    .unwrap_or(3.0)
+            };
+            let mut random = SplitMix64::new(4);
+            let radii: Vec<f64> = (0..200).map(|_| radius(random.normal3().normalize())).collect();
+            let cubes = radii.iter().map(|r| r.powi(3)).sum::<f64>() / radii.len() as f64;
+            assert!((cubes - 1.0).abs() < 0.05, "{apart}: {cubes} of the volume");
+        }
+        let is_far = |p: &&DVec3| p.distance(DVec3::ZERO).min(p.distance(shift)) > 1.5;
+        let far = far_points(&field, &field.lattice().world_box(), 0.0);
+        assert_eq!(
+            far.iter()
+                .filter(is_far)
+                .filter(|p| field.value(**p) > 0.0)
+                .count(),
+            0
+        );
+    }
+}
+
+/// One point in fifty lies at ten diagonals: their box holds the torus in a cell of the first grid or two.
+#[test]
+fn far_outliers_do_not_stretch_the_box_of_a_robust_fit() {
+    let mut samples = cloud(
+        Solid::Torus,
+        &CloudOptions {
+            count: 20_000,
+            ..CloudOptions::default()
+        },
+    );
+    let truth = Solid::Torus.field();
+    let (plain, _) = fit::<f32>(&samples, &to_depth(8)).expect("a clean cloud");
+    let mut random = SplitMix64::new(5);
+    for _ in 0..400 {
+        samples.positions.push(10.0 * random.normal3());
+        samples.normals.push(random.normal3().normalize());
+    }
+    let (_, report) = fit::<f32>(&samples, &PointOptions::default()).expect("a cloud");
+    let is_told = |note: &String| note.contains("times as long") && note.contains("robust");
+    assert!(report.notes.iter().any(is_told), "{:?}", report.notes);
+    let options = PointOptions {
+        robust: true,
+        ..to_depth(8)
+    };
+    let (field, report) = fit::<f32>(&samples, &options).expect("a cloud");
+    let [size, plain] = [&field, &plain].map(|f| f.lattice().world_box().size().max_element());
+    assert!(size < 1.5 * plain, "{size} for {plain}: {:?}", report.notes);
+    let far = far_points(&*truth, &field.lattice().world_box(), 0.1);
+    let wrong = far
+        .iter()
+        .filter(|p| (field.value(**p) > 0.0) != (truth.value(**p) > 0.0));
+    assert_eq!(wrong.count(), 0, "{:?}", report.notes);
+    assert!(
+        report.notes.iter().any(|n| n.contains("far from all points")),
+        "{:?}",
+        report.notes
+    );
+}
