@@ -69,7 +69,7 @@ pub fn others(state: &State, name: &str) -> Result<Others, CommandError> {
                 true => DAffine3::IDENTITY,
                 false => own.inverse() * placement,
             };
-            let put = others.put(other, &object.field, iso, map);
+            let put = others.put(other, &object.field, iso, map, object.density().is_some());
             put.map_err(|e| CommandError::Script(format!("object {other:?} cannot be used: {e}")))?;
         }
     }

@@ -18,6 +18,8 @@ struct Other {
     distance: Arc<dyn Field>,
     reach: Aabb,
     canvas_from_object: DAffine3,
+    /// Density over distance, and that of the surface, if its densities count.
+    densities: Option<(f64, f64)>,
     /// The field itself and its iso-value, where it lies as the canvas does and has levels.
     own: Option<(HierarchicalSpline<f32>, f64)>,
 }
@@ -29,7 +31,8 @@ impl fmt::Debug for Others {
 }
 
 impl Others {
-    /// Puts an object in; `canvas_from_object` maps its world to that of the canvas.
+    /// Puts an object in; `canvas_from_object` maps its world to that of the canvas. `has_densities` tells whether its values are those of a
+    /// scan, or only distances to its surface.
     ///
     /// # Errors
     /// [`CsgError`] for an iso-value that is not finite, or a map that flattens.
@@ -39,15 +42,17 @@ impl Others {
         body: &Body,
         iso: f64,
         canvas_from_object: DAffine3,
+        has_densities: bool,
     ) -> Result<(), CsgError> {
         let steep = 1.0 / body.slope();
         let distance = Csg::sum(vec![(steep, body.shared())], -iso * steep)?;
         let is_beside = canvas_from_object == DAffine3::IDENTITY;
+        let mut stretch = 1.0;
         let distance: Arc<dyn Field> = match is_beside {
             true => Arc::new(distance),
             false => {
                 // A distance of the object, in lengths of the canvas.
-                let stretch = canvas_from_object.matrix3.determinant().abs().cbrt();
+                stretch = canvas_from_object.matrix3.determinant().abs().cbrt();
                 let placed = Arc::new(Csg::affine(Arc::new(distance), canvas_from_object)?);
                 Arc::new(Csg::sum(vec![(stretch, placed)], 0.0)?)
             }
@@ -56,6 +61,7 @@ impl Others {
             distance,
             reach: body.world_box().transformed(&canvas_from_object),
             canvas_from_object,
+            densities: has_densities.then(|| (body.slope() / stretch, iso)),
             own: body
                 .levels()
                 .filter(|_| is_beside)
@@ -77,6 +83,11 @@ impl Others {
     pub fn get(&self, name: &str) -> Result<(Arc<dyn Field>, Aabb), String> {
         let other = self.known(name)?;
         Ok((other.distance.clone(), other.reach))
+    }
+
+    /// Densities of an object over the distances of [`Self::get`], and that of its surface, if they count.
+    pub(crate) fn densities(&self, name: &str) -> Option<(f64, f64)> {
+        self.0.get(name)?.densities
     }
 
     /// Map from the world of an object to that of the canvas.

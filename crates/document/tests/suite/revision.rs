@@ -268,7 +268,13 @@ fn by_script(before: &HierarchicalSpline<f32>, text: &str) -> (HierarchicalSplin
     let others = |n: usize| {
         let mut others = Others::default();
         for (name, object) in states[n].objects() {
-            let put = others.put(name, &object.field, ISO, DAffine3::IDENTITY);
+            let put = others.put(
+                name,
+                &object.field,
+                ISO,
+                DAffine3::IDENTITY,
+                object.density().is_some(),
+            );
             put.unwrap();
         }
         Some(others)

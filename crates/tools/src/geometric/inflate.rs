@@ -76,15 +76,12 @@ impl Inflate {
                 averaged(field, &within, finest, deviation, false, control)?
             }
         };
-        let lifted = Moved {
-            field,
-            by: Lift {
-                mean,
-                weight,
-                by: self.by.0,
-            },
-            step: 1e-4 * self.radius.0,
+        let lift = Lift {
+            mean,
+            weight,
+            by: self.by.0,
         };
+        let lifted = Moved::new(field, lift, 1e-4 * self.radius.0);
         let fineness = Fineness {
             tolerance: self.tolerance,
             finer: self.finer,

@@ -1,7 +1,8 @@
 //! A field whose matter a tool has moved.
 
-use bspline::{Aabb, Field, Frame, Interval, Jet};
-use glam::{DMat3, DVec3};
+use bspline::hierarchical::Lattice;
+use bspline::{Aabb, Field, Frame, HierarchicalSpline, Interval, Jet, Real};
+use glam::{DAffine3, DMat3, DVec3};
 
 use crate::slope::slope;
 
@@ -17,17 +18,43 @@ pub(super) trait Displacement: Send + Sync {
     fn reaches(&self, b: &Aabb) -> bool;
 }
 
-/// `f(x − d(x))`: every place takes the value that lies behind it.
+/// `f(x − d(x))`: every place takes the value that lies behind it, or where that would be beyond the box of the field, the last in it: there a
+/// field falls to the outside of every solid, which is no matter.
 pub(super) struct Moved<'a, D> {
-    pub field: &'a dyn Field,
-    pub by: D,
+    field: &'a dyn Field,
+    lattice: &'a Lattice,
+    lattice_from_world: &'a DAffine3,
+    by: D,
     /// Of the differences that its slope is taken from, a length.
-    pub step: f64,
+    step: f64,
+}
+
+impl<'a, D: Displacement> Moved<'a, D> {
+    /// `field` moved; its slope is taken from differences over the length `step`.
+    pub fn new<T: Real>(field: &'a HierarchicalSpline<T>, by: D, step: f64) -> Self {
+        Self {
+            field,
+            lattice: field.lattice(),
+            lattice_from_world: field.lattice_from_world(),
+            by,
+            step,
+        }
+    }
 }
 
 impl<D: Displacement> Field for Moved<'_, D> {
     fn value(&self, p: DVec3) -> f64 {
-        self.field.value(p - self.by.at(p))
+        let by = self.by.at(p);
+        if by == DVec3::ZERO {
+            return self.field.value(p);
+        }
+        let extent = self.lattice.extent();
+        let [own, behind] = [p, p - by].map(|p| self.lattice_from_world.transform_point3(p));
+        let last = behind.clamp(own.min(DVec3::ZERO), own.max(extent));
+        self.field.value(match last == behind {
+            true => p - by,
+            false => self.lattice.world_from_lattice.transform_point3(last),
+        })
     }
 
     /// By central differences.

@@ -131,7 +131,12 @@ impl Paste {
         };
         let [clip, cover] = [clip, Arc::new(solid) as Arc<dyn Field>].map(|part| carried(part, map));
         let (clip, cover) = (clip?, cover?);
-        let clip = Csg::sum(vec![(scale * field.slope(), clip)], iso).map_err(GeometricError::shape)?;
+        // Between scans densities go as they are; else the surface goes to that of the object.
+        let between_scans = others
+            .densities(&self.from)
+            .filter(|_| limits.density().is_some());
+        let (steep, level) = between_scans.unwrap_or((scale * field.slope(), iso));
+        let clip = Csg::sum(vec![(steep, clip)], level).map_err(GeometricError::shape)?;
         let weight = Faded::new(cover, -(margin + blend) / scale, -margin / scale);
         let mixed = Mixed {
             from: field,

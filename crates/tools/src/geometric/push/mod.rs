@@ -167,11 +167,7 @@ impl Push {
             feature: Some(BEND * self.radius.0),
             densities: true,
         });
-        let moved = Moved {
-            field: writer.field,
-            by: cover,
-            step: 1e-4 * self.radius.0,
-        };
+        let moved = Moved::new(writer.field, cover, 1e-4 * self.radius.0);
         writer.written(&moved, &within, &fineness, control)
     }
 }

@@ -344,7 +344,7 @@ fn formulas_and_objects_are_tools() {
     let mut canvas = canvas(&block);
     canvas
         .others
-        .put("ball", &ball.clone().into(), ISO, DAffine3::IDENTITY)
+        .put("ball", &ball.clone().into(), ISO, DAffine3::IDENTITY, false)
         .unwrap();
     let text = "within = { min = [6, 6, 12.5], max = [18, 18, 20] }
         add = { shape = { object = { name = \"ball\" } }, along = [[12, 12, 13]], finer = 2 }";

@@ -17,7 +17,7 @@ fn beside(
     let mut canvas: Canvas = canvas(field);
     canvas
         .others
-        .put("clip", &clip.clone().into(), ISO, DAffine3::IDENTITY)
+        .put("clip", &clip.clone().into(), ISO, DAffine3::IDENTITY, false)
         .unwrap();
     let left = stroke(text).apply(canvas, &mut Control::default());
     left.unwrap_or_else(|e| panic!("{text}: {e}")).0.field
