@@ -4,9 +4,9 @@ use bspline::cubic;
 
 /// Weight of a sample that pads an axis up to a whole number of coarse cells, against 1 for a voxel.
 ///
-/// It only keeps functions beyond the last voxel at the volume's own edge value. Between 1e-3 and 1e-1 the
-/// residuals of a head of 182³ voxels did not change by 0.1 %.
-pub(crate) const PAD_WEIGHT: f64 = 1e-2;
+/// It keeps functions beyond the last voxel at the volume's own edge value. At 0.01 the noise of scans of 64³ and 95³ spread there to 2 to 3.5
+/// times what it is within, at 0.3 to 1.2 times, and residuals change by less than 1 %. At 1 a head took four times as long.
+pub(crate) const PAD_WEIGHT: f64 = 0.3;
 
 /// An axis with `samples` voxels under `levels` dyadic levels, whose finest has the voxels as knots.
 ///

@@ -16,6 +16,8 @@ const SAMPLES_PER_CELL: f64 = 4.0 / 3.0;
 pub(super) const ROOM: f64 = 4.0;
 /// Knot intervals that the rim takes from a region.
 const RIM: f64 = 0.58;
+/// Knot intervals from a face of the field's box within which so little can move that what moves a path there throws up what lies beside it.
+const FACE: f64 = 1.9;
 /// Mass and damping over `K/(λr)²` and `K/(λr²)`.
 const MASS: f64 = 0.1;
 const DAMPING: f64 = 1.0;
@@ -56,6 +58,13 @@ impl<T: Real> Ground<'_, T> {
             region.moved(self.field, self.cells(region.cells().level, targets)?, matter)?;
         self.paint(&mut region)?;
         Ok((field, region))
+    }
+
+    /// Whether a place is so near a face of the field's box that a region can hardly move it.
+    pub fn is_at_face(&self, region: &Region<T>, place: DVec3) -> bool {
+        let local = self.field.lattice_from_world().transform_point3(place);
+        let within = local.min(self.field.lattice().extent() - local).min_element();
+        within * ((1u64 << region.cells().level) as f64) < FACE
     }
 
     /// Whether a region reaches some radii beside a path, or to the border of the field.

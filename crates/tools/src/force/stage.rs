@@ -40,17 +40,18 @@ impl<T: Real> ForceStroke<T> {
 
     /// A path that begins to act.
     fn acting(&self, index: usize, age: usize) -> Acting {
-        let place = self.targets[index].path.at(0.0);
+        let target = &self.targets[index];
+        let (place, start) = (target.path.at(0.0), self.start(target));
         Acting {
             index,
             age,
             force: 0.0,
-            start: self.start(&self.targets[index]),
+            start,
             crossing: None,
             before: None,
             stiffness: 0.0,
             worth: 1.0,
-            is_free: self.holding.limits.is_free(&Aabb::new(place, place)),
+            is_free: self.holding.limits.is_free(&Aabb::new(place, place)) && !self.is_at_face(target, start),
         }
     }
 

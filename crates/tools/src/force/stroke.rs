@@ -25,6 +25,11 @@ pub(super) const ADVANCE: f64 = 0.3;
 /// Radii that a region leaves a tool in a hand to go on.
 const ROAM: f64 = 3.0;
 
+/// Where forces move nothing.
+pub(super) const AT_FACE: &str = "within two knot intervals of a face of the field's box, where the solid is cut off and forces move nothing";
+/// What does.
+pub(super) const INSTEAD: &str = "use inflate, push or a move there";
+
 /// A path that acts.
 #[derive(Clone, Debug)]
 pub(super) struct Acting {
@@ -143,7 +148,7 @@ impl<T: Real> ForceStroke<T> {
             least: 0.0,
             most: 0.0,
         };
-        Ok(Self {
+        let stroke = Self {
             origin: field.clone(),
             field: field.clone(),
             region,
@@ -178,7 +183,27 @@ impl<T: Real> ForceStroke<T> {
                 cuts: 1,
             },
             targets,
-        })
+        };
+        match stroke.paths_at_face() == stroke.targets.len() {
+            true => Err(ForceError::tool(format!(
+                "the tool acts {AT_FACE}; act farther inside, or {INSTEAD}"
+            ))),
+            false => Ok(stroke),
+        }
+    }
+
+    /// Paths that begin or end where the box of the field holds them, and do not act.
+    pub fn paths_at_face(&self) -> usize {
+        let is_at_face = |t: &&Target| self.is_at_face(t, self.start(t));
+        self.targets.iter().filter(is_at_face).count()
+    }
+
+    /// Whether a path that met the surface at `start` begins there, or has to end there.
+    pub(super) fn is_at_face(&self, target: &Target, start: Option<Start>) -> bool {
+        let ground = self.ground();
+        let is_there = |s: f64| ground.is_at_face(&self.region, target.path.at(s));
+        is_there(start.map_or(0.0, |start| start.at.max(0.0)))
+            || !target.ends_early && is_there(target.path.length())
     }
 
     /// The same on painted matter: stiffness, mass, damping and rest lengths. To be called before the first step.

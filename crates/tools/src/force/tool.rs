@@ -2,6 +2,7 @@ use bspline::{HierarchicalSpline, Real};
 use fitting::Control;
 use glam::DVec3;
 
+use super::stroke::{AT_FACE, INSTEAD};
 use super::{Chisel, Drill, ForceError, ForceReport, ForceStroke, Holding, Pull};
 use crate::paint::Layers;
 
@@ -106,13 +107,18 @@ impl ForceTool<'_> {
 pub(crate) fn released<T: Real>(
     stroke: ForceStroke<T>,
 ) -> Result<(HierarchicalSpline<T>, Vec<String>), ForceError> {
-    let is_elastic = stroke.is_elastic();
+    let (is_elastic, at_face, paths) = (stroke.is_elastic(), stroke.paths_at_face(), stroke.targets.len());
     let (field, report) = stroke.release()?;
-    let notes = if is_elastic {
+    let mut notes = if is_elastic {
         Vec::new()
     } else {
         late_paths(&report)
     };
+    if at_face > 0 {
+        notes.push(format!(
+            "{at_face} of {paths} paths begin or end {AT_FACE}; {INSTEAD}"
+        ));
+    }
     Ok((field, notes))
 }
 

@@ -1,9 +1,9 @@
 //! A brush that lifts a surface along its normals, or lowers it.
 
-use bspline::{Aabb, Field, HierarchicalSpline, Real, TensorSpline};
+use bspline::{Aabb, Field, Frame, HierarchicalSpline, Real, TensorSpline};
 use fitting::Control;
 use fitting::field::FieldFitReport;
-use glam::DVec3;
+use glam::{DAffine3, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
 use super::GeometricError;
@@ -18,6 +18,17 @@ use crate::number::{Finite, Point, Positive};
 /// Standard deviation of the mean whose slope tells the way, over the way's length: a surface is found from as far as it is to go, where the density
 /// of a scan itself is even but for noise.
 const BLUR: f64 = 0.5;
+
+/// Times that a way is halved: an eighth of what the part would need is a step.
+const HALVINGS: u32 = 3;
+
+/// Places at which it is looked whether what is on the other side of a part comes through, about.
+const LOOKED: f64 = (1u64 << 17) as f64;
+
+/// Share of their distance that they lie beside the corners of the box: in the middle of a part, which is easily a plane of knots, nothing moves.
+const ASIDE: f64 = 0.25;
+/// Of them so many by the noise of a scan.
+const CHANCE: usize = 8;
 
 /// Places that such a mean is taken from, at most.
 const PLACES: f64 = (1u64 << 25) as f64;
@@ -62,12 +73,26 @@ impl Inflate {
                 self.by.0, self.radius.0
             )));
         }
+        self.raised(field, iso, self.by.0, HALVINGS, limits, control)
+    }
+
+    /// The same by another length. Where so much of it would bring through what is on the other side of a part, it goes half the way twice, up to
+    /// so many `halvings`.
+    fn raised<T: Real>(
+        &self,
+        field: &HierarchicalSpline<T>,
+        iso: f64,
+        by: f64,
+        halvings: u32,
+        limits: &Limits,
+        control: &mut Control,
+    ) -> Result<(HierarchicalSpline<T>, FieldFitReport), GeometricError> {
         let writer = Writer { field, iso, limits };
         let (weight, reach) = band(&self.along, self.radius.0)?;
         let within = writer.within(&reach)?;
         let finest = field.finest_in(&within).max(writer.detail());
         let spacing = field.lattice().spacing(finest);
-        let deviation = BLUR * self.by.0.abs();
+        let deviation = BLUR * by.abs();
         let knots = within.widened(REACH * deviation).size() / spacing;
         let mean = match knots.x * knots.y * knots.z > PLACES {
             true => sampled(field, &within, deviation, PLACES, control)?,
@@ -76,12 +101,12 @@ impl Inflate {
                 averaged(field, &within, finest, deviation, false, control)?
             }
         };
-        let lift = Lift {
-            mean,
-            weight,
-            by: self.by.0,
-        };
+        let lift = Lift { mean, weight, by };
         let lifted = Moved::new(field, lift, 1e-4 * self.radius.0);
+        if halvings > 0 && comes_through(field, &lifted, iso, by > 0.0, &within, spacing.min_element()) {
+            let (half, _) = self.raised(field, iso, 0.5 * by, halvings - 1, limits, control)?;
+            return self.raised(&half, iso, 0.5 * by, halvings - 1, limits, control);
+        }
         let fineness = Fineness {
             tolerance: self.tolerance,
             finer: self.finer,
@@ -90,6 +115,38 @@ impl Inflate {
         };
         writer.written(&lifted, &within, &fineness, control)
     }
+}
+
+/// Whether some of the solid, or of what is outside it where that is to grow, would be lost by what is to make it larger.
+fn comes_through(
+    field: &dyn Field,
+    lifted: &dyn Field,
+    iso: f64,
+    grows: bool,
+    within: &Aabb,
+    spacing: f64,
+) -> bool {
+    let size = within.size();
+    let step = (0.5 * spacing).max(libm::cbrt(size.x * size.y * size.z / LOOKED));
+    let count = (size / step).ceil().to_array().map(|n| n as usize + 1);
+    let frame = Frame {
+        world_from_grid: DAffine3::from_scale_rotation_translation(
+            DVec3::splat(step),
+            DQuat::IDENTITY,
+            within.min + ASIDE * step,
+        ),
+        cells: count.map(|n| n as u32),
+    };
+    let [before, after] = [field, lifted].map(|field| {
+        let mut values = vec![0.0; count.iter().product()];
+        field.frame_values(&frame, [0; 3], count, &mut values);
+        values
+    });
+    let lost = before.iter().zip(&after).filter(|(before, after)| match grows {
+        true => **before > iso && **after < iso,
+        false => **before < iso && **after > iso,
+    });
+    lost.count() > CHANCE
 }
 
 /// Out of the solid, where the brush acts.

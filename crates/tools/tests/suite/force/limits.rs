@@ -77,3 +77,25 @@ fn strokes_across_a_border_of_limits_cost_what_others_do() {
         }
     }
 }
+
+/// Beside a face of the field's box hardly anything gives way: what brought a path home there threw up a hill nine times as high beside it.
+#[test]
+fn forces_do_not_act_where_the_box_cuts_the_solid_off() {
+    let field = block::<f32>(24);
+    let text = |along: &str| format!("along = {along}\nby = [0, 0, 1.2]\nradius = {R}");
+    let error = pull(&text("[[0.8, 12, 12]]")).begin(&field, ISO).err();
+    let error = error.expect("all of it lies at a face").to_string();
+    assert!(error.contains("cut off") && error.contains("inflate"), "{error}");
+    let stroke = pull(&text("[[0.2, 12, 12], [12, 12, 12]]"))
+        .begin(&field, ISO)
+        .unwrap();
+    let at_face = stroke.paths_at_face();
+    assert!((1..=5).contains(&at_face), "{at_face}");
+    let (left, report) = finished(stroke);
+    assert!(report.arrival.least > 0.98, "{report:?}");
+    for x in 0..48 {
+        let top = |z: &f64| left.value(DVec3::new(0.25 * f64::from(x), 12.0, *z)) > ISO;
+        let height = (0..240).map(|n| 0.1 * f64::from(n)).rev().find(top).unwrap();
+        assert!(height < 13.5, "{height} at {x}");
+    }
+}

@@ -135,6 +135,35 @@ fn inflating_moves_the_edge_of_a_scan_by_what_was_asked() {
     }
 }
 
+/// What lies deeper than half of a plate is its other side: in one step that came through as a slot of air, 0.5 either way.
+#[test]
+fn inflating_a_plate_by_more_than_half_of_it_leaves_no_slot() {
+    let plate = |p: DVec3| 300.0 * ((1.5 - (p.z - 12.0).abs()) / 0.8).tanh() + ISO;
+    let plate = HierarchicalSpline::schoenberg(*block().lattice(), 300.0, plate).unwrap();
+    let at = |z: f64| DVec3::new(12.0, 12.0, 12.0 + z);
+    for by in [1.0, 2.0, 3.0] {
+        let left = done(
+            &plate,
+            &format!("inflate = {{ along = [[12, 12, 12]], radius = 8, by = {by} }}"),
+        );
+        let heights = |field: &HierarchicalSpline<f32>| {
+            let solid = (-800..800)
+                .map(|n| 0.01 * f64::from(n))
+                .filter(|z| field.value(at(*z)) > ISO);
+            let solid: Vec<f64> = solid.collect();
+            (solid[0], solid[solid.len() - 1], solid.len())
+        };
+        let ((low, high, count), before) = (heights(&left), heights(&plate));
+        assert_eq!(
+            count,
+            ((high - low) * 100.0).round() as usize + 1,
+            "{by}: a slot from {low} to {high}"
+        );
+        let moved = 0.5 * (high - low) - 0.5 * (before.1 - before.0);
+        assert!((moved - by).abs() <= 0.1 * by, "{by}: {moved}");
+    }
+}
+
 /// Knots put in change nothing; with the tolerance of rounding they go again.
 #[test]
 fn knots_come_and_go_without_a_change() {
