@@ -202,8 +202,8 @@ impl<T: Real> ForceStroke<T> {
     pub(super) fn is_at_face(&self, target: &Target, start: Option<Start>) -> bool {
         let ground = self.ground();
         let is_there = |s: f64| ground.is_at_face(&self.region, target.path.at(s));
-        is_there(start.map_or(0.0, |start| start.at.max(0.0)))
-            || !target.ends_early && is_there(target.path.length())
+        let ends = || !target.ends_early && is_there(target.path.length());
+        start.is_some_and(|start| is_there(start.at.max(0.0)) || ends())
     }
 
     /// The same on painted matter: stiffness, mass, damping and rest lengths. To be called before the first step.
