@@ -107,17 +107,11 @@ impl<T: Real> LevelFit<'_, T> {
         // A function takes part where a knot beside its own exceeds the tolerance.
         let mut spread = tiles.map(|i| tiles.spread(i, &exceeding, 1));
         let (first, last) = self.region.allowed();
-        let takes_part = tiles.map(|i| match own.contains(&i) {
-            true => {
-                let allowed = and(&spread[i], &between(tiles.keys[i], first, last));
-                self.free(tiles.keys[i], allowed, [0, 0])
-            }
-            false => NONE,
+        let takes_part = tiles.map_of(&own, |i| {
+            let allowed = and(&spread[i], &between(tiles.keys[i], first, last));
+            self.free(tiles.keys[i], allowed, [0, 0])
         });
-        let reached = tiles.map(|i| match own.contains(&i) {
-            true => self.reached(&tiles, i, &spread),
-            false => NONE,
-        });
+        let reached = tiles.map_of(&own, |i| self.reached(&tiles, i, &spread));
         let mut near = tiles.map(|i| judge.near(&tiles, i, &reached[i], &target, &rest));
         // What was asked of the target makes room.
         let (coefficients, left) = self.coefficients(&tiles, &rest, &takes_part, target);
@@ -171,12 +165,9 @@ impl<T: Real> LevelFit<'_, T> {
                 rest,
                 count,
             } = self.samples(slab)?;
-            let left = tiles.map(|i| match own.contains(&i) {
-                true => {
-                    let judged = self.free(tiles.keys[i], between(tiles.keys[i], lo, hi), [1, 2]);
-                    judge.left(&tiles, i, &judged, &target, &rest)
-                }
-                false => Left::default(),
+            let left = tiles.map_of(&own, |i| {
+                let judged = self.free(tiles.keys[i], between(tiles.keys[i], lo, hi), [1, 2]);
+                judge.left(&tiles, i, &judged, &target, &rest)
             });
             all = left.into_iter().fold(all, |all, one| Left {
                 worst: all.worst.max(one.worst),

@@ -1,6 +1,8 @@
 //! Values at the knots of a level in tiles of 8³, and what is done with them: stencils and masks that look into the
 //! tiles beside.
 
+use std::ops::Range;
+
 use bspline::vectorized;
 use rayon::prelude::*;
 
@@ -93,6 +95,15 @@ impl Tiles {
     /// What `of` gives for each tile, in order, whatever the number of threads.
     pub fn map<R: Send>(&self, of: impl Fn(usize) -> R + Sync + Send) -> Vec<R> {
         each(self.keys.len(), of)
+    }
+
+    /// The same for some of the tiles, and nothing for the others.
+    pub fn map_of<R: Default + Send>(
+        &self,
+        some: &Range<usize>,
+        of: impl Fn(usize) -> R + Sync + Send,
+    ) -> Vec<R> {
+        self.map(|i| if some.contains(&i) { of(i) } else { R::default() })
     }
 
     /// Values of each tile, all of which `of` writes.

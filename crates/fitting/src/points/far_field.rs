@@ -59,7 +59,7 @@ pub(crate) fn settle(base: &mut FullGrid<f64>, samples: &Samples) -> (usize, Vec
         .iter()
         .flat_map(|part| &part.clusters)
         .for_each(|i| is_small[*i] = true);
-    let about: Vec<Vec<usize>> = small.iter().map(|part| part.sites(base.n)).collect();
+    let about: Vec<Vec<usize>> = small.iter().map(|part| sites_about(part, base.n)).collect();
     let places: Vec<DVec3> = about
         .iter()
         .flatten()
@@ -310,16 +310,30 @@ fn site_position(site: usize, n: usize) -> DVec3 {
     (DVec3::from_array(s.map(|s| s as f64)) - 1.0) / n as f64
 }
 
+/// Sites at the corners of a cell of a level of `n` cells.
+fn corners(cell: [usize; 3], n: usize) -> impl Iterator<Item = usize> {
+    let m = n + 3;
+    (0..8).map(move |corner| {
+        let s = [0, 1, 2].map(|a| cell[a] + 1 + (corner >> a & 1));
+        (s[0] * m + s[1]) * m + s[2]
+    })
+}
+
+/// Sites at the corners of the cells of a part, each once.
+fn sites_about(part: &SmallPart, n: usize) -> Vec<usize> {
+    let mut sites: Vec<usize> = part.cells.iter().flat_map(|cell| corners(*cell, n)).collect();
+    sites.sort_unstable();
+    sites.dedup();
+    sites
+}
+
 /// Sites of a level of `n` cells in whose eight cells there is none of `points`.
 fn far_sites(points: impl Iterator<Item = DVec3>, n: usize) -> Vec<usize> {
     let m = n + 3;
     let mut is_near = vec![false; m * m * m];
     for p in points {
         let cell = (p * n as f64).to_array().map(|x| (x as usize).min(n - 1));
-        for corner in 0..8 {
-            let s = [0, 1, 2].map(|a| cell[a] + 1 + (corner >> a & 1));
-            is_near[(s[0] * m + s[1]) * m + s[2]] = true;
-        }
+        corners(cell, n).for_each(|site| is_near[site] = true);
     }
     (0..m * m * m).filter(|&s| !is_near[s]).collect()
 }

@@ -34,21 +34,25 @@ fn bulk(positions: impl ExactSizeIterator<Item = DVec3> + Clone, trim: f64) -> (
 }
 
 /// How far a place lies beyond a box; not above 0 within it.
-fn beyond((low, high): (DVec3, DVec3), p: DVec3) -> f64 {
+pub(super) fn beyond((low, high): (DVec3, DVec3), p: DVec3) -> f64 {
     (low - p).max(p - high).max_element()
+}
+
+/// Removes points that lie farther from the bulk than `extents` of it, if they are few. The bulk is without the share `trim` on each side.
+fn drop_few<P>(points: &mut Vec<P>, at: impl Fn(&P) -> DVec3, trim: f64, extents: f64) {
+    let bulk = bulk(points.iter().map(&at), trim);
+    let reach = extents * (bulk.1 - bulk.0).max_element();
+    let is_near = |p: &P| beyond(bulk, at(p)) <= reach;
+    let outside = points.iter().filter(|p| !is_near(p)).count();
+    if reach > 0.0 && outside as f64 <= OUTLIER_SHARE * points.len() as f64 + 1.0 {
+        points.retain(is_near);
+    }
 }
 
 /// Removes points far beyond the bulk, when they are few: one such point would take all resolution away.
 pub(crate) fn drop_far_outliers(positions: &[DVec3], kept: &mut Vec<u32>) {
-    if kept.len() < LEAST {
-        return;
-    }
-    let bulk = bulk(kept.iter().map(|i| positions[*i as usize]), OUTLIER_SHARE);
-    let reach = FAR * (bulk.1 - bulk.0).max_element();
-    let is_near = |i: &u32| beyond(bulk, positions[*i as usize]) <= reach;
-    let outside = kept.iter().filter(|i| !is_near(i)).count();
-    if reach > 0.0 && outside as f64 <= OUTLIER_SHARE * kept.len() as f64 + 1.0 {
-        kept.retain(is_near);
+    if kept.len() >= LEAST {
+        drop_few(kept, |i| positions[*i as usize], OUTLIER_SHARE, FAR);
     }
 }
 
@@ -80,13 +84,7 @@ pub(super) fn without_far(samples: &Samples, cloud: OrientedPoints<'_>) -> Resul
         return Ok(None);
     }
     // Few outliers have neighbours that speak for them by chance.
-    let bulk = bulk(live.iter().copied(), OUTERMOST);
-    let reach = (bulk.1 - bulk.0).max_element();
-    let is_near = |p: &DVec3| beyond(bulk, *p) <= reach;
-    let outside = live.iter().filter(|p| !is_near(p)).count();
-    if outside as f64 <= OUTLIER_SHARE * live.len() as f64 + 1.0 {
-        live.retain(is_near);
-    }
+    drop_few(&mut live, |p| *p, OUTERMOST, 1.0);
     let low = live.iter().copied().fold(DVec3::INFINITY, DVec3::min);
     let high = live.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
     match BOX_SCALE * STRETCHED * (high - low).max_element() < 1.0 {

@@ -4,7 +4,7 @@ use bspline::{HierarchicalSpline, Real};
 use glam::DVec3;
 
 use super::LEAST_POINTS;
-use super::far_points::drop_far_outliers;
+use super::far_points::{beyond, drop_far_outliers};
 use crate::FitError;
 use crate::level::MAX_DEPTH;
 use crate::level::assemble::{Level, assemble};
@@ -201,12 +201,7 @@ impl Samples {
     /// # Errors
     /// As [`Self::prepare`].
     pub fn cut_to(&self, cloud: OrientedPoints<'_>, low: DVec3, high: DVec3) -> Result<Self, FitError> {
-        let is_within = |i: &usize| {
-            (low - self.positions[*i])
-                .max(self.positions[*i] - high)
-                .max_element()
-                <= 0.0
-        };
+        let is_within = |i: &usize| beyond((low, high), self.positions[*i]) <= 0.0;
         let all = 0..self.positions.len();
         let mut kept: Vec<u32> = all.filter(is_within).map(|i| self.source[i]).collect();
         kept.sort_unstable();

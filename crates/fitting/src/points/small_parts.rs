@@ -41,22 +41,6 @@ impl SmallPart {
             .map(|i| data[*i].position.distance_squared(x));
         squares.fold(f64::INFINITY, f64::min).sqrt().max(LEAST / n as f64)
     }
-
-    /// Sites of the coefficients at the corners of its cells, on a level of `n` cells.
-    pub fn sites(&self, n: usize) -> Vec<usize> {
-        let m = n + 3;
-        let corners = |cell: &[usize; 3]| {
-            let cell = *cell;
-            (0..8).map(move |corner: usize| {
-                let s: [usize; 3] = std::array::from_fn(|a| cell[a] + 1 + (corner >> a & 1));
-                (s[0] * m + s[1]) * m + s[2]
-            })
-        };
-        let mut sites: Vec<usize> = self.cells.iter().flat_map(corners).collect();
-        sites.sort_unstable();
-        sites.dedup();
-        sites
-    }
 }
 
 /// The small parts that are closed, on a level of `n` cells.
