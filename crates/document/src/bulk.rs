@@ -35,3 +35,13 @@ impl<'a> Bulk<'a> {
         })
     }
 }
+
+/// Appends a part, and tells its length. The first is taken over as it is: that of a large scan takes hundreds of megabytes.
+pub(crate) fn put(part: Vec<u8>, bytes: &mut Vec<u8>) -> u64 {
+    let length = part.len() as u64;
+    match bytes.is_empty() {
+        true => *bytes = part,
+        false => bytes.extend_from_slice(&part),
+    }
+    length
+}

@@ -9,7 +9,7 @@ use tools::body::BodyDiff;
 use tools::paint::{Layer, Substance};
 
 use crate::body;
-use crate::bulk::Bulk;
+use crate::bulk::{self, Bulk};
 use crate::error::{damaged, fault};
 use crate::layers::{self, LayerHead};
 use crate::{DocumentError, Object, Properties, State};
@@ -208,8 +208,7 @@ impl Change {
     pub(crate) fn write(&self, path: &Path, bytes: &mut Vec<u8>) -> Result<ChangeHead, DocumentError> {
         let put = |part: Result<Vec<u8>, formats::Fault>, bytes: &mut Vec<u8>| {
             let part = part.map_err(|f| fault(path, f))?;
-            bytes.extend_from_slice(&part);
-            Ok::<_, DocumentError>(part.len() as u64)
+            Ok::<_, DocumentError>(bulk::put(part, bytes))
         };
         let painted =
             |of: &Object, bytes: &mut Vec<u8>| layers::write(&of.layers, &of.field.lattice(), path, bytes);

@@ -276,11 +276,12 @@ impl Journal {
     /// Appends a record. When it fails, nothing is appended.
     pub fn append(&mut self, kind: Kind, parts: &Parts) -> Result<Record, DocumentError> {
         let record = Record::of(kind, parts, self.end);
-        let bytes = [&record.head()[..], &parts.text, &parts.bulk].concat();
+        let start = [&record.head()[..], &parts.text].concat();
         let mut write = || {
             self.file.set_len(self.end)?;
             self.file.seek(SeekFrom::Start(self.end))?;
-            self.file.write_all(&bytes)?;
+            self.file.write_all(&start)?;
+            self.file.write_all(&parts.bulk)?;
             self.file.sync_data()
         };
         if let Err(source) = write() {

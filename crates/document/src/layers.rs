@@ -7,7 +7,7 @@ use formats::field::{decode_difference, encode_difference};
 use serde::{Deserialize, Serialize};
 use tools::paint::{Layer, Layers, Substance};
 
-use crate::bulk::Bulk;
+use crate::bulk::{Bulk, put};
 use crate::error::{damaged, fault};
 use crate::{DocumentError, Object};
 
@@ -46,8 +46,7 @@ pub(crate) fn write_difference(
     bytes: &mut Vec<u8>,
 ) -> Result<LayerHead, DocumentError> {
     let own = encode_difference(difference).map_err(|f| fault(path, f))?;
-    bytes.extend_from_slice(&own);
-    let bytes = own.len() as u64;
+    let bytes = put(own, bytes);
     Ok(LayerHead { layer, level, bytes })
 }
 

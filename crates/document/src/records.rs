@@ -7,7 +7,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::body;
-use crate::bulk::Bulk;
+use crate::bulk::{Bulk, put};
 use crate::entry::{EditHead, ObjectHead, SnapshotHead, hex};
 use crate::error::{damaged, fault};
 use crate::journal::{Journal, Parts, Record};
@@ -20,8 +20,7 @@ pub(crate) fn snapshot(path: &Path, state: &State, forgotten: u64) -> Result<Par
     let mut objects = Vec::new();
     for (name, object) in state.objects() {
         let bytes = body::encode(&object.field, &object.meta).map_err(|f| fault(path, f))?;
-        let count = bytes.len() as u64;
-        bulk.extend(bytes);
+        let count = put(bytes, &mut bulk);
         let layers = layers::write(&object.layers, &object.field.lattice(), path, &mut bulk)?;
         objects.push(ObjectHead::new(name, object, count, layers));
     }

@@ -112,7 +112,15 @@ impl Judge {
     /// Those of the knots `asked` of a tile between which the interpolant of what its knots hold may be off, by `left`, what the quasi-interpolant
     /// leaves at the knots: a ninth of fourth differences.
     pub fn between(&self, asked: &Mask, left: &Values) -> Mask {
-        let most = self.density / BETWEEN;
+        Self::more_than(asked, left, self.density / BETWEEN)
+    }
+
+    /// Those of the knots `asked` of a tile at which more is left than may be anywhere.
+    pub fn over(&self, asked: &Mask, left: &Values) -> Mask {
+        Self::more_than(asked, left, self.density)
+    }
+
+    fn more_than(asked: &Mask, left: &Values, most: f64) -> Mask {
         mask(
             asked,
             #[inline(always)]

@@ -36,6 +36,9 @@ pub(super) struct LevelFit<'a, T> {
     pub slab: usize,
 }
 
+/// How often what functions leave that stop taking part is put into more. More than three would look beyond the tiles beside a slab.
+const ROUNDS: usize = 2;
+
 /// What bricks add, as it is gathered.
 type Bricks<T> = BTreeMap<BrickKey, DenseCorrections<T>>;
 
@@ -104,17 +107,23 @@ impl<T: Real> LevelFit<'_, T> {
             let judged = between(tiles.keys[i], lo, hi);
             judge.exceeding(&tiles, i, &judged, &target, &rest)
         });
-        // A function takes part where a knot beside its own exceeds the tolerance.
         let mut spread = tiles.map(|i| tiles.spread(i, &exceeding, 1));
-        let (first, last) = self.region.allowed();
-        let takes_part = tiles.map_of(&own, |i| {
-            let allowed = and(&spread[i], &between(tiles.keys[i], first, last));
-            self.free(tiles.keys[i], allowed, [0, 0])
-        });
+        let mut takes_part = self.taking_part(&tiles, &spread);
         let reached = tiles.map_of(&own, |i| self.reached(&tiles, i, &spread));
         let mut near = tiles.map(|i| judge.near(&tiles, i, &reached[i], &target, &rest));
         // What was asked of the target makes room.
-        let (coefficients, left) = self.coefficients(&tiles, &rest, &takes_part, target);
+        let (mut coefficients, mut left) = self.coefficients(&tiles, &rest, &takes_part, target);
+        if judge.is_for_density() && self.region.level == self.options.finest {
+            for _ in 0..ROUNDS {
+                self.refine(
+                    &tiles,
+                    &rest,
+                    (&mut spread, &mut takes_part),
+                    &mut coefficients,
+                    &mut left,
+                );
+            }
+        }
         if judge.is_for_density() {
             for i in own.clone() {
                 let is_known = self.is_resolved && !is_none(&takes_part[i]);
@@ -125,13 +134,58 @@ impl<T: Real> LevelFit<'_, T> {
                 near[i] = std::array::from_fn(|x| near[i][x] | open[x]);
             }
         }
-        gather(&tiles.keys, &takes_part, &coefficients, bricks);
         // What lies beside the slab's own tiles is for its neighbours.
         for i in (0..own.start).chain(own.end..tiles.keys.len()) {
-            spread[i] = NONE;
+            (spread[i], takes_part[i]) = (NONE, NONE);
         }
+        gather(&tiles.keys, &takes_part, &coefficients, bricks);
         open.extend(self.open(&tiles, &near, &spread));
         Ok(count)
+    }
+
+    /// The functions that take part: those next to a knot, or on one, that exceeds the tolerance, where they may.
+    fn taking_part(&self, tiles: &Tiles, spread: &[Mask]) -> Vec<Mask> {
+        let (first, last) = self.region.allowed();
+        tiles.map(|i| {
+            let allowed = and(&spread[i], &between(tiles.keys[i], first, last));
+            self.free(tiles.keys[i], allowed, [0, 0])
+        })
+    }
+
+    /// Where functions stop taking part, those that do may leave more than is allowed, and it is not on a finer level that this is
+    /// made up for: more take part, and what is left goes into all that do. Room is made up to two knots further.
+    fn refine(
+        &self,
+        tiles: &Tiles,
+        rest: &[Values],
+        (spread, takes_part): (&mut Vec<Mask>, &mut Vec<Mask>),
+        coefficients: &mut Room,
+        left: &mut Room,
+    ) {
+        let (first, last) = self.region.sampled();
+        let rows = |i: usize| Rows::of(&between(tiles.keys[i], first, last));
+        tiles.change(coefficients, |i, values| cut(&takes_part[i], values));
+        tiles.change(left, |i, out| {
+            out.copy_from_slice(&rest[i]);
+            if tiles.is_any_near(i, takes_part) {
+                tiles.convolved(i, &rows(i), coefficients, SAMPLES, out, |to, _, value| {
+                    *to -= value
+                });
+            }
+        });
+        let (judge, (lo, hi)) = (self.judge(), self.region.judged());
+        let over = tiles.map(|i| judge.over(&between(tiles.keys[i], lo, hi), &left[i]));
+        for (i, spread) in spread.iter_mut().enumerate() {
+            let more = tiles.spread(i, &over, 1);
+            *spread = std::array::from_fn(|x| spread[x] | more[x]);
+        }
+        *takes_part = self.taking_part(tiles, spread);
+        tiles.change(coefficients, |i, out| {
+            if !is_none(&takes_part[i]) {
+                let rows = Rows::of(&takes_part[i]);
+                tiles.convolved(i, &rows, left, QUASI, out, |to, _, value| *to += value);
+            }
+        });
     }
 
     /// Those of the places `asked` of a tile about which all functions may change, from so many knots before to so many behind.
@@ -347,6 +401,15 @@ fn gather<T: Real>(keys: &[TileKey], takes_part: &[Mask], coefficients: &[Values
                     _ => copied::<T, { TILE - 1 }>(&values[at..], to),
                 }
             }
+        }
+    }
+}
+
+/// Zeros beside the places of a mask.
+fn cut(mask: &Mask, values: &mut Values) {
+    for (place, value) in values.iter_mut().enumerate() {
+        if mask[place / 64] >> (place % 64) & 1 == 0 {
+            *value = 0.0;
         }
     }
 }

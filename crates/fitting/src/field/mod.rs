@@ -132,7 +132,7 @@ pub fn fit_field_where<T: Real>(
     let is_resolved = |level: usize| level >= detail && level + 1 >= options.finest;
     let across = |level: &usize| extent.min_element() * (1u64 << *level) as f64 >= ACROSS;
     let first = (0..options.finest).find(across).unwrap_or(options.finest);
-    let mut open = Vec::new();
+    let (mut open, mut edits) = (Vec::new(), Vec::new());
     for level in first..=options.finest {
         let done = (level - first) as f64 / (options.finest + 2 - first) as f64;
         control.step("writing back", done)?;
@@ -151,7 +151,13 @@ pub fn fit_field_where<T: Real>(
         if !round.edits.is_empty() {
             report.levels.push(level);
             report.functions += round.edits.iter().map(|e| e.add.count()).sum::<usize>();
-            field = field.added(&round.edits).map_err(not_added)?;
+            let mut first = edits.len();
+            edits.extend(round.edits);
+            // The bits are the same from there. Of a large box the version before makes room for the next.
+            if keys.len() > SLAB {
+                (field, first) = (onto.clone(), 0);
+            }
+            field = field.added(&edits[first..]).map_err(not_added)?;
         }
         open = round.open;
     }

@@ -23,7 +23,8 @@ pub(super) struct Fineness {
     /// Distance from the true surface that may stay off the creases, a world length; a fiftieth of the finest knot interval
     /// if missing.
     pub tolerance: Option<Positive>,
-    /// Levels finer than the object's detail that may be added. If missing one, and as many more as the feature asks for.
+    /// Levels finer than the object's detail that may be added. If missing as many as the feature asks for; without a feature
+    /// one, and none where the densities of a scan are carried along.
     pub finer: Option<u8>,
     /// Smallest length that the tool shapes, if it has one.
     pub feature: Option<f64>,
@@ -90,20 +91,6 @@ impl Fineness {
             _ => Ok(()),
         }
     }
-
-    /// The finest level that a tool may use on an object of so much detail.
-    fn finest(&self, lattice: &Lattice, detail: usize) -> usize {
-        let shows = |feature: f64| {
-            let spacing = |finer: usize| lattice.spacing(detail + finer).min_element();
-            (1..MOST_FINER).find(|finer| ACROSS * spacing(*finer) <= feature)
-        };
-        let finer = match (self.finer, self.feature) {
-            (Some(finer), _) => usize::from(finer),
-            (None, Some(feature)) => shows(feature).unwrap_or(MOST_FINER),
-            (None, None) => 1,
-        };
-        (detail + finer).min(MAX_LEVELS - 1)
-    }
 }
 
 /// A field, and what bounds a change of it.
@@ -118,6 +105,27 @@ impl<T: Real> Writer<'_, T> {
     /// one before.
     pub fn detail(&self) -> usize {
         self.limits.detail().unwrap_or(self.field.level_count() - 1)
+    }
+
+    /// The finest level that a tool may use.
+    fn finest(&self, fineness: &Fineness) -> usize {
+        let (lattice, detail) = (self.field.lattice(), self.detail());
+        let shows = |feature: f64| {
+            let spacing = |finer: usize| lattice.spacing(detail + finer).min_element();
+            (1..MOST_FINER).find(|finer| ACROSS * spacing(*finer) <= feature)
+        };
+        let finer = match (fineness.finer, fineness.feature) {
+            (Some(finer), _) => usize::from(finer),
+            (None, Some(feature)) => shows(feature).unwrap_or(MOST_FINER),
+            // The knots of a scan are the centres of its voxels, where its densities count.
+            (None, None) => usize::from(self.density(fineness).is_none()),
+        };
+        (detail + finer).min(MAX_LEVELS - 1)
+    }
+
+    /// How far densities may be off, where a tool carries those of a scan along.
+    fn density(&self, fineness: &Fineness) -> Option<f64> {
+        self.limits.density().filter(|_| fineness.densities)
     }
 
     /// Least distance of its knots.
@@ -138,9 +146,8 @@ impl<T: Real> Writer<'_, T> {
 
     /// Distance that may stay where a tool makes the field as fine as it asks for.
     pub fn tolerance(&self, fineness: &Fineness) -> f64 {
-        let lattice = self.field.lattice();
-        let finest = fineness.finest(lattice, self.detail());
-        let own = TOLERANCE * lattice.spacing(finest).min_element();
+        let spacing = self.field.lattice().spacing(self.finest(fineness));
+        let own = TOLERANCE * spacing.min_element();
         fineness.tolerance.map_or(own, |t| t.0)
     }
 
@@ -177,7 +184,7 @@ impl<T: Real> Writer<'_, T> {
         control: &mut Control,
     ) -> Result<(HierarchicalSpline<T>, FieldFitReport), GeometricError> {
         fineness.check(self.detail())?;
-        let finest = fineness.finest(self.field.lattice(), self.detail());
+        let finest = self.finest(fineness);
         // What is there already must not be left over; and nothing finer than a coarse edit may be.
         let finest = finest.max(self.field.finest_in(within));
         let finest = finest.min(self.limits.finest().unwrap_or(finest));
@@ -193,7 +200,7 @@ impl<T: Real> Writer<'_, T> {
         if !self.limits.is_inside() {
             self.stays_in_box(target, within)?;
         }
-        let density = self.limits.density().filter(|_| fineness.densities);
+        let density = self.density(fineness);
         // A scan knows its surface as well as its densities.
         let usual = density.map_or(TOLERANCE * spacing, |_| spacing);
         let tolerance = fineness.tolerance.map_or(usual, |t| t.0);
