@@ -6,7 +6,7 @@ use fitting::{Control, FitError};
 
 use crate::canvas::Canvas;
 use crate::face::cut_off;
-use crate::force::{Bend, Extrude, ForceError, ForceTool};
+use crate::force::{Bend, Extrude, ForceError, ForceTool, swept};
 use crate::geometric::{
     Copy, Cut, Geometric, GeometricError, Inflate, Move, Operation, Origin, Paste, Push, Refine, Simplify,
     Smooth, Sweep,
@@ -178,7 +178,7 @@ impl Tool<'_> {
                     Self::Force(tool) => tool.apply(old, *iso, layers, &holding, control)?,
                     _ => unreachable!("it is one of these"),
                 };
-                let field = limits.kept(old, &field);
+                let field = limits.kept(old, &swept(old, field, *iso, control)?);
                 return Ok((Canvas { field, ..canvas }, told));
             }
             Self::Hold(hold) => {

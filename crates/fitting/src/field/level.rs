@@ -36,7 +36,7 @@ pub(super) struct LevelFit<'a, T> {
     pub slab: usize,
 }
 
-/// How often what functions leave that stop taking part is put into more. More than three would look beyond the tiles beside a slab.
+/// How often more functions take part in what is left where they stop. A third time would look beyond the tiles beside a slab.
 const ROUNDS: usize = 2;
 
 /// What bricks add, as it is gathered.

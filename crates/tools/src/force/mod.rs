@@ -13,6 +13,7 @@
 mod area;
 mod bend;
 mod chisel;
+mod crumbs;
 mod drill;
 mod extent;
 mod extrude;
@@ -41,6 +42,7 @@ mod within;
 
 pub use bend::Bend;
 pub use chisel::Chisel;
+pub(crate) use crumbs::swept;
 pub use drill::Drill;
 pub use extent::Extent;
 pub use extrude::Extrude;

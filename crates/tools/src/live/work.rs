@@ -6,7 +6,7 @@ use glam::DVec3;
 use super::Pose;
 use super::script::not_by_hand;
 use crate::canvas::Canvas;
-use crate::force::{ForceError, ForceStroke, ForceTool, released};
+use crate::force::{ForceError, ForceStroke, ForceTool, released, swept};
 use crate::geometric::{Geometric, GeometricError};
 use crate::limits::Limits;
 use crate::number::{Finite, Numbers, Point, Positive};
@@ -235,7 +235,10 @@ impl Work {
             }
             self.steps = poses;
             let (field, told) = released(force)?;
-            self.canvas.field = self.limits.kept(&self.before.field, &field);
+            let old = &self.before.field;
+            self.canvas.field = self
+                .limits
+                .kept(old, &swept(old, field, self.before.iso, control)?);
             notes.extend(told);
         }
         for late in during {

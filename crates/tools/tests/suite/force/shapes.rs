@@ -106,6 +106,33 @@ fn what_is_extruded_keeps_its_section() {
     }
 }
 
+/// Matter as dense deep below its surface as next to it, as in scans: the forces that held the surface about a pillar dug a ring below it.
+#[test]
+fn what_is_extruded_from_a_scan_leaves_no_pocket_below_it() {
+    const EDGE: f64 = 0.45;
+    let (air, tissue, iso) = (-1000.0, 50.0, -300.0);
+    let lattice = Lattice {
+        world_from_lattice: DAffine3::IDENTITY,
+        cells: [24; 3],
+    };
+    let density = |p: DVec3| air + 0.5 * (tissue - air) * (1.0 + libm::erf((12.0 - p.z) / EDGE));
+    let field = HierarchicalSpline::<f32>::schoenberg(lattice, 500.0, density).unwrap();
+    let square = "[[6, 6, 12], [18, 6, 12], [18, 18, 12], [6, 18, 12]]";
+    let text = format!("extrude = {{ area = {square}, by = [0, 0, 5], radius = 2 }}");
+    let stroke: Stroke = toml::from_str(&text).unwrap();
+    let canvas = Canvas::alone(field.clone(), iso, 0);
+    let (left, _) = stroke.apply(canvas, &mut Control::default()).unwrap();
+    let knots =
+        (0..25 * 25 * 25).map(|n| DVec3::new(f64::from(n / 625), f64::from(n / 25 % 25), f64::from(n % 25)));
+    let (mut gone, mut come) = (0, 0);
+    for p in knots {
+        let [was, is] = [&field, &left.field].map(|field| field.value(p) > iso);
+        gone += usize::from(was && !is && p.z < 11.0);
+        come += usize::from(is && !was);
+    }
+    assert!(come > 500 && gone == 0, "{come} came, {gone} went");
+}
+
 /// Against the bend of space of the same numbers, which is exact.
 #[test]
 fn bends_by_forces_end_where_those_of_space_do() {
