@@ -83,7 +83,7 @@ pub enum CommandError {
 }
 
 impl Command {
-    /// What a script asks for, in its order: a scene is one command, of a session every stroke is one, and an empty text is a session without strokes. `object` names the
+    /// What a script asks for, in its order: a scene is one command, of a session every stroke is one, and a text without keys is a session without strokes. `object` names the
     /// object where a script names none. A text whose first sign is a brace is a session in JSON, one stroke or command a line; any other
     /// is TOML.
     ///
@@ -93,13 +93,13 @@ impl Command {
         text: &str,
         object: impl Fn(Option<&str>) -> Result<String, E>,
     ) -> Result<Vec<Self>, E> {
-        if text.trim().is_empty() {
-            return Ok(Vec::new());
-        }
         if text.trim_start().starts_with('{') {
             return Self::of_lines(lines_of(text)?, object);
         }
         let table: toml::Table = parsed(text)?;
+        if table.is_empty() {
+            return Ok(Vec::new());
+        }
         if !table.contains_key("stroke") {
             let _: Scene = parsed(text)?;
             let script = text.to_string();
