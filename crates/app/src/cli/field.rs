@@ -349,7 +349,7 @@ impl OpenField {
     }
 
     /// The least and the largest value at the corners of some cells.
-    fn values_met(&self) -> [f64; 2] {
+    pub fn values_met(&self) -> [f64; 2] {
         let frame = self.frame_of_resolution(LOOKED_AT);
         let nodes = frame.cells.map(|n| n as usize + 1);
         let mut values = vec![0.0; nodes.iter().product()];

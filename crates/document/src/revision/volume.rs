@@ -123,14 +123,14 @@ pub fn revise_volume(
                     let blended = in_part.then(|| matter.blended(stayed, came, is)).flatten();
                     let density = blended.or_else(|| {
                         let [old, was] = came;
-                        let steep = || fitted.value_gradient(origin).1.length();
+                        let beside = || matter.beside(fitted, origin);
                         let least = if is_carried {
                             OFF * matter.ramp
                         } else {
                             matter.rounding
                         };
                         let how = (least, mixed.most(place));
-                        let density = matter.revised(voxel, old, [was, is], how, steep, &mut part);
+                        let density = matter.revised(voxel, old, [was, is], how, beside, &mut part);
                         density.or(is_carried.then_some(old))
                     });
                     let density = density.filter(|density| *density != stayed[0]);
@@ -336,7 +336,16 @@ impl Matter {
             .then(|| stayed + share.clamp(0.0, 1.0) * (came - stayed))
     }
 
-    /// The new density of a voxel, if it has one: of what had `old` in the scan and `was` in its fit, which is as steep as `steep` there,
+    /// How many voxels outside of a surface a place lies, if the way up does lead to one: the wall of a lung is as steep as bone.
+    fn beside(&self, field: &dyn Field, place: DVec3) -> Option<f64> {
+        let (value, gradient) = field.value_gradient(place);
+        let way = gradient.try_normalize()? * self.voxel;
+        let ahead = |step: u32| field.value(place + BESIDE * f64::from(step) / 4.0 * way);
+        let is_there = (1..=4).any(|step| ahead(step) >= self.iso);
+        is_there.then(|| (self.iso - value) / (gradient.length() * self.voxel))
+    }
+
+    /// The new density of a voxel, if it has one: of what had `old` in the scan and `was` in its fit, so many voxels `beside` a surface,
     /// where the field is `now`. Changes up to `least` are none. Where brushes have passed that mix densities, all of the field's
     /// change is meant, up to the `most` that they met in the solid and outside of it.
     fn revised(
@@ -345,7 +354,7 @@ impl Matter {
         old: f64,
         [was, now]: [f64; 2],
         (least, most): (f64, Option<[f64; 2]>),
-        steep: impl Fn() -> f64,
+        beside: impl Fn() -> Option<f64>,
         told: &mut VolumeRevision,
     ) -> Option<f64> {
         let change = now - was;
@@ -379,7 +388,7 @@ impl Matter {
                 // Voxels from the surface that comes, or from the one that goes.
                 let outside = match change > 0.0 {
                     true => (self.iso - now) / self.ramp,
-                    false => (self.iso - was) / (steep() * self.voxel),
+                    false => beside()?,
                 };
                 let share = (BESIDE - outside).clamp(0.0, 1.0);
                 let to = if change > 0.0 { raised } else { lowered };

@@ -104,6 +104,21 @@ fn an_object_that_was_not_edited_changes_no_voxel() {
     assert_eq!(revision, VolumeRevision::default());
 }
 
+/// The wall of a lung is as steep as bone, and no surface of it.
+#[test]
+fn a_tool_for_bone_leaves_a_wall_alone_beside_which_there_is_none() {
+    let wall = |p: DVec3| -100.0 + 130.0 * (0.5 + 0.7 * (p.x - 12.0)).clamp(0.0, 1.0);
+    let before = HierarchicalSpline::schoenberg(*fitted().lattice(), 50.0, wall).unwrap();
+    let mut scan = scan();
+    scan.header.world_from_voxel = DAffine3::IDENTITY;
+    scan.values = (0..SIDE * SIDE * SIDE).map(|v| wall(index(v)) as f32).collect();
+    let tool = sphere(DVec3::new(12.0, 11.0, 12.5), 5.0);
+    let (now, revision) = revised(Operation::Carve, &tool, &before, &scan);
+    let p = DVec3::new(14.0, 11.0, 12.0);
+    assert!(now.value(p) < before.value(p) - 50.0, "the field is carved");
+    assert_eq!(revision, VolumeRevision::default());
+}
+
 #[test]
 fn what_is_carved_is_filled_and_leaves_no_ghost_of_its_surface() {
     let centre = DVec3::new(12.0, 12.0, 21.0);

@@ -158,38 +158,77 @@ fn root(mut f: impl FnMut(f64) -> f64, mut a: (f64, f64), mut b: (f64, f64)) -> 
     b.0
 }
 
-/// The point of the surface `f = iso` that is nearest to `p`, about: steps along the gradient, each as long as the linear
-/// field asks for.
+/// Spheres about a place, up to how far the surface is looked for, and directions on each.
+const SPHERES: usize = 16;
+const DIRECTIONS: usize = 128;
+
+/// The point of the surface `f = iso` that is nearest to `p`, about: down along the gradient, and where noise or flat ground leads that astray,
+/// where the first of growing spheres meets it.
 ///
 /// # Errors
 /// [`ForceError::Nowhere`] where there is none within `reach`.
 pub fn nearest_surface(field: &dyn Field, iso: f64, p: DVec3, reach: f64) -> Result<DVec3, ForceError> {
-    let nowhere = ForceError::Nowhere {
+    let found = descended(field, iso, p, reach).or_else(|| met(field, iso, p, reach));
+    found.ok_or(ForceError::Nowhere {
         at: p.to_array(),
         reach,
-    };
+    })
+}
+
+/// Steps along the gradient, each as long as the linear field asks for.
+fn descended(field: &dyn Field, iso: f64, p: DVec3, reach: f64) -> Option<DVec3> {
     let mut x = p;
     for _ in 0..64 {
         let (value, gradient) = field.value_gradient(x);
         let steep = gradient.length_squared();
         if !(steep > 0.0 && steep.is_finite()) {
-            return Err(nowhere);
+            return None;
         }
         let step = (iso - value) / steep * gradient;
         // Long steps are not trusted where the field bends.
         let step = step.clamp_length_max(0.25 * reach);
         x += step;
         if x.distance(p) > reach {
-            return Err(nowhere);
+            return None;
         }
         if step.length() <= 1e-9 * reach {
-            return Ok(x);
+            return Some(x);
         }
     }
     // Single precision may not settle to that.
     let (value, gradient) = field.value_gradient(x);
-    match (value - iso).abs() <= 1e-4 * reach * gradient.length() {
-        true => Ok(x),
-        false => Err(nowhere),
+    ((value - iso).abs() <= 1e-4 * reach * gradient.length()).then_some(x)
+}
+
+/// On the first sphere on which the field lies on the other side somewhere, the nearest place on the way there.
+fn met(field: &dyn Field, iso: f64, p: DVec3, reach: f64) -> Option<DVec3> {
+    let sign = if field.value(p) > iso { 1.0 } else { -1.0 };
+    // Evenly over the sphere, on a spiral.
+    let directions = (0..DIRECTIONS).map(|n| {
+        let z = 1.0 - (2 * n + 1) as f64 / DIRECTIONS as f64;
+        let turn = n as f64 * std::f64::consts::PI * (3.0 - libm::sqrt(5.0));
+        let flat = libm::sqrt(1.0 - z * z);
+        DVec3::new(flat * libm::cos(turn), flat * libm::sin(turn), z)
+    });
+    let directions: Vec<DVec3> = directions.collect();
+    let mut inner = vec![sign * (field.value(p) - iso); DIRECTIONS];
+    for sphere in 1..=SPHERES {
+        let [from, to] = [sphere - 1, sphere].map(|n| reach * n as f64 / SPHERES as f64);
+        let mut nearest: Option<(f64, DVec3)> = None;
+        for (way, inner) in directions.iter().zip(&mut inner) {
+            let behind = |s: f64| sign * (field.value(p + s * *way) - iso);
+            let outer = behind(to);
+            if outer <= 0.0 {
+                let s = root(behind, (from, *inner), (to, outer));
+                if nearest.is_none_or(|(least, _)| s < least) {
+                    nearest = Some((s, p + s * *way));
+                }
+            }
+            *inner = outer;
+        }
+        if let Some((_, at)) = nearest {
+            return Some(at);
+        }
     }
+    None
 }

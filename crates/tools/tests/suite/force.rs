@@ -23,6 +23,7 @@ use tools::canvas::Canvas;
 use tools::force::quadrature::Tolerance;
 use tools::force::{
     Arrival, Chisel, Drill, Extent, ForceReport, ForceStroke, How, Path, Pull, Rule, Solid, Target,
+    nearest_surface,
 };
 use tools::session::Session;
 

@@ -94,13 +94,18 @@ pub fn of_field(source: &Source, iso: Option<f64>, notes: &mut Vec<String>) -> O
     }
     if let Some(iso) = iso {
         let range = open.field().bounds(&open.lattice().world_box());
+        let [low, high] = open.values_met();
+        let told = format!("densities of {} run from {low:.6} to {high:.6}", source.name());
         if !(range.lo..=range.hi).contains(&iso) {
             return Err(Failure::usage(format!(
-                "--iso {iso}: densities of {} run from {:.6} to {:.6}; choose another --iso, between them",
-                source.name(),
-                range.lo,
-                range.hi
+                "--iso {iso}: {told}; choose another --iso, between them"
             )));
+        }
+        // Between the places that were looked at there may be more.
+        if !(low..=high).contains(&iso) {
+            notes.push(format!(
+                "--iso {iso}: {told} where they were looked at; there may be no surface"
+            ));
         }
     }
     let meta = FieldMeta {

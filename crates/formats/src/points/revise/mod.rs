@@ -191,8 +191,8 @@ fn binary_rows(
     }
 }
 
-/// Words of a line with some in new words' place.
-fn words(line: &[u8], separator: impl Fn(u8) -> bool, new: &[(usize, f64)]) -> Vec<u8> {
+/// Words of a line with some in new words' place, with this decimal mark.
+fn words(line: &[u8], separator: impl Fn(u8) -> bool, new: &[(usize, f64)], mark: &str) -> Vec<u8> {
     let mut out = Vec::with_capacity(line.len() + 16);
     let (mut word, mut at) = (0, 0);
     while at < line.len() {
@@ -207,7 +207,7 @@ fn words(line: &[u8], separator: impl Fn(u8) -> bool, new: &[(usize, f64)]) -> V
             continue;
         }
         match new.iter().find(|(n, _)| *n == word) {
-            Some((_, value)) => out.extend_from_slice(format!("{value:?}").as_bytes()),
+            Some((_, value)) => out.extend_from_slice(format!("{value:?}").replace('.', mark).as_bytes()),
             None => out.extend_from_slice(&line[at..end]),
         }
         word += 1;

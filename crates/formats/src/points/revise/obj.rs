@@ -52,7 +52,7 @@ pub fn revised(bytes: &[u8], changes: &CloudChanges) -> Result<Vec<u8>, Fault> {
     let blank = |c: u8| c.is_ascii_whitespace();
     let placed_line = |line: &[u8], v: DVec3| {
         let new: Vec<_> = (1..4).zip(v.to_array()).collect();
-        words(line, blank, &new)
+        words(line, blank, &new, ".")
     };
     let mut out = Vec::with_capacity(bytes.len());
     let mut rows = [Rows::of(changes), Rows::of(changes)];

@@ -91,7 +91,7 @@ fn ascii(body: &[u8], header: &Header, changes: &CloudChanges, out: &mut Vec<u8>
                 _ => (column.word, value),
             })
             .collect();
-        words(line, |c| c.is_ascii_whitespace(), &new)
+        words(line, |c| c.is_ascii_whitespace(), &new, ".")
     };
     text_rows(body, header.points, changes, placed_line, out);
 }

@@ -103,7 +103,7 @@ fn ascii(body: &[u8], vertex: &Element, columns: &Columns, changes: &CloudChange
                 _ => (at, value),
             })
             .collect();
-        words(line, |c| c.is_ascii_whitespace(), &new)
+        words(line, |c| c.is_ascii_whitespace(), &new, ".")
     };
     text_rows(body, vertex.count, changes, placed_line, out);
 }

@@ -279,6 +279,22 @@ fn rows_move_go_and_come_and_the_others_stay() {
     }
 }
 
+#[test]
+fn columns_of_text_stay_where_their_names_are_and_commas_decimal() {
+    let text = b"id;Nz;Ny;Nx;Z;Y;X\n7;1;0;0;0,5;1,5;2,5\n8;1;0;0;1;2;3\n";
+    let changes = CloudChanges {
+        moved: vec![Placed {
+            row: 0,
+            position: DVec3::new(-4.5, 0.25, 6.0),
+            normal: DVec3::X,
+        }],
+        ..Default::default()
+    };
+    let new = xyz::revised(text, &changes).unwrap();
+    let expected = "id;Nz;Ny;Nx;Z;Y;X\n7;0,0;0,0;1,0;6,0;0,25;-4,5\n8;1;0;0;1;2;3\n";
+    assert_eq!(String::from_utf8(new).unwrap(), expected);
+}
+
 /// A camera and a material name no vertex; an edge does.
 #[test]
 fn elements_that_name_no_vertices_are_copied() {

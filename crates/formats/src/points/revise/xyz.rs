@@ -1,12 +1,12 @@
 use super::{CloudChanges, Placed, Row, Rows, words};
 use crate::Fault;
-use crate::points::xyz::Line;
+use crate::ReadLimits;
+use crate::limits::Budget;
+use crate::points::xyz::{Apart, Columns, Line, parse_columns};
 
 /// The bytes of the file with its changes.
 pub fn revised(bytes: &[u8], changes: &CloudChanges) -> Result<Vec<u8>, Fault> {
-    let has_normals = crate::points::parse_xyz(bytes, &crate::ReadLimits::default())?
-        .normals
-        .is_some();
+    let (_, columns) = parse_columns(bytes, &mut Budget::new(&ReadLimits::default()))?;
     let mut rows = Rows::of(changes);
     let mut out = Vec::with_capacity(bytes.len());
     let mut points: Vec<&[u8]> = Vec::new();
@@ -24,7 +24,7 @@ pub fn revised(bytes: &[u8], changes: &CloudChanges) -> Result<Vec<u8>, Fault> {
         }
         match rows.next(points.len()) {
             Row::Stays => out.extend_from_slice(line),
-            Row::Moves(placed) => out.extend(placed_line(line, placed, has_normals)),
+            Row::Moves(placed) => out.extend(placed_line(line, placed, &columns)),
             Row::Goes => {}
         }
         points.push(line);
@@ -33,18 +33,21 @@ pub fn revised(bytes: &[u8], changes: &CloudChanges) -> Result<Vec<u8>, Fault> {
         if !out.ends_with(b"\n") {
             out.push(b'\n');
         }
-        out.extend(placed_line(points[placed.row], placed, has_normals));
+        out.extend(placed_line(points[placed.row], placed, &columns));
     }
     Ok(out)
 }
 
-fn placed_line(line: &[u8], placed: &Placed, has_normals: bool) -> Vec<u8> {
-    let numbers = [placed.position, placed.normal].map(|v| v.to_array());
-    let count = if has_normals { 6 } else { 3 };
-    let new: Vec<_> = numbers.into_iter().flatten().enumerate().take(count).collect();
-    words(
-        line,
-        |c| matches!(c, b' ' | b'\t' | b',' | b';' | b'\r' | b'\n'),
-        &new,
-    )
+fn placed_line(line: &[u8], placed: &Placed, columns: &Columns) -> Vec<u8> {
+    let mut new: Vec<_> = columns
+        .position
+        .into_iter()
+        .zip(placed.position.to_array())
+        .collect();
+    let normal = columns.normal.into_iter().flatten();
+    new.extend(normal.zip(placed.normal.to_array()));
+    let has_decimal_commas = Apart::of(line.trim_ascii()).has_decimal_commas();
+    let is_between = |c| matches!(c, b' ' | b'\t' | b';' | b'\r' | b'\n') || c == b',' && !has_decimal_commas;
+    let mark = if has_decimal_commas { "," } else { "." };
+    words(line, is_between, &new, mark)
 }

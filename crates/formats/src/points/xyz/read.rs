@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::columns::{Apart, Columns};
 use crate::error::excerpt;
 use crate::limits::{Budget, Counted};
 use crate::points::cloud::PointCloud;
@@ -17,8 +18,10 @@ const UNIT_LENGTH_SLACK: f64 = 0.05;
 /// Reads the text of an XYZ file: three columns, or six and more with the normal in columns 4 to 6.
 ///
 /// Empty lines and those that start with `#` or `//` are skipped; so is a first line that holds one whole number
-/// (the count) or the names of the columns. Columns 4 to 6 are normals if all have length 1 or 0, or, in a file of
+/// (the count). Where the first line, or a comment before it, names all columns, x, y and z among them, position and normal are where these names are
+/// (`nx`, `normal_x`, `i` and so on). Elsewhere columns 4 to 6 are normals if all have length 1 or 0, or, in a file of
 /// just six columns, if any of their numbers is negative; otherwise (colours, say) they are skipped, with a note.
+/// Commas are decimal where blanks, tabs or semicolons stand between the columns: `1,5;2,5;3`.
 ///
 /// # Errors
 /// A [`Fault`] with the line for a word that is no number or a line with another number of columns.
@@ -28,12 +31,22 @@ pub fn parse_xyz(bytes: &[u8], limits: &ReadLimits) -> Result<PointCloud, Fault>
 }
 
 pub(in crate::points) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<RawShape, Fault> {
+    Ok(parse_columns(bytes, budget)?.0)
+}
+
+/// What a file holds, and in which columns.
+pub(in crate::points) fn parse_columns(
+    bytes: &[u8],
+    budget: &mut Budget,
+) -> Result<(RawShape, Columns), Fault> {
     let mut notes = Vec::new();
     let mut positions = Counted::new("points");
     let mut normals = Counted::new("normals");
     let mut columns = 0;
     let mut promised = None;
-    let mut names = Vec::new();
+    let mut names: Vec<String> = Vec::new();
+    let mut by_name = None;
+    let mut comma = None;
     // Line of the first triple that is no unit vector.
     let mut not_unit = None;
     let mut has_negative = false;
@@ -44,32 +57,48 @@ pub(in crate::points) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<RawS
         let line = lines.line;
         match Line::of(text, &mut is_first) {
             Line::Point => {}
-            Line::Nothing => continue,
+            Line::Nothing => {
+                // A comment may name the columns.
+                let told = names_in(text);
+                if columns == 0 && Columns::named(&told).is_some() {
+                    names = told;
+                }
+                continue;
+            }
             Line::Count(n) => {
                 promised = Some(n);
                 continue;
             }
             Line::Names => {
-                notes.push(format!(
-                    "line {line}: column names {} were skipped",
-                    excerpt(text)
-                ));
-                names = words(text)
-                    .map(|w| String::from_utf8_lossy(w).into_owned())
-                    .collect();
+                names = names_in(text);
+                if Columns::named(&names).is_none() {
+                    notes.push(format!(
+                        "line {line}: column names {} were skipped",
+                        excerpt(text)
+                    ));
+                }
                 continue;
             }
         }
-        let mut row = [0.0; 6];
-        let mut found = 0;
-        for word in words(text) {
-            if found < 6 {
-                row[found] = number(word, line)?;
-            }
-            found += 1;
+        let apart = Apart::of(text);
+        if apart.has_decimal_commas() {
+            comma = comma.or(Some(line));
         }
         if columns == 0 {
-            columns = found;
+            columns = apart.words(text).count();
+            by_name = Columns::named(&names).filter(|_| names.len() == columns);
+        }
+        let mut row = [0.0; 6];
+        let mut found = 0;
+        for word in apart.words(text) {
+            let slot = match &by_name {
+                Some(columns) => columns.slot(found),
+                None => Some(found).filter(|n| *n < 6),
+            };
+            if let Some(slot) = slot {
+                row[slot] = number(&apart.pointed(word), line)?;
+            }
+            found += 1;
         }
         if found != columns || matches!(found, 0..3) {
             return Err(Fault::line(
@@ -79,7 +108,11 @@ pub(in crate::points) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<RawS
             ));
         }
         positions.push(DVec3::new(row[0], row[1], row[2]), budget)?;
-        if columns == 6 || columns > 6 && not_unit.is_none() {
+        let may_be_normal = match &by_name {
+            Some(columns) => columns.normal.is_some(),
+            None => columns == 6 || columns > 6 && not_unit.is_none(),
+        };
+        if may_be_normal {
             let n = DVec3::new(row[3], row[4], row[5]);
             let length = n.length();
             if length > 0.0 && length.is_finite() && (length - 1.0).abs() > UNIT_LENGTH_SLACK {
@@ -103,26 +136,46 @@ pub(in crate::points) fn parse(bytes: &[u8], budget: &mut Budget) -> Result<RawS
         ));
     }
     // Colours are never negative, but a lidar intensity may be: it stands in files of seven columns.
-    let stored = columns >= 6 && (not_unit.is_none() || columns == 6 && has_negative);
+    let looks_stored = columns >= 6 && (not_unit.is_none() || columns == 6 && has_negative);
+    let taken = by_name.unwrap_or(Columns {
+        position: [0, 1, 2],
+        normal: looks_stored.then_some([3, 4, 5]),
+    });
+    let stored = taken.normal.is_some();
+    if let Some(line) = comma {
+        notes.push(format!(
+            "line {line}: commas within numbers were read as decimal points"
+        ));
+    }
     match (columns, not_unit) {
+        _ if by_name.is_some() => {}
         (4 | 5, _) => notes.push(format!("{columns} columns: those after the third were skipped")),
         (6.., Some(line)) if !stored => notes.push(format!(
             "columns 4 to 6 are no unit normals (line {line}); skipped as colours or the like"
         )),
         _ => {}
     }
-    let taken = if stored { 6 } else { 3 };
     let name = |i: usize| match names.get(i) {
         Some(name) if names.len() == columns => name.clone(),
         _ => format!("column {}", i + 1),
     };
-    Ok(RawShape {
-        left_out_attributes: (taken..columns).map(name).collect(),
+    let left_out = (0..columns).filter(|column| taken.slot(*column).is_none());
+    let shape = RawShape {
+        left_out_attributes: left_out.map(name).collect(),
         positions: positions.items,
         normals: stored.then_some(normals.items),
         notes,
         ..Default::default()
-    })
+    };
+    Ok((shape, taken))
+}
+
+/// The words of a line of names, or of a comment.
+fn names_in(text: &[u8]) -> Vec<String> {
+    let marks = text.iter().take_while(|c| matches!(c, b'#' | b'/')).count();
+    words(&text[marks..])
+        .map(|w| String::from_utf8_lossy(w).into_owned())
+        .collect()
 }
 
 /// What a line is.
@@ -234,6 +287,69 @@ mod tests {
         ] {
             assert_eq!(read(text).unwrap().left_out_attributes, expected, "{text}");
         }
+    }
+
+    #[test]
+    fn columns_are_taken_by_their_names() {
+        let at = [DVec3::new(1.0, 2.0, 3.0), DVec3::new(4.0, 5.0, 6.0)];
+        for (text, left_out) in [
+            ("id,x,y,z\n7,1,2,3\n8,4,5,6\n", &["id"][..]),
+            ("Y X Z\n2 1 3\n5 4 6\n", &[]),
+            ("# GpsTime X Y Z\n2\n0.1 1 2 3\n0.2 4 5 6\n", &["GpsTime"]),
+            ("x y z r g b\n1 2 3 1 0 0\n4 5 6 0 1 0\n", &["r", "g", "b"]),
+        ] {
+            let c = read(text).unwrap();
+            assert_eq!((&c.positions[..], c.normals), (&at[..], None), "{text}");
+            assert_eq!(c.left_out_attributes, left_out, "{text}");
+            assert!(c.notes.is_empty(), "{text}: {:?}", c.notes);
+        }
+        for text in [
+            "id;Nx;Ny;Nz;Z;Y;X\n0;0;0;-1;3;2;1\n1;0;0;-1;6;5;4\n",
+            "//X Y Z R Nx Ny Nz\n2\n1 2 3 9 0 0 -1\n4 5 6 9 0 0 -1\n",
+        ] {
+            let c = read(text).unwrap();
+            assert_eq!(c.positions, at, "{text}");
+            assert_eq!(c.normals.unwrap(), [DVec3::NEG_Z; 2], "{text}");
+        }
+        // Names that do not tell, or not of all columns.
+        for text in [
+            "East North Up\n1 2 3\n4 5 6\n",
+            "z y x w\n1 2 3\n4 5 6\n",
+            "# x y y z\n1 2 3 4\n4 5 6 7\n",
+        ] {
+            assert_eq!(read(text).unwrap().positions, at, "{text}");
+        }
+    }
+
+    #[test]
+    fn commas_are_decimal_where_something_else_is_between_the_columns() {
+        let at = [DVec3::new(1.5, -2.25, 3.0), DVec3::new(4.0, 5.0, 6.5)];
+        for text in [
+            "X;Y;Z\n1,5;-2,25;3\n4;5;6,5\n",
+            "1,5\t-2,25\t3\n4\t5\t6,5\n",
+            "1,5 -2,25 3,0\n4 5 6,5\n",
+            "1,5; -2,25; 3,0; 7,5\n4; 5; 6,5; 0\n",
+        ] {
+            let c = read(text).unwrap();
+            assert_eq!(c.positions, at, "{text}");
+            assert!(
+                c.notes.iter().any(|n| n.contains("decimal points")),
+                "{:?}",
+                c.notes
+            );
+        }
+        for (text, columns) in [
+            ("1, 2, 3\n", 3),
+            ("1,2,3 4,5,6\n", 6),
+            ("1,\t2,\t3\n", 3),
+            ("0.5,1.5 2.5,3.5 1,2\n", 6),
+            ("1,2,3,4,5,6\n", 6),
+        ] {
+            let c = read(text).unwrap();
+            assert_eq!(3 + c.left_out_attributes.len(), columns, "{text}: {:?}", c.notes);
+        }
+        let error = read("1.234,5;0,5;2,25\n").unwrap_err().to_string();
+        assert!(error.contains("not a number"), "{error}");
     }
 
     #[test]

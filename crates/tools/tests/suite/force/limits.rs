@@ -99,3 +99,32 @@ fn forces_do_not_act_where_the_box_cuts_the_solid_off() {
         assert!((least..13.5).contains(&height), "{height} at {x}");
     }
 }
+
+/// In noise the gradient leads anywhere: places from which it never came to a surface less than two radii away were refused.
+#[test]
+fn surfaces_beside_noise_are_found_wherever_they_are_near() {
+    let noise = |p: DVec3| {
+        14.0 * libm::sin(5.1 * p.x + 1.7 * p.y)
+            * libm::sin(4.7 * p.y - 2.3 * p.z)
+            * libm::sin(6.1 * p.z + p.x)
+    };
+    let lattice = Lattice {
+        world_from_lattice: DAffine3::IDENTITY,
+        cells: [24; 3],
+    };
+    let ct = |p: DVec3| 525.0 * libm::erf((12.0 - p.z) / 0.9) - 475.0 + noise(p);
+    let field = HierarchicalSpline::<f32>::schoenberg(lattice, 500.0, ct).unwrap();
+    let reach = 8.0;
+    let (mut nowhere, mut lost) = (0, 0);
+    for n in 0..200 {
+        let at = |k: u32| 6.0 + 12.0 * f64::from(n * k % 199) / 199.0;
+        let p = DVec3::new(at(29), at(61), 8.0 + 9.0 * f64::from(n) / 200.0);
+        match nearest_surface(&field, -300.0, p, reach) {
+            Ok(found) => lost += usize::from(found.distance(p) > (p.z - 11.7).abs() + 1.0),
+            Err(_) => nowhere += 1,
+        }
+    }
+    println!("{nowhere} not found, {lost} found too far");
+    assert_eq!(nowhere, 0);
+    assert!(lost <= 20, "{lost}");
+}

@@ -1,0 +1,100 @@
+//! What the columns of a file are, and how its lines are cut into them.
+
+use std::borrow::Cow;
+
+/// How the words of a line stand apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Apart {
+    /// Whether commas are part of the numbers, as in `1,5;2,5;3`.
+    has_decimal_commas: bool,
+}
+
+impl Apart {
+    /// Commas are decimal where the line falls into three words and more without them, and each word has one within at most. Between blanks alone
+    /// no word with one may have a point too: `0.5,1.5 2.5,3.5` are four numbers.
+    pub fn of(text: &[u8]) -> Self {
+        let has_decimal_commas = memchr::memchr(b',', text).is_some() && {
+            let between_blanks = memchr::memchr2(b';', b'\t', text).is_none();
+            let is_number = |word: &[u8]| match memchr::memchr(b',', word) {
+                None => true,
+                Some(at) => {
+                    let (whole, rest) = (&word[..at], &word[at + 1..]);
+                    let is_point = between_blanks && word.contains(&b'.');
+                    !whole.is_empty() && !rest.is_empty() && !rest.contains(&b',') && !is_point
+                }
+            };
+            let all = || cut(text, false);
+            all().count() >= 3 && all().all(is_number)
+        };
+        Self { has_decimal_commas }
+    }
+
+    pub fn has_decimal_commas(self) -> bool {
+        self.has_decimal_commas
+    }
+
+    /// The words of a line.
+    pub fn words(self, text: &[u8]) -> impl Iterator<Item = &[u8]> + Clone {
+        cut(text, !self.has_decimal_commas)
+    }
+
+    /// A word as numbers are written elsewhere.
+    pub fn pointed(self, word: &[u8]) -> Cow<'_, [u8]> {
+        match self.has_decimal_commas && word.contains(&b',') {
+            true => word.iter().map(|c| if *c == b',' { b'.' } else { *c }).collect(),
+            false => Cow::Borrowed(word),
+        }
+    }
+}
+
+fn cut(text: &[u8], at_commas: bool) -> impl Iterator<Item = &[u8]> + Clone {
+    text.split(move |c| matches!(c, b' ' | b'\t' | b';') || at_commas && *c == b',')
+        .filter(|w| !w.is_empty())
+}
+
+/// Where position and normal stand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Columns {
+    pub position: [usize; 3],
+    /// None where nothing says so: those after the position may be a normal.
+    pub normal: Option<[usize; 3]>,
+}
+
+/// What the axes of a normal are called.
+const NORMALS: [[&str; 3]; 5] = [
+    ["nx", "ny", "nz"],
+    ["normal_x", "normal_y", "normal_z"],
+    ["normalx", "normaly", "normalz"],
+    ["normal[0]", "normal[1]", "normal[2]"],
+    ["i", "j", "k"],
+];
+
+impl Columns {
+    /// By the names of all columns; none unless they tell x, y and z.
+    pub fn named(names: &[String]) -> Option<Self> {
+        let of = |axes: [&str; 3]| -> Option<[usize; 3]> {
+            let mut found = [0; 3];
+            for (axis, found) in axes.iter().zip(&mut found) {
+                let mut all = names
+                    .iter()
+                    .enumerate()
+                    .filter(|(_, n)| n.eq_ignore_ascii_case(axis));
+                match (all.next(), all.next()) {
+                    (Some((n, _)), None) => *found = n,
+                    _ => return None,
+                }
+            }
+            Some(found)
+        };
+        Some(Self {
+            position: of(["x", "y", "z"])?,
+            normal: NORMALS.into_iter().find_map(of),
+        })
+    }
+
+    /// Number of a column in a row of position and normal, if it is one of them.
+    pub fn slot(&self, column: usize) -> Option<usize> {
+        let normal = self.normal.unwrap_or([usize::MAX; 3]);
+        self.position.iter().chain(&normal).position(|c| *c == column)
+    }
+}
