@@ -4,8 +4,8 @@
 //! then thin it below; and what they draw out ends in a haze, of which noise makes specks. Such crumbs become again what they were.
 
 use bspline::{Aabb, Field, Frame, HierarchicalSpline, Interval, Jet, Real};
-use fitting::Control;
 use fitting::field::{Aim, FieldFitOptions, fit_field};
+use fitting::{Control, FitError};
 use glam::{DAffine3, DVec3};
 
 use super::ForceError;
@@ -27,14 +27,47 @@ pub(crate) fn swept<T: Real>(
     iso: f64,
     control: &mut Control,
 ) -> Result<HierarchicalSpline<T>, ForceError> {
+    restored(before, after, [iso; 2], Knots::crumbs, control)
+}
+
+/// A field that has all of the solid that there was before, of a tool that takes nothing away.
+///
+/// # Errors
+/// [`ForceError::Cancelled`].
+pub(super) fn grown<T: Real>(
+    before: &HierarchicalSpline<T>,
+    after: HierarchicalSpline<T>,
+    iso: f64,
+    control: &mut Control,
+) -> Result<HierarchicalSpline<T>, ForceError> {
+    // A surface that is held stays where it was to a share of a knot interval.
+    let finest = after.lattice().spacing(after.level_count() - 1);
+    let slack = CLOSE * after.slope() * finest.min_element();
+    restored(before, after, [iso, iso - slack], Knots::lost, control)
+}
+
+/// A field that is again what it was before at the knots that are `marked` by where the solid was and is, each by its iso-value.
+fn restored<T: Real>(
+    before: &HierarchicalSpline<T>,
+    after: HierarchicalSpline<T>,
+    iso: [f64; 2],
+    marked: impl Fn(&Knots, [&[bool]; 2]) -> Vec<bool>,
+    control: &mut Control,
+) -> Result<HierarchicalSpline<T>, ForceError> {
     let Some(knots) = Knots::changed(before, &after) else {
         return Ok(after);
     };
-    let crumbs = knots.crumbs(before, &after, iso);
-    let Some(about) = crumbs.about() else {
+    let [was, is] = [(before, iso[0]), (&after, iso[1])].map(|(field, iso)| knots.solid(field, iso));
+    let marked = marked(&knots, [&was, &is]);
+    let marked = Marked {
+        grid_from_world: knots.frame.world_from_grid.inverse(),
+        knots,
+        marked,
+    };
+    let Some(about) = marked.about() else {
         return Ok(after);
     };
-    let level = crumbs.knots.level;
+    let level = marked.knots.level;
     let spacing = after.lattice().spacing(level);
     let within = about.widened(MARGIN * spacing.max_element());
     let whole = after.lattice().world_box();
@@ -49,11 +82,11 @@ pub(crate) fn swept<T: Real>(
     let target = Restored {
         before,
         after: &after,
-        crumbs,
+        marked,
     };
     match fit_field(&target, &after, &within, &options, control) {
         Ok((field, ..)) => Ok(field),
-        Err(why @ fitting::FitError::Cancelled) => Err(ForceError::Cancelled(why)),
+        Err(why @ FitError::Cancelled) => Err(ForceError::Cancelled(why)),
         // The box is too thin for a fit.
         Err(_) => Ok(after),
     }
@@ -123,21 +156,20 @@ impl Knots {
         self.beside(knot, 1).count() < 6
     }
 
-    /// Those that are to become what they were: crumbs, and what is about them without being of their kind before or after.
-    fn crumbs<T: Real>(
-        self,
-        before: &HierarchicalSpline<T>,
-        after: &HierarchicalSpline<T>,
-        iso: f64,
-    ) -> Crumbs {
-        let [was, is] = [before, after].map(|field| self.solid(field, iso));
+    /// Those that were in the solid and are no more.
+    fn lost(&self, [was, is]: [&[bool]; 2]) -> Vec<bool> {
+        was.iter().zip(is).map(|(was, is)| *was && !is).collect()
+    }
+
+    /// Crumbs, and what is about them without being of their kind before or after.
+    fn crumbs(&self, [was, is]: [&[bool]; 2]) -> Vec<bool> {
         let mut seen = vec![false; self.len()];
         let mut marked = vec![false; self.len()];
         for first in 0..self.len() {
             if is[first] == was[first] || seen[first] {
                 continue;
             }
-            // A piece that holds something that was of its kind before is none: then the rest of it is not looked at.
+            // A piece that meets something that was of its kind before is none: the rest of it is not looked at.
             seen[first] = true;
             let mut piece = vec![first];
             let mut next = 0;
@@ -146,12 +178,10 @@ impl Knots {
                 let knot = piece[next];
                 next += 1;
                 is_crumb &= !self.is_at_rim(knot);
-                for other in self.beside(knot, 1) {
-                    if is[other] != is[first] {
-                        continue;
-                    }
-                    is_crumb &= was[other] != is[first];
-                    if was[other] != is[first] && !seen[other] {
+                for other in self.beside(knot, 1).filter(|other| is[*other] == is[first]) {
+                    let is_new = was[other] != is[first];
+                    is_crumb &= is_new;
+                    if is_new && !seen[other] {
                         seen[other] = true;
                         piece.push(other);
                     }
@@ -167,11 +197,7 @@ impl Knots {
                 }
             }
         }
-        Crumbs {
-            grid_from_world: self.frame.world_from_grid.inverse(),
-            knots: self,
-            marked,
-        }
+        marked
     }
 }
 
@@ -179,13 +205,14 @@ fn span(lo: [i64; 3], hi: [i64; 3]) -> [usize; 3] {
     std::array::from_fn(|a| (hi[a] + 1 - lo[a]).max(0) as usize)
 }
 
-struct Crumbs {
+/// Knots of which a field is to become what it was.
+struct Marked {
     knots: Knots,
     grid_from_world: DAffine3,
     marked: Vec<bool>,
 }
 
-impl Crumbs {
+impl Marked {
     /// A box about all of them.
     fn about(&self) -> Option<Aabb> {
         let marked = (0..self.marked.len()).filter(|n| self.marked[*n]);
@@ -197,7 +224,7 @@ impl Crumbs {
         }))
     }
 
-    /// Whether a place belongs to a knot that is to become what it was.
+    /// Whether a place belongs to one.
     fn holds(&self, p: DVec3) -> bool {
         let [_, ny, nz] = self.knots.count;
         let at = self.grid_from_world.transform_point3(p).round().to_array();
@@ -207,16 +234,16 @@ impl Crumbs {
     }
 }
 
-/// A field that is another about its crumbs.
+/// A field that is another about the knots that are marked.
 struct Restored<'a, T> {
     before: &'a HierarchicalSpline<T>,
     after: &'a HierarchicalSpline<T>,
-    crumbs: Crumbs,
+    marked: Marked,
 }
 
 impl<T: Real> Restored<'_, T> {
     fn at(&self, p: DVec3) -> &HierarchicalSpline<T> {
-        if self.crumbs.holds(p) {
+        if self.marked.holds(p) {
             self.before
         } else {
             self.after
@@ -247,7 +274,7 @@ impl<T: Real> Field for Restored<'_, T> {
         for (n, value) in out.iter_mut().enumerate() {
             let at = [n / nz / ny, n / nz % ny, n % nz];
             let p = frame.node(std::array::from_fn(|a| lo[a] + at[a] as i64));
-            if self.crumbs.holds(p) {
+            if self.marked.holds(p) {
                 *value = self.before.value(p);
             }
         }

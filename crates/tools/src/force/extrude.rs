@@ -6,6 +6,7 @@ use glam::{DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
 use super::area::Flat;
+use super::crumbs::grown;
 use super::toward::{STAGE, Toward};
 use super::{ForceError, Holding, How};
 use crate::curve::Along;
@@ -99,6 +100,8 @@ impl Extrude {
             }) as Box<dyn Field>)
         };
         let (drawn, _) = toward.driven(stages as usize, &zone, pillar, control)?;
+        // The forces that hold the surface beside it thin the matter of scans below.
+        let drawn = grown(field, drawn, iso, control)?;
         Ok((drawn, Vec::new()))
     }
 }
