@@ -5,7 +5,8 @@
 //! the new surface its density runs from the iso-value to that of the fill. The voxels that it had shared with what lay beside it
 //! become what lies there: else a ghost of the old surface would stay. What never was part of the solid stays, but for the
 //! voxels beside a new surface. Matter that was added is
-//! no denser than the median of the solid: tools make it the denser the deeper it lies. Brushes that
+//! no denser than the median of the solid: tools make it the denser the deeper it lies; what was solid already changes by what its fit
+//! lacks of that. Brushes that
 //! carry densities along or mix them, as smoothing does, leave what they make of them, between the fill and the densest
 //! voxel that they met. Moves, and pastes of what the object had elsewhere, carry along what the fit had smoothed away:
 //! `v = f_new(x) + (v − f_fit)(w⁻¹(x))`.
@@ -393,6 +394,11 @@ impl Matter {
                 let share = (BESIDE - outside).clamp(0.0, 1.0);
                 let to = if change > 0.0 { raised } else { lowered };
                 return (share > 0.0).then_some(old + share * (to - old));
+            }
+            // What was solid already is filled up where its fit shows less than that.
+            (true, true) if change > 0.0 => {
+                let most = self.median_solid;
+                (old + now.min(most) - was.min(most)).min(most.max(old))
             }
             (_, true) if change > 0.0 => raised,
             (_, true) => lowered,

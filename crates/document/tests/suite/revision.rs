@@ -120,6 +120,24 @@ fn a_tool_for_bone_leaves_a_wall_alone_beside_which_there_is_none() {
 }
 
 #[test]
+fn what_was_solid_keeps_its_noise_where_more_is_added() {
+    let mut scan = scan();
+    scan.header.world_from_voxel = DAffine3::IDENTITY;
+    let mut draw = Draw(7);
+    let values = (0..SIDE * SIDE * SIDE).map(|v| ball(index(v)) + 0.04 * f64::from(draw.below(1000)) - 20.0);
+    scan.values = values.map(|v| v as f32).collect();
+    let tool = sphere(DVec3::new(18.0, 12.0, 12.0), 6.0);
+    let (_, revision) = revised(Operation::Add, &tool, &fitted(), &scan);
+    let deep = |c: &&Change| index(c.voxel).distance(DVec3::splat(12.0)) < 7.0;
+    assert!(revision.added > 100, "{}", revision.added);
+    for change in revision.changes.iter().filter(deep) {
+        let by = change.density - f64::from(scan.values[change.voxel]);
+        // The field rounds the crease where the two meet.
+        assert!((-4.0..2.0).contains(&by), "{}: {by}", index(change.voxel));
+    }
+}
+
+#[test]
 fn what_is_carved_is_filled_and_leaves_no_ghost_of_its_surface() {
     let centre = DVec3::new(12.0, 12.0, 21.0);
     let tool = sphere(centre, 4.0);

@@ -89,7 +89,20 @@ impl Element {
         }
     }
 
+    /// The property of a name, or else one that is written in other letters, or as some programs call it.
     pub fn find(&self, name: &str) -> Option<usize> {
+        let called = match name {
+            "nx" => "normal_x",
+            "ny" => "normal_y",
+            "nz" => "normal_z",
+            name => name,
+        };
+        let is_near = |p: &Property| [name, called].iter().any(|n| p.name.eq_ignore_ascii_case(n));
+        self.named(name)
+            .or_else(|| self.properties.iter().position(is_near))
+    }
+
+    fn named(&self, name: &str) -> Option<usize> {
         self.properties.iter().position(|p| p.name == name)
     }
 }
@@ -170,7 +183,7 @@ pub(in crate::points) fn read(bytes: &[u8]) -> Result<Header, Fault> {
                     .last_mut()
                     .ok_or_else(|| bad("a property follows its element"))?;
                 let name = String::from_utf8_lossy(name).into_owned();
-                if element.find(&name).is_some() {
+                if element.named(&name).is_some() {
                     return Err(bad("a property is declared once"));
                 }
                 element.properties.push(Property { name, shape });

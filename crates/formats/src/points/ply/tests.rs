@@ -127,6 +127,19 @@ fn properties_that_are_not_taken_are_named() {
     assert!(plain.left_out_attributes.is_empty());
 }
 
+#[test]
+fn names_in_other_letters_and_long_names_of_normals_are_known() {
+    let file = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float normal_x\nproperty float normal_y\nproperty float normal_z\n\
+                property float X\nproperty float Y\nproperty float Z\nend_header\n0 0 1 1 2 3\n0 1 0 4 5 6\n";
+    let cloud = read(file.as_bytes()).unwrap();
+    assert_eq!(
+        cloud.positions,
+        [DVec3::new(1.0, 2.0, 3.0), DVec3::new(4.0, 5.0, 6.0)]
+    );
+    assert_eq!(cloud.normals.as_deref(), Some(&[DVec3::Z, DVec3::Y][..]));
+    assert!(cloud.left_out_attributes.is_empty());
+}
+
 fn ascii(vertices: u64, rest: &str, body: &str) -> Vec<u8> {
     format!(
         "ply\nformat ascii 1.0\nelement vertex {vertices}\nproperty float x\nproperty float y\n\
