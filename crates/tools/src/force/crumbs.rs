@@ -14,6 +14,8 @@ use super::ForceError;
 const MOST: usize = 1 << 23;
 /// Share of the slope over a knot interval by which what becomes what it was may be off.
 const CLOSE: f64 = 0.02;
+/// The same by which what lies beside what a tool has lost may be thinner.
+const THIN: f64 = 0.1;
 /// Knot intervals beside the crumbs in which the field may change.
 const MARGIN: f64 = 4.0;
 
@@ -27,10 +29,14 @@ pub(crate) fn swept<T: Real>(
     iso: f64,
     control: &mut Control,
 ) -> Result<HierarchicalSpline<T>, ForceError> {
-    restored(before, after, [iso; 2], Knots::crumbs, control)
+    let crumbs = |knots: &Knots, values: [&[f64]; 2]| {
+        let [was, is] = values.map(|values| values.iter().map(|value| *value > iso).collect::<Vec<_>>());
+        knots.crumbs(&was, &is)
+    };
+    restored(before, after, crumbs, control)
 }
 
-/// A field that has all of the solid that there was before, of a tool that takes nothing away.
+/// A field that has all of the solid that there was before, of a tool that takes nothing away, and about what it had lost no thinner.
 ///
 /// # Errors
 /// [`ForceError::Cancelled`].
@@ -40,24 +46,28 @@ pub(super) fn grown<T: Real>(
     iso: f64,
     control: &mut Control,
 ) -> Result<HierarchicalSpline<T>, ForceError> {
-    // A surface that is held stays where it was to a share of a knot interval.
     let finest = after.lattice().spacing(after.level_count() - 1);
-    let slack = CLOSE * after.slope() * finest.min_element();
-    restored(before, after, [iso, iso - slack], Knots::lost, control)
+    let slope = after.slope() * finest.min_element();
+    let lost = |knots: &Knots, [was, is]: [&[f64]; 2]| {
+        // A surface that is held stays where it was to a share of a knot interval.
+        let is_lost = |n: &usize| was[*n] > iso && is[*n] < iso - CLOSE * slope;
+        let is_thin = |n: &usize| was[*n] > iso && is[*n] < was[*n] - THIN * slope;
+        knots.flood(is_lost, is_thin)
+    };
+    restored(before, after, lost, control)
 }
 
-/// A field that is again what it was before at the knots that are `marked` by where the solid was and is, each by its iso-value.
+/// A field that is again what it was before at the knots that are `marked` by their values before and after.
 fn restored<T: Real>(
     before: &HierarchicalSpline<T>,
     after: HierarchicalSpline<T>,
-    iso: [f64; 2],
-    marked: impl Fn(&Knots, [&[bool]; 2]) -> Vec<bool>,
+    marked: impl Fn(&Knots, [&[f64]; 2]) -> Vec<bool>,
     control: &mut Control,
 ) -> Result<HierarchicalSpline<T>, ForceError> {
     let Some(knots) = Knots::changed(before, &after) else {
         return Ok(after);
     };
-    let [was, is] = [(before, iso[0]), (&after, iso[1])].map(|(field, iso)| knots.solid(field, iso));
+    let [was, is] = [before, &after].map(|field| knots.values(field));
     let marked = marked(&knots, [&was, &is]);
     let marked = Marked {
         grid_from_world: knots.frame.world_from_grid.inverse(),
@@ -131,11 +141,10 @@ impl Knots {
         self.count.iter().product()
     }
 
-    /// Which of them lie in a solid.
-    fn solid(&self, field: &dyn Field, iso: f64) -> Vec<bool> {
+    fn values(&self, field: &dyn Field) -> Vec<f64> {
         let mut values = vec![0.0; self.len()];
         field.frame_values(&self.frame, self.lo, self.count, &mut values);
-        values.into_iter().map(|value| value > iso).collect()
+        values
     }
 
     /// Those next to one, by `reach` axes at most; none beyond the rim.
@@ -147,7 +156,7 @@ impl Knots {
             let axes = step.iter().filter(|s| **s != 1).count();
             let to: [usize; 3] = std::array::from_fn(|a| (at[a] + step[a]).wrapping_sub(1));
             let is_there = (1..=reach).contains(&axes) && (0..3).all(|a| to[a] < self.count[a]);
-            is_there.then_some((to[0] * ny + to[1]) * nz + to[2])
+            is_there.then(|| (to[0] * ny + to[1]) * nz + to[2])
         })
     }
 
@@ -156,13 +165,23 @@ impl Knots {
         self.beside(knot, 1).count() < 6
     }
 
-    /// Those that were in the solid and are no more.
-    fn lost(&self, [was, is]: [&[bool]; 2]) -> Vec<bool> {
-        was.iter().zip(is).map(|(was, is)| *was && !is).collect()
+    /// The knots that are `seeds`, and those in touch with them by way of such as are `like` them.
+    fn flood(&self, seeds: impl Fn(&usize) -> bool, like: impl Fn(&usize) -> bool) -> Vec<bool> {
+        let mut marked = vec![false; self.len()];
+        let mut open: Vec<usize> = (0..self.len()).filter(seeds).collect();
+        open.iter().for_each(|knot| marked[*knot] = true);
+        while let Some(knot) = open.pop() {
+            for other in self.beside(knot, 3).filter(&like) {
+                if !std::mem::replace(&mut marked[other], true) {
+                    open.push(other);
+                }
+            }
+        }
+        marked
     }
 
     /// Crumbs, and what is about them without being of their kind before or after.
-    fn crumbs(&self, [was, is]: [&[bool]; 2]) -> Vec<bool> {
+    fn crumbs(&self, was: &[bool], is: &[bool]) -> Vec<bool> {
         let mut seen = vec![false; self.len()];
         let mut marked = vec![false; self.len()];
         for first in 0..self.len() {
