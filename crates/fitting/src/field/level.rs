@@ -18,9 +18,9 @@ use super::tiles::{TILE, TileKey, Tiles, Values};
 use crate::FitError;
 
 /// Side and middle of the cubic B-spline at the knots.
-const SAMPLES: [f64; 2] = [1.0 / 6.0, 4.0 / 6.0];
+pub(super) const SAMPLES: [f64; 2] = [1.0 / 6.0, 4.0 / 6.0];
 /// The same of the quasi-interpolant's coefficients \[Lyche75\].
-const QUASI: [f64; 2] = [-1.0 / 6.0, 8.0 / 6.0];
+pub(super) const QUASI: [f64; 2] = [-1.0 / 6.0, 8.0 / 6.0];
 
 /// Target and field compared on one level.
 pub(super) struct LevelFit<'a, T> {
@@ -35,9 +35,6 @@ pub(super) struct LevelFit<'a, T> {
     /// Tiles of a slab from which on the next one begins.
     pub slab: usize,
 }
-
-/// How often more functions take part in what is left where they stop. A third time would look beyond the tiles beside a slab.
-const ROUNDS: usize = 2;
 
 /// What bricks add, as it is gathered.
 type Bricks<T> = BTreeMap<BrickKey, DenseCorrections<T>>;
@@ -114,15 +111,8 @@ impl<T: Real> LevelFit<'_, T> {
         // What was asked of the target makes room.
         let (mut coefficients, mut left) = self.coefficients(&tiles, &rest, &takes_part, target);
         if judge.is_for_density() && self.region.level == self.options.finest {
-            for _ in 0..ROUNDS {
-                self.refine(
-                    &tiles,
-                    &rest,
-                    (&mut spread, &mut takes_part),
-                    &mut coefficients,
-                    &mut left,
-                );
-            }
+            let parts = (&mut spread[..], &mut takes_part);
+            self.refine(&tiles, &rest, parts, &mut coefficients, &mut left);
         }
         if judge.is_for_density() {
             for i in own.clone() {
@@ -144,48 +134,12 @@ impl<T: Real> LevelFit<'_, T> {
     }
 
     /// The functions that take part: those next to a knot, or on one, that exceeds the tolerance, where they may.
-    fn taking_part(&self, tiles: &Tiles, spread: &[Mask]) -> Vec<Mask> {
+    pub(super) fn taking_part(&self, tiles: &Tiles, spread: &[Mask]) -> Vec<Mask> {
         let (first, last) = self.region.allowed();
         tiles.map(|i| {
             let allowed = and(&spread[i], &between(tiles.keys[i], first, last));
             self.free(tiles.keys[i], allowed, [0, 0])
         })
-    }
-
-    /// Where functions stop taking part, those that do may leave more than is allowed, and it is not on a finer level that this is
-    /// made up for: more take part, and what is left goes into all that do. Room is made up to two knots further.
-    fn refine(
-        &self,
-        tiles: &Tiles,
-        rest: &[Values],
-        (spread, takes_part): (&mut Vec<Mask>, &mut Vec<Mask>),
-        coefficients: &mut Room,
-        left: &mut Room,
-    ) {
-        let (first, last) = self.region.sampled();
-        let rows = |i: usize| Rows::of(&between(tiles.keys[i], first, last));
-        tiles.change(coefficients, |i, values| cut(&takes_part[i], values));
-        tiles.change(left, |i, out| {
-            out.copy_from_slice(&rest[i]);
-            if tiles.is_any_near(i, takes_part) {
-                tiles.convolved(i, &rows(i), coefficients, SAMPLES, out, |to, _, value| {
-                    *to -= value
-                });
-            }
-        });
-        let (judge, (lo, hi)) = (self.judge(), self.region.judged());
-        let over = tiles.map(|i| judge.over(&between(tiles.keys[i], lo, hi), &left[i]));
-        for (i, spread) in spread.iter_mut().enumerate() {
-            let more = tiles.spread(i, &over, 1);
-            *spread = std::array::from_fn(|x| spread[x] | more[x]);
-        }
-        *takes_part = self.taking_part(tiles, spread);
-        tiles.change(coefficients, |i, out| {
-            if !is_none(&takes_part[i]) {
-                let rows = Rows::of(&takes_part[i]);
-                tiles.convolved(i, &rows, left, QUASI, out, |to, _, value| *to += value);
-            }
-        });
     }
 
     /// Those of the places `asked` of a tile about which all functions may change, from so many knots before to so many behind.
@@ -233,7 +187,7 @@ impl<T: Real> LevelFit<'_, T> {
         Ok((all, samples))
     }
 
-    fn judge(&self) -> Judge {
+    pub(super) fn judge(&self) -> Judge {
         let region = &self.region;
         let to_world = self.field.lattice_from_world().matrix3.transpose();
         let [cell, finest] = [region.level, region.finest].map(|level| region.world_spacing(level));
@@ -401,15 +355,6 @@ fn gather<T: Real>(keys: &[TileKey], takes_part: &[Mask], coefficients: &[Values
                     _ => copied::<T, { TILE - 1 }>(&values[at..], to),
                 }
             }
-        }
-    }
-}
-
-/// Zeros beside the places of a mask.
-fn cut(mask: &Mask, values: &mut Values) {
-    for (place, value) in values.iter_mut().enumerate() {
-        if mask[place / 64] >> (place % 64) & 1 == 0 {
-            *value = 0.0;
         }
     }
 }

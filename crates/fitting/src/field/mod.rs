@@ -10,6 +10,7 @@ mod judge;
 mod level;
 mod masks;
 mod prune;
+mod refine;
 mod region;
 mod room;
 mod sample;
