@@ -121,7 +121,8 @@ impl Knots {
             let scale = (1u64 << level) as f64;
             let last = lattice.cells_at(level);
             let lo: [i64; 3] = std::array::from_fn(|a| ((local.min[a] * scale).floor() as i64).max(0));
-            let hi = std::array::from_fn(|a| ((local.max[a] * scale).ceil() as i64).min(i64::from(last[a])));
+            let hi: [i64; 3] =
+                std::array::from_fn(|a| ((local.max[a] * scale).ceil() as i64).min(i64::from(last[a])));
             Self {
                 level,
                 frame: Frame {
@@ -130,7 +131,7 @@ impl Knots {
                     cells: [1; 3],
                 },
                 lo,
-                count: span(lo, hi),
+                count: std::array::from_fn(|a| (hi[a] + 1 - lo[a]).max(0) as usize),
             }
         };
         let levels = (0..=after.finest_in(&changed)).rev().map(at_level);
@@ -150,7 +151,7 @@ impl Knots {
     /// Those next to one, by `reach` axes at most; none beyond the rim.
     fn beside(&self, knot: usize, reach: usize) -> impl Iterator<Item = usize> + '_ {
         let [_, ny, nz] = self.count;
-        let at = [knot / nz / ny, knot / nz % ny, knot % nz];
+        let at = place(knot, self.count);
         (0..27).filter_map(move |n| {
             let step = [n / 9, n / 3 % 3, n % 3];
             let axes = step.iter().filter(|s| **s != 1).count();
@@ -220,8 +221,9 @@ impl Knots {
     }
 }
 
-fn span(lo: [i64; 3], hi: [i64; 3]) -> [usize; 3] {
-    std::array::from_fn(|a| (hi[a] + 1 - lo[a]).max(0) as usize)
+/// Where a node stands in a block of so many, last axis fastest.
+fn place(n: usize, [_, ny, nz]: [usize; 3]) -> [usize; 3] {
+    [n / nz / ny, n / nz % ny, n % nz]
 }
 
 /// Knots of which a field is to become what it was.
@@ -235,9 +237,8 @@ impl Marked {
     /// A box about all of them.
     fn about(&self) -> Option<Aabb> {
         let marked = (0..self.marked.len()).filter(|n| self.marked[*n]);
-        let [_, ny, nz] = self.knots.count;
         Aabb::about(marked.map(|n| {
-            let at = [n / nz / ny, n / nz % ny, n % nz];
+            let at = place(n, self.knots.count);
             let at = std::array::from_fn(|a| self.knots.lo[a] + at[a] as i64);
             self.knots.frame.node(at)
         }))
@@ -289,9 +290,8 @@ impl<T: Real> Field for Restored<'_, T> {
 
     fn frame_values(&self, frame: &Frame, lo: [i64; 3], count: [usize; 3], out: &mut [f64]) {
         self.after.frame_values(frame, lo, count, out);
-        let [_, ny, nz] = count;
         for (n, value) in out.iter_mut().enumerate() {
-            let at = [n / nz / ny, n / nz % ny, n % nz];
+            let at = place(n, count);
             let p = frame.node(std::array::from_fn(|a| lo[a] + at[a] as i64));
             if self.marked.holds(p) {
                 *value = self.before.value(p);

@@ -47,7 +47,8 @@ impl Apart {
     }
 }
 
-fn cut(text: &[u8], at_commas: bool) -> impl Iterator<Item = &[u8]> + Clone {
+/// The words of a text.
+pub fn cut(text: &[u8], at_commas: bool) -> impl Iterator<Item = &[u8]> + Clone {
     text.split(move |c| matches!(c, b' ' | b'\t' | b';') || at_commas && *c == b',')
         .filter(|w| !w.is_empty())
 }

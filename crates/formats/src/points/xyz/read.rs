@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::columns::{Apart, Columns};
+use super::columns::{Apart, Columns, cut};
 use crate::error::excerpt;
 use crate::limits::{Budget, Counted};
 use crate::points::cloud::PointCloud;
@@ -173,7 +173,7 @@ pub(in crate::points) fn parse_columns(
 /// The words of a line of names, or of a comment.
 fn names_in(text: &[u8]) -> Vec<String> {
     let marks = text.iter().take_while(|c| matches!(c, b'#' | b'/')).count();
-    words(&text[marks..])
+    cut(&text[marks..], true)
         .map(|w| String::from_utf8_lossy(w).into_owned())
         .collect()
 }
@@ -204,14 +204,9 @@ impl Line {
     }
 }
 
-fn words(text: &[u8]) -> impl Iterator<Item = &[u8]> + Clone {
-    text.split(|c| matches!(c, b' ' | b'\t' | b',' | b';'))
-        .filter(|w| !w.is_empty())
-}
-
 /// Whether a line holds words only, as `X,Y,Z` does.
 fn is_column_names(text: &[u8]) -> bool {
-    let mut words = words(text);
+    let mut words = cut(text, true);
     words.clone().count() >= 3
         && words.all(|w| {
             w.iter().any(u8::is_ascii_alphabetic)
