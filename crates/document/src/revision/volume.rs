@@ -9,7 +9,7 @@
 //! lacks of that. Brushes that
 //! carry densities along or mix them, as smoothing does, leave what they make of them, between the fill and the densest
 //! voxel that they met. Moves, and pastes of what the object had elsewhere, carry along what the fit had smoothed away:
-//! `v = f_new(x) + (v − f_fit)(w⁻¹(x))`.
+//! `v = f_new(x) + (v − f_fit)(w⁻¹(x))`; from beyond the scan comes nothing, which is the fill.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -34,6 +34,9 @@ const PROBES: usize = 1 << 18;
 /// Voxels outside of a surface that comes or goes over which densities pass into those of the scan: the first changes with the field.
 const BESIDE: f64 = 2.0;
 
+/// So far round its centre a voxel reaches.
+const HALF: DVec3 = DVec3::splat(0.5);
+
 /// Share of what the field falls by in a voxel that is no edit: what is written back may be off by so much.
 const OFF: f64 = 0.1;
 
@@ -48,6 +51,8 @@ pub struct VolumeRevision {
     pub added: usize,
     /// Those that were carved and filled.
     emptied: Vec<usize>,
+    /// To which something came from beyond the scan.
+    pub(super) beyond: usize,
 }
 
 impl VolumeRevision {
@@ -66,6 +71,7 @@ impl VolumeRevision {
         self.emptied.extend(next.emptied);
         self.carved += next.carved;
         self.added += next.added;
+        self.beyond += next.beyond;
     }
 }
 
@@ -114,12 +120,14 @@ pub fn revise_volume(
                     let (origin, in_part) = journey.back(place);
                     let is_carried = origin != place;
                     let stayed = [f64::from(volume.values[voxel]), was];
-                    let came = match is_carried {
-                        true => {
-                            let there = sampled(volume, voxel_from_world.transform_point3(origin));
-                            [there, fitted.value(origin)]
-                        }
-                        false => stayed,
+                    let there = voxel_from_world.transform_point3(origin);
+                    let came = if !is_carried {
+                        stayed
+                    } else if there.cmpge(-HALF).all() && there.cmple(last + HALF).all() {
+                        [sampled(volume, there), fitted.value(origin)]
+                    } else {
+                        part.beyond += 1;
+                        [fill; 2]
                     };
                     let blended = in_part.then(|| matter.blended(stayed, came, is)).flatten();
                     let density = blended.or_else(|| {
@@ -149,12 +157,13 @@ pub fn revise_volume(
         all.emptied.extend(part.emptied);
         all.carved += part.carved;
         all.added += part.added;
+        all.beyond += part.beyond;
     }
     all.changes.sort_unstable_by_key(|c| c.voxel);
     let is_touched = |voxel: usize| {
         let place = DVec3::from_array([voxel % nx, voxel / nx % ny, voxel / (nx * ny)].map(|i| i as f64));
         let place = world_from_voxel.transform_point3(place);
-        now.value(place) != fitted.value(place)
+        (now.value(place) - fitted.value(place)).abs() > matter.rounding
     };
     without_ghosts(&mut all, volume, iso, is_touched);
     Ok(all)

@@ -316,6 +316,13 @@ fn sentences(
             human_number(fill)
         ));
     }
+    if revision.beyond > 0 {
+        notes.push(format!(
+            "{} voxels would show what the scan does not reach; there they have density {} (fill)",
+            human_count(revision.beyond),
+            human_number(fill)
+        ));
+    }
     if revision.is_filled() && fill >= iso {
         notes.push(format!(
             "that is no less than {}, where the surface lies: what was carved is still solid; choose a smaller fill",

@@ -281,6 +281,31 @@ fn what_is_moved_takes_the_noise_of_its_scan_along() {
     assert!(checked > 50 && worst < 1.0, "{checked} {worst}");
 }
 
+#[test]
+fn what_comes_from_beyond_the_scan_is_nothing() {
+    let bar = |p: DVec3| 100.0 * (5.5 - (p.y - 12.0).hypot(p.z - 12.0)).clamp(0.0, 1.0);
+    let before = HierarchicalSpline::schoenberg(*fitted().lattice(), 50.0, bar).unwrap();
+    let mut scan = scan();
+    scan.header.world_from_voxel = DAffine3::IDENTITY;
+    for (v, value) in scan.values.iter_mut().enumerate() {
+        *value = bar(index(v)) as f32 + (v * 7919 % 10) as f32;
+    }
+    let text = "[[stroke]]\nmove = { motion = { shift = { region = { min = [0, 0, 0], max = [24, 24, 24] }, by = [4, 0, 0], blend = 9 } } }\n";
+    let changes = changed_by(&before, &scan, text);
+    let inside = |p: DVec3| bar(p) == 100.0;
+    let (mut filled, mut carried) = (0, 0);
+    for (place, [_, density], [_, now]) in changes.into_iter().filter(|(p, ..)| inside(*p)) {
+        if place.x < 3.0 {
+            assert!(now < ISO && density < ISO, "{place}: {density}, {now}");
+            filled += usize::from(density == FILL);
+        } else if place.x > 4.0 {
+            assert!(density >= 100.0, "{place}: {density}, {now}");
+            carried += 1;
+        }
+    }
+    assert!(filled > 100 && carried > 500, "{filled} {carried}");
+}
+
 /// What a script leaves of a field, and the way there.
 fn by_script(before: &HierarchicalSpline<f32>, text: &str) -> (HierarchicalSpline<f32>, Journey) {
     let commands = Command::of_script(text, |_| Ok::<_, document::CommandError>("ball".to_string())).unwrap();
