@@ -40,11 +40,11 @@ impl<T: Real> Region<T> {
     /// What changed since the viewer last asked, as the least box; `None` if nothing did. A new viewer has seen the field
     /// as it was when the region was cut. After a release or a move begin with a new viewer.
     pub fn change_since(&self, viewer: &mut Viewer<T>) -> Option<Change<T>> {
-        let p = &self.patch.state().p;
+        let p = self.on_cells();
         if viewer.seen.len() != p.len() {
             viewer.seen = vec![T::zero(); p.len()];
         }
-        let [_, ny, nz] = self.patch.lattice().coefficient_dims();
+        let [_, ny, nz] = self.cells.count.map(|c| c as usize - 3);
         let (mut low, mut high) = ([usize::MAX; 3], [0; 3]);
         for (i, (now, seen)) in p.iter().zip(&mut viewer.seen).enumerate() {
             if now != seen {

@@ -61,6 +61,19 @@ pub enum RegionError {
         /// Samples per cell asked for.
         value: f64,
     },
+    /// Knots that do not lie on the cells.
+    #[error(
+        "axis {axis}: {count} cells cannot have a knot at every {stride} of them; take 1, 2, 4 or 8, and a multiple of that of {MIN_CELLS} \
+         cells or more"
+    )]
+    Stride {
+        /// Which axis.
+        axis: usize,
+        /// Cells from one knot to the next.
+        stride: u32,
+        /// Cells.
+        count: u32,
+    },
     /// Axes that are not perpendicular in the world.
     #[error(
         "two axes of the field are not perpendicular (the cosine of their angle is {cosine:.2e}), which springs need; \

@@ -34,6 +34,7 @@ mod parts;
 mod scene;
 mod sleep;
 mod snapshot;
+mod strides;
 mod tensor;
 mod watch;
 mod window;
@@ -66,6 +67,9 @@ const PERPENDICULAR: f64 = 1e-4;
 /// How a region is sampled and solved.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RegionOptions {
+    /// Cells from one knot of the region to the next on each axis: 1, 2, 4 or 8. Where cells are not cubic the fine axes need no
+    /// more knots than the coarse one.
+    pub stride: [u32; 3],
     /// Samples per cell on each axis; both ends of the region get one. Of cells that are not cubic, numbers in the ratio
     /// of the edges make the samples cubic.
     pub samples_per_cell: [f64; 3],
@@ -80,11 +84,12 @@ pub struct RegionOptions {
 }
 
 impl RegionOptions {
-    /// Linear springs to six neighbours, the scale of densities from the slope of the field, 4/3 samples per cell, asleep
+    /// Linear springs to six neighbours, the scale of densities from the slope of the field, knots at each cell, 4/3 samples per cell, asleep
     /// below a thousandth of a cell of `level` per second and per second squared.
     pub fn of<T: Real>(field: &HierarchicalSpline<T>, level: usize) -> Self {
         let cell = field.lattice().spacing(level.min(62)).min_element();
         Self {
+            stride: [1; 3],
             samples_per_cell: [4.0 / 3.0; 3],
             law: Law::Linear {
                 scale: 1.0 / field.slope(),
@@ -104,6 +109,7 @@ impl RegionOptions {
 pub struct Region<T> {
     cells: Cells,
     field_lattice: FieldLattice,
+    stride: [u32; 3],
     samples_per_cell: [f64; 3],
     /// Coefficients of the free functions in the field that the region was cut from.
     origin: Vec<T>,
@@ -129,6 +135,7 @@ impl<T: Real> Region<T> {
         options: &RegionOptions,
     ) -> Result<Self, RegionError> {
         cells.check(field)?;
+        strides::check(&cells, options.stride)?;
         spills(field, &cells)?;
         let map = field.lattice().world_from_lattice;
         perpendicular(&map.matrix3)?;
@@ -146,7 +153,8 @@ impl<T: Real> Region<T> {
         let axis = |a: usize| {
             let (first, count) = (f64::from(cells.first[a]), cells.count[a]);
             let end = first + f64::from(count);
-            let knots = KnotVector::uniform(3, count as usize, first, end).map_err(LatticeError::from)?;
+            let intervals = (count / options.stride[a]) as usize;
+            let knots = KnotVector::uniform(3, intervals, first, end).map_err(LatticeError::from)?;
             Axis::new(
                 a,
                 knots,
@@ -168,6 +176,7 @@ impl<T: Real> Region<T> {
         Ok(Self {
             cells,
             field_lattice: *field.lattice(),
+            stride: options.stride,
             samples_per_cell: options.samples_per_cell,
             origin: coefficients(field, &cells)?,
             patch,
@@ -181,6 +190,11 @@ impl<T: Real> Region<T> {
     /// The cells.
     pub fn cells(&self) -> &Cells {
         &self.cells
+    }
+
+    /// Cells from one knot to the next.
+    pub fn stride(&self) -> [u32; 3] {
+        self.stride
     }
 
     /// The patch.
@@ -304,11 +318,11 @@ impl<T: Real> Region<T> {
         }
         // Function s of the level has the support s - 3 .. s + 1: the first inside is number first + 3.
         let first = self.cells.first.map(|f| f + 3);
-        let shape @ [_, ny, nz] = self.patch.lattice().coefficient_dims();
-        let p = &self.patch.state().p;
+        let shape @ [_, ny, nz] = self.cells.count.map(|c| c as usize - 3);
+        let p = self.on_cells();
         let level = self.cells.level;
         if p.iter().all(|p| *p != T::zero()) {
-            let change = Add(p.clone());
+            let change = Add(p.into_owned());
             return Ok(onto.edited_blocks(&[BlockEdit {
                 level,
                 first,

@@ -7,18 +7,20 @@ use super::{Cells, MIN_CELLS, Region, RegionError, RegionOptions};
 use crate::matter::Matter;
 use crate::springs::{Plasticity, Weights};
 
-/// Cells after which cells and samples meet, 4/3 samples a cell: regions that begin and end there share their samples.
+/// Knot intervals after which knots and samples meet, 4/3 samples an interval: regions that begin and end there share their samples.
 const PERIOD: u32 = 3;
 
 impl Cells {
     /// The cells of a level within `half` of a place of the world, along the axes of the lattice, as far as the field
-    /// reaches; rounded out so that regions with 4/3 samples a cell that are cut round any two places share their samples.
+    /// reaches; rounded out so that regions with knots `stride` cells apart and 4/3 samples between them that are cut round any two places share
+    /// their samples.
     ///
     /// # Errors
     /// [`RegionError`] for a box that misses the field or becomes too large.
     pub fn around<T: Real>(
         field: &HierarchicalSpline<T>,
         level: usize,
+        stride: [u32; 3],
         place: DVec3,
         half: DVec3,
     ) -> Result<Self, RegionError> {
@@ -34,12 +36,12 @@ impl Cells {
         };
         for (a, limit) in lattice.cells_at(level).into_iter().enumerate() {
             let reach = half[a] / spacing[a];
-            let period = f64::from(PERIOD);
+            let period = f64::from(PERIOD * stride[a]);
             let low = ((at[a] - reach) / period).floor() * period;
             let high = ((at[a] + reach) / period).ceil() * period;
             let [low, high] = [low, high].map(|v| v.clamp(0.0, f64::from(limit)) as u32);
             (cells.first[a], cells.count[a]) = (low, high - low);
-            if cells.count[a] < MIN_CELLS {
+            if cells.count[a] / stride[a] < MIN_CELLS {
                 return Err(RegionError::TooFewCells {
                     axis: a,
                     count: cells.count[a],
@@ -166,6 +168,7 @@ impl<T: Real> Region<T> {
         }
         let field = self.bake(onto)?;
         let options = RegionOptions {
+            stride: self.stride,
             samples_per_cell: self.samples_per_cell,
             law: self.patch.springs().law(),
             neighbours: self.patch.material.neighbours,
@@ -185,8 +188,8 @@ impl<T: Real> Region<T> {
         let dims = patch.lattice().coefficient_dims();
         for (i, v) in patch.motion.state.v.iter_mut().enumerate() {
             let at = [i / dims[2] / dims[1], i / dims[2] % dims[1], i % dims[2]];
-            let at: [u32; 3] = std::array::from_fn(|a| new.cells.first[a] + at[a] as u32);
-            *v = self.velocity_of(at);
+            let cell = std::array::from_fn(|a| new.cells.first[a] + self.stride[a] * at[a] as u32);
+            *v = self.velocity_of(cell);
         }
         patch.sample_velocities();
         for (n, differences) in old
@@ -242,7 +245,9 @@ impl<T: Real> Region<T> {
         let mut place = 0;
         for a in 0..3 {
             match cell[a].checked_sub(self.cells.first[a]) {
-                Some(i) if (i as usize) < dims[a] => place = place * dims[a] + i as usize,
+                Some(i) if i % self.stride[a] == 0 && ((i / self.stride[a]) as usize) < dims[a] => {
+                    place = place * dims[a] + (i / self.stride[a]) as usize;
+                }
                 _ => return T::zero(),
             }
         }

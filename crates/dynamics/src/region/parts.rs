@@ -313,7 +313,7 @@ impl<T: Real> Region<T> {
             samples: [0; 3],
         };
         for k in 0..3 {
-            let (cells, gaps) = (self.cells.count[k] as usize, samples[k] - 1);
+            let (cells, gaps) = (self.intervals()[k] as usize, samples[k] - 1);
             let meetings = greatest_common_divisor(cells, gaps);
             let (period, step) = (cells / meetings, gaps / meetings);
             // Function i reaches over cells i to i + 4.
@@ -334,9 +334,11 @@ impl<T: Real> Region<T> {
         let m = whole.lattice().sample_dims();
         let spacing = self.field_lattice.spacing(self.cells.level);
         let axis = |k: usize| -> Result<Axis, LatticeError> {
-            let first = f64::from(self.cells.first[k]) + w.first[k] as f64;
-            let knots = KnotVector::uniform(3, w.cells[k], first, first + w.cells[k] as f64)?;
-            Axis::new(k, knots, Rim::Fixed, w.samples[k], w.cells[k] as f64 * spacing[k])
+            let stride = f64::from(self.stride[k]);
+            let first = f64::from(self.cells.first[k]) + stride * w.first[k] as f64;
+            let length = stride * w.cells[k] as f64;
+            let knots = KnotVector::uniform(3, w.cells[k], first, first + length)?;
+            Axis::new(k, knots, Rim::Fixed, w.samples[k], length * spacing[k])
         };
         let axes = (|| Ok::<_, LatticeError>([axis(0)?, axis(1)?, axis(2)?]))();
         let lattice = Lattice::new(axes.expect("a part of knots and samples that are a lattice is one"));

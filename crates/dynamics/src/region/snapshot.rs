@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::parts::{Part, Parts};
 use super::window::Window;
-use super::{Cells, MIN_CELLS, Region, RegionError, Thresholds, cells, perpendicular};
+use super::{Cells, MIN_CELLS, Region, RegionError, Thresholds, cells, perpendicular, strides};
 use crate::patch::{Patch, PatchError, finite};
 use crate::snapshot::PatchSnapshot;
 
@@ -18,6 +18,7 @@ pub struct RegionSnapshot<T> {
     /// Columns of the map from the field's lattice to the world.
     world_from_lattice: [f64; 12],
     field_cells: [u32; 3],
+    stride: [u32; 3],
     samples_per_cell: [f64; 3],
     origin: Vec<T>,
     patch: PatchSnapshot<T>,
@@ -46,6 +47,7 @@ impl<T: Real> Region<T> {
             cells: self.cells,
             world_from_lattice: self.field_lattice.world_from_lattice.to_cols_array(),
             field_cells: self.field_lattice.cells,
+            stride: self.stride,
             samples_per_cell: self.samples_per_cell,
             origin: self.origin.clone(),
             patch: self.patch.snapshot(),
@@ -83,10 +85,12 @@ impl<T: Real> Region<T> {
         };
         let patch = Patch::restore(&s.patch)?;
         let dims = patch.lattice().coefficient_dims();
-        finite("coefficient", &s.origin, patch.lattice().coefficient_count())?;
-        if !(0..3).all(|a| inside(a) && dims[a] == s.cells.count[a] as usize - 3) {
+        let is_one = |a: usize| inside(a) && dims[a] == (s.cells.count[a] / s.stride[a]) as usize - 3;
+        if strides::check(&s.cells, s.stride).is_err() || !(0..3).all(is_one) {
             return Err(damaged("its cells are not those of its patch").into());
         }
+        let free = s.cells.count.map(|c| c as usize - 3);
+        finite("coefficient", &s.origin, free.iter().product())?;
         if !s.parts.is_sound() {
             return Err(damaged("its record of parts is not one").into());
         }
@@ -107,6 +111,7 @@ impl<T: Real> Region<T> {
         Ok(Self {
             cells: s.cells,
             field_lattice,
+            stride: s.stride,
             samples_per_cell: s.samples_per_cell,
             origin: s.origin.clone(),
             patch,

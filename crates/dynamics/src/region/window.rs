@@ -8,10 +8,10 @@ use crate::lattice::{Lattice, SampleBox};
 /// Coefficients beyond those that move, on each side, of a part that is kept.
 const LEAST_MARGIN: usize = 2;
 
-/// A box of cells whose ends are samples.
+/// A box of knot intervals whose ends are samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Window {
-    /// First free coefficient, which is also the first cell, and cells.
+    /// First free coefficient, which is also the first interval, and intervals.
     pub first: [usize; 3],
     pub cells: [usize; 3],
     pub first_sample: [usize; 3],

@@ -1,6 +1,6 @@
 use bspline::{HierarchicalSpline, Real};
 use dynamics::matter::{Matter, Quantity};
-use dynamics::region::{Cells, Region, RegionOptions};
+use dynamics::region::{Cells, MIN_CELLS, Region, RegionOptions};
 use dynamics::springs::Weights;
 use glam::DVec3;
 
@@ -37,12 +37,15 @@ impl<T: Real> Ground<'_, T> {
     /// A region about paths, at rest, of matter that moves as wide as the tool is.
     pub fn cut(&self, targets: &[&Target]) -> Result<Region<T>, ForceError> {
         let level = level(self.field, self.radius)?;
-        let mut region = Region::new(
-            self.field,
-            self.cells(level, targets)?,
-            matter(self.field, self.radius),
-            &RegionOptions::of(self.field, level),
-        )?;
+        let stride = stride(self.field, level, self.radius);
+        let options = RegionOptions {
+            stride,
+            samples_per_cell: stride.map(|s| SAMPLES_PER_CELL / f64::from(s)),
+            ..RegionOptions::of(self.field, level)
+        };
+        let cells = self.cells(level, stride, targets)?;
+        let matter = matter(self.field, self.radius);
+        let mut region = Region::new(self.field, cells, matter, &options)?;
         self.paint(&mut region)?;
         Ok(region)
     }
@@ -54,8 +57,8 @@ impl<T: Real> Ground<'_, T> {
         targets: &[&Target],
     ) -> Result<(HierarchicalSpline<T>, Region<T>), ForceError> {
         let matter = matter(self.field, self.radius);
-        let (field, mut region) =
-            region.moved(self.field, self.cells(region.cells().level, targets)?, matter)?;
+        let cells = self.cells(region.cells().level, region.stride(), targets)?;
+        let (field, mut region) = region.moved(self.field, cells, matter)?;
         self.paint(&mut region)?;
         Ok((field, region))
     }
@@ -63,8 +66,9 @@ impl<T: Real> Ground<'_, T> {
     /// Whether a place is so near a face of the field's box that a region can hardly move it.
     pub fn is_at_face(&self, region: &Region<T>, place: DVec3) -> bool {
         let local = self.field.lattice_from_world().transform_point3(place);
-        let within = local.min(self.field.lattice().extent() - local).min_element();
-        within * ((1u64 << region.cells().level) as f64) < FACE
+        let within = local.min(self.field.lattice().extent() - local);
+        let cells = within * (1u64 << region.cells().level) as f64;
+        (cells / DVec3::from_array(region.stride().map(f64::from))).min_element() < FACE
     }
 
     /// Whether a region reaches some radii beside a path, or to the border of the field.
@@ -77,7 +81,7 @@ impl<T: Real> Ground<'_, T> {
             let p = self.field.lattice_from_world().transform_point3(*p) * scale;
             (0..3).all(|a| {
                 let (low, end) = (cells.first[a], cells.first[a] + cells.count[a]);
-                let room = 0.999 * radii * self.radius / spacing[a] + RIM;
+                let room = 0.999 * radii * self.radius / spacing[a] + RIM * f64::from(region.stride()[a]);
                 (low == 0 || p[a] - f64::from(low) >= room)
                     && (end == limit[a] || f64::from(end) - p[a] >= room)
             })
@@ -119,13 +123,14 @@ impl<T: Real> Ground<'_, T> {
     }
 
     /// Cells about paths, with room on all sides.
-    fn cells(&self, level: usize, targets: &[&Target]) -> Result<Cells, ForceError> {
+    fn cells(&self, level: usize, stride: [u32; 3], targets: &[&Target]) -> Result<Cells, ForceError> {
         let [low, high] = bounds(self.field, targets);
         let lattice = self.field.lattice();
-        let room = (ROOM + self.roam) * self.radius + RIM * lattice.spacing(level).max_element();
+        let knots = lattice.spacing(level) * DVec3::from_array(stride.map(f64::from));
+        let room = (ROOM + self.roam) * self.radius + RIM * knots.max_element();
         let middle = lattice.world_from_lattice.transform_point3(0.5 * (low + high));
         let half = 0.5 * (high - low) * lattice.spacing(0) + room;
-        Ok(Cells::around(self.field, level, middle, half)?.widened(self.field)?)
+        Ok(Cells::around(self.field, level, stride, middle, half)?.widened(self.field)?)
     }
 }
 
@@ -140,6 +145,17 @@ fn level<T: Real>(field: &HierarchicalSpline<T>, radius: f64) -> Result<usize, F
             field.lattice().spacing(0).max_element()
         ))),
     }
+}
+
+/// Cells from knot to knot of a level: along an axis of cells that are finer than a tool needs, as many as still are fine enough.
+fn stride<T: Real>(field: &HierarchicalSpline<T>, level: usize, radius: f64) -> [u32; 3] {
+    let most = SAMPLES_PER_CELL * radius / SPACINGS_PER_RADIUS;
+    let (spacing, cells) = (field.lattice().spacing(level), field.lattice().cells_at(level));
+    std::array::from_fn(|a| {
+        let fits = |n: &u32| cells[a].is_multiple_of(*n) && cells[a] / n >= MIN_CELLS;
+        let is_fine = |n: &u32| f64::from(*n) * spacing[a] <= most && fits(n);
+        [2, 4, 8].into_iter().take_while(is_fine).last().unwrap_or(1)
+    })
 }
 
 /// Over what length the motion of such matter fades by `e` in a step of `dt`, as `1/m`.

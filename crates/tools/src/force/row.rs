@@ -18,7 +18,8 @@ fn basis(t: f64) -> [f64; 4] {
 /// The free coefficients of a region, as functions of the world.
 pub struct Functions<'a, T> {
     field: &'a HierarchicalSpline<T>,
-    scale: f64,
+    /// Knot intervals per cell of the coarsest level.
+    scale: DVec3,
     first: DVec3,
     dims: [usize; 3],
 }
@@ -27,10 +28,11 @@ impl<'a, T: Real> Functions<'a, T> {
     /// Those of a region that was cut from `field`.
     pub fn of(field: &'a HierarchicalSpline<T>, region: &Region<T>) -> Self {
         let cells = region.cells();
+        let stride = DVec3::from_array(region.stride().map(f64::from));
         Self {
             field,
-            scale: (1u64 << cells.level) as f64,
-            first: DVec3::from_array(cells.first.map(f64::from)),
+            scale: (1u64 << cells.level) as f64 / stride,
+            first: DVec3::from_array(cells.first.map(f64::from)) / stride,
             dims: region.patch().lattice().coefficient_dims(),
         }
     }

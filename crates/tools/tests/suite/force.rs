@@ -132,6 +132,44 @@ fn integrals_equal_their_closed_forms() {
     close(found, -0.5, "beyond");
 }
 
+/// Voxels of scans are often much longer than wide.
+#[test]
+fn long_cells_take_no_more_samples_than_cubes_and_end_alike() {
+    let text = "along = [[12, 12, 12], [15, 13, 12]]\nlift = 2\nradius = 1.2";
+    let (cubes, of_cubes) = pulled(&block::<f32>(24), text);
+    for cell in [
+        DVec3::new(0.25, 0.25, 1.0),
+        DVec3::new(0.5, 1.0, 0.125),
+        DVec3::new(1.0, 0.3, 1.0),
+    ] {
+        let lattice = Lattice {
+            world_from_lattice: DAffine3::from_scale(cell),
+            cells: (24.0 / cell).to_array().map(|n| n as u32),
+        };
+        let block = HierarchicalSpline::<f32>::schoenberg(lattice, SLOPE, |p| SLOPE * (12.0 - p.z) + ISO);
+        let (long, report) = pulled(&block.unwrap(), text);
+        assert!(
+            report.samples < 2 * of_cubes.samples,
+            "{cell}: {}",
+            report.samples
+        );
+        assert!(
+            report.arrival.least > 0.99 && report.arrival.most < 1.01,
+            "{cell}"
+        );
+        for (x, y) in [
+            (12.0, 12.0),
+            (13.5, 12.5),
+            (13.0, 13.5),
+            (14.0, 11.0),
+            (16.5, 13.5),
+        ] {
+            let off = height(&long, x, y) - height(&cubes, x, y);
+            assert!(off.abs() < 0.08, "{cell}: {off} at {x}, {y}");
+        }
+    }
+}
+
 #[test]
 fn clay_arrives_in_time_and_not_beyond() {
     let block = block::<f32>(24);

@@ -6,6 +6,7 @@ mod moving;
 mod parts;
 mod random_events;
 mod sleep;
+mod strides;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

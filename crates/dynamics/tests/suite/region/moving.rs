@@ -116,7 +116,7 @@ impl Stroke {
     pub fn following(&self, half: f64, every: usize, keeping: bool) -> HierarchicalSpline<f32> {
         let last = self.path.len() - 1;
         let place = |step: usize| self.path[step.min(last)];
-        let round = |step| Cells::around(&self.field, 0, place(step), DVec3::splat(half)).unwrap();
+        let round = |step| Cells::around(&self.field, 0, [1; 3], place(step), DVec3::splat(half)).unwrap();
         let mut onto = self.field.clone();
         let mut region = self.cut(&onto, round(every / 2));
         for step in 0..=last {

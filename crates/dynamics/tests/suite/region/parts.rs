@@ -83,18 +83,20 @@ fn a_frame_ends_when_its_time_is_spent() {
     assert_eq!(frame(&mut regions), [false, true, true]);
 }
 
-/// A long half-space of 48 cells with a push near one end.
-fn long() -> (HierarchicalSpline<f64>, Region<f64>, Vec<f64>) {
+/// A long half-space of 48 knot intervals of so many cells each with a push near one end.
+fn long(stride: u32) -> (HierarchicalSpline<f64>, Region<f64>, Vec<f64>) {
     let mut lattice = lattice();
-    lattice.cells = [48, 12, 12];
-    lattice.world_from_lattice.matrix3 = DMat3::IDENTITY;
+    lattice.cells = [48, 12, 12].map(|n| n * stride);
+    lattice.world_from_lattice.matrix3 = DMat3::from_diagonal(DVec3::splat(1.0 / f64::from(stride)));
     let flat = HierarchicalSpline::<f64>::from_corrections(lattice, 1.0, vec![BTreeMap::new()]);
     let cells = Cells {
         level: 0,
         first: [0; 3],
-        count: [48, 12, 12],
+        count: lattice.cells,
     };
     let options = RegionOptions {
+        stride: [stride; 3],
+        samples_per_cell: [4.0 / 3.0 / f64::from(stride); 3],
         sleep: Thresholds {
             speed: 2e-4,
             acceleration: 1e-3,
@@ -114,7 +116,12 @@ fn long() -> (HierarchicalSpline<f64>, Region<f64>, Vec<f64>) {
 
 #[test]
 fn parts_sleep_that_a_push_does_not_reach() {
-    let (flat, mut whole, force) = long();
+    parts_sleep(1);
+    parts_sleep(2);
+}
+
+fn parts_sleep(stride: u32) {
+    let (flat, mut whole, force) = long(stride);
     let mut parts = whole.clone();
     parts.set_parts_sleep(true);
     for region in [&mut whole, &mut parts] {
