@@ -215,6 +215,10 @@ impl Combined {
         let Writer { field, iso, .. } = *writer;
         let reach = self.reach.widened(self.blend);
         let within = writer.within(&reach)?;
+        if self.operation == Operation::Carve && field.bounds(&reach).hi < iso {
+            // In air there is nothing to take away.
+            return Ok((field.clone(), FieldFitReport::default()));
+        }
         let slope = field.slope();
         let solid: Arc<dyn Field> = Arc::new(field.clone());
         let tools: Result<Vec<Arc<dyn Field>>, _> = self

@@ -324,6 +324,18 @@ fn no_coefficient_changes_beyond_the_tool() {
 
 /// A formula and an object take what a shape of their form takes; a formula masks too.
 #[test]
+fn carving_air_changes_nothing() {
+    let before = block();
+    let after = |tool: &str, z: f64| {
+        let text = format!("{tool} = {{ along = [[12, 12, {z}]], shape.sphere.radius = 2 }}");
+        done(&before, &text).sha256()
+    };
+    assert_eq!(after("carve", 16.0), before.sha256());
+    assert_ne!(after("carve", 13.5), before.sha256());
+    assert_ne!(after("add", 16.0), before.sha256());
+}
+
+#[test]
 fn formulas_and_objects_are_tools() {
     let block = block();
     let before = volume(&block);
