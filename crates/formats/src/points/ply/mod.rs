@@ -204,6 +204,15 @@ fn read_elements<V: Values>(
         }
     }
     faces.finish(&mut raw);
+    let rows = header.elements.iter().filter(|e| e.count > 0);
+    let row = rows.map(|e| e.least_row(header.encoding)).max().unwrap_or(0);
+    let behind = left(&values) as u64;
+    // Some programs end files with a line end.
+    if row > 0 && behind >= row {
+        raw.notes.push(format!(
+            "{behind} bytes behind the last row that the header tells of were not read; if they are rows, its counts are wrong"
+        ));
+    }
     Ok(raw)
 }
 

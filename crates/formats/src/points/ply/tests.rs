@@ -249,6 +249,17 @@ fn nan_points_take_their_faces_with_them() {
 }
 
 #[test]
+fn rows_that_the_header_does_not_tell_of_are_told() {
+    let normals = "property float nx\nproperty float ny\nproperty float nz\n";
+    for (rows, is_told) in [(4, false), (5, true), (40, true)] {
+        let c = read(&ascii(4, normals, &"0 0 0 1 2 3\n".repeat(rows))).unwrap();
+        assert_eq!(c.positions.len(), 4);
+        let told = c.notes.iter().any(|n| n.contains("behind the last row"));
+        assert_eq!(told, is_told, "{rows}: {:?}", c.notes);
+    }
+}
+
+#[test]
 fn the_ceiling_holds_for_points_and_for_faces() {
     let body = "0 0 0 1 2 3\n".repeat(1000);
     let normals = "property float nx\nproperty float ny\nproperty float nz\n";
