@@ -103,6 +103,16 @@ pub enum GeometricError {
         /// Corners of the field's box.
         field: [[f64; 3]; 2],
     },
+    /// The tool lies beside the region that it is limited to.
+    #[error(
+        "the tool reaches from {tool:?}, and within lets it act from {region:?}; move the tool, or widen within"
+    )]
+    Beside {
+        /// Corners of the tool's box.
+        tool: [[f64; 3]; 2],
+        /// Corners of what is left of the field's box.
+        region: [[f64; 3]; 2],
+    },
     /// The solid would be cut off.
     #[error(
         "the solid would leave the box of its field at {at:?}, which cannot grow there: the solid is cut off at that face, or the \

@@ -154,22 +154,27 @@ impl<T: Real> Writer<'_, T> {
     /// The box in which a tool that acts in `reach` changes the field.
     ///
     /// # Errors
-    /// [`GeometricError::Outside`] if it lies beside the field, or beside what the limits leave.
+    /// [`GeometricError::Outside`] if it lies beside the field, [`GeometricError::Beside`] if beside what the limits leave.
     pub fn within(&self, reach: &Aabb) -> Result<Aabb, GeometricError> {
         let margin = MARGIN * self.spacing();
-        let whole = self.limits.cut(&self.field.lattice().world_box());
+        let whole = self.field.lattice().world_box();
+        let left = self.limits.cut(&whole);
         let own = Aabb {
             min: reach.min - margin,
             max: reach.max + margin,
         };
-        if own.max.cmplt(whole.min).any() || own.min.cmpgt(whole.max).any() {
-            let corners = |b: &Aabb| [b.min.to_array(), b.max.to_array()];
-            return Err(GeometricError::Outside {
-                tool: corners(reach),
-                field: corners(&whole),
-            });
+        let misses = |b: &Aabb| own.max.cmplt(b.min).any() || own.min.cmpgt(b.max).any();
+        let corners = |b: &Aabb| [b.min.to_array(), b.max.to_array()];
+        let tool = corners(reach);
+        if misses(&whole) {
+            let field = corners(&whole);
+            return Err(GeometricError::Outside { tool, field });
         }
-        Ok(Aabb::new(own.min.max(whole.min), own.max.min(whole.max)))
+        if misses(&left) {
+            let region = corners(&left);
+            return Err(GeometricError::Beside { tool, region });
+        }
+        Ok(Aabb::new(own.min.max(left.min), own.max.min(left.max)))
     }
 
     /// The field with `target` in a box, as far as the limits allow, and how close it is.

@@ -260,7 +260,11 @@ impl Work {
         let is_beside = match why {
             // There the box can grow.
             ToolError::Geometric(GeometricError::Leaves { .. }) => self.before.face_for(&why).is_none(),
-            ToolError::Geometric(GeometricError::Outside { .. } | GeometricError::Nowhere { .. })
+            ToolError::Geometric(
+                GeometricError::Outside { .. }
+                | GeometricError::Beside { .. }
+                | GeometricError::Nowhere { .. },
+            )
             | ToolError::Force(ForceError::Nowhere { .. } | ForceError::Outside { .. })
             | ToolError::Paint(PaintError::Outside(..)) => true,
             _ => false,

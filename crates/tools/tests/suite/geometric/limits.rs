@@ -125,7 +125,7 @@ fn limits_that_make_no_sense_are_refused() {
     let tool = "carve = { shape = { sphere = { radius = 2.0 } }, along = [[12, 12, 12]] }";
     for (limit, why) in [
         ("within = { min = [9, 9, 9], max = [9, 12, 12] }", "no size"),
-        ("within = { min = [1, 1, 1], max = [2, 2, 2] }", "the field from"),
+        ("within = { min = [1, 1, 1], max = [2, 2, 2] }", "widen within"),
         ("mask = { boxes = [] }", "no box"),
         ("mask = { }", "exactly one"),
         (
