@@ -130,7 +130,7 @@ enum Command {
     Redo(document::undo::Args),
     /// Do all edits of a document again and compare the result
     Replay(document::replay::Args),
-    /// Write an object of a document as a field
+    /// Write an object of a document as a field, or into the scan that it was fitted to
     Export(document::export::Args),
     /// Touch a document through a device, and work on it by hand
     Feel(document::feel::Args),

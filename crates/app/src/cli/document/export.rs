@@ -21,7 +21,7 @@ pub struct Args {
     /// Document (.isoclay)
     document: PathBuf,
     /// Field to write (.iclay), for mesh, picture, sample and the others; - writes to standard output. With --like a volume
-    /// (.nii, .nii.gz), a cloud (.ply, .xyz) or a new directory for a DICOM series
+    /// (.nii, .nii.gz), a cloud in the format of the scan, or a new directory for a DICOM series
     #[arg(short, long, value_name = "OUT")]
     pub output: PathBuf,
     /// Object to write, where there are several
