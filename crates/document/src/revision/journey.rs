@@ -25,7 +25,16 @@ pub(super) struct Mix {
     /// It changes nothing outside, and takes nothing from there.
     pub reach: Aabb,
     /// Where what it brings comes from, if it does not lie there already.
-    pub brought: Option<Aabb>,
+    pub brought: Option<Brought>,
+}
+
+/// Where a brush brings matter from.
+#[derive(Clone, Copy)]
+pub(super) enum Brought {
+    /// From a box of the object itself.
+    Here(Aabb),
+    /// From another object, with the densities that it has there.
+    Elsewhere,
 }
 
 impl Mix {
@@ -233,15 +242,14 @@ fn mixes(stroke: &Stroke, is_own: impl Fn(&str) -> bool) -> impl Iterator<Item =
             brought: None,
         })
     });
-    let everywhere = Aabb {
-        min: DVec3::NEG_INFINITY,
-        max: DVec3::INFINITY,
-    };
     let pasted = stroke.paste.as_ref().and_then(|paste| {
         let (from, map) = paste.carried().ok()?;
         Some(Mix {
             reach: from.transformed(&map),
-            brought: Some(if is_own(&paste.from) { from } else { everywhere }),
+            brought: Some(match is_own(&paste.from) {
+                true => Brought::Here(from),
+                false => Brought::Elsewhere,
+            }),
         })
     });
     passed.chain(pasted)

@@ -20,7 +20,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::Journey;
-use super::journey::Mix;
+use super::journey::{Brought, Mix};
 
 /// Voxels on an edge of the tiles in which changed voxels are looked for.
 const TILE: usize = 8;
@@ -255,9 +255,10 @@ impl<'a> Mixed<'a> {
     fn new(volume: &Volume, journey: &'a Journey) -> Self {
         let mixes = journey.mixes();
         let most = mixes.iter().map(|mix| {
-            let brought = mix
-                .brought
-                .map_or(f64::NEG_INFINITY, |from| largest(volume, &from));
+            let brought = mix.brought.map_or(f64::NEG_INFINITY, |from| match from {
+                Brought::Here(from) => largest(volume, &from),
+                Brought::Elsewhere => f64::INFINITY,
+            });
             [brought.max(largest(volume, &mix.reach)), brought]
         });
         Self {
@@ -409,8 +410,12 @@ impl Matter {
                 let most = self.median_solid;
                 (old + now.min(most) - was.min(most)).min(most.max(old))
             }
-            (_, true) if change > 0.0 => raised,
-            (_, true) => lowered,
+            (false, true) => raised,
+            // What stays solid keeps its density but for the voxel beside the new surface: a tool's field may rise much slower than matter does.
+            (true, true) => {
+                let depth = ((now - self.iso) / self.ramp).min(1.0);
+                lowered.max(old.min(self.iso + depth * (old - self.iso)))
+            }
         })
     }
 }
