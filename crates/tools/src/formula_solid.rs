@@ -9,7 +9,8 @@ use crate::slope::slope;
 const ASKED: usize = 33;
 
 /// What a formula `g` of place makes a solid: `g/√(|∇g|² + (g/R)²)`, 0 where `g` is, about the distance from there
-/// \[Taubin94\], and nowhere more than `R`. Where `g` is not finite it is `-R`, outside.
+/// \[Taubin94\], and nowhere more than `R`. Where `g` is not finite, and where it is 0 and even, as a comparison is that does not hold, it is
+/// `-R`, outside.
 #[derive(Clone, Debug)]
 pub struct FormulaSolid {
     formula: Formula,
@@ -47,10 +48,10 @@ impl Field for FormulaSolid {
         };
         let Slope { value, gradient } = self.formula.of([0, 1, 2].map(along));
         let distance = value / (gradient.length_squared() + (value / self.most).powi(2)).sqrt();
-        match (value == 0.0, distance.is_finite()) {
-            (true, _) => 0.0,
-            (_, true) => distance,
-            _ => -self.most,
+        match value == 0.0 && gradient != DVec3::ZERO {
+            true => -f64::MIN_POSITIVE,
+            false if distance.is_finite() => distance,
+            false => -self.most,
         }
     }
 
@@ -79,7 +80,7 @@ impl Field for FormulaSolid {
         // Where something is not finite the interval is the whole line.
         let (lo, hi) = (
             if value.lo > 0.0 { f64::MIN_POSITIVE } else { -most },
-            if value.hi < 0.0 { -f64::MIN_POSITIVE } else { most },
+            if value.hi <= 0.0 { -f64::MIN_POSITIVE } else { most },
         );
         Interval::new(lo, hi)
     }

@@ -178,7 +178,7 @@ impl Tool<'_> {
                     Self::Force(tool) => tool.apply(old, *iso, layers, &holding, control)?,
                     _ => unreachable!("it is one of these"),
                 };
-                let field = limits.kept(old, &swept(old, field, *iso, control)?);
+                let field = limits.kept(old, &swept(old, field, *iso, limits, control)?);
                 return Ok((Canvas { field, ..canvas }, told));
             }
             Self::Hold(hold) => {

@@ -4,11 +4,12 @@
 //! then thin it below; and what they draw out ends in a haze, of which noise makes specks. Such crumbs become again what they were.
 
 use bspline::{Aabb, Field, Frame, HierarchicalSpline, Interval, Jet, Real};
-use fitting::field::{Aim, FieldFitOptions, fit_field};
+use fitting::field::{Aim, FieldFitOptions, fit_field_where};
 use fitting::{Control, FitError};
 use glam::{DAffine3, DVec3};
 
 use super::ForceError;
+use crate::limits::Limits;
 
 /// Most knots at which a change is looked at; of larger ones those of a coarser level.
 const MOST: usize = 1 << 23;
@@ -19,7 +20,7 @@ const THIN: f64 = 0.1;
 /// Knot intervals beside the crumbs in which the field may change.
 const MARGIN: f64 = 4.0;
 
-/// A field without the crumbs that it has more than the one before, whose surface lies at `iso` too.
+/// A field without the crumbs that it has more than the one before, whose surface lies at `iso` too, as far as limits allow.
 ///
 /// # Errors
 /// [`ForceError::Cancelled`].
@@ -27,16 +28,18 @@ pub(crate) fn swept<T: Real>(
     before: &HierarchicalSpline<T>,
     after: HierarchicalSpline<T>,
     iso: f64,
+    limits: &Limits,
     control: &mut Control,
 ) -> Result<HierarchicalSpline<T>, ForceError> {
     let crumbs = |knots: &Knots, values: [&[f64]; 2]| {
         let [was, is] = values.map(|values| values.iter().map(|value| *value > iso).collect::<Vec<_>>());
         knots.crumbs(&was, &is)
     };
-    restored(before, after, crumbs, control)
+    restored(before, after, crumbs, limits, control)
 }
 
-/// A field that has all of the solid that there was before, of a tool that takes nothing away, and about what it had lost no thinner.
+/// A field that has all of the solid that there was before, of a tool that takes nothing away, and about what it had lost no thinner, as far as
+/// limits allow.
 ///
 /// # Errors
 /// [`ForceError::Cancelled`].
@@ -44,6 +47,7 @@ pub(super) fn grown<T: Real>(
     before: &HierarchicalSpline<T>,
     after: HierarchicalSpline<T>,
     iso: f64,
+    limits: &Limits,
     control: &mut Control,
 ) -> Result<HierarchicalSpline<T>, ForceError> {
     let finest = after.lattice().spacing(after.level_count() - 1);
@@ -54,7 +58,7 @@ pub(super) fn grown<T: Real>(
         let is_thin = |n: &usize| was[*n] > iso && is[*n] < was[*n] - THIN * slope;
         knots.flood(is_lost, is_thin)
     };
-    restored(before, after, lost, control)
+    restored(before, after, lost, limits, control)
 }
 
 /// A field that is again what it was before at the knots that are `marked` by their values before and after.
@@ -62,6 +66,7 @@ fn restored<T: Real>(
     before: &HierarchicalSpline<T>,
     after: HierarchicalSpline<T>,
     marked: impl Fn(&Knots, [&[f64]; 2]) -> Vec<bool>,
+    limits: &Limits,
     control: &mut Control,
 ) -> Result<HierarchicalSpline<T>, ForceError> {
     let Some(knots) = Knots::changed(before, &after) else {
@@ -94,7 +99,9 @@ fn restored<T: Real>(
         after: &after,
         marked,
     };
-    match fit_field(&target, &after, &within, &options, control) {
+    // The levels of a fit are right together alone: what may not change takes no part in it.
+    let is_free = |support: &Aabb| limits.may_change(support);
+    match fit_field_where(&target, &after, &within, &options, &is_free, control) {
         Ok((field, ..)) => Ok(field),
         Err(why @ FitError::Cancelled) => Err(ForceError::Cancelled(why)),
         // The box is too thin for a fit.

@@ -101,7 +101,7 @@ impl Extrude {
         };
         let (drawn, _) = toward.driven(stages as usize, &zone, pillar, control)?;
         // The forces that hold the surface beside it thin the matter of scans below.
-        let drawn = grown(field, drawn, iso, control)?;
+        let drawn = grown(field, drawn, iso, &holding.limits, control)?;
         Ok((drawn, Vec::new()))
     }
 }

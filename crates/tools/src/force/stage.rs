@@ -10,7 +10,7 @@ use super::hand::Hand;
 use super::row::Functions;
 use super::stroke::{Acting, ForceStroke, STAGE};
 use super::target::Target;
-use super::{ForceError, Solid};
+use super::{Extent, ForceError, Solid};
 
 /// Radii about the paths of a stage in which those of earlier ones go on acting.
 const TRAIL: f64 = 5.0;
@@ -42,6 +42,15 @@ impl<T: Real> ForceStroke<T> {
     fn acting(&self, index: usize, age: usize) -> Acting {
         let target = &self.targets[index];
         let (place, start) = (target.path.at(0.0), self.start(target));
+        // Nearer to what may not change a stage leaves paths short, and the next ones would push them on and on.
+        let beside = match self.extent {
+            Extent::Whole => {
+                let level = self.region.cells().level;
+                self.field.lattice().spacing(level).max_element()
+            }
+            _ => 0.0,
+        };
+        let about = Aabb::new(place - beside, place + beside);
         Acting {
             index,
             age,
@@ -51,7 +60,7 @@ impl<T: Real> ForceStroke<T> {
             before: None,
             stiffness: 0.0,
             worth: 1.0,
-            is_free: self.holding.limits.is_free(&Aabb::new(place, place)) && !self.is_at_face(target, start),
+            is_free: self.holding.limits.is_free(&about) && !self.is_at_face(target, start),
         }
     }
 

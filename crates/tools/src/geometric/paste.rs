@@ -153,7 +153,21 @@ impl Paste {
             feature: None,
             densities: true,
         };
-        writer.written(&mixed, &within, &fineness, control)
+        // A box that is turned fills little of the upright one about it: no function acts far beside it.
+        let beside = (margin + blend + 3f64.sqrt() * around) / scale;
+        let own = Aabb::new(b.min - beside, b.max + beside);
+        let back = map.inverse();
+        let is_beside = |support: &Aabb| {
+            let support = support.transformed(&back);
+            self.turn.is_some() && !(support.min.cmpge(own.min).all() && support.max.cmple(own.max).all())
+        };
+        writer.written_where(
+            &mixed,
+            &within,
+            &fineness,
+            &|support| !is_beside(support),
+            control,
+        )
     }
 
     /// The box that is taken, and how it goes to its place.

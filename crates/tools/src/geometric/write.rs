@@ -188,6 +188,21 @@ impl<T: Real> Writer<'_, T> {
         fineness: &Fineness,
         control: &mut Control,
     ) -> Result<(HierarchicalSpline<T>, FieldFitReport), GeometricError> {
+        self.written_where(target, within, fineness, &|_| true, control)
+    }
+
+    /// The same with those functions alone of whose supports `is_meant` is true.
+    ///
+    /// # Errors
+    /// As [`Self::written`].
+    pub fn written_where(
+        &self,
+        target: &dyn Field,
+        within: &Aabb,
+        fineness: &Fineness,
+        is_meant: &(dyn Fn(&Aabb) -> bool + Sync),
+        control: &mut Control,
+    ) -> Result<(HierarchicalSpline<T>, FieldFitReport), GeometricError> {
         fineness.check(self.detail())?;
         let finest = self.finest(fineness);
         // What is there already must not be left over; and nothing finer than a coarse edit may be.
@@ -209,7 +224,7 @@ impl<T: Real> Writer<'_, T> {
         // A scan knows its surface as well as its densities.
         let usual = density.map_or(TOLERANCE * spacing, |_| spacing);
         let tolerance = fineness.tolerance.map_or(usual, |t| t.0);
-        let is_free = |support: &Aabb| self.limits.may_change(support);
+        let is_free = |support: &Aabb| is_meant(support) && self.limits.may_change(support);
         let iso = self.iso;
         let aim = match density {
             None => Aim::Surface { iso, tolerance },

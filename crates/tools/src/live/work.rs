@@ -236,9 +236,8 @@ impl Work {
             self.steps = poses;
             let (field, told) = released(force)?;
             let old = &self.before.field;
-            self.canvas.field = self
-                .limits
-                .kept(old, &swept(old, field, self.before.iso, control)?);
+            let field = swept(old, field, self.before.iso, &self.limits, control)?;
+            self.canvas.field = self.limits.kept(old, &field);
             notes.extend(told);
         }
         for late in during {

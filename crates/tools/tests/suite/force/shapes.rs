@@ -118,19 +118,30 @@ fn what_is_extruded_from_a_scan_leaves_no_pocket_below_it() {
     let density = |p: DVec3| air + 0.5 * (tissue - air) * (1.0 + libm::erf((12.0 - p.z) / EDGE));
     let field = HierarchicalSpline::<f32>::schoenberg(lattice, 500.0, density).unwrap();
     let square = "[[6, 6, 12], [18, 6, 12], [18, 18, 12], [6, 18, 12]]";
-    let text = format!("extrude = {{ area = {square}, by = [0, 0, 5], radius = 2 }}");
-    let stroke: Stroke = toml::from_str(&text).unwrap();
-    let canvas = Canvas::alone(field.clone(), iso, 0);
-    let (left, _) = stroke.apply(canvas, &mut Control::default()).unwrap();
-    let knots =
-        (0..25 * 25 * 25).map(|n| DVec3::new(f64::from(n / 625), f64::from(n / 25 % 25), f64::from(n % 25)));
-    let (mut gone, mut come) = (0, 0);
-    for p in knots {
-        let [was, is] = [&field, &left.field].map(|field| field.value(p) > iso);
-        gone += usize::from(was && !is && p.z < 11.0);
-        come += usize::from(is && !was);
+    let knots: Vec<DVec3> = (0..25 * 25 * 25)
+        .map(|n| DVec3::new(f64::from(n / 625), f64::from(n / 25 % 25), f64::from(n % 25)))
+        .collect();
+    for mask in [
+        "",
+        "mask = { formula = \"x - 11.3 + 0.4*(y - 12) - 0.5*(z - 12)\" }\n",
+    ] {
+        let text = format!("{mask}extrude = {{ area = {square}, by = [0, 0, 5], radius = 2 }}");
+        let stroke: Stroke = toml::from_str(&text).unwrap();
+        let canvas = Canvas::alone(field.clone(), iso, 0);
+        let (left, _) = stroke.apply(canvas, &mut Control::default()).unwrap();
+        let (mut gone, mut come, mut least, mut most) = (0, 0, air, tissue);
+        for p in &knots {
+            let [was, is] = [&field, &left.field].map(|field| field.value(*p));
+            gone += usize::from(was > iso && is < iso && p.z < 11.0);
+            come += usize::from(is > iso && was < iso);
+            (least, most) = (least.min(is), most.max(is));
+        }
+        assert!(come > 200 && gone == 0, "{mask}: {come} came, {gone} went");
+        assert!(
+            least > air - 400.0 && most < tissue + 900.0,
+            "{mask}: {least} to {most}"
+        );
     }
-    assert!(come > 500 && gone == 0, "{come} came, {gone} went");
 }
 
 /// Against the bend of space of the same numbers, which is exact.

@@ -348,6 +348,21 @@ fn formulas_and_objects_are_tools() {
             &format!("{formula}, along = [[12, 12, 12]], finer = 2"),
         ));
     assert!((taken / half_ball - 1.0).abs() < 0.005, "{taken} of {half_ball}");
+    // What a comparison says is 1 or 0, and on a plateau of 0 there is no solid.
+    for text in ["x^2 + y^2 + z^2 < 9", "max(0, 9 - x^2 - y^2 - z^2)"] {
+        let tool = format!(
+            "shape = {{ formula = {{ text = \"{text}\", size = [7, 7, 7] }} }}, along = [[12, 12, 12]]"
+        );
+        let left = done(&block, &format!("carve = {{ {tool} }}"));
+        let taken = (before - volume(&left)) / half_ball;
+        assert!((taken - 1.0).abs() < 0.15, "{text}: {taken}");
+        let masked = done(
+            &block,
+            &format!("mask = {{ formula = \"x < 12\", outside = true }}\ncarve = {{ {tool} }}"),
+        );
+        let taken = (before - volume(&masked)) / half_ball;
+        assert!((0.3..0.6).contains(&taken), "{text}: {taken}");
+    }
     // The ball on the block, laid into another block as a tool.
     let ball = done(
         &block,
