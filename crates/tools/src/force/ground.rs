@@ -147,9 +147,13 @@ fn level<T: Real>(field: &HierarchicalSpline<T>, radius: f64) -> Result<usize, F
     }
 }
 
-/// Cells from knot to knot of a level: along an axis of cells that are finer than a tool needs, as many as still are fine enough.
+/// Share of the longest edge of a cell beyond which no knots lie apart: cubes keep theirs.
+const LONGEST: f64 = 1.5;
+
+/// Cells from knot to knot of a level: along an axis of cells that are shorter than others, as many as still are fine enough for a tool.
 fn stride<T: Real>(field: &HierarchicalSpline<T>, level: usize, radius: f64) -> [u32; 3] {
-    let most = SAMPLES_PER_CELL * radius / SPACINGS_PER_RADIUS;
+    let longest = LONGEST * field.lattice().spacing(level).max_element();
+    let most = longest.min(SAMPLES_PER_CELL * radius / SPACINGS_PER_RADIUS);
     let (spacing, cells) = (field.lattice().spacing(level), field.lattice().cells_at(level));
     std::array::from_fn(|a| {
         let fits = |n: &u32| cells[a].is_multiple_of(*n) && cells[a] / n >= MIN_CELLS;
