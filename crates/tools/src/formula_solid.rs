@@ -40,6 +40,18 @@ impl FormulaSolid {
     }
 }
 
+impl FormulaSolid {
+    /// Whether the formula is above 0 a millionth of `R` beside a place, along an axis: no plateau of 0 lies there.
+    fn is_above_beside(&self, p: DVec3) -> bool {
+        let step = 1e-6 * self.most;
+        let beside = DVec3::AXES
+            .into_iter()
+            .flat_map(|axis| [p - step * axis, p + step * axis]);
+        let value = |at: DVec3| self.formula.of([at.x, at.y, at.z]);
+        beside.map(value).any(|value| value > 0.0)
+    }
+}
+
 impl Field for FormulaSolid {
     fn value(&self, p: DVec3) -> f64 {
         let along = |a: usize| Slope {
@@ -48,10 +60,12 @@ impl Field for FormulaSolid {
         };
         let Slope { value, gradient } = self.formula.of([0, 1, 2].map(along));
         let distance = value / (gradient.length_squared() + (value / self.most).powi(2)).sqrt();
-        match value == 0.0 && gradient != DVec3::ZERO {
-            true => -f64::MIN_POSITIVE,
-            false if distance.is_finite() => distance,
-            false => -self.most,
+        if distance.is_finite() && value != 0.0 {
+            distance
+        } else if value == 0.0 && (gradient != DVec3::ZERO || self.is_above_beside(p)) {
+            -f64::MIN_POSITIVE
+        } else {
+            -self.most
         }
     }
 

@@ -363,6 +363,14 @@ fn formulas_and_objects_are_tools() {
         let taken = (before - volume(&masked)) / half_ball;
         assert!((0.3..0.6).contains(&taken), "{text}: {taken}");
     }
+    // A root of a higher order is a surface, and no plateau.
+    let cube = "shape = { formula = { text = \"(0 - z)^3\", size = [6, 6, 6] } }";
+    let taken = before
+        - volume(&done(
+            &block,
+            &format!("carve = {{ {cube}, along = [[12, 12, 11]] }}"),
+        ));
+    assert!((taken / 108.0 - 1.0).abs() < 0.01, "{taken}");
     // The ball on the block, laid into another block as a tool.
     let ball = done(
         &block,
