@@ -68,10 +68,15 @@ impl VolumeRevision {
         self.changes.extend(earlier);
         self.changes.sort_by_key(|c| c.voxel);
         self.changes.dedup_by_key(|c| c.voxel);
-        self.emptied.extend(next.emptied);
-        self.carved += next.carved;
-        self.added += next.added;
-        self.beyond += next.beyond;
+        self.count(next.emptied, [next.carved, next.added, next.beyond]);
+    }
+
+    /// Counts what became of more voxels.
+    fn count(&mut self, emptied: Vec<usize>, [carved, added, beyond]: [usize; 3]) {
+        self.emptied.extend(emptied);
+        self.carved += carved;
+        self.added += added;
+        self.beyond += beyond;
     }
 }
 
@@ -154,10 +159,7 @@ pub fn revise_volume(
     let mut all = VolumeRevision::default();
     for part in parts {
         all.changes.extend(part.changes);
-        all.emptied.extend(part.emptied);
-        all.carved += part.carved;
-        all.added += part.added;
-        all.beyond += part.beyond;
+        all.count(part.emptied, [part.carved, part.added, part.beyond]);
     }
     all.changes.sort_unstable_by_key(|c| c.voxel);
     let is_touched = |voxel: usize| {

@@ -157,17 +157,11 @@ impl Paste {
         let beside = (margin + blend + 3f64.sqrt() * around) / scale;
         let own = Aabb::new(b.min - beside, b.max + beside);
         let back = map.inverse();
-        let is_beside = |support: &Aabb| {
+        let is_near = |support: &Aabb| {
             let support = support.transformed(&back);
-            self.turn.is_some() && !(support.min.cmpge(own.min).all() && support.max.cmple(own.max).all())
+            self.turn.is_none() || support.min.cmpge(own.min).all() && support.max.cmple(own.max).all()
         };
-        writer.written_where(
-            &mixed,
-            &within,
-            &fineness,
-            &|support| !is_beside(support),
-            control,
-        )
+        writer.written_where(&mixed, &within, &fineness, &is_near, control)
     }
 
     /// The box that is taken, and how it goes to its place.

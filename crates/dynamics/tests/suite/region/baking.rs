@@ -5,7 +5,7 @@ use bspline::{Field, HierarchicalSpline, Real};
 use dynamics::region::{Cells, Region, RegionError, RegionOptions, Thresholds};
 use glam::DVec3;
 
-use super::{CELLS, Random, damped, field, lattice, options, pushed};
+use super::{CELLS, Random, damped, field, lattice, off_at_samples, options, pushed};
 
 /// Random world points of the lattice's box, some just outside the faces of the region, and whether they lie in it.
 fn points(cells: Cells, count: usize) -> Vec<(DVec3, bool)> {
@@ -112,12 +112,7 @@ fn baked_field_is_the_patch<T: Real>(tolerance: f64) {
         let region = pushed(&old, CELLS, damped());
         let new = region.bake(&old).unwrap();
         let [nx, ny, nz] = region.patch().lattice().sample_dims();
-        let (mut worst, mut moved) = (0.0f64, 0.0f64);
-        for (i, d) in region.patch().state().d.iter().enumerate() {
-            let p = region.sample_position([i / nz / ny, i / nz % ny, i % nz]);
-            worst = worst.max((new.value(p) - d.as_f64()).abs());
-            moved = moved.max((new.value(p) - old.value(p)).abs());
-        }
+        let [worst, moved] = off_at_samples(&region, &old, &new);
         assert_eq!(region.patch().state().d.len(), nx * ny * nz);
         // The field is about 12 at most: tens of units of rounding, of the steps too.
         assert!(

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use bspline::hierarchical::{BrickKey, Corrections, Lattice, LevelCorrections};
-use bspline::{HierarchicalSpline, Real};
+use bspline::{Field, HierarchicalSpline, Real};
 use dynamics::integrators::Integrator;
 use dynamics::matter::{Matter, Quantity};
 use dynamics::region::{Cells, Region, RegionOptions};
@@ -119,6 +119,24 @@ fn pushed<T: Real>(field: &HierarchicalSpline<T>, cells: Cells, matter: Matter) 
             .expect("awake under a force");
     }
     region
+}
+
+/// How far the field `new` is at the samples from what the patch says, and from the field `old`, at most.
+fn off_at_samples<T: Real>(
+    region: &Region<T>,
+    old: &HierarchicalSpline<T>,
+    new: &HierarchicalSpline<T>,
+) -> [f64; 2] {
+    let [_, ny, nz] = region.patch().lattice().sample_dims();
+    let d = region.patch().state().d.iter().enumerate();
+    d.fold([0.0; 2], |[off, moved], (i, d)| {
+        let p = region.sample_position([i / nz / ny, i / nz % ny, i % nz]);
+        let now = new.value(p);
+        [
+            off.max((now - d.as_f64()).abs()),
+            moved.max((now - old.value(p)).abs()),
+        ]
+    })
 }
 
 fn state_bits<T: Real>(region: &Region<T>) -> Vec<u64> {
