@@ -1,12 +1,13 @@
 //! What a stroke may not move: places outside of its limits, and the constraints of the object.
 
-use bspline::{Aabb, HierarchicalSpline, Real};
+use bspline::{Aabb, Field, HierarchicalSpline, Real};
 use dynamics::constraints::{Constraint, Hold, On, curve};
 use dynamics::patch::PatchError;
 use dynamics::region::Region;
 use glam::DVec3;
 
 use super::ForceError;
+use super::path::nearest_surface;
 use super::row::Functions;
 use super::spread::axes;
 use crate::hold::Held;
@@ -49,11 +50,10 @@ impl Holding {
         let is_free = |p: DVec3| self.limits.is_free(&Aabb::new(p, p)) && functions.weight(p) > REACH;
         let (origin, axes) = (region.sample_position([0; 3]), axes(region));
         let world = |[x, y, z]: [f64; 3]| origin + x * axes[0] + y * axes[1] + z * axes[2];
-        let value = |at| bspline::Field::value(field, world(at));
+        let value = |at| field.value(world(at));
         let spacing = APART * field.lattice().spacing(region.cells().level).min_element();
         let mut rows = Vec::new();
         for held in &self.holds {
-            let density = self.iso + held.depth.map_or(0.0, |d| d.0) * field.slope();
             let hold = |length: f64| held.spring.map_or(Hold::Hard, |k| Hold::Spring(k.0 * length));
             for line in &held.lines {
                 let local: Vec<[f64; 3]> = line.iter().map(|p| region.local(p.0)).collect();
@@ -61,15 +61,23 @@ impl Holding {
                     [at] => vec![Constraint {
                         label: held.name.clone(),
                         on: On::Point { at, field: value(at) },
-                        density,
+                        density: self.iso,
                         hold: hold(radius),
                     }],
-                    _ => curve(&held.name, &local, spacing, density, hold(1.0), value)
+                    _ => curve(&held.name, &local, spacing, self.iso, hold(1.0), value)
                         .map_err(PatchError::from)?,
                 };
-                rows.extend(points.into_iter().filter(|c| match &c.on {
-                    On::Point { at, .. } => is_free(world(*at)),
-                    On::Samples(_) => true,
+                rows.extend(points.into_iter().filter_map(|mut row| {
+                    let On::Point { at, field: here } = &mut row.on else {
+                        return Some(row);
+                    };
+                    let mut place = world(*at);
+                    if let Some(depth) = held.depth {
+                        place = above(field, self.iso, place, depth.0, radius);
+                        *at = region.local(place);
+                        *here = field.value(place);
+                    }
+                    is_free(place).then_some(row)
                 }));
             }
         }
@@ -82,6 +90,13 @@ impl Holding {
         }
         Ok(Drawn::new(rows, 0.3 * radius * field.slope()))
     }
+}
+
+/// Where the surface is to lie for `place` to be `depth` deep below it: out along the normal of the surface nearest to it. The density
+/// that lies so deep is that of the field as it is, and not of the surface that comes.
+fn above<F: Field>(field: &F, iso: f64, place: DVec3, depth: f64, reach: f64) -> DVec3 {
+    let foot = nearest_surface(field, iso, place, reach).unwrap_or(place);
+    place - depth * field.value_gradient(foot).1.normalize_or_zero()
 }
 
 /// Constraints of a region, to which springs draw the surface bit by bit.

@@ -136,14 +136,18 @@ fn springs_draw_the_surface_to_where_it_is_not_yet() {
         println!("{off}");
         assert!(off < limit, "{hold}: {off}");
     }
-    // Places within the solid, and without.
-    for depth in [0.5, -0.4] {
+    // Places within the solid, and without, as deep as asked on the flank of a pull, and about so at the next one, which tilts it.
+    let next = format!("[[stroke]]\npull = {{ along = [[15.5, 12, 12]], lift = 0.6, radius = {R} }}");
+    for depth in [0.6, -0.5] {
         let hold = format!(
             "[[stroke]]\nhold = {{ name = 'a', points = [[13.5, 12, 12]], depth = {depth}, spring = 5000 }}"
         );
-        let (left, _) = played(&field, &format!("{hold}\n{pull}")).unwrap();
-        let found = (left.field.value(DVec3::new(13.5, 12.0, 12.0)) - ISO) / SLOPE;
-        assert!((found - depth).abs() < 0.01, "{found}");
+        for (strokes, limit) in [(pull.clone(), 0.01), (format!("{pull}\n{next}"), 0.1)] {
+            let (left, _) = played(&field, &format!("{hold}\n{strokes}")).unwrap();
+            let found = height(&left.field, 13.5, 12.0);
+            println!("{found} of {depth}");
+            assert!((found / depth - 1.0).abs() < limit, "{found} of {depth}");
+        }
     }
 }
 
