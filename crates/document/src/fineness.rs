@@ -41,6 +41,8 @@ const AIM: f64 = 0.96;
 const LEAST: f64 = 0.8;
 /// Trials until the best found is taken.
 const TRIALS: usize = 12;
+/// Factor by which a trial lies between the errors of cells that kept what is wanted and that did not; nearer ones are not told apart.
+const BETWEEN: f64 = 1.15;
 /// Triangles whose chord error is measured; of larger meshes as many, evenly spread.
 const MEASURED: usize = 1 << 12;
 
@@ -258,7 +260,7 @@ impl<'a> Search<'a> {
             }
             // Errors of the cells and of the triangles rise together.
             let next = of_cells * (0.85 * wanted / error).clamp(0.1, 4.0);
-            if met > 0.0 && met * 1.3 > missed {
+            if met > 0.0 && met * BETWEEN > missed / BETWEEN {
                 let kept = best.as_ref().map_or(wanted, |b| b.error);
                 if is_rescaled || kept > 0.66 * wanted {
                     break;
@@ -268,7 +270,7 @@ impl<'a> Search<'a> {
                 (met, missed, of_cells) = (0.0, f64::INFINITY, met);
                 continue;
             }
-            of_cells = next.clamp(met * 1.15, missed / 1.15);
+            of_cells = next.clamp(met * BETWEEN, missed / BETWEEN);
         }
         let best = best.ok_or(SurfaceError::Tolerance)?;
         notes.push(format!(

@@ -6,8 +6,8 @@
 use std::sync::Arc;
 
 use bspline::primitives::Cuboid;
-use bspline::{Aabb, Csg, Field, HierarchicalSpline, Real};
-use glam::{DAffine3, DVec3};
+use bspline::{Aabb, Csg, Field, Frame, HierarchicalSpline, Interval, Real};
+use glam::{BVec3, DAffine3, DVec3};
 use serde::{Deserialize, Serialize};
 
 use crate::coefficients::{changed, coefficient, support, with_functions};
@@ -233,9 +233,7 @@ impl Limits {
             .all(|(_, solid)| solid.bounds(support).lo > 0.0);
         let is_deep =
             |interior: &Arc<Interior>| self.each_side(support).all(|b| interior.bounds(&b).lo > 0.0);
-        region
-            && self.mask.iter().all(|mask| mask.bounds(support).lo > 0.0)
-            && self.interior.iter().all(is_deep)
+        region && self.mask.iter().all(|mask| is_in(&**mask, support)) && self.interior.iter().all(is_deep)
     }
 
     /// The same for functions that may not be active yet: of the outer surface no bit is to change.
@@ -253,7 +251,7 @@ impl Limits {
     /// Whether nothing in a world box may change.
     pub fn is_shut(&self, part: &Aabb) -> bool {
         let region = self.region.iter().any(|(_, solid)| solid.bounds(part).hi <= 0.0);
-        region || self.mask.iter().any(|mask| mask.bounds(part).hi <= 0.0)
+        region || self.mask.iter().any(|mask| is_out(&**mask, part))
     }
 
     /// How much of a change happens at a place, 0 to 1.
@@ -309,4 +307,32 @@ impl Limits {
         });
         with_functions(old, &functions).expect("functions of the lattice")
     }
+}
+
+/// Whether a field is above 0 in all of a box. The bounds of a scan that is placed aslant cost as much as hundreds of values: most boxes that
+/// are not in have a corner that tells, and most that are need no more than their side.
+fn is_in(field: &dyn Field, b: &Aabb) -> bool {
+    probes(b).all(|p| field.value(p) > 0.0) && (side(field, b).lo > 0.0 || field.bounds(b).lo > 0.0)
+}
+
+/// Whether a field is above 0 nowhere in a box.
+fn is_out(field: &dyn Field, b: &Aabb) -> bool {
+    probes(b).all(|p| field.value(p) <= 0.0) && (side(field, b).hi <= 0.0 || field.bounds(b).hi <= 0.0)
+}
+
+/// Bounds over a box that are as tight as it takes to tell its side of 0.
+fn side(field: &dyn Field, b: &Aabb) -> Interval {
+    field.frame_bounds_about(&Frame::over(b, [1; 3]), [0; 3], [1; 3], 0.0)
+}
+
+/// The middle and the corners of a box.
+fn probes(b: &Aabb) -> impl Iterator<Item = DVec3> {
+    let corner = |n: usize| {
+        DVec3::select(
+            BVec3::from_array([0, 1, 2].map(|a| n >> a & 1 == 1)),
+            b.max,
+            b.min,
+        )
+    };
+    std::iter::once(b.center()).chain((0..8).map(corner))
 }

@@ -179,4 +179,14 @@ impl Field for Sum {
         let mean = self.mean_value_form(&frame.world_box(lo, hi));
         mean.map_or(plain, |mean| plain.intersection(mean))
     }
+
+    /// A single term is asked on which side of its own level it lies.
+    fn frame_bounds_about(&self, frame: &Frame, lo: [i64; 3], hi: [i64; 3], level: f64) -> Interval {
+        match self.terms[..] {
+            [(w, ref field)] if w > 0.0 => {
+                self.add_intervals(|_| field.frame_bounds_about(frame, lo, hi, (level - self.constant) / w))
+            }
+            _ => self.frame_bounds(frame, lo, hi),
+        }
+    }
 }

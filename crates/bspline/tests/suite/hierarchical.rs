@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::common::{Options, field_conformance};
 use bspline::hierarchical::{BrickKey, Corrections, Lattice, LevelCorrections};
-use bspline::{Aabb, Field, Frame, HierarchicalSpline, Interval, Real};
+use bspline::{Aabb, Csg, Field, Frame, HierarchicalSpline, Interval, Real};
 use glam::{DAffine3, DMat3, DVec3};
 
 /// A small seeded generator: tests need the same numbers everywhere.
@@ -375,8 +375,15 @@ fn bounds_about_a_level_answer_like_the_bounds() {
         // Reaches over the lattice's box on all sides, at an offset of its own.
         let region = f.lattice().world_box();
         let frame = Frame::over(&Aabb::new(region.min - 0.37, region.max + 0.41), [60; 3]);
+        // As another object is seen: shifted to its surface, turned, stretched.
+        let shifted = Csg::sum(vec![(0.5, Arc::new(f.clone()) as _)], 0.1).unwrap();
+        let turn = DAffine3::from_rotation_z(0.3);
+        let placed = Csg::affine(Arc::new(shifted), turn).unwrap();
+        let placed = Csg::sum(vec![(1.7, Arc::new(placed) as _)], -0.05).unwrap();
+        let fields: [&dyn Field; 2] = [&f, &placed];
         let mut rng = Lcg(seed);
-        for _ in 0..4000 {
+        for n in 0..8000 {
+            let f = fields[n % 2];
             let size = 1.0 + 30.0 * rng.next().powi(4);
             let lo: [i64; 3] = std::array::from_fn(|_| (rng.next() * (60.0 - size)) as i64);
             let hi = lo.map(|x| x + size as i64);
@@ -392,7 +399,7 @@ fn bounds_about_a_level_answer_like_the_bounds() {
         }
     }
     // Only rounding may lose an answer.
-    assert!(asked > 4000 && told + 10 >= asked, "{told} of {asked}");
+    assert!(asked > 8000 && told + 10 >= asked, "{told} of {asked}");
 }
 
 #[test]

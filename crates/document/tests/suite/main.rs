@@ -6,6 +6,7 @@ mod cloud;
 mod common;
 mod densities;
 mod family;
+mod fineness;
 mod killed;
 mod knots;
 mod live;

@@ -249,6 +249,41 @@ fn low_contrasts_are_solved_by_the_smoother_alone() {
     );
 }
 
+/// What a solve leaves is small beside the acceleration of its step, not only beside the impulse, which hides it where steps are short: else
+/// all that accelerates is left, and a motion loses more the more steps it is made of.
+#[test]
+fn short_steps_keep_what_accelerates() {
+    let factor = SolverOptions {
+        direct_limit: usize::MAX,
+        ..SolverOptions::default()
+    };
+    for contrast in [4.0, 100.0] {
+        let [mut p, mut exact] = [SolverOptions::default(), factor]
+            .map(|options| half_painted(&mut Random(31), contrast, options));
+        for _ in 0..20 {
+            p.step(Integrator::TrBdf2, 0.5).unwrap();
+        }
+        let at = p.state().clone();
+        exact.set_state(&at.p, &at.v).unwrap();
+        for integrator in [Integrator::TrBdf2, Integrator::Paper] {
+            for dt in [0.5, 0.05, 0.005, 0.0005] {
+                let gained = |p: &Patch<f32>| {
+                    let (mut p, before) = (p.clone(), p.state().w.clone());
+                    p.step(integrator, dt).unwrap();
+                    let pairs = p.state().w.iter().zip(&before);
+                    pairs.map(|(now, then)| f64::from(now - then)).collect::<Vec<_>>()
+                };
+                let (found, right) = (gained(&p), gained(&exact));
+                let apart: f64 = found.iter().zip(&right).map(|(a, b)| (a - b).powi(2)).sum();
+                let size: f64 = right.iter().map(|b| b.powi(2)).sum();
+                let off = (apart / size).sqrt();
+                println!("{contrast} {integrator:?} {dt}: {off:.1e}");
+                assert!(off < 0.05, "{contrast} {integrator:?} {dt}: {off:.1e}");
+            }
+        }
+    }
+}
+
 /// Under a brush that stiffens the smoother ends to solve alone, and begins again where it is wiped off: what is restored from a
 /// snapshot does so in the same steps.
 #[test]

@@ -162,22 +162,30 @@ fn root(mut f: impl FnMut(f64) -> f64, mut a: (f64, f64), mut b: (f64, f64)) -> 
 const SPHERES: usize = 16;
 const DIRECTIONS: usize = 128;
 
+/// A way down that is longer than it leads by less than this share of it, and this of the reach, is straight.
+const BENT: [f64; 2] = [0.1, 0.01];
+
 /// The point of the surface `f = iso` that is nearest to `p`, about: down along the gradient, and where noise or flat ground leads that astray,
 /// where the first of growing spheres meets it.
 ///
 /// # Errors
 /// [`ForceError::Nowhere`] where there is none within `reach`.
 pub fn nearest_surface(field: &dyn Field, iso: f64, p: DVec3, reach: f64) -> Result<DVec3, ForceError> {
-    let found = descended(field, iso, p, reach).or_else(|| met(field, iso, p, reach));
+    let found = match descended(field, iso, p, reach) {
+        Some((at, walked)) if walked <= (1.0 + BENT[0]) * at.distance(p) + BENT[1] * reach => Some(at),
+        // The walk through the noise of a scan's air ends anywhere.
+        Some((at, _)) => met(field, iso, p, at.distance(p)).or(Some(at)),
+        None => met(field, iso, p, reach),
+    };
     found.ok_or(ForceError::Nowhere {
         at: p.to_array(),
         reach,
     })
 }
 
-/// Steps along the gradient, each as long as the linear field asks for.
-fn descended(field: &dyn Field, iso: f64, p: DVec3, reach: f64) -> Option<DVec3> {
-    let mut x = p;
+/// Steps along the gradient, each as long as the linear field asks for: where they end, and how long they are together.
+fn descended(field: &dyn Field, iso: f64, p: DVec3, reach: f64) -> Option<(DVec3, f64)> {
+    let (mut x, mut walked) = (p, 0.0);
     for _ in 0..64 {
         let (value, gradient) = field.value_gradient(x);
         let steep = gradient.length_squared();
@@ -188,16 +196,17 @@ fn descended(field: &dyn Field, iso: f64, p: DVec3, reach: f64) -> Option<DVec3>
         // Long steps are not trusted where the field bends.
         let step = step.clamp_length_max(0.25 * reach);
         x += step;
+        walked += step.length();
         if x.distance(p) > reach {
             return None;
         }
         if step.length() <= 1e-9 * reach {
-            return Some(x);
+            return Some((x, walked));
         }
     }
     // Single precision may not settle to that.
     let (value, gradient) = field.value_gradient(x);
-    ((value - iso).abs() <= 1e-4 * reach * gradient.length()).then_some(x)
+    ((value - iso).abs() <= 1e-4 * reach * gradient.length()).then_some((x, walked))
 }
 
 /// On the first sphere on which the field lies on the other side somewhere, the nearest place on the way there.

@@ -142,7 +142,7 @@ fn springs_draw_the_surface_to_where_it_is_not_yet() {
         let hold = format!(
             "[[stroke]]\nhold = {{ name = 'a', points = [[13.5, 12, 12]], depth = {depth}, spring = 5000 }}"
         );
-        for (strokes, limit) in [(pull.clone(), 0.01), (format!("{pull}\n{next}"), 0.1)] {
+        for (strokes, limit) in [(pull.clone(), 0.01), (format!("{pull}\n{next}"), 0.15)] {
             let (left, _) = played(&field, &format!("{hold}\n{strokes}")).unwrap();
             let found = height(&left.field, 13.5, 12.0);
             println!("{found} of {depth}");
