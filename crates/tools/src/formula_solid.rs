@@ -62,6 +62,9 @@ impl Field for FormulaSolid {
         let distance = value / (gradient.length_squared() + (value / self.most).powi(2)).sqrt();
         if distance.is_finite() && value != 0.0 {
             distance
+        } else if value.is_finite() && value != 0.0 {
+            // Without a slope, as at the tip of a cone: the side is known.
+            value.clamp(-self.most, self.most)
         } else if value == 0.0 && (gradient != DVec3::ZERO || self.is_above_beside(p)) {
             -f64::MIN_POSITIVE
         } else {

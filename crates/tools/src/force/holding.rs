@@ -19,6 +19,9 @@ const APART: f64 = 0.5;
 const REACH: f64 = 0.25;
 /// Numbers that constraints may take, points times unknowns.
 const MOST: usize = 1 << 27;
+/// Radii of the tool within which springs find the surface, and by which they draw it a step.
+const NEAR: f64 = 2.0;
+const STRIDE: f64 = 0.3;
 /// Points at most.
 const MOST_POINTS: usize = 2000;
 
@@ -55,6 +58,10 @@ impl Holding {
         let mut rows = Vec::new();
         for held in &self.holds {
             let hold = |length: f64| held.spring.map_or(Hold::Hard, |k| Hold::Spring(k.0 * length));
+            let way = |place: DVec3| match held.spring {
+                None => Some([place; 2]),
+                Some(_) => self.way(field, place, held.depth.map_or(0.0, |d| d.0), radius),
+            };
             for line in &held.lines {
                 let local: Vec<[f64; 3]> = line.iter().map(|p| region.local(p.0)).collect();
                 let points = match local[..] {
@@ -67,17 +74,12 @@ impl Holding {
                     _ => curve(&held.name, &local, spacing, self.iso, hold(1.0), value)
                         .map_err(PatchError::from)?,
                 };
-                rows.extend(points.into_iter().filter_map(|mut row| {
-                    let On::Point { at, field: here } = &mut row.on else {
-                        return Some(row);
+                rows.extend(points.into_iter().filter_map(|constraint| {
+                    let On::Point { at, .. } = constraint.on else {
+                        return None;
                     };
-                    let mut place = world(*at);
-                    if let Some(depth) = held.depth {
-                        place = above(field, self.iso, place, depth.0, radius);
-                        *at = region.local(place);
-                        *here = field.value(place);
-                    }
-                    is_free(place).then_some(row)
+                    let way = way(world(at)).filter(|way| is_free(way[1]))?;
+                    Some(Row { constraint, way })
                 }));
             }
         }
@@ -88,41 +90,45 @@ impl Holding {
                 rows.len()
             )));
         }
-        Ok(Drawn::new(rows, 0.3 * radius * field.slope()))
+        Ok(Drawn::new(rows, STRIDE * radius))
+    }
+
+    /// From the surface to where it is to lie for `place` to be `depth` deep below it: out along the normal of the surface nearest to it.
+    /// Not by the density that lies so deep, which is that of the field as it is. None where no surface is near.
+    fn way<F: Field>(&self, field: &F, place: DVec3, depth: f64, radius: f64) -> Option<[DVec3; 2]> {
+        let foot = nearest_surface(field, self.iso, place, NEAR * radius).ok()?;
+        let normal = field.value_gradient(foot).1.normalize_or_zero();
+        Some([foot, place - depth * normal])
     }
 }
 
-/// Where the surface is to lie for `place` to be `depth` deep below it: out along the normal of the surface nearest to it. The density
-/// that lies so deep is that of the field as it is, and not of the surface that comes.
-fn above<F: Field>(field: &F, iso: f64, place: DVec3, depth: f64, reach: f64) -> DVec3 {
-    let foot = nearest_surface(field, iso, place, reach).unwrap_or(place);
-    place - depth * field.value_gradient(foot).1.normalize_or_zero()
+/// A constraint, and the way that the surface has to go.
+#[derive(Clone, Debug)]
+struct Row {
+    constraint: Constraint,
+    way: [DVec3; 2],
 }
 
-/// Constraints of a region, to which springs draw the surface bit by bit.
+/// Constraints of a region, to which springs draw the surface bit by bit: all at once would leave a drop of solid there, or a bubble.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Drawn {
-    rows: Vec<Constraint>,
+    rows: Vec<Row>,
     done: usize,
     steps: usize,
 }
 
 impl Drawn {
-    /// By densities of at most `stride` a step.
-    fn new(mut rows: Vec<Constraint>, stride: f64) -> Self {
-        let mut most = 0.0_f64;
-        for row in &mut rows {
-            let On::Point { field, .. } = row.on else { continue };
-            match row.hold {
-                Hold::Hard => row.density = field,
-                Hold::Spring(_) => most = most.max((row.density - field).abs()),
-            }
-        }
+    /// By at most `stride` a step.
+    fn new(rows: Vec<Row>, stride: f64) -> Self {
+        let longest = rows
+            .iter()
+            .map(|row| row.way[0].distance(row.way[1]))
+            .fold(0.0, f64::max);
         Self {
             steps: if rows.is_empty() {
                 0
             } else {
-                (most / stride).ceil().max(1.0) as usize
+                (longest / stride).ceil().max(1.0) as usize
             },
             rows,
             done: 0,
@@ -134,23 +140,33 @@ impl Drawn {
         self.done == self.steps
     }
 
-    /// The constraints of the next step; `None` if they are those of the one before.
-    pub fn next(&mut self) -> Option<Vec<Constraint>> {
+    /// The constraints of the next step on the region that was cut from `field`; `None` if they are those of the one before.
+    pub fn next<T: Real>(
+        &mut self,
+        field: &HierarchicalSpline<T>,
+        region: &Region<T>,
+    ) -> Option<Vec<Constraint>> {
         if self.is_done() {
             return None;
         }
         self.done += 1;
         let share = self.done as f64 / self.steps as f64;
-        let mut rows = self.rows.clone();
-        for row in &mut rows {
-            if let On::Point { field, .. } = row.on {
-                row.density = if self.is_done() {
-                    row.density
-                } else {
-                    field + share * (row.density - field)
-                };
+        let rows = self.rows.iter().map(|Row { constraint, way }| {
+            let place = way[0].lerp(way[1], share);
+            let here = field.value(place);
+            Constraint {
+                on: On::Point {
+                    at: region.local(place),
+                    field: here,
+                },
+                // What is held hard stays what it is.
+                density: match constraint.hold {
+                    Hold::Hard => here,
+                    Hold::Spring(_) => constraint.density,
+                },
+                ..constraint.clone()
             }
-        }
-        Some(rows)
+        });
+        Some(rows.collect())
     }
 }

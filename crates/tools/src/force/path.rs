@@ -174,8 +174,8 @@ pub fn nearest_surface(field: &dyn Field, iso: f64, p: DVec3, reach: f64) -> Res
     let found = match descended(field, iso, p, reach) {
         Some((at, walked)) if walked <= (1.0 + BENT[0]) * at.distance(p) + BENT[1] * reach => Some(at),
         // The walk through the noise of a scan's air ends anywhere.
-        Some((at, _)) => met(field, iso, p, at.distance(p)).or(Some(at)),
-        None => met(field, iso, p, reach),
+        Some((at, _)) => nearer(field, iso, p, at.distance(p)).or(Some(at)),
+        None => nearer(field, iso, p, reach),
     };
     found.ok_or(ForceError::Nowhere {
         at: p.to_array(),
@@ -207,6 +207,20 @@ fn descended(field: &dyn Field, iso: f64, p: DVec3, reach: f64) -> Option<(DVec3
     // Single precision may not settle to that.
     let (value, gradient) = field.value_gradient(x);
     ((value - iso).abs() <= 1e-4 * reach * gradient.length()).then_some((x, walked))
+}
+
+/// Where the spheres meet the surface, and from there along it to where it is perpendicular to the way: they are asked in few directions.
+fn nearer(field: &dyn Field, iso: f64, p: DVec3, reach: f64) -> Option<DVec3> {
+    let mut at = met(field, iso, p, reach)?;
+    for _ in 0..4 {
+        let normal = field.value_gradient(at).1.normalize_or_zero();
+        let aside = (p - at).reject_from_normalized(normal);
+        match descended(field, iso, at + aside, at.distance(p)) {
+            Some((next, _)) if next.distance(p) < at.distance(p) => at = next,
+            _ => break,
+        }
+    }
+    Some(at)
 }
 
 /// On the first sphere on which the field lies on the other side somewhere, the nearest place on the way there.

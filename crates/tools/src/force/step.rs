@@ -53,7 +53,7 @@ impl<T: Real> ForceStroke<T> {
     pub fn step(&mut self) -> Result<Told, ForceError> {
         self.chase()?;
         self.advance()?;
-        if let Some(constraints) = self.drawn.next() {
+        if let Some(constraints) = self.drawn.next(&self.field, &self.region) {
             self.region.patch_mut().set_constraints(&constraints)?;
         }
         let goals = self.goals();

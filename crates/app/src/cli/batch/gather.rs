@@ -276,10 +276,10 @@ fn has_numbers(file: &Path) -> bool {
             }))
 }
 
-/// Plain files of a directory that are not hidden, sorted.
+/// Plain files of a directory that are not hidden, sorted, and links that lead nowhere: someone meant a file.
 fn files_of(directory: &Path) -> Vec<PathBuf> {
     entries(directory, |path, metadata| {
-        metadata.is_file() || (metadata.is_symlink() && path.is_file())
+        metadata.is_file() || metadata.is_symlink() && path.metadata().map_or(true, |m| m.is_file())
     })
 }
 

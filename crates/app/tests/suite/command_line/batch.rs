@@ -141,6 +141,7 @@ fn bad_inputs_stop_nothing_and_are_named() {
         fs::read(bench.path("scans/clouds/sphere.ply")).unwrap(),
     );
     fs::set_permissions(bench.path("secret.ply"), fs::Permissions::from_mode(0o0)).unwrap();
+    std::os::unix::fs::symlink("moved away.ply", bench.path("scans/clouds/link.ply")).unwrap();
     // The superuser reads it all the same.
     let secret = usize::from(!geteuid().is_root());
     let run = batch(
@@ -150,13 +151,13 @@ fn bad_inputs_stop_nothing_and_are_named() {
     assert_eq!(run.code, 3, "{}", run.stderr);
     let objects = objects(&run);
     let (whole, each) = objects.split_last().unwrap();
-    let failed = BROKEN.len() + 4 + secret;
+    let failed = BROKEN.len() + 5 + secret;
     assert_eq!(whole["failed"], failed, "{whole}");
     assert_eq!(whole["done"], GOOD + 1 - secret, "{whole}");
     assert_eq!(whole["pending"], 0);
     assert_eq!(whole["exit_code"], 3);
     assert!(whole["remedy"].as_str().unwrap().contains("--resume"));
-    assert_eq!(each.len(), GOOD + 1 + BROKEN.len() + 4);
+    assert_eq!(each.len(), GOOD + 1 + BROKEN.len() + 5);
     for (i, e) in each.iter().enumerate() {
         assert_eq!(e["ended"], i + 1);
         assert_eq!(e["of"], each.len());
@@ -179,6 +180,7 @@ fn bad_inputs_stop_nothing_and_are_named() {
         ("words.stl", "words.stl"),
         ("pipe.xyz", "is a pipe"),
         ("nowhere.ply", "check the path"),
+        ("link.ply", "link.ply"),
         ("scans/empty", "nothing that can be fitted"),
         ("gone/*.ply", "no file fits this pattern"),
     ] {
