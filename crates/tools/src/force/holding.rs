@@ -19,8 +19,10 @@ const APART: f64 = 0.5;
 const REACH: f64 = 0.25;
 /// Numbers that constraints may take, points times unknowns.
 const MOST: usize = 1 << 27;
-/// Radii of the tool within which springs find the surface, and by which they draw it a step.
+/// Radii of the tool within which springs find the surface, by which they draw it at most, and in a step: farther off a drop of solid comes
+/// up, or a bubble, in place of the surface, from half a radius on in one case of eight.
 const NEAR: f64 = 2.0;
+const FARTHEST: f64 = 0.45;
 const STRIDE: f64 = 0.3;
 /// Points at most.
 const MOST_POINTS: usize = 2000;
@@ -94,11 +96,13 @@ impl Holding {
     }
 
     /// From the surface to where it is to lie for `place` to be `depth` deep below it: out along the normal of the surface nearest to it.
-    /// Not by the density that lies so deep, which is that of the field as it is. None where no surface is near.
+    /// Not by the density that lies so deep, which is that of the field as it is. What is farther is left for the next stroke; none where no
+    /// surface is near.
     fn way<F: Field>(&self, field: &F, place: DVec3, depth: f64, radius: f64) -> Option<[DVec3; 2]> {
         let foot = nearest_surface(field, self.iso, place, NEAR * radius).ok()?;
         let normal = field.value_gradient(foot).1.normalize_or_zero();
-        Some([foot, place - depth * normal])
+        let way = place - depth * normal - foot;
+        Some([foot, foot + way.clamp_length_max(FARTHEST * radius)])
     }
 }
 

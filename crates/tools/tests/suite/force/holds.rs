@@ -122,10 +122,10 @@ fn springs_draw_the_surface_to_where_it_is_not_yet() {
     let pull = format!("[[stroke]]\npull = {{ along = [[12, 12, 12]], lift = 1.2, radius = {R} }}");
     for (hold, limit) in [
         (
-            "along = { formulas = { x = '12 + 2*cos(t)', y = '12 + 2*sin(t)', z = '12.6', from = 0, to = 6.283185307179586 } }, spring = 1000",
+            "along = { formulas = { x = '12 + 2*cos(t)', y = '12 + 2*sin(t)', z = '12.5', from = 0, to = 6.283185307179586 } }, spring = 1000",
             0.01,
         ),
-        ("points = [[13.5, 12, 12.9]], spring = 5000", 0.01),
+        ("points = [[13.5, 12, 12.5]], spring = 5000", 0.01),
     ] {
         let (left, _) = played(
             &field,
@@ -138,7 +138,7 @@ fn springs_draw_the_surface_to_where_it_is_not_yet() {
     }
     // Places within the solid, and without, as deep as asked on the flank of a pull, and about so at the next one, which tilts it.
     let next = format!("[[stroke]]\npull = {{ along = [[15.5, 12, 12]], lift = 0.6, radius = {R} }}");
-    for depth in [0.6, -0.5] {
+    for depth in [0.5, -0.5] {
         let hold = format!(
             "[[stroke]]\nhold = {{ name = 'a', points = [[13.5, 12, 12]], depth = {depth}, spring = 5000 }}"
         );
@@ -148,6 +148,16 @@ fn springs_draw_the_surface_to_where_it_is_not_yet() {
             println!("{found} of {depth}");
             assert!((found / depth - 1.0).abs() < limit, "{found} of {depth}");
         }
+    }
+    // From farther it comes by half a radius a stroke, and without drops on the way.
+    let far = "[[stroke]]\nhold = { name = 'a', points = [[13.5, 12, 12]], depth = 1.2, spring = 5000 }";
+    let mut strokes = format!("{far}\n{pull}");
+    for least in [0.4, 0.8, 1.1] {
+        let (left, _) = played(&field, &strokes).unwrap();
+        let found = height(&left.field, 13.5, 12.0);
+        println!("{found} of 1.2");
+        assert!(found > least && found < 1.3, "{found}");
+        strokes = format!("{strokes}\n{next}");
     }
 }
 
