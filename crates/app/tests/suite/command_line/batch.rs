@@ -180,7 +180,7 @@ fn bad_inputs_stop_nothing_and_are_named() {
         ("words.stl", "words.stl"),
         ("pipe.xyz", "is a pipe"),
         ("nowhere.ply", "check the path"),
-        ("link.ply", "link.ply"),
+        ("link.ply", "check the path"),
         ("scans/empty", "nothing that can be fitted"),
         ("gone/*.ply", "no file fits this pattern"),
     ] {
