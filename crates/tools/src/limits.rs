@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use bspline::primitives::Cuboid;
 use bspline::{Aabb, Csg, Field, Frame, HierarchicalSpline, Interval, Real};
-use glam::{BVec3, DAffine3, DVec3};
+use glam::{DAffine3, DVec3};
 use serde::{Deserialize, Serialize};
 
 use crate::coefficients::{changed, coefficient, support, with_functions};
@@ -327,12 +327,7 @@ fn side(field: &dyn Field, b: &Aabb) -> Interval {
 
 /// The middle and the corners of a box.
 fn probes(b: &Aabb) -> impl Iterator<Item = DVec3> {
-    let corner = |n: usize| {
-        DVec3::select(
-            BVec3::from_array([0, 1, 2].map(|a| n >> a & 1 == 1)),
-            b.max,
-            b.min,
-        )
-    };
+    let ends = [b.min, b.max];
+    let corner = move |n: usize| DVec3::from_array([0, 1, 2].map(|a| ends[n >> a & 1][a]));
     std::iter::once(b.center()).chain((0..8).map(corner))
 }

@@ -19,10 +19,11 @@ const APART: f64 = 0.5;
 const REACH: f64 = 0.25;
 /// Numbers that constraints may take, points times unknowns.
 const MOST: usize = 1 << 27;
-/// Radii of the tool within which springs find the surface, by which they draw it at most, and in a step: farther off a drop of solid comes
-/// up, or a bubble, in place of the surface, from half a radius on in one case of eight.
+/// Radii of the tool within which springs find the surface.
 const NEAR: f64 = 2.0;
+/// Radii by which a stroke draws it: from half a radius on a drop of solid, or a bubble, comes up there in its place in one case of eight.
 const FARTHEST: f64 = 0.45;
+/// Radii by which a step draws it.
 const STRIDE: f64 = 0.3;
 /// Points at most.
 const MOST_POINTS: usize = 2000;
@@ -76,10 +77,14 @@ impl Holding {
                     _ => curve(&held.name, &local, spacing, self.iso, hold(1.0), value)
                         .map_err(PatchError::from)?,
                 };
-                rows.extend(points.into_iter().filter_map(|constraint| {
-                    let On::Point { at, .. } = constraint.on else {
+                rows.extend(points.into_iter().filter_map(|mut constraint| {
+                    let On::Point { at, field: here } = constraint.on else {
                         return None;
                     };
+                    if held.spring.is_none() {
+                        // What is there stays.
+                        constraint.density = here;
+                    }
                     let way = way(world(at)).filter(|way| is_free(way[1]))?;
                     Some(Row { constraint, way })
                 }));
@@ -157,17 +162,12 @@ impl Drawn {
         let share = self.done as f64 / self.steps as f64;
         let rows = self.rows.iter().map(|Row { constraint, way }| {
             let place = way[0].lerp(way[1], share);
-            let here = field.value(place);
+            let on = On::Point {
+                at: region.local(place),
+                field: field.value(place),
+            };
             Constraint {
-                on: On::Point {
-                    at: region.local(place),
-                    field: here,
-                },
-                // What is held hard stays what it is.
-                density: match constraint.hold {
-                    Hold::Hard => here,
-                    Hold::Spring(_) => constraint.density,
-                },
+                on,
                 ..constraint.clone()
             }
         });
