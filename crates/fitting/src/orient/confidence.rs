@@ -24,9 +24,31 @@ const WORTH_TELLING: usize = 10;
 /// Most sentences.
 const MOST_TOLD: usize = 5;
 
-/// `2 min(w(x − δn) − ½, ½ − w(x + δn))`, clamped to 0 to 1: 1 where one side is inside and the other outside beyond
-/// doubt, 0 where both sides are alike, as on an open sheet.
-pub(super) fn of_signs(points: &[DVec3], normals: &[DVec3], surface: &Surface) -> Vec<f32> {
+/// Winding numbers beside a point.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sides {
+    inner: f32,
+    outer: f32,
+}
+
+impl Sides {
+    /// `2 min(w(x − δn) − ½, ½ − w(x + δn))`, clamped to 0 to 1: 1 where one side is inside and the other outside beyond
+    /// doubt, 0 where both sides are alike, as on an open sheet.
+    pub fn confidence(&self) -> f32 {
+        (2.0 * (self.inner - 0.5).min(0.5 - self.outer)).clamp(0.0, 1.0)
+    }
+
+    /// With every normal turned over.
+    pub fn turned(&self) -> Self {
+        Self {
+            inner: -self.outer,
+            outer: -self.inner,
+        }
+    }
+}
+
+/// The winding numbers on both sides of every point.
+pub(super) fn sides(points: &[DVec3], normals: &[DVec3], surface: &Surface) -> Vec<Sides> {
     let single: Vec<[f32; 3]> = points.iter().map(|p| p.as_vec3().to_array()).collect();
     let strengths: Vec<[f32; 3]> = normals
         .iter()
@@ -49,9 +71,9 @@ pub(super) fn of_signs(points: &[DVec3], normals: &[DVec3], surface: &Surface) -
     };
     let (inner, outer) = (side(-1.0), side(1.0));
     inner
-        .iter()
-        .zip(&outer)
-        .map(|(i, o)| (2.0 * (i - 0.5).min(0.5 - o)).clamp(0.0, 1.0))
+        .into_iter()
+        .zip(outer)
+        .map(|(inner, outer)| Sides { inner, outer })
         .collect()
 }
 

@@ -12,6 +12,7 @@ pub(crate) mod kernel;
 mod local;
 mod outliers;
 mod sampling;
+mod sheets;
 mod surface;
 mod tagging;
 pub(crate) mod tree;
@@ -21,6 +22,7 @@ use glam::DVec3;
 
 use crate::{Control, FitError};
 use cloud::Cloud;
+use confidence::Sides;
 pub use confidence::leaf_confidence;
 pub use estimated::EstimatedCloud;
 use kernel::{Gradient, Target};
@@ -120,20 +122,21 @@ pub fn orient_points(
             needed: cloud::FEWEST,
         });
     }
-    let signed = match options.route {
+    let mut signed = match options.route {
         Route::WindingNumber => by_winding(&points, &surface, control)?,
         Route::Tagging => by_tagging(&points, &surface, control)?,
     };
     control.step("measuring confidence", 0.9)?;
-    let confidence = confidence::of_signs(&points, &signed, &surface);
-    Ok(assemble(
-        &cloud,
-        &kept,
-        &signed,
-        &confidence,
-        &surface,
-        options.route,
-    ))
+    let told = confidence::sides(&points, &signed, &surface);
+    let mut confidence = told.iter().map(Sides::confidence).collect();
+    let on_sheets = sheets::align(&points, &surface, &mut signed, &mut confidence);
+    let mut orientation = assemble(&cloud, &kept, &signed, &confidence, &surface, options.route);
+    if on_sheets > 0 {
+        orientation.notes.push(format!(
+            "{on_sheets} points lie on open sheets, which have no inside: their normals follow those of their neighbours"
+        ));
+    }
+    Ok(orientation)
 }
 
 /// Normals from the winding field of representatives, then of all points.

@@ -213,6 +213,81 @@ fn an_open_sheet_has_no_inside_and_says_so() {
     assert!(o.normals.iter().all(|n| n.z.abs() > 0.999));
 }
 
+/// Points of hills over a square, `raised`, with their normals upward.
+fn terrain(count: usize, seed: u64, raised: f64) -> (Vec<DVec3>, Vec<DVec3>) {
+    let mut random = SplitMix64::new(seed);
+    let waves: Vec<[f64; 4]> = (0..12)
+        .map(|_| {
+            let [u, v] = [random.uniform() - 0.5, random.uniform() - 0.5].map(|f| 40.0 * f);
+            [u, v, 6.0 * random.uniform(), 0.12 / (4.0 + u.hypot(v))]
+        })
+        .collect();
+    let point = |_| {
+        let at = random.uniform3();
+        let (mut z, mut slope) = (raised, DVec3::ZERO);
+        for [u, v, phase, height] in &waves {
+            let (sin, cos) = (u * at.x + v * at.y + phase).sin_cos();
+            z += height * sin;
+            slope += DVec3::new(*u, *v, 0.0) * (height * cos);
+        }
+        (at.with_z(z), (DVec3::Z - slope).normalize())
+    };
+    (0..count).map(point).unzip()
+}
+
+#[test]
+fn terrain_faces_up() {
+    for seed in 0..4 {
+        let (points, truth) = terrain(4000, seed, 0.0);
+        let o = orient(&points);
+        assert!(right(&o, &truth) > 0.999, "seed {seed}: {}", right(&o, &truth));
+        assert!(o.notes.iter().any(|n| n.contains("open sheets")), "{:?}", o.notes);
+    }
+}
+
+#[test]
+fn two_noisy_shells_that_nearly_touch_are_no_open_sheet() {
+    // Most signs are unsure; the normals of neighbours contradict each other whatever is followed.
+    let mut random = SplitMix64::new(5);
+    let both = [(1.0, 1200), (0.85, 900)];
+    let shells = both.map(|(radius, count)| split(shell(DVec3::ZERO, radius, 10 * count, 1.0)).0);
+    let points: Vec<DVec3> = shells
+        .into_iter()
+        .flatten()
+        .map(|p| p + (random.uniform3() - 0.5) * 0.1)
+        .collect();
+    let o = orient(&points);
+    assert!(o.unsure_count > points.len() / 3, "{}", o.unsure_count);
+    assert!(
+        !o.notes.iter().any(|n| n.contains("open sheets")),
+        "{:?}",
+        o.notes
+    );
+}
+
+#[test]
+fn an_open_bowl_faces_away_from_its_hollow() {
+    // Three quarters of a ball, lying on its side, and one more than half open.
+    for most in [0.5, -0.3] {
+        let ball = shell(DVec3::ZERO, 1.0, 8000, 1.0);
+        let (points, outward) = split(ball.into_iter().filter(|p| p.0.x < most).collect());
+        let o = orient(&points);
+        assert!(right(&o, &outward) > 0.999, "{most}: {}", right(&o, &outward));
+    }
+}
+
+#[test]
+fn a_closed_solid_over_terrain_keeps_its_own_sides() {
+    let (mut points, mut truth) = terrain(8000, 3, -2.0);
+    let (ball, outward) = split(shell(DVec3::ZERO, 0.3, 3000, 1.0));
+    points.extend(ball);
+    truth.extend(outward);
+    let o = orient(&points);
+    assert!(right(&o, &truth) > 0.999, "{}", right(&o, &truth));
+    let sure = o.confidence[8000..].iter().filter(|c| **c > UNSURE).count();
+    assert!(sure > 2900, "{sure}");
+}
+
 #[test]
 fn wrong_signs_are_among_the_unsure_ones() {
     // Every twentieth point of a clean ball is kept: the exterior leaks in for the tagging route.
