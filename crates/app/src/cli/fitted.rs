@@ -316,6 +316,11 @@ fn fit_voxels<T: Stored>(volume: &Volume, choice: &Choice, control: &mut Control
     );
     report.notes.extend(doubt);
     let iso = otsu_threshold(&volume.values);
+    if iso.is_none() {
+        report
+            .notes
+            .push("all voxels measured have one density: the field has no surface of its own".into());
+    }
     if let Some(value) = padding(&volume.values) {
         report.notes.push(format!(
             "the voxels of density {} were not measured, and do not count where the surface is looked for",

@@ -97,11 +97,17 @@ pub fn run(args: &Args) -> Outcome {
         .map(|frames| StagedFiles::new("--frames", frames))
         .transpose()?;
     let scene = read(&script)?;
-    let field = match &args.field {
-        Some(field) => Source::open(field, None, FIELDS, &cancel)?.under("--field"),
-        None => {
+    let field = match (&args.field, &scene.field) {
+        (Some(field), _) => Source::open(field, None, FIELDS, &cancel)?.under("--field"),
+        (None, Some(field)) => {
             let directory = args.scene.parent().unwrap_or(Path::new(""));
-            Source::open(&directory.join(&scene.field), None, FIELDS, &cancel)?
+            Source::open(&directory.join(field), None, FIELDS, &cancel)?
+        }
+        (None, None) => {
+            return Err(Failure::input(format!(
+                "{}: names no field to move; give --field FIELD, or begin it with the line field = \"FIELD.iclay\"",
+                script.name()
+            )));
         }
     };
     refuse_own_input("-o", &field, &args.output)?;

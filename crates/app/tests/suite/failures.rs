@@ -249,7 +249,11 @@ fn empty_and_constant_volumes() {
     bench.write("constant.nii", nifti([20, 18, 16], &[7; 20 * 18 * 16]));
     let fitted = fit(&bench, "constant.nii").json();
     assert!(number(&fitted, "max") < 1e-5, "{fitted}");
-    // There is a field, but no surface in it.
+    // There is a field, but no surface in it; that is told at once.
+    assert!(
+        fitted["notes"].to_string().contains("no surface of its own"),
+        "{fitted}"
+    );
     let run = bench.run("mesh out.iclay -o out.ply");
     assert_eq!(run.code, 3, "{}", run.stderr);
     assert!(

@@ -389,6 +389,7 @@ fn what_cannot_be_is_refused_by_line_or_table_with_a_remedy_and_writes_nothing()
             ["none.iclay", "No such file"],
         ),
         ("field = \"ball.iclay\"", "field = 3", ["line 2", "string"]),
+        ("field = \"ball.iclay\"", "", ["names no field", "--field"]),
     ];
     for (from, to, words) in cases {
         assert!(SCENE.contains(from), "{from}");
@@ -401,6 +402,14 @@ fn what_cannot_be_is_refused_by_line_or_table_with_a_remedy_and_writes_nothing()
     }
     std::fs::remove_file(ball.0.path("scene.toml")).unwrap();
     assert_eq!(ball.0.files(), before);
+}
+
+#[test]
+fn a_scene_without_a_field_moves_the_one_named_beside_it() {
+    let ball = Ball::new();
+    let (_, own) = ball.play(SCENE, "");
+    let (_, beside) = ball.play(&SCENE.replace("field = \"ball.iclay\"", ""), "--field ball.iclay");
+    assert_eq!(own["field_sha256"], beside["field_sha256"]);
 }
 
 #[test]

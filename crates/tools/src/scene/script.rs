@@ -15,8 +15,8 @@ use crate::number::{Finite, NonNegative, Point, Positive};
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Scene {
-    /// Field file, from the directory of the scene.
-    pub field: PathBuf,
+    /// Field file, from the directory of the scene; whoever runs it names one if missing.
+    pub field: Option<PathBuf>,
     /// Density of the surface; the field's own if missing.
     pub iso: Option<Finite>,
     /// What moves.

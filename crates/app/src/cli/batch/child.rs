@@ -171,16 +171,21 @@ fn stop(command: &str, bounds: &Bounds, now: Instant) -> Option<Stop> {
     if bounds.cancel.is_cancelled() {
         return Some(Stop::Cancelled);
     }
-    let (_, limit) = bounds.deadline.filter(|(end, _)| now >= *end)?;
-    Some(Stop::Failed(Reason {
-        stage: command.into(),
+    late(command, bounds.deadline, now).map(Stop::Failed)
+}
+
+/// The reason if the time is over.
+pub fn late(stage: &str, deadline: Option<(Instant, Duration)>, now: Instant) -> Option<Reason> {
+    let (_, limit) = deadline.filter(|(end, _)| now >= *end)?;
+    Some(Reason {
+        stage: stage.into(),
         exit_code: None,
         signal: None,
         message: format!(
             "was not done after {} s and was ended; raise --time-limit",
             human_number(limit.as_secs_f64())
         ),
-    }))
+    })
 }
 
 /// The object on the last line.

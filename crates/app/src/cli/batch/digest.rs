@@ -5,7 +5,6 @@ use std::io::{self, Read};
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 
-use fitting::Cancel;
 use sha2::{Digest, Sha256};
 
 use super::super::overwrite::named_files;
@@ -17,8 +16,8 @@ const DEEPEST: usize = 8;
 /// SHA-256 of all that a fit of `path` reads, and its bytes. A change of a name inside a directory is a change.
 ///
 /// # Errors
-/// Those of the system; [`io::ErrorKind::Interrupted`] after a cancel.
-pub fn of(path: &Path, cancel: &Cancel) -> io::Result<(String, u64)> {
+/// Those of the system; [`io::ErrorKind::Interrupted`] once it `is_over`.
+pub fn of(path: &Path, is_over: &dyn Fn() -> bool) -> io::Result<(String, u64)> {
     let mut files = Vec::new();
     if path.is_dir() {
         files_below(path, Path::new(""), 0, &mut files)?;
@@ -32,7 +31,7 @@ pub fn of(path: &Path, cancel: &Cancel) -> io::Result<(String, u64)> {
     }
     let (mut whole, mut bytes) = (Sha256::new(), 0);
     for (name, file) in files {
-        let (content, length) = of_file(&file, cancel)?;
+        let (content, length) = of_file(&file, is_over)?;
         for part in [name.as_os_str().as_bytes(), &content] {
             whole.update((part.len() as u64).to_le_bytes());
             whole.update(part);
@@ -43,12 +42,12 @@ pub fn of(path: &Path, cancel: &Cancel) -> io::Result<(String, u64)> {
 }
 
 /// SHA-256 of one file, and its length.
-pub fn of_file(path: &Path, cancel: &Cancel) -> io::Result<([u8; 32], u64)> {
+pub fn of_file(path: &Path, is_over: &dyn Fn() -> bool) -> io::Result<([u8; 32], u64)> {
     let mut file = File::open(path)?;
     let (mut hash, mut length) = (Sha256::new(), 0);
     let mut part = vec![0; 1 << 18];
     loop {
-        if cancel.is_cancelled() {
+        if is_over() {
             return Err(io::Error::from(io::ErrorKind::Interrupted));
         }
         match file.read(&mut part) {
@@ -99,7 +98,7 @@ mod tests {
     fn all_that_is_read_counts() {
         let scratch = tempfile::tempdir().unwrap();
         let at = |name: &str| scratch.path().join(name);
-        let hash = |name: &str| of(&at(name), &Cancel::new()).unwrap();
+        let hash = |name: &str| of(&at(name), &|| false).unwrap();
         fs::create_dir(at("series")).unwrap();
         fs::write(at("series/1"), "one").unwrap();
         fs::write(at("series/2"), "two").unwrap();
@@ -115,10 +114,8 @@ mod tests {
         assert_ne!(renamed, series);
         fs::write(at("series/3"), "TWO").unwrap();
         assert_ne!(hash("series").0, renamed);
-        let cancel = Cancel::new();
-        cancel.cancel();
         assert_eq!(
-            of(&at("series"), &cancel).unwrap_err().kind(),
+            of(&at("series"), &|| true).unwrap_err().kind(),
             io::ErrorKind::Interrupted
         );
     }

@@ -14,7 +14,7 @@ use sha2::{Digest, Sha256};
 use super::super::failure::{Failure, OrFail, Outcome};
 use super::super::quantity::Memory;
 use super::super::summary::hex;
-use super::child::{Bounds, Ended, Stop, ask};
+use super::child::{self, Bounds, Ended, Stop, ask};
 use super::choice::Choice;
 use super::digest;
 use super::gather::Item;
@@ -95,14 +95,16 @@ impl Plan<'_> {
         }
         show("reading", 0.0);
         let stamp = stamp(&item.path);
-        match digest::of(&item.path, self.cancel) {
+        let deadline = self.time_limit.map(|limit| (start + limit, limit));
+        let late = || child::late("reading", deadline, Instant::now());
+        match digest::of(&item.path, &|| self.cancel.is_cancelled() || late().is_some()) {
             Ok((content, bytes)) => {
                 entry.key = Some(self.key(&content));
                 (entry.input_sha256, entry.input_bytes) = (Some(content), bytes);
             }
             Err(_) if self.cancel.is_cancelled() => return Ok(None),
             Err(e) => {
-                entry.failure = Some(reading(unreadable(&e)));
+                entry.failure = Some(late().unwrap_or_else(|| reading(unreadable(&e))));
                 return Ok(Some((entry, false)));
             }
         }
@@ -111,7 +113,7 @@ impl Plan<'_> {
         }
         let scratch = self.work.join(&item.name);
         fs::create_dir_all(&scratch).map_err(|e| no_room(self.directory, &e))?;
-        let done = self.make(item, &scratch, start, &mut entry, show);
+        let done = self.make(item, &scratch, deadline, &mut entry, show);
         let whole = match done {
             Ok(made) => {
                 if entry.failure.is_none() && self::stamp(&item.path) != stamp {
@@ -154,7 +156,8 @@ impl Plan<'_> {
                 .all(|c| matches!(c, std::path::Component::Normal(_)));
             is_inside
                 && path.metadata().is_ok_and(|m| m.is_file() && m.len() == w.bytes)
-                && digest::of_file(&path, self.cancel).is_ok_and(|(sha, _)| hex(&sha) == w.sha256)
+                && digest::of_file(&path, &|| self.cancel.is_cancelled())
+                    .is_ok_and(|(sha, _)| hex(&sha) == w.sha256)
         };
         match (found.state, &found.failure) {
             (State::Done, _) => found.outputs.values().all(is_there),
@@ -170,13 +173,13 @@ impl Plan<'_> {
         &self,
         item: &Item,
         scratch: &Path,
-        start: Instant,
+        deadline: Option<(Instant, Duration)>,
         entry: &mut Entry,
         show: &dyn Fn(&str, f64),
     ) -> Result<Vec<(&'static str, PathBuf)>, ()> {
         let bounds = Bounds {
             cancel: self.cancel,
-            deadline: self.time_limit.map(|t| (start + t, t)),
+            deadline,
             scratch,
             is_aside: false,
         };
@@ -247,7 +250,7 @@ impl Plan<'_> {
         for (role, path) in made {
             let place = PLACES.iter().find(|p| p.0 == *role).map_or("", |p| p.1);
             let name = path.file_name().unwrap_or_default();
-            let (sha256, bytes) = digest::of_file(path, self.cancel)?;
+            let (sha256, bytes) = digest::of_file(path, &|| self.cancel.is_cancelled())?;
             fs::create_dir_all(self.directory.join(place))?;
             fs::rename(path, self.directory.join(place).join(name))?;
             let written = Written {

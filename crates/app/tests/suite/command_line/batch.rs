@@ -415,6 +415,21 @@ fn a_cancel_ends_all_and_leaves_what_can_be_resumed() {
     assert_eq!(run.code, 3);
 }
 
+/// A file that takes minutes to read, and no room on the disk.
+#[test]
+fn the_time_limit_is_one_for_reading_too() {
+    let bench = Bench::new();
+    let huge = fs::File::create(bench.path("huge.stl")).unwrap();
+    huge.set_len(1 << 37).unwrap();
+    let run = batch(&bench, "huge.stl -o out --json --no-report --time-limit 1s");
+    assert_eq!(run.code, 3, "{}", run.stderr);
+    let failure = &objects(&run).last().unwrap()["failures"][0];
+    assert!(
+        failure["reason"].as_str().unwrap().contains("--time-limit"),
+        "{failure}"
+    );
+}
+
 /// A fit that hangs, and one that falls, are each one failure; the others are done.
 #[test]
 fn hangs_and_crashes_are_failures_like_others() {
