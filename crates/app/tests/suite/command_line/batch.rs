@@ -423,7 +423,8 @@ fn the_time_limit_is_one_for_reading_too() {
     huge.set_len(1 << 37).unwrap();
     let run = batch(&bench, "huge.stl -o out --json --no-report --time-limit 1s");
     assert_eq!(run.code, 3, "{}", run.stderr);
-    let failure = &objects(&run).last().unwrap()["failures"][0];
+    let told = objects(&run);
+    let failure = &told.last().unwrap()["failures"][0];
     assert!(
         failure["reason"].as_str().unwrap().contains("--time-limit"),
         "{failure}"
