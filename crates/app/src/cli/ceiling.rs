@@ -45,7 +45,7 @@ pub fn hold(ceiling: Memory) -> Outcome {
     let total = (ceiling.0 as f64 * (1.0 + LOST)) as u64 + SLACK;
     let Some(left) = total.checked_sub(resident) else {
         return Err(Failure::limit(format!(
-            "--memory {}: the program alone holds {}; raise it",
+            "--memory {}: the program alone holds {}; raise --memory",
             human_bytes(ceiling.0),
             human_bytes(resident)
         )));
