@@ -1,5 +1,5 @@
 use bspline::hierarchical::Lattice;
-use bspline::{Aabb, Field, Frame, HierarchicalSpline};
+use bspline::{Aabb, Field, Frame, HierarchicalSpline, Real};
 use glam::DVec3;
 
 /// Most points across a face at which it is looked at.
@@ -75,6 +75,15 @@ impl Face {
         frame.world_from_grid = lattice.world_from_lattice * frame.world_from_grid;
         let count = std::array::from_fn(|a| if a == axis { 1 } else { cells[a] as usize + 1 });
         Some(FaceNodes { frame, count })
+    }
+
+    /// Whether the solid whose surface lies at `iso` reaches it.
+    pub fn cuts<T: Real>(self, field: &HierarchicalSpline<T>, iso: f64) -> bool {
+        let lattice = field.lattice();
+        let step = 1.0 / (1u64 << (field.level_count() - 1)) as f64;
+        let whole = Aabb::new(DVec3::ZERO, lattice.extent());
+        let nodes = self.nodes(lattice, &whole, step);
+        nodes.is_some_and(|nodes| nodes.values(field).iter().any(|value| *value > iso))
     }
 
     /// The face beyond which a place lies, by the most cells; none for a place in the box.

@@ -1,6 +1,5 @@
 //! Boxes of fields that grow when a stroke needs more room.
 
-use bspline::{Aabb, HierarchicalSpline};
 use glam::DVec3;
 
 use crate::canvas::Canvas;
@@ -36,7 +35,7 @@ impl Canvas {
         };
         let finest = self.field.level_count().max(self.detail + 1) - 1;
         let cells = u64::from(self.field.lattice().cells[face.axis] + self.step(face));
-        let can_grow = cells << finest <= MOST_CELLS && !is_cut(&self.field, self.iso, face);
+        let can_grow = cells << finest <= MOST_CELLS && !face.cuts(&self.field, self.iso);
         can_grow.then_some(face)
     }
 
@@ -74,13 +73,4 @@ impl Canvas {
             ..self.clone()
         })
     }
-}
-
-/// Whether the solid reaches a face.
-fn is_cut(field: &HierarchicalSpline<f32>, iso: f64, face: Face) -> bool {
-    let lattice = field.lattice();
-    let step = 1.0 / (1u64 << (field.level_count() - 1)) as f64;
-    let whole = Aabb::new(DVec3::ZERO, lattice.extent());
-    let nodes = face.nodes(lattice, &whole, step);
-    nodes.is_some_and(|nodes| nodes.values(field).iter().any(|value| *value > iso))
 }

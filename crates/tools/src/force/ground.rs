@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use super::ForceError;
 use super::target::Target;
+use crate::face::Face;
 use crate::paint::{self, Layers, Substance};
 
 /// Samples at most this share of a radius apart: coarser ones show in the result.
@@ -63,12 +64,13 @@ impl<T: Real> Ground<'_, T> {
         Ok((field, region))
     }
 
-    /// Whether a place is so near a face of the field's box that a region can hardly move it.
-    pub fn is_at_face(&self, region: &Region<T>, place: DVec3) -> bool {
+    /// Faces of the field's box so near a place that a region can hardly move it.
+    pub fn faces_at(&self, region: &Region<T>, place: DVec3) -> impl Iterator<Item = Face> + use<T> {
         let local = self.field.lattice_from_world().transform_point3(place);
-        let within = local.min(self.field.lattice().extent() - local);
-        let cells = within * (1u64 << region.cells().level) as f64;
-        (cells / DVec3::from_array(region.stride().map(f64::from))).min_element() < FACE
+        let ends = [local, self.field.lattice().extent() - local];
+        let knots = DVec3::from_array(region.stride().map(f64::from)) / (1u64 << region.cells().level) as f64;
+        let is_near = move |face: &Face| ends[usize::from(face.is_last)][face.axis] < FACE * knots[face.axis];
+        Face::ALL.into_iter().filter(is_near)
     }
 
     /// Whether a region reaches some radii beside a path, or to the border of the field.

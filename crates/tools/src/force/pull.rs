@@ -71,7 +71,7 @@ impl Pull {
             _ => places.iter().map(|place| place.normal).collect(),
         };
         let targets: Result<Vec<_>, _> = places.iter().zip(normals).map(target).collect();
-        ForceStroke::new(field, iso, targets?, self.extent(), self.radius.0, &self.how)
+        ForceStroke::new(field, iso, targets?, self.extent(), self.radius.0, &self.how)?.with_room()
     }
 
     /// Takes hold of a field for a hand that will say the way, its ends from the place of the surface.

@@ -15,6 +15,7 @@ use super::system::Memory;
 use super::target::{Start, Target};
 use super::within::within;
 use super::{ForceError, How, Rule, Solid, track};
+use crate::face::Face;
 use crate::paint::Layers;
 
 /// Radii of track that a tool goes on at once. Each time the shape so far becomes the one at rest: what is left behind
@@ -27,6 +28,8 @@ const ROAM: f64 = 3.0;
 
 /// Where forces move nothing.
 pub(super) const AT_FACE: &str = "within two knot intervals of a face of the field's box, where the solid is cut off and forces move nothing";
+/// Cells of the coarsest level beyond a face that a place without room is said to lie.
+const BEYOND: f64 = 1e-3;
 /// What does.
 pub(super) const INSTEAD: &str = "use inflate, push or a move there";
 
@@ -185,11 +188,35 @@ impl<T: Real> ForceStroke<T> {
             targets,
         };
         match stroke.paths_at_face() == stroke.targets.len() {
-            true => Err(ForceError::tool(format!(
-                "the tool acts {AT_FACE}; act farther inside, or {INSTEAD}"
-            ))),
+            true => Err(stroke.with_room().err().unwrap_or_else(|| {
+                ForceError::tool(format!(
+                    "the tool acts {AT_FACE}; act farther inside, or {INSTEAD}"
+                ))
+            })),
             false => Ok(stroke),
         }
+    }
+
+    /// The same, if no path begins or ends where the box of the field holds it, but for faces that cut the solid off.
+    ///
+    /// # Errors
+    /// [`ForceError::Outside`] of a place beyond the face.
+    pub(super) fn with_room(self) -> Result<Self, ForceError> {
+        let lattice = self.field.lattice();
+        let held = |t: &Target| self.faces_at(t, self.start(t)).collect::<Vec<_>>();
+        let held: Vec<_> = self.targets.iter().flat_map(held).collect();
+        let first = Face::ALL
+            .into_iter()
+            .filter_map(|face| held.iter().find(|h| h.1 == face));
+        for (place, face) in first.filter(|h| !h.1.cuts(&self.field, self.iso)) {
+            let mut local = self.field.lattice_from_world().transform_point3(*place);
+            local[face.axis] = match face.is_last {
+                true => lattice.extent()[face.axis] + BEYOND,
+                false => -BEYOND,
+            };
+            track::within(&self.field, lattice.world_from_lattice.transform_point3(local))?;
+        }
+        Ok(self)
     }
 
     /// Paths that begin or end where the box of the field holds them, and do not act.
@@ -200,10 +227,19 @@ impl<T: Real> ForceStroke<T> {
 
     /// Whether a path that met the surface at `start` begins there, or has to end there.
     pub(super) fn is_at_face(&self, target: &Target, start: Option<Start>) -> bool {
+        self.faces_at(target, start).next().is_some()
+    }
+
+    /// Ends of a path that met the surface at `start`, each with the faces of the box that hold it.
+    fn faces_at(&self, target: &Target, start: Option<Start>) -> impl Iterator<Item = (DVec3, Face)> {
+        let first = start.map(|start| start.at.max(0.0));
+        let last = first.and((!target.ends_early).then_some(target.path.length()));
+        let ends = [first, last].map(|end| end.map(|s| target.path.at(s)));
         let ground = self.ground();
-        let is_there = |s: f64| ground.is_at_face(&self.region, target.path.at(s));
-        let ends = || !target.ends_early && is_there(target.path.length());
-        start.is_some_and(|start| is_there(start.at.max(0.0)) || ends())
+        ends.into_iter().flatten().flat_map(move |place| {
+            let faces = ground.faces_at(&self.region, place);
+            faces.map(move |face| (place, face))
+        })
     }
 
     /// The same on painted matter: stiffness, mass, damping and rest lengths. To be called before the first step.

@@ -73,7 +73,7 @@ impl<T: Real> Toward<'_, T> {
             let settle = SETTLE[usize::from(stage >= stages)];
             let most = (longest / (ADVANCE * self.radius)).ceil() as usize + settle;
             let stroke = ForceStroke::new(&field, self.iso, targets, Extent::Whole, self.radius, self.how)?;
-            let mut stroke = stroke.painted(self.layers)?.held(self.holding)?;
+            let mut stroke = stroke.with_room()?.painted(self.layers)?.held(self.holding)?;
             let mut steps = 0;
             while !stroke.is_over() && steps < most {
                 let done = (stage - 1) as f64 + stroke.progress();

@@ -2,6 +2,7 @@
 
 mod areas;
 mod borders;
+mod faces;
 mod gaps;
 mod holds;
 mod limits;
