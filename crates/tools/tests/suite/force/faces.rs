@@ -9,31 +9,36 @@ fn ended(field: &HierarchicalSpline<f32>, stroke: &str) -> Result<(Canvas, Vec<S
     left.map_err(|e| e.to_string())
 }
 
-/// A ball whose top is two knot intervals from the face: the box grows, though no path leaves it.
+/// How far a stroke lifts the top, at (12, 12, `top`), of a ball of radius 8.
+fn gained(top: f64, stroke: &str) -> (f64, Vec<String>) {
+    let ball = field_of(24, |p| 8.0 - p.distance(DVec3::new(12.0, 12.0, top - 8.0)));
+    let (left, notes) = ended(&ball, stroke).unwrap_or_else(|e| panic!("{stroke}: {e}"));
+    let is_inside = |z: f64| left.field.value(DVec3::new(12.0, 12.0, z)) > ISO;
+    let (mut low, mut high) = (top - 2.0, top + 4.0);
+    for _ in 0..40 {
+        let z = 0.5 * (low + high);
+        *(if is_inside(z) { &mut low } else { &mut high }) = z;
+    }
+    (low - top, notes)
+}
+
+/// The box grows, though no path leaves it: what is gained two knot intervals from a face is gained far from any.
 #[test]
 fn what_ends_beside_a_face_has_room() {
-    let ball = field_of(24, |p| 10.0 - p.distance(DVec3::splat(12.0)));
-    for (stroke, by) in [
-        ("pull = { along = [[12, 12, 22]], lift = 0.5, radius = 1.5 }", 0.5),
-        ("pull = { along = [[12, 12, 22]], lift = 1.2, radius = 1.5 }", 1.2),
-        (
-            "extrude = { area = [[9, 9, 22], [15, 9, 22], [15, 15, 22], [9, 15, 22]], by = [0, 0, 1.6], radius = 1 }",
-            1.6,
-        ),
-    ] {
-        let (left, notes) = ended(&ball, stroke).unwrap_or_else(|e| panic!("{stroke}: {e}"));
-        assert!(
-            notes.iter().any(|n| n.contains("has grown")),
-            "{stroke}: {notes:?}"
-        );
-        let value = |z: f64| left.field.value(DVec3::new(12.0, 12.0, z)) - ISO;
-        let (mut low, mut high) = (20.0, 26.0);
-        for _ in 0..40 {
-            let z = 0.5 * (low + high);
-            *(if value(z) > 0.0 { &mut low } else { &mut high }) = z;
-        }
-        let gained = low - 22.0;
-        assert!((gained / by - 1.0).abs() < 0.05, "{stroke}: {gained}");
+    let strokes: [fn(f64) -> String; 3] = [
+        |z| format!("pull = {{ along = [[12, 12, {z}]], lift = 0.5, radius = 1.5 }}"),
+        |z| format!("pull = {{ along = [[12, 12, {z}]], lift = 1.2, radius = 1.5 }}"),
+        |z| {
+            let area = format!("[[10, 10, {z}], [14, 10, {z}], [14, 14, {z}], [10, 14, {z}]]");
+            format!("extrude = {{ area = {area}, by = [0, 0, 1.6], radius = 1 }}")
+        },
+    ];
+    for stroke in strokes {
+        let (by, notes) = gained(22.0, &stroke(22.0));
+        assert!(notes.iter().any(|n| n.contains("has grown")), "{notes:?}");
+        let (roomy, notes) = gained(18.0, &stroke(18.0));
+        assert!(notes.is_empty(), "{notes:?}");
+        assert!((by / roomy - 1.0).abs() < 1e-3, "{by} for {roomy}");
     }
 }
 
