@@ -135,6 +135,14 @@ impl Document {
         &self.path
     }
 
+    /// Tells before hours of work whether edits can be kept.
+    ///
+    /// # Errors
+    /// [`DocumentError::File`] for a file that may only be read.
+    pub fn writable(&self) -> Result<(), DocumentError> {
+        self.journal.as_ref().map_or(Ok(()), Journal::writable)
+    }
+
     /// Bytes of the file.
     pub fn size(&self) -> u64 {
         self.journal.as_ref().map_or(0, Journal::size)

@@ -108,6 +108,8 @@ impl Record {
 pub(crate) struct Journal {
     path: PathBuf,
     file: File,
+    /// Whether records can be appended.
+    is_writable: bool,
     /// Where the next record goes.
     end: u64,
 }
@@ -153,11 +155,15 @@ impl Journal {
 
     /// Opens a file, and finds its records.
     pub fn open(path: &Path) -> Result<(Self, Vec<Record>, Tail), DocumentError> {
-        let mut file = OpenOptions::new()
-            .read(true)
-            .write(true)
-            .open(path)
-            .map_err(io_error(path, "opening"))?;
+        let opened = OpenOptions::new().read(true).write(true).open(path);
+        // What may only be read is read.
+        let (opened, is_writable) = match opened.as_ref().map_err(io::Error::kind) {
+            Err(io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem) => {
+                (File::open(path), false)
+            }
+            _ => (opened, true),
+        };
+        let mut file = opened.map_err(io_error(path, "opening"))?;
         lock(&file, path)?;
         let length = file.metadata().map_err(io_error(path, "reading"))?.len();
         let reading = || io_error(path, "reading");
@@ -190,6 +196,7 @@ impl Journal {
         let mut journal = Self {
             path: path.into(),
             file,
+            is_writable,
             end: START,
         };
         let mut records = Vec::new();
@@ -275,6 +282,7 @@ impl Journal {
 
     /// Appends a record. When it fails, nothing is appended.
     pub fn append(&mut self, kind: Kind, parts: &Parts) -> Result<Record, DocumentError> {
+        self.writable()?;
         let record = Record::of(kind, parts, self.end);
         let start = [&record.head()[..], &parts.text].concat();
         let mut write = || {
@@ -291,6 +299,17 @@ impl Journal {
         }
         self.end += record.size();
         Ok(record)
+    }
+
+    /// # Errors
+    /// If the file may only be read.
+    pub fn writable(&self) -> Result<(), DocumentError> {
+        match self.is_writable {
+            true => Ok(()),
+            false => Err(io_error(&self.path, "writing")(
+                io::ErrorKind::PermissionDenied.into(),
+            )),
+        }
     }
 
     /// Takes a record for the end: it and all behind it go with the next append.

@@ -39,6 +39,25 @@ pub fn refuse_own_input(option: &str, input: &Source, output: &Path) -> Outcome 
     )))
 }
 
+/// Refuses two outputs that are one file.
+pub fn refuse_own_output(option: &str, output: &Path, other: &Path) -> Outcome {
+    // What is not there yet has a directory.
+    let place = |path: &Path| {
+        path.canonicalize().ok().or_else(|| {
+            let directory = path.parent().filter(|p| !p.as_os_str().is_empty());
+            let directory = directory.unwrap_or(Path::new(".")).canonicalize().ok()?;
+            Some(directory.join(path.file_name()?))
+        })
+    };
+    if place(output) != place(other) && !is_same(output, other) {
+        return Ok(());
+    }
+    Err(Failure::usage(format!(
+        "{option} {}: is what -o names, too, and one would be lost; name another file",
+        output.display()
+    )))
+}
+
 /// One file, also under two hard links.
 fn is_same(a: &Path, b: &Path) -> bool {
     match (a.metadata(), b.metadata()) {

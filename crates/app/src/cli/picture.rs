@@ -13,6 +13,7 @@ use super::failure::{Failure, OrFail, Outcome};
 use super::field::{FieldArgs, OpenField};
 use super::mesh::Mesher;
 use super::output::Output;
+use super::overwrite::refuse_own_output;
 use super::progress::Bar;
 use super::quantity::{between, finite, human_number, positive, threads};
 use super::staged::StagedFiles;
@@ -139,6 +140,9 @@ pub fn draw(args: &Args, another: Draw, turns: Option<usize>) -> Outcome {
         return Err(Failure::usage(
             "--errors -: standard output takes one picture; name a file",
         ));
+    }
+    if let Some(path) = &args.errors {
+        refuse_own_output("--errors", path, &args.output)?;
     }
     set_threads(args.threads)?;
     let open = args.field.load_placed(&source)?;

@@ -29,12 +29,12 @@ const STEPS: usize = 30;
 /// Gap of a scan, in its spacings, from which on surface is bare: one in 300 000 gaps of points thrown at random is wider.
 const GAP: f64 = 2.0;
 
-/// Least distance of a new point from all others, in spacings of the scan.
-const APART: f64 = 0.8;
+/// Least distance of a new point from all others, in spacings of the scan: places chosen one after the other are then as dense.
+const APART: f64 = 0.725;
 
 /// Points whose neighbours tell the spacing of the scan, and how many of these.
 const PROBES: usize = 128;
-const NEIGHBOURS: usize = 6;
+const NEIGHBOURS: usize = 20;
 
 /// Most cells of the grid on which bare surface is looked for, along one axis.
 const MOST_CELLS: f64 = 4096.0;
@@ -103,15 +103,14 @@ pub fn revise_cloud(
         ..PolygonizeOptions::default()
     };
     let (mesh, _) = polygonize(now, &frame, &options)?;
-    let surface: Vec<(DVec3, DVec3)> = (mesh.positions.into_par_iter())
-        .filter_map(|vertex| {
-            // Caps of the mesh at the faces of its box are no surface.
-            let (value, gradient) = now.value_gradient(vertex);
-            let is_surface = (value - iso).abs() < 0.1 * spacing * fitted.slope();
-            let is_new = (value - fitted.value(vertex)).abs() > least;
-            (is_surface && is_new).then(|| (vertex, -gradient.normalize_or_zero()))
-        })
-        .collect();
+    // Caps of the mesh at the faces of its box are no surface.
+    let on_surface = |p: DVec3| {
+        let (value, gradient) = now.value_gradient(p);
+        let is_surface = (value - iso).abs() < 0.1 * spacing * fitted.slope();
+        let is_new = (value - fitted.value(p)).abs() > least;
+        (is_surface && is_new).then(|| (p, -gradient.normalize_or_zero()))
+    };
+    let vertices: Vec<Option<(DVec3, DVec3)>> = mesh.positions.into_par_iter().map(on_surface).collect();
     let mut scanned = Cover::new(GAP * spacing);
     for (row, point) in points.iter().enumerate() {
         scanned.put(*point, row);
@@ -122,20 +121,36 @@ pub fn revise_cloud(
     };
     // Scans have gaps of their own: bare is what is farther from all points than those are wide, and what lies round it.
     let mut bare = Cover::new(GAP * spacing);
-    for (vertex, normal) in &surface {
+    for (vertex, normal) in vertices.iter().flatten() {
         if cover.is_bare(*vertex, GAP * spacing) && !was_bare(*vertex, *normal) {
             bare.put(*vertex, 0);
         }
     }
-    for (vertex, normal) in surface {
-        if !bare.is_bare(vertex, GAP * spacing) && cover.is_bare(vertex, APART * spacing) {
-            let row = cover.nearest(vertex, points);
-            cover.put(vertex, row);
-            changes.added.push(Placed {
-                row,
-                position: vertex,
-                normal,
+    let is_bare = |p: &DVec3| !bare.is_bare(*p, GAP * spacing);
+    for corners in mesh.triangles.iter().map(|t| t.map(|v| vertices[v as usize])) {
+        let [Some(a), Some(b), Some(c)] = corners else {
+            continue;
+        };
+        let corners = [a, b, c];
+        if !corners.iter().any(|(p, _)| is_bare(p)) {
+            continue;
+        }
+        // Vertices alone are too few to choose from.
+        let middles = [(a, b), (b, c), (c, a)]
+            .into_iter()
+            .filter_map(|((p, normal), (q, _))| {
+                surface_of(now, iso, 0.5 * (p + q), normal, least).and_then(on_surface)
             });
+        for (position, normal) in corners.into_iter().chain(middles) {
+            if is_bare(&position) && cover.is_bare(position, APART * spacing) {
+                let row = cover.nearest(position, points);
+                cover.put(position, row);
+                changes.added.push(Placed {
+                    row,
+                    position,
+                    normal,
+                });
+            }
         }
     }
     Ok(changes)
@@ -210,7 +225,8 @@ fn surface_of(
     None
 }
 
-/// Edge of the square that a point of the scan has for itself: the median, from the distance of the sixth neighbour.
+/// Edge of the square that a point of the scan has for itself: the median, from the distances of the nearest neighbours. About a point
+/// thrown at random the kth lies at `π·d² = k·edge²` on average; of even points the shells of a lattice come near that sum together.
 fn spacing(points: &[DVec3]) -> f64 {
     let probes: Vec<&DVec3> = points
         .iter()
@@ -224,9 +240,11 @@ fn spacing(points: &[DVec3]) -> f64 {
                 .map(|q| p.distance_squared(*q))
                 .filter(|d| *d > 0.0)
                 .collect();
-            let rank = NEIGHBOURS.min(squares.len()).checked_sub(1)?;
-            let (_, square, _) = squares.select_nth_unstable_by(rank, f64::total_cmp);
-            Some((std::f64::consts::PI * *square / (rank + 1) as f64).sqrt())
+            let count = NEIGHBOURS.min(squares.len());
+            let (nearer, last, _) = squares.select_nth_unstable_by(count.checked_sub(1)?, f64::total_cmp);
+            nearer.sort_unstable_by(f64::total_cmp);
+            let sum = nearer.iter().sum::<f64>() + *last;
+            Some((std::f64::consts::TAU * sum / (count * (count + 1)) as f64).sqrt())
         })
         .collect();
     edges.sort_unstable_by(f64::total_cmp);

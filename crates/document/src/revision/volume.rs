@@ -396,7 +396,8 @@ impl Matter {
                 let share = ((self.iso - now) / self.ramp).min(1.0);
                 self.iso + share * (self.fill - self.iso)
             }
-            (false, false) if change.abs() <= OFF * self.ramp => return None,
+            // The waves that a tool leaves in coarse functions around it.
+            (true, true) | (false, false) if change.abs() <= OFF * self.ramp => return None,
             (false, false) => {
                 // Voxels from the surface that comes, or from the one that goes.
                 let outside = match change > 0.0 {

@@ -123,6 +123,61 @@ fn points_follow_their_surface_go_with_it_and_cover_what_is_new() {
     }
 }
 
+/// Where a sphere is carved from a ball the new points are as dense as those of the scan, be these even or thrown at random.
+#[test]
+fn bared_surface_is_as_dense_as_the_scan() {
+    let named = |_: Option<&str>| Ok::<_, document::CommandError>("ball".to_string());
+    let text = "[[stroke]]\ncarve = { shape = { sphere = { radius = 9 } }, along = [[20, 20, 36]] }\n";
+    let commands = Command::of_script(text, named).unwrap();
+    let Command::Stroke { stroke, .. } = &commands[0] else {
+        unreachable!()
+    };
+    let before = large();
+    let tools::tool::Tool::Carve(carve) = stroke.tool().unwrap() else {
+        unreachable!()
+    };
+    let others = tools::others::Others::default();
+    let (limits, control) = (Limits::default(), &mut Control::default());
+    let operation = tools::geometric::Operation::Carve;
+    let (now, _) = carve
+        .apply(operation, &before, 0.0, &others, &limits, control)
+        .unwrap();
+    let journey = Journey::new(&commands, "ball", &before.lattice().world_box(), |_| None);
+    // What of the carved sphere lies more than a spacing inside of the ball.
+    let top = DVec3::new(20.0, 20.0, 36.0);
+    let inner: f64 = 15.0;
+    let cosine = (inner * inner - 16.0 * 16.0 - 81.0) / (2.0 * 16.0 * 9.0);
+    let area = std::f64::consts::TAU * 81.0 * (1.0 + cosine);
+    let mut draw = Draw(4);
+    let mut thrown = |n: usize| -> Vec<DVec3> {
+        let coordinate = |draw: &mut Draw| f64::from(draw.below(200_001)) / 1e5 - 1.0;
+        let ways = std::iter::from_fn(|| Some(DVec3::from_array([(); 3].map(|()| coordinate(&mut draw)))));
+        let ways = ways.filter(|p| (0.01..1.0).contains(&p.length_squared()));
+        ways.take(n)
+            .map(|p| DVec3::splat(20.0) + 16.0 * p.normalize())
+            .collect()
+    };
+    for (name, points) in [
+        ("even", scan()),
+        ("8000", thrown(8000)),
+        ("16000", thrown(16000)),
+        ("40000", thrown(40000)),
+    ] {
+        let changes = revise_cloud(&before, &now, &points, 0.0, &journey).unwrap();
+        let inside = changes
+            .added
+            .iter()
+            .filter(|a| a.position.distance(DVec3::splat(20.0)) < inner);
+        let inside = inside
+            .filter(|a| (a.position.distance(top) - 9.0).abs() < 0.2)
+            .count();
+        let scanned = points.len() as f64 / (4.0 * std::f64::consts::PI * 256.0);
+        let ratio = inside as f64 / area / scanned;
+        println!("{name}: {inside} points, {ratio:.3} as dense as the scan");
+        assert!((ratio - 1.0).abs() < 0.1, "{name}: {ratio}");
+    }
+}
+
 /// The fit closed the solid below; that is no surface that anybody scanned, and an edit that moves it does not make it one.
 #[test]
 fn surface_without_points_gets_none_when_it_is_moved() {

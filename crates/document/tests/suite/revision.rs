@@ -234,9 +234,7 @@ fn what_lies_two_voxels_beside_the_tool_keeps_its_density() {
             let depth = 3.0 - index(c.voxel).distance(centre);
             depth < -2.0
         });
-        let changes = beside.map(|c| (c.density - f64::from(scan.values[c.voxel])).abs());
-        let most = changes.fold(0.0, f64::max);
-        assert!(most < 5.0, "seed {seed}: by {most}");
+        assert_eq!(beside.count(), 0, "seed {seed}");
     }
 }
 

@@ -17,6 +17,10 @@ use crate::mix::{Faded, Mixed};
 use crate::number::{NonNegative, Point, Positive};
 use crate::others::Others;
 
+/// Least width over which a paste passes into what is there, in knot intervals: in a narrower one waves of the splines throw up specks of
+/// solid in the empty space about what is pasted.
+const PASSAGE: f64 = 2.0;
+
 /// Keeps a copy of the object, as it is now, under another name. It shares all that does not change.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -56,7 +60,8 @@ pub struct Paste {
     /// How much larger it becomes; 1 if missing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scale: Option<Positive>,
-    /// Width about the box over which it passes into what is there; four knot intervals of the object's detail if missing.
+    /// Width about the box over which it passes into what is there; four knot intervals of the object's detail if missing, and two at least
+    /// (of those that `finer` adds).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub blend: Option<Positive>,
     /// As for [`Geometric`].
@@ -116,7 +121,8 @@ impl Paste {
         let (map, scale) = self.map(b.center()).map_err(GeometricError::Shape)?;
         let solid = Cuboid::new(b.center(), 0.5 * b.size()).map_err(GeometricError::shape)?;
         let around = MARGIN * writer.spacing();
-        let blend = self.blend.map_or(around, |blend| blend.0);
+        let least = PASSAGE * writer.spacing() / f64::from(1u32 << self.finer.unwrap_or(0).min(31));
+        let blend = self.blend.map_or(around, |blend| blend.0.max(least));
         // What a cut rounds off lies a few knots beside the box; elsewhere that would be a moat about what is pasted.
         let margin = if map == DAffine3::IDENTITY { around } else { 0.0 };
         let to = b.transformed(&map);

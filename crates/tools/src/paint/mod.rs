@@ -26,13 +26,16 @@ const MOST_NODES: u64 = 1 << 24;
 /// Largest number that can be painted: a factor beyond it makes no difference that a solver could follow.
 const LARGEST: f64 = 1e6;
 
+/// Smallest factor of what must not vanish. Layers keep single-precision differences from 1, and those end at 6e-8.
+const SMALLEST: f64 = 1e-6;
+
 /// What can be painted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Substance {
-    /// Factor on the stiffness of the springs, above 0.
+    /// Factor on the stiffness of the springs, 1e-6 or above.
     Stiffness,
-    /// Factor on the mass, above 0.
+    /// Factor on the mass, 1e-6 or above.
     Mass,
     /// Factor on the damping, 0 or above.
     Damping,
@@ -54,12 +57,14 @@ impl Substance {
     }
 
     fn check(self, value: f64) -> Result<(), String> {
-        let needs_some = matches!(self, Self::Stiffness | Self::Mass);
-        let least = if needs_some { "above 0" } else { "0 or above" };
-        match value.is_finite() && value <= LARGEST && (value > 0.0 || value == 0.0 && !needs_some) {
+        let least = match self {
+            Self::Stiffness | Self::Mass => SMALLEST,
+            _ => 0.0,
+        };
+        match (least..=LARGEST).contains(&value) {
             true => Ok(()),
             false => Err(format!(
-                "{} cannot be {value}; it is {least}, and at most {LARGEST:e}",
+                "{} cannot be {value}; it is {least:?} or above, and at most {LARGEST:e}",
                 self.name()
             )),
         }

@@ -117,6 +117,29 @@ fn many_places_are_read_as_one_by_one() {
     assert!(all.iter().any(|v| *v > 5.0));
 }
 
+/// What a layer would round to nothing is refused, and the least that it takes is there.
+#[test]
+fn factors_of_matter_never_vanish() {
+    let field = ball(16);
+    for layer in ["mass", "stiffness"] {
+        let painted = |value: &str| {
+            laid(
+                &format!("layer = '{layer}'\nformula = '{value}'"),
+                &field,
+                &Layers::new(),
+            )
+        };
+        for value in ["0", "1e-9", "9e-7"] {
+            let why = painted(value).unwrap_err().to_string();
+            assert!(why.contains("it is 1e-6 or above"), "{why}");
+        }
+        let least = painted("1e-6").unwrap();
+        let substance = *least.keys().next().unwrap();
+        let there = values(&least, substance, &[DVec3::splat(4.3)]).unwrap()[0];
+        assert!((there / 1e-6 - 1.0).abs() < 0.05, "{there}");
+    }
+}
+
 #[test]
 fn layers_are_filled_by_formula_by_calibration_and_from_stiffness() {
     let field = ball(16);
@@ -166,7 +189,7 @@ fn strokes_that_make_no_sense_say_why() {
         ("layer = 'mass'\nformula = '1'\nof-stiffness = 2", "exactly one"),
         (
             "layer = 'mass'\nbrush = { value = 0, along = [[4, 4, 4]], radius = 1 }",
-            "above 0",
+            "1e-6 or above",
         ),
         (
             "layer = 'mass'\nbrush = { value = 1e9, along = [[4, 4, 4]], radius = 1 }",

@@ -191,7 +191,7 @@ impl Plan<'_> {
         arguments.extend(self.choice.arguments(item.kind).into_iter().map(OsString::from));
         arguments.extend(["--".into(), item.path.clone().into_os_string()]);
         let ended = ask("fit", &arguments, &bounds, &|stage, f| show(stage, FIT * f));
-        let Some(fit) = settle(ended, entry)? else {
+        let Some(fit) = settle(ended, scratch, entry)? else {
             return Ok(made);
         };
         entry.notes.extend(notes(&fit));
@@ -204,7 +204,7 @@ impl Plan<'_> {
             let mut arguments = self.common(&mesh);
             arguments.push(field.clone().into());
             let ended = ask("mesh", &arguments, &bounds, &|stage, _| show(stage, FIT));
-            let Some(said) = settle(ended, entry)? else {
+            let Some(said) = settle(ended, scratch, entry)? else {
                 return Ok(made);
             };
             entry.notes.extend(notes(&said));
@@ -228,7 +228,10 @@ impl Plan<'_> {
                 Ok(_) => made.extend([("picture", picture), ("errors", errors)]),
                 Err(Stop::Cancelled) => return Err(()),
                 // The result is there all the same.
-                Err(Stop::Failed(reason)) => entry.notes.push(format!("no picture: {}", reason.message)),
+                Err(Stop::Failed(reason)) => {
+                    let why = without_scratch(&reason.message, scratch);
+                    entry.notes.push(format!("no picture: {why}"));
+                }
             }
         }
         Ok(made)
@@ -265,16 +268,22 @@ impl Plan<'_> {
 }
 
 /// What a command said; `None` and a reason in the entry if it failed, `Err` after a cancel.
-fn settle(ended: Ended, entry: &mut Entry) -> Result<Option<Map<String, Value>>, ()> {
+fn settle(ended: Ended, scratch: &Path, entry: &mut Entry) -> Result<Option<Map<String, Value>>, ()> {
     entry.peak_rss_bytes = entry.peak_rss_bytes.max(ended.peak);
     match ended.said {
         Ok(said) => Ok(Some(said)),
         Err(Stop::Cancelled) => Err(()),
-        Err(Stop::Failed(reason)) => {
+        Err(Stop::Failed(mut reason)) => {
+            reason.message = without_scratch(&reason.message, scratch);
             entry.failure = Some(reason);
             Ok(None)
         }
     }
+}
+
+/// A message that names files as they are called, not where they were made: that directory is gone when it is read.
+fn without_scratch(message: &str, scratch: &Path) -> String {
+    message.replace(&format!("{}/", scratch.display()), "")
 }
 
 fn notes(said: &Map<String, Value>) -> Vec<String> {

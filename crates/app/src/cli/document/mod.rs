@@ -43,6 +43,13 @@ pub fn open(path: &Path, notes: &mut Vec<String>) -> Outcome<Document> {
     Ok(opened.document)
 }
 
+/// The same, for a command that changes it.
+pub fn open_to_change(path: &Path, notes: &mut Vec<String>) -> Outcome<Document> {
+    let document = open(path, notes)?;
+    document.writable().map_err(failure)?;
+    Ok(document)
+}
+
 pub fn options() -> Options {
     Options {
         limits: limits(None),

@@ -1,7 +1,7 @@
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use super::{Told, failure, open};
+use super::{Told, failure, open_to_change};
 use crate::cli::failure::Outcome;
 use crate::cli::quantity::count;
 
@@ -21,7 +21,7 @@ pub struct Args {
 /// Undoes the last edits, or does again what was undone.
 pub fn run(args: &Args, again: bool) -> Outcome {
     let mut notes = Vec::new();
-    let mut document = open(&args.document, &mut notes)?;
+    let mut document = open_to_change(&args.document, &mut notes)?;
     let asked = args.steps.get();
     let done = match again {
         true => document.redo(asked),

@@ -591,3 +591,19 @@ fn a_directory_belongs_to_one_batch() {
     assert_eq!(bench.run("batch a.ply -o a.ply").code, 2);
     assert_eq!(bench.run("batch - -o out2").code, 2);
 }
+
+/// Directories in which results are made are gone when a reason is read.
+#[test]
+fn reasons_name_no_passing_directory() {
+    let bench = Bench::new();
+    let head = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 8 8 8\nspacings: 1 1 1\nencoding: ascii\n\n";
+    bench.write("flat.nrrd", format!("{head}{}", "7 ".repeat(512)));
+    let run = batch(&bench, "flat.nrrd -o out --mesh ply --json");
+    assert_eq!(run.code, 3, "{}", run.stderr);
+    let objects = objects(&run);
+    let reason = objects.last().unwrap()["failures"][0]["reason"].as_str().unwrap();
+    assert!(
+        reason.starts_with("flat.nrrd") && reason.contains("all over"),
+        "{reason}"
+    );
+}

@@ -460,3 +460,56 @@ fn clouds_of_other_formats_come_back_too() {
         run.stderr
     );
 }
+
+/// Whoever may only read a document sees it, and is told before any work that edits cannot be kept.
+#[test]
+fn documents_of_others_are_read() {
+    use std::fs::{Permissions, copy, set_permissions};
+    use std::os::unix::fs::PermissionsExt;
+    use std::os::unix::process::CommandExt;
+
+    let bench = ball();
+    bench.json("new clay.isoclay ball.iclay");
+    // Root may do everything: somebody else runs a copy of the program that they can reach.
+    copy(env!("CARGO_BIN_EXE_isoclay"), bench.path("isoclay")).unwrap();
+    set_permissions(&bench.directory, Permissions::from_mode(0o755)).unwrap();
+    set_permissions(bench.path("clay.isoclay"), Permissions::from_mode(0o444)).unwrap();
+    let run = |arguments: &str| {
+        let mut command = std::process::Command::new(bench.path("isoclay"));
+        if rustix::process::geteuid().is_root() {
+            command.uid(65534);
+        }
+        let arguments = arguments.split(' ');
+        let run = command.args(arguments).current_dir(&bench.directory).output();
+        crate::common::Run::from(run.unwrap())
+    };
+    let before = std::fs::read(bench.path("clay.isoclay")).unwrap();
+    for command in ["info clay.isoclay", "history clay.isoclay", "replay clay.isoclay"] {
+        let read = run(command);
+        assert_eq!(read.code, 0, "{command}: {}", read.stderr);
+    }
+    for command in ["sculpt clay.isoclay --script out.toml", "undo clay.isoclay"] {
+        let refused = run(command);
+        assert_eq!(refused.code, 4, "{command}: {}", refused.stderr);
+        assert!(
+            refused.stderr.contains("check the permissions"),
+            "{}",
+            refused.stderr
+        );
+    }
+    assert_eq!(std::fs::read(bench.path("clay.isoclay")).unwrap(), before);
+}
+
+/// Two pictures in one file would be one.
+#[test]
+fn two_pictures_of_one_name_are_refused() {
+    let bench = ball();
+    std::os::unix::fs::symlink("a.png", bench.path("link.png")).unwrap();
+    for errors in ["a.png", "./a.png", "link.png"] {
+        let refused = bench.run(&format!("picture ball.iclay -o a.png --errors {errors}"));
+        assert_eq!(refused.code, 2, "{errors}: {}", refused.stderr);
+        assert!(refused.stderr.contains("name another file"), "{}", refused.stderr);
+        // The link leads to a file now.
+        bench.write("a.png", "");
+    }
+}

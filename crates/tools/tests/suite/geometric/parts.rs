@@ -99,6 +99,32 @@ fn a_pasted_part_is_the_part_elsewhere() {
     assert!((value - ISO).abs() < 0.03 * gradient.length(), "{value}");
 }
 
+/// A passage narrower than splines can be throws up no specks of solid in the empty space about what is pasted.
+#[test]
+fn narrow_passages_leave_empty_space_empty() {
+    let block = block();
+    let half = DVec3::new(4.0, 3.3, 2.7);
+    let inside = |p: DVec3| 1.0 - ((p - 12.0) / half).length();
+    let clip = HierarchicalSpline::schoenberg(*block.lattice(), block.slope(), |p| {
+        ISO + 2.7 * block.slope() * inside(p)
+    })
+    .unwrap();
+    for margin in [0.2, 0.5, 1.0] {
+        let [min, max] = [-1.0, 1.0].map(|side| (12.0 + side * (half + margin)).to_array());
+        for blend in [0.1, 0.5, 1.0] {
+            let text = format!(
+                "paste = {{ from = \"clip\", region = {{ min = {min:?}, max = {max:?} }}, by = [0, 0, 5.5], blend = {blend} }}"
+            );
+            let both = beside(&block, &clip, &text);
+            for n in 0..40u32.pow(3) {
+                let p = DVec3::from([n / 1600, n / 40 % 40, n % 40].map(|n| 0.6 * f64::from(n)));
+                let is_air = p.z > 12.5 && inside(p - DVec3::Z * 5.5) < -0.15;
+                assert!(!is_air || both.value(p) < ISO, "{margin} {blend}: {p}");
+            }
+        }
+    }
+}
+
 #[test]
 fn parts_that_make_no_sense_are_refused() {
     let field = block();

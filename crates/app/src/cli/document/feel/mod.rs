@@ -12,7 +12,7 @@ use std::time::Duration;
 use tools::haptics::simulated::SimulatedDevice;
 use tools::haptics::{Abilities, Device, Embedding, TickRecord, Unresolved};
 
-use super::{Told, chosen, failure, open};
+use super::{Told, chosen, failure, open, open_to_change};
 use crate::cli::failure::{Failure, Outcome};
 use crate::cli::interrupt;
 use crate::cli::output::Output;
@@ -113,7 +113,8 @@ pub fn run(args: &Args) -> Outcome {
     let usual = if is_real { REAL } else { script.end() + REST };
     let seconds = args.seconds.unwrap_or(usual);
     let mut notes = Vec::new();
-    let document = open(&args.document, &mut notes)?;
+    let opened = if grip.tool.is_some() { open_to_change } else { open };
+    let document = opened(&args.document, &mut notes)?;
     let name = chosen(document.state(), args.object.as_deref())?.to_string();
     let (held, workspace) = match &named {
         Name::Simulated(preset) => {
