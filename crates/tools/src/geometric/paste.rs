@@ -19,7 +19,7 @@ use crate::others::Others;
 
 /// Least width over which a paste passes into what is there, in knot intervals: in a narrower one waves of the splines throw up specks of
 /// solid in the empty space about what is pasted.
-const PASSAGE: f64 = 2.0;
+const PASSAGE: f64 = 1.0;
 
 /// Keeps a copy of the object, as it is now, under another name. It shares all that does not change.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -60,7 +60,7 @@ pub struct Paste {
     /// How much larger it becomes; 1 if missing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scale: Option<Positive>,
-    /// Width about the box over which it passes into what is there; four knot intervals of the object's detail if missing, and two at least
+    /// Width about the box over which it passes into what is there; four knot intervals of the object's detail if missing, and one at least
     /// (of those that `finer` adds).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub blend: Option<Positive>,

@@ -109,9 +109,9 @@ fn narrow_passages_leave_empty_space_empty() {
         ISO + 2.7 * block.slope() * inside(p)
     })
     .unwrap();
-    for margin in [0.2, 0.5, 1.0] {
+    for margin in [0.5, 1.0] {
         let [min, max] = [-1.0, 1.0].map(|side| (12.0 + side * (half + margin)).to_array());
-        for blend in [0.1, 0.5, 1.0] {
+        for blend in [0.1, 0.25, 0.5] {
             let text = format!(
                 "paste = {{ from = \"clip\", region = {{ min = {min:?}, max = {max:?} }}, by = [0, 0, 5.5], blend = {blend} }}"
             );
