@@ -5,6 +5,7 @@ use document::{Command, Journey, revise_cloud};
 use fitting::Control;
 use glam::DVec3;
 use tools::limits::Limits;
+use tools::session::Stroke;
 
 use super::common::{Draw, large};
 
@@ -21,6 +22,17 @@ fn scan() -> Vec<DVec3> {
             DVec3::splat(20.0) + (16.0 + noise) * DVec3::new(r * cos, r * sin, z)
         })
         .collect()
+}
+
+/// A stroke of an object "ball", as it is written, and the stroke in it.
+fn commanded(stroke: &str) -> (Vec<Command>, Stroke) {
+    let named = |_: Option<&str>| Ok::<_, document::CommandError>("ball".to_string());
+    let commands = Command::of_script(&format!("[[stroke]]\n{stroke}\n"), named).unwrap();
+    let Command::Stroke { stroke, .. } = &commands[0] else {
+        unreachable!()
+    };
+    let stroke = (**stroke).clone();
+    (commands, stroke)
 }
 
 #[test]
@@ -48,11 +60,7 @@ fn points_follow_their_surface_go_with_it_and_cover_what_is_new() {
             false,
         ),
     ] {
-        let named = |_: Option<&str>| Ok::<_, document::CommandError>("ball".to_string());
-        let commands = Command::of_script(&format!("[[stroke]]\n{text}\n"), named).unwrap();
-        let Command::Stroke { stroke, .. } = &commands[0] else {
-            unreachable!()
-        };
+        let (commands, stroke) = commanded(text);
         let others = tools::others::Others::default();
         let (before, limits, control) = (large(), Limits::default(), &mut Control::default());
         let now = match stroke.tool().unwrap() {
@@ -126,12 +134,8 @@ fn points_follow_their_surface_go_with_it_and_cover_what_is_new() {
 /// Where a sphere is carved from a ball the new points are as dense as those of the scan, be these even or thrown at random.
 #[test]
 fn bared_surface_is_as_dense_as_the_scan() {
-    let named = |_: Option<&str>| Ok::<_, document::CommandError>("ball".to_string());
-    let text = "[[stroke]]\ncarve = { shape = { sphere = { radius = 9 } }, along = [[20, 20, 36]] }\n";
-    let commands = Command::of_script(text, named).unwrap();
-    let Command::Stroke { stroke, .. } = &commands[0] else {
-        unreachable!()
-    };
+    let (commands, stroke) =
+        commanded("carve = { shape = { sphere = { radius = 9 } }, along = [[20, 20, 36]] }");
     let before = large();
     let tools::tool::Tool::Carve(carve) = stroke.tool().unwrap() else {
         unreachable!()
@@ -181,12 +185,7 @@ fn bared_surface_is_as_dense_as_the_scan() {
 /// The fit closed the solid below; that is no surface that anybody scanned, and an edit that moves it does not make it one.
 #[test]
 fn surface_without_points_gets_none_when_it_is_moved() {
-    let named = |_: Option<&str>| Ok::<_, document::CommandError>("ball".to_string());
-    let text = "[[stroke]]\ninflate = { along = [[20, 20, 4]], radius = 9, by = 1.5 }\n";
-    let commands = Command::of_script(text, named).unwrap();
-    let Command::Stroke { stroke, .. } = &commands[0] else {
-        unreachable!()
-    };
+    let (_, stroke) = commanded("inflate = { along = [[20, 20, 4]], radius = 9, by = 1.5 }");
     let before = large();
     let inflate = stroke.inflate.as_ref().unwrap();
     let (now, _) = inflate

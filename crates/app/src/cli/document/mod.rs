@@ -70,9 +70,12 @@ pub fn edited_meta(object: &Object) -> FieldMeta {
 fn failure(error: DocumentError) -> Failure {
     match &error {
         DocumentError::File(e) => match &e.fault {
-            Fault::Io { doing: "writing", .. } | Fault::Output { .. } | Fault::Limit { .. } => {
-                Failure::limit(error)
+            Fault::Io {
+                doing: "writing" | "creating the output",
+                ..
             }
+            | Fault::Output { .. }
+            | Fault::Limit { .. } => Failure::limit(error),
             _ => Failure::input(error),
         },
         DocumentError::InUse(_) => Failure::limit(error),

@@ -488,7 +488,11 @@ fn documents_of_others_are_read() {
         let read = run(command);
         assert_eq!(read.code, 0, "{command}: {}", read.stderr);
     }
-    for command in ["sculpt clay.isoclay --script out.toml", "undo clay.isoclay"] {
+    for command in [
+        "sculpt clay.isoclay --script out.toml",
+        "undo clay.isoclay",
+        "new other.isoclay ball.iclay",
+    ] {
         let refused = run(command);
         assert_eq!(refused.code, 4, "{command}: {}", refused.stderr);
         assert!(
