@@ -20,6 +20,9 @@ use super::Journey;
 /// Rounding of a field's values, in units of the slope times the diagonal: less is no change.
 const ROUNDING: f64 = 1e-6;
 
+/// Way of the surface, in spacings of the scan, that is no edit: tools leave such waves in coarse functions around them.
+const STILL: f64 = 0.01;
+
 /// Least cosine between the normals of a point before and after.
 const TURNED: f64 = 0.5;
 
@@ -173,7 +176,8 @@ fn fate(
 ) -> Fate {
     let (level, before) = fitted.value_gradient(p);
     let carried = journey.forth(p);
-    if carried == p && (now.value(p) - level).abs() <= least {
+    let still = least.max(STILL * spacing * fitted.slope());
+    if carried == p && (now.value(p) - level).abs() <= still {
         return Fate::Stays;
     }
     let far = match journey.pushes(carried) {

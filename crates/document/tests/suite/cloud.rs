@@ -168,6 +168,10 @@ fn bared_surface_is_as_dense_as_the_scan() {
         ("40000", thrown(40000)),
     ] {
         let changes = revise_cloud(&before, &now, &points, 0.0, &journey).unwrap();
+        // Beyond two knot intervals the tool left waves, which are no edit.
+        let ways = changes.moved.iter().map(|m| points[m.row].distance(top) - 9.0);
+        let farthest = ways.fold(0.0, f64::max);
+        assert!(farthest < 2.0, "{name}: {farthest}");
         let inside = changes
             .added
             .iter()
@@ -198,5 +202,5 @@ fn surface_without_points_gets_none_when_it_is_moved() {
     assert_eq!(changes.added.len(), 0);
     // Where there are points they move along.
     let changes = revise_cloud(&before, &now, &whole, 0.0, &journey).unwrap();
-    assert!(changes.moved.len() > 500, "{}", changes.moved.len());
+    assert!(changes.moved.len() > 400, "{}", changes.moved.len());
 }
