@@ -150,8 +150,9 @@ fn command() -> clap::Command {
     Cli::command().mut_subcommand("sample", |sample| {
         sample.mut_arg("spacing", |a| {
             a.help(
-                "Voxels of this size in place of those of VOLUME, in its unit: the box stays the same and holds a whole \
-                 number of them. One number, or three. With --shape: the spacing of that file in mm",
+                "Voxels of this size in place of those of VOLUME, in mm (in the file's own unit if it tells none): the box \
+                 stays the same and holds a whole number of them. One number, or three. With --shape: the spacing of \
+                 that file in mm",
             )
         })
     })
