@@ -301,6 +301,8 @@ impl Journal {
         Ok(record)
     }
 
+    /// Whether records can be appended.
+    ///
     /// # Errors
     /// If the file may only be read.
     pub fn writable(&self) -> Result<(), DocumentError> {

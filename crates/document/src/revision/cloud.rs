@@ -246,6 +246,7 @@ fn spacing(points: &[DVec3]) -> f64 {
                 .collect();
             let count = NEIGHBOURS.min(squares.len());
             let (nearer, last, _) = squares.select_nth_unstable_by(count.checked_sub(1)?, f64::total_cmp);
+            // A sum has one order.
             nearer.sort_unstable_by(f64::total_cmp);
             let sum = nearer.iter().sum::<f64>() + *last;
             Some((std::f64::consts::TAU * sum / (count * (count + 1)) as f64).sqrt())

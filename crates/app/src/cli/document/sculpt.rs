@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use document::Command;
 use fitting::Control;
 
-use super::{Told, chosen, edited_meta, failure, open_to_change};
+use super::{Told, chosen, edited_meta, failure, open, open_to_change};
 use crate::cli::failure::{Failure, Outcome};
 use crate::cli::output::Output;
 use crate::cli::progress::Bar;
@@ -45,7 +45,8 @@ pub fn run(args: &Args) -> Outcome {
     let preview = preview.map(|path| Output::check("--preview", path, &["iclay"], None, &[&script]));
     let preview = preview.transpose()?;
     let mut notes = Vec::new();
-    let mut document = open_to_change(&args.document, &mut notes)?;
+    let opened = if preview.is_some() { open } else { open_to_change };
+    let mut document = opened(&args.document, &mut notes)?;
     let file = args.script.file_name().unwrap_or_default().to_string_lossy();
     let about = |e: Failure| e.about(script.name());
     let named = |own: Option<&str>| {
