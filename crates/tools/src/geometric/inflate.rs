@@ -91,19 +91,23 @@ impl Inflate {
         let (weight, reach) = band(&self.along, self.radius.0)?;
         let within = writer.within(&reach)?;
         let finest = field.finest_in(&within).max(writer.detail());
-        let spacing = field.lattice().spacing(finest);
+        let shortest = field.lattice().spacing(finest).min_element();
         let deviation = BLUR * by.abs();
+        // Knots far closer than the mean is wide tell no more of it.
+        let wide = |level: &usize| field.lattice().spacing(*level).max_element() <= 0.5 * deviation;
+        let level = (writer.detail()..finest).find(wide).unwrap_or(finest);
+        let spacing = field.lattice().spacing(level);
         let knots = within.widened(REACH * deviation).size() / spacing;
         let mean = match knots.x * knots.y * knots.z > PLACES {
             true => sampled(field, &within, deviation, PLACES, control)?,
             false => {
                 let deviation = spacing.to_array().map(|spacing| deviation / spacing);
-                averaged(field, &within, finest, deviation, false, control)?
+                averaged(field, &within, level, deviation, false, control)?
             }
         };
         let lift = Lift { mean, weight, by };
         let lifted = Moved::new(field, lift, 1e-4 * self.radius.0);
-        if halvings > 0 && comes_through(field, &lifted, iso, by > 0.0, &within, spacing.min_element()) {
+        if halvings > 0 && comes_through(field, &lifted, iso, by > 0.0, &within, shortest) {
             let (half, _) = self.raised(field, iso, 0.5 * by, halvings - 1, limits, control)?;
             return self.raised(&half, iso, 0.5 * by, halvings - 1, limits, control);
         }
@@ -111,7 +115,7 @@ impl Inflate {
             tolerance: self.tolerance,
             finer: self.finer,
             feature: None,
-            densities: true,
+            densities: Some(1.0),
         };
         writer.written(&lifted, &within, &fineness, control)
     }

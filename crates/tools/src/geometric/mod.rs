@@ -192,7 +192,7 @@ impl Geometric {
             tolerance: self.tolerance,
             finer: self.finer,
             feature: Some(self.shape.feature()),
-            densities: false,
+            densities: None,
         };
         let combined = Combined {
             operation,

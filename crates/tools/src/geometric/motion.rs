@@ -110,7 +110,7 @@ impl Move {
             tolerance: self.tolerance,
             finer: self.finer,
             feature: None,
-            densities: true,
+            densities: Some(1.0),
         };
         if let Motion::Mirror { at, normal, blend } = &self.motion {
             return mirrored(&writer, at.0, normal.0, *blend, &fineness, control);

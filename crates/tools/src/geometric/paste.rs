@@ -157,7 +157,7 @@ impl Paste {
             tolerance: self.tolerance,
             finer: self.finer,
             feature: None,
-            densities: true,
+            densities: Some(1.0),
         };
         // A box that is turned fills little of the upright one about it: no function acts far beside it.
         let beside = (margin + blend + 3f64.sqrt() * around) / scale;

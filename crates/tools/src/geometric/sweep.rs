@@ -71,7 +71,7 @@ impl Sweep {
             tolerance: self.tolerance,
             finer: self.finer,
             feature: Some(self.shape.feature()),
-            densities: false,
+            densities: None,
         };
         let lines = self.along.lines(&field.lattice().world_box());
         let chord = CHORD * writer.tolerance(&fineness);

@@ -28,8 +28,8 @@ pub(super) struct Fineness {
     pub finer: Option<u8>,
     /// Smallest length that the tool shapes, if it has one.
     pub feature: Option<f64>,
-    /// Whether the tool carries matter along: of a scan the densities off the surface too.
-    pub densities: bool,
+    /// Of tools that carry or even matter: what densities of a scan, off the surface too, may be off by, over what its fit left.
+    pub densities: Option<f64>,
 }
 
 /// Knot intervals across a feature that show it.
@@ -125,7 +125,7 @@ impl<T: Real> Writer<'_, T> {
 
     /// How far densities may be off, where a tool carries those of a scan along.
     fn density(&self, fineness: &Fineness) -> Option<f64> {
-        self.limits.density().filter(|_| fineness.densities)
+        Some(fineness.densities? * self.limits.density()?)
     }
 
     /// Least distance of its knots.
@@ -222,7 +222,8 @@ impl<T: Real> Writer<'_, T> {
         }
         let density = self.density(fineness);
         // A scan knows its surface as well as its densities.
-        let usual = density.map_or(TOLERANCE * spacing, |_| spacing);
+        let part = density.and(fineness.densities).unwrap_or(TOLERANCE);
+        let usual = part.max(TOLERANCE) * spacing;
         let tolerance = fineness.tolerance.map_or(usual, |t| t.0);
         let is_free = |support: &Aabb| is_meant(support) && self.limits.may_change(support);
         let iso = self.iso;

@@ -165,7 +165,7 @@ impl Push {
             tolerance: Some(Positive(tolerance.min(LOST * cover.by.abs()))),
             finer: self.finer,
             feature: Some(BEND * self.radius.0),
-            densities: true,
+            densities: Some(1.0),
         });
         let moved = Moved::new(writer.field, cover, 1e-4 * self.radius.0);
         writer.written(&moved, &within, &fineness, control)

@@ -2,9 +2,10 @@
 
 use bspline::Field;
 use bspline::hierarchical::HierarchicalSpline;
+use fitting::Control;
 use glam::DVec3;
 
-use super::{ISO, SLOPE, block, done, random, refused, volume};
+use super::{ISO, SLOPE, block, canvas, done, random, refused, stroke, volume};
 
 const WAY: &str = "along = [[8, 12, 12], [16, 12, 12]]";
 
@@ -59,6 +60,115 @@ fn smoothing_evens_out_and_leaves_what_is_linear() {
         last = now;
     }
     assert!(last < 0.2 * roughness(&rough), "{last}");
+}
+
+/// A ball of 300 above its surface, with noise, as a scan has it.
+fn scanned(seed: u64) -> HierarchicalSpline<f32> {
+    let noise = std::cell::RefCell::new(random(seed));
+    let middle = DVec3::splat(12.0);
+    let inside = |p: DVec3| ((8.0 - p.distance(middle)) / 0.8).tanh();
+    let scan = |p: DVec3| 300.0 * inside(p) + ISO + noise.borrow_mut()(-25.0, 25.0);
+    HierarchicalSpline::schoenberg(*block().lattice(), 300.0, scan).unwrap()
+}
+
+/// Values on every other knot of a cube about a place.
+fn values(field: &HierarchicalSpline<f32>, at: DVec3, half: f64) -> Vec<f64> {
+    let side = |n: usize| (n as f64 - half).clamp(-half, half);
+    let count = 2 * half as usize + 1;
+    let places = (0..count * count * count)
+        .map(|n| at + DVec3::new(side(n / count / count), side(n / count % count), side(n % count)));
+    places.map(|p| field.value(p)).collect()
+}
+
+fn deviation(values: &[f64]) -> f64 {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    let square = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
+    (square / values.len() as f64).sqrt()
+}
+
+/// The tolerance of a scan's fit is as large as its noise: what is written to within that stays noisy.
+#[test]
+fn smoothing_takes_the_noise_of_a_scan_away() {
+    for seed in 0..5 {
+        let scan = scanned(seed);
+        for (level, keep, most) in [(1, false, 0.45), (2, false, 0.25), (1, true, 0.7), (2, true, 0.4)] {
+            let text = format!(
+                "smooth = {{ along = [[12, 12, 12]], radius = 8, level = {level}, keep-volume = {keep} }}"
+            );
+            let mut scanned = canvas(&scan);
+            scanned.density = Some(20.0);
+            let left = stroke(&text).apply(scanned, &mut Control::default());
+            let inside = |field| deviation(&values(field, DVec3::splat(12.0), 2.0));
+            let (before, after) = (inside(&scan), inside(&left.unwrap().0.field));
+            assert!(after < most * before, "{seed} {text}: {after} of {before}");
+        }
+    }
+}
+
+/// Beyond a face a mean has nothing to go by: straight lines from the last two functions grew a hundredfold in five strokes.
+#[test]
+fn smoothing_at_a_corner_of_the_box_as_often_as_one_likes_grows_nothing() {
+    for seed in 0..3 {
+        let scan = scanned(seed);
+        let range = |field: &HierarchicalSpline<f32>| {
+            let all = values(field, DVec3::splat(2.0), 2.0);
+            all.into_iter()
+                .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
+                    [low.min(v), high.max(v)]
+                })
+        };
+        let [low, high] = range(&scan);
+        for (level, keep) in [(1, false), (2, true), (5, false), (5, true), (10, false)] {
+            let text = format!(
+                "smooth = {{ along = [[0, 0, 0]], radius = 9, level = {level}, keep-volume = {keep} }}"
+            );
+            let mut field = scan.clone();
+            for n in 0..6 {
+                field = done(&field, &text);
+                let [least, most] = range(&field);
+                assert!(
+                    low <= least && most <= high,
+                    "{seed} {text}, stroke {n}: {least} {most}"
+                );
+            }
+            assert!(
+                deviation(&values(&field, DVec3::splat(2.0), 2.0))
+                    < 0.6 * deviation(&values(&scan, DVec3::splat(2.0), 2.0)),
+                "{text}"
+            );
+        }
+    }
+}
+
+/// A pore asks for knots of a hundredth: means over those of the whole brush took minutes and gigabytes.
+#[test]
+fn brushes_over_a_pore_cost_what_it_holds() {
+    let field = block();
+    let pore = done(
+        &field,
+        "carve = { shape = { cylinder = { axis = [0, 0, 1], radius = 0.02, height = 1 } }, along = [[12.5, 12, 12]] }",
+    );
+    assert!(pore.level_count() > 4, "{}", pore.level_count());
+    for (text, height) in [
+        ("smooth = { along = [[12, 12, 12]], radius = 6, level = 2 }", 12.0),
+        (
+            "smooth = { along = [[12, 12, 12]], radius = 6, level = 1, keep-volume = true }",
+            12.0,
+        ),
+        ("inflate = { along = [[12, 12, 12]], radius = 6, by = 2 }", 14.0),
+    ] {
+        let plain = done(&field, text);
+        let mut control = Control {
+            memory_limit: Some(64 << 20),
+            ..Default::default()
+        };
+        let left = stroke(text).apply(canvas(&pore), &mut control);
+        let left = left.unwrap_or_else(|e| panic!("{text}: {e}")).0.field;
+        for p in [[11.0, 12.0], [12.5, 13.0], [12.5, 12.0]].map(|[x, y]| DVec3::new(x, y, height)) {
+            let off = (left.value(p) - plain.value(p)) / SLOPE;
+            assert!(off.abs() < 0.05, "{text} {p}: {off}");
+        }
+    }
 }
 
 /// A mean draws a bump in; the kernel that keeps what is quadratic hardly does.
