@@ -1,9 +1,10 @@
 //! Brushes: smoothing, swelling, and knots put in and taken out.
 
 use bspline::Field;
-use bspline::hierarchical::HierarchicalSpline;
+use bspline::hierarchical::{BlockEdit, Change, HierarchicalSpline, Lattice};
 use fitting::Control;
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
+use tools::canvas::Canvas;
 
 use super::{ISO, SLOPE, block, canvas, done, random, refused, stroke, volume};
 
@@ -62,13 +63,30 @@ fn smoothing_evens_out_and_leaves_what_is_linear() {
     assert!(last < 0.2 * roughness(&rough), "{last}");
 }
 
-/// A ball of 300 above its surface, with noise, as a scan has it.
+/// A ball of 300 above its surface, with noise on the finer of two levels, as a scan has it.
 fn scanned(seed: u64) -> HierarchicalSpline<f32> {
-    let noise = std::cell::RefCell::new(random(seed));
-    let middle = DVec3::splat(12.0);
-    let inside = |p: DVec3| ((8.0 - p.distance(middle)) / 0.8).tanh();
-    let scan = |p: DVec3| 300.0 * inside(p) + ISO + noise.borrow_mut()(-25.0, 25.0);
-    HierarchicalSpline::schoenberg(*block().lattice(), 300.0, scan).unwrap()
+    let lattice = Lattice {
+        world_from_lattice: DAffine3::IDENTITY,
+        cells: [24; 3],
+    };
+    let ball = |p: DVec3| 300.0 * ((8.0 - p.distance(DVec3::splat(12.0))) / 0.8).tanh() + ISO;
+    let ball = HierarchicalSpline::schoenberg(lattice, 300.0, ball).unwrap();
+    let mut draw = random(seed);
+    let noise = BlockEdit {
+        level: 1,
+        first: [0; 3],
+        shape: [51; 3],
+        change: Change::Add((0..51 * 51 * 51).map(|_| draw(-25.0, 25.0) as f32).collect()),
+    };
+    ball.edited_blocks(&[noise]).unwrap()
+}
+
+/// What a stroke leaves of it; its fit left 20.
+fn on_scan(scan: &HierarchicalSpline<f32>, text: &str) -> HierarchicalSpline<f32> {
+    let mut canvas = Canvas::alone(scan.clone(), ISO, 1);
+    canvas.density = Some(20.0);
+    let left = stroke(text).apply(canvas, &mut Control::default());
+    left.unwrap_or_else(|e| panic!("{text}: {e}")).0.field
 }
 
 /// Values on every other knot of a cube about a place.
@@ -95,11 +113,8 @@ fn smoothing_takes_the_noise_of_a_scan_away() {
             let text = format!(
                 "smooth = {{ along = [[12, 12, 12]], radius = 8, level = {level}, keep-volume = {keep} }}"
             );
-            let mut scanned = canvas(&scan);
-            scanned.density = Some(20.0);
-            let left = stroke(&text).apply(scanned, &mut Control::default());
             let inside = |field| deviation(&values(field, DVec3::splat(12.0), 2.0));
-            let (before, after) = (inside(&scan), inside(&left.unwrap().0.field));
+            let (before, after) = (inside(&scan), inside(&on_scan(&scan, &text)));
             assert!(after < most * before, "{seed} {text}: {after} of {before}");
         }
     }
@@ -124,7 +139,7 @@ fn smoothing_at_a_corner_of_the_box_as_often_as_one_likes_grows_nothing() {
             );
             let mut field = scan.clone();
             for n in 0..6 {
-                field = done(&field, &text);
+                field = on_scan(&field, &text);
                 let [least, most] = range(&field);
                 assert!(
                     low <= least && most <= high,
