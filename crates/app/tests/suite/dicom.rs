@@ -68,3 +68,20 @@ fn odd_series_are_refused_until_an_option_says_what_to_do() {
     let one = bench.json(&format!("info {several} --series 30"));
     assert_eq!(one["dims"], serde_json::json!([16, 12, 1]));
 }
+
+/// A series is a directory, whatever its name ends in.
+#[test]
+fn an_edited_series_is_written_into_no_directory_that_is_called_a_file() {
+    let bench = Bench::new();
+    let ct = data("ct");
+    bench.json(&format!("fit {ct} -o ct.iclay --method interpolate"));
+    bench.json("new clay.isoclay ct.iclay");
+    for name in ["edited.nii.gz", "edited.NRRD", "edited.dcm"] {
+        let refused = bench.run(&format!("export clay.isoclay --like {ct} -o {name}"));
+        assert_eq!(refused.code, 2, "{name}: {}", refused.stderr);
+        assert!(refused.stderr.contains("into a directory"), "{}", refused.stderr);
+        assert!(!bench.path(name).exists());
+    }
+    bench.json(&format!("export clay.isoclay --like {ct} -o edited.2026"));
+    assert!(bench.path("edited.2026").is_dir());
+}

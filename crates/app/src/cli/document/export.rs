@@ -94,7 +94,10 @@ fn scan_with_edits(args: &Args, scan: &Path, cost: &Cost) -> Outcome {
         _ => &["xyz", "xyzn", "txt", "csv", "asc", "pts"],
     };
     let output = match formats {
-        [] => None,
+        [] => {
+            refuse_file_name(&args.output)?;
+            None
+        }
         formats => Some(Output::check("-o", &args.output, formats, None, &[&source])?),
     };
     let like = Like {
@@ -117,4 +120,17 @@ fn scan_with_edits(args: &Args, scan: &Path, cost: &Cost) -> Outcome {
         }
         .print(args.json),
     }
+}
+
+/// Refuses names of files for what becomes a directory.
+fn refuse_file_name(output: &Path) -> Outcome {
+    const FILES: [&str; 9] = ["nii", "gz", "nrrd", "nhdr", "mha", "mhd", "tif", "tiff", "dcm"];
+    let ending = output.extension().unwrap_or_default().to_string_lossy();
+    if !FILES.iter().any(|file| ending.eq_ignore_ascii_case(file)) {
+        return Ok(());
+    }
+    Err(Failure::usage(format!(
+        "-o {}: a DICOM series is written into a directory; name a new one, without .{ending}, which convert makes a file of",
+        output.display()
+    )))
 }

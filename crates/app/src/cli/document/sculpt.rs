@@ -57,18 +57,30 @@ pub fn run(args: &Args) -> Outcome {
     let bar = Bar::new();
     let mut control = bar.control(&cancel);
     let mut shown = document.state().clone();
-    for command in &commands {
+    let mut is_changed = false;
+    for (n, command) in commands.iter().enumerate() {
         let title = format!("{} ({file})", command.title());
-        let (next, told) = command
-            .apply(&shown, &mut control)
-            .map_err(|e| about(Failure::from(e).about(&title)))?;
+        let (next, told) = command.apply(&shown, &mut control).map_err(|e| {
+            let e = Failure::from(e).about(&title);
+            about(match is_changed {
+                true => e.about(format!(
+                    "stroke {} of {} (those before it are done, undo takes them back)",
+                    n + 1,
+                    commands.len()
+                )),
+                false => e,
+            })
+        })?;
         notes.extend(told.into_iter().map(|note| format!("{title}: {note}")));
         shown = next;
-        if preview.is_none()
-            && !document
-                .commit(&title, command.to_value(), shown.clone())
-                .map_err(failure)?
-        {
+        if preview.is_some() {
+            continue;
+        }
+        let is_edit = document
+            .commit(&title, command.to_value(), shown.clone())
+            .map_err(failure)?;
+        is_changed |= is_edit;
+        if !is_edit {
             notes.push(format!("{title}: changes nothing; no edit was made"));
         }
     }

@@ -501,6 +501,12 @@ fn documents_of_others_are_read() {
             refused.stderr
         );
     }
+    // A preview changes no document.
+    std::fs::create_dir(bench.path("theirs")).unwrap();
+    set_permissions(bench.path("theirs"), Permissions::from_mode(0o777)).unwrap();
+    let preview = run("sculpt clay.isoclay --script out.toml --preview theirs/shown.iclay");
+    assert_eq!(preview.code, 0, "{}", preview.stderr);
+    assert!(bench.path("theirs/shown.iclay").is_file());
     assert_eq!(std::fs::read(bench.path("clay.isoclay")).unwrap(), before);
 }
 

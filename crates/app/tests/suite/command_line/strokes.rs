@@ -255,6 +255,37 @@ fn objects_are_placed_and_move_with_their_parents() {
     clay.ends();
 }
 
+/// Who runs a session again after an error would do its first strokes twice.
+#[test]
+fn a_session_that_fails_tells_what_it_has_done() {
+    let clay = Clay::new();
+    let good = "carve = { shape = { sphere = { radius = 1 } }, along = [[0, 0, 3]] }";
+    let bad = "smooth = { along = [[0, 0, 3]], radius = 2, level = 99 }";
+    for (strokes, done, told) in [
+        (&[bad][..], 0, None),
+        (
+            &[good, bad, good],
+            1,
+            Some("stroke 2 of 3 (those before it are done, undo takes them back)"),
+        ),
+    ] {
+        let text: String = strokes.iter().map(|s| format!("[[stroke]]\n{s}\n")).collect();
+        clay.bench.write("session.toml", text);
+        let run = clay
+            .bench
+            .run("sculpt clay.isoclay --script session.toml --object block");
+        assert_eq!(run.code, 3, "{}", run.stderr);
+        assert_eq!(run.stderr.contains("stroke "), told.is_some(), "{}", run.stderr);
+        assert!(
+            told.is_none_or(|told| run.stderr.contains(told)),
+            "{}",
+            run.stderr
+        );
+        assert!(run.stderr.contains("write 1 to 10"), "{}", run.stderr);
+        assert_eq!(clay.bench.json("info clay.isoclay")["done"], done);
+    }
+}
+
 #[test]
 fn strokes_happen_on_both_sides_and_on_coarse_levels_alone() {
     let clay = Clay::new();

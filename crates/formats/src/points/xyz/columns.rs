@@ -47,10 +47,47 @@ impl Apart {
     }
 }
 
-/// The words of a text.
+/// The words of a text, without quotation marks about them.
 pub fn cut(text: &[u8], at_commas: bool) -> impl Iterator<Item = &[u8]> + Clone {
     text.split(move |c| matches!(c, b' ' | b'\t' | b';') || at_commas && *c == b',')
         .filter(|w| !w.is_empty())
+        .map(unquoted)
+}
+
+fn unquoted(word: &[u8]) -> &[u8] {
+    let inner = |word: &'_ [u8]| word.strip_prefix(b"\"").is_some_and(|w| w.ends_with(b"\""));
+    if inner(word) {
+        &word[1..word.len() - 1]
+    } else {
+        word
+    }
+}
+
+/// The names of columns, empty ones among them where separators tell that there is one; blanks may be part of those between other separators.
+pub fn names(text: &[u8]) -> Vec<String> {
+    let separated = text.split(|c| matches!(c, b',' | b';' | b'\t'));
+    let separated: Vec<String> = separated.map(|w| name(unquoted(w.trim_ascii()))).collect();
+    if Columns::named(&separated).is_some() {
+        return separated;
+    }
+    // A unit that stands alone belongs to the word before it.
+    cut(text, true)
+        .filter(|w| !(w.starts_with(b"[") || w.starts_with(b"(")))
+        .map(name)
+        .collect()
+}
+
+/// A name without the unit behind it, as in `x [m]`.
+fn name(word: &[u8]) -> String {
+    let word = String::from_utf8_lossy(word);
+    let word = word.trim();
+    let unit = word.strip_suffix(']').and_then(|w| w.rsplit_once('['));
+    let unit = unit.or(word.strip_suffix(')').and_then(|w| w.rsplit_once('(')));
+    match unit {
+        Some((name, unit)) if !name.is_empty() && unit.chars().all(char::is_alphabetic) => name.trim_end(),
+        _ => word,
+    }
+    .into()
 }
 
 /// Where position and normal stand.
@@ -60,6 +97,15 @@ pub struct Columns {
     /// None where nothing says so: those after the position may be a normal.
     pub normal: Option<[usize; 3]>,
 }
+
+/// What the axes of a position are called.
+const POSITIONS: [[&str; 3]; 5] = [
+    ["x", "y", "z"],
+    ["easting", "northing", "elevation"],
+    ["easting", "northing", "height"],
+    ["easting", "northing", "altitude"],
+    ["easting", "northing", "z"],
+];
 
 /// What the axes of a normal are called.
 const NORMALS: [[&str; 3]; 5] = [
@@ -71,7 +117,7 @@ const NORMALS: [[&str; 3]; 5] = [
 ];
 
 impl Columns {
-    /// By the names of all columns; none unless they tell x, y and z.
+    /// By the names of all columns; none unless they tell those of a position.
     pub fn named(names: &[String]) -> Option<Self> {
         let of = |axes: [&str; 3]| -> Option<[usize; 3]> {
             let mut found = [0; 3];
@@ -88,7 +134,7 @@ impl Columns {
             Some(found)
         };
         Some(Self {
-            position: of(["x", "y", "z"])?,
+            position: POSITIONS.into_iter().find_map(of)?,
             normal: NORMALS.into_iter().find_map(of),
         })
     }

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::columns::{Apart, Columns, cut};
+use super::columns::{Apart, Columns, cut, names};
 use crate::error::excerpt;
 use crate::limits::{Budget, Counted};
 use crate::points::cloud::PointCloud;
@@ -86,6 +86,9 @@ pub(in crate::points) fn parse_columns(
         }
         if columns == 0 {
             columns = apart.words(text).count();
+            if names.len() != columns {
+                names.retain(|name| !name.is_empty());
+            }
             by_name = Columns::named(&names).filter(|_| names.len() == columns);
         }
         let mut row = [0.0; 6];
@@ -156,7 +159,7 @@ pub(in crate::points) fn parse_columns(
         _ => {}
     }
     let name = |i: usize| match names.get(i) {
-        Some(name) if names.len() == columns => name.clone(),
+        Some(name) if names.len() == columns && !name.is_empty() => name.clone(),
         _ => format!("column {}", i + 1),
     };
     let left_out = (0..columns).filter(|column| taken.slot(*column).is_none());
@@ -170,12 +173,10 @@ pub(in crate::points) fn parse_columns(
     Ok((shape, taken))
 }
 
-/// The words of a line of names, or of a comment.
+/// The names in a line of them, or in a comment.
 fn names_in(text: &[u8]) -> Vec<String> {
     let marks = text.iter().take_while(|c| matches!(c, b'#' | b'/')).count();
-    cut(&text[marks..], true)
-        .map(|w| String::from_utf8_lossy(w).into_owned())
-        .collect()
+    names(&text[marks..])
 }
 
 /// What a line is.
@@ -206,14 +207,13 @@ impl Line {
 
 /// Whether a line holds words only, as `X,Y,Z` does.
 fn is_column_names(text: &[u8]) -> bool {
-    let mut words = cut(text, true);
-    words.clone().count() >= 3
-        && words.all(|w| {
-            w.iter().any(u8::is_ascii_alphabetic)
-                && w.is_ascii()
-                && w.iter().all(u8::is_ascii_graphic)
-                && fast_float2::parse::<f64, _>(w).is_err()
-        })
+    let is_plain = text
+        .iter()
+        .all(|c| c.is_ascii_graphic() || matches!(c, b' ' | b'\t'));
+    let mut words = cut(text, true).filter(|w| !w.is_empty());
+    let is_name =
+        |w: &[u8]| w.iter().any(u8::is_ascii_alphabetic) && fast_float2::parse::<f64, _>(w).is_err();
+    is_plain && words.clone().count() >= 3 && words.all(is_name)
 }
 
 #[cfg(test)]
@@ -292,6 +292,18 @@ mod tests {
             ("Y X Z\n2 1 3\n5 4 6\n", &[]),
             ("# GpsTime X Y Z\n2\n0.1 1 2 3\n0.2 4 5 6\n", &["GpsTime"]),
             ("x y z r g b\n1 2 3 1 0 0\n4 5 6 0 1 0\n", &["r", "g", "b"]),
+            ("\"z\",\"y\",\"x\"\n3,2,1\n6,5,4\n", &[]),
+            (
+                "\"\",\"x\",\"y\",\"z\"\n\"1\",1,2,3\n\"2\",4,5,6\n",
+                &["column 1"],
+            ),
+            (",x,y,z\n0,1,2,3\n1,4,5,6\n", &["column 1"]),
+            ("z,y,x,\n3,2,1,\n6,5,4,\n", &[]),
+            ("point id;x [m];y [m];z [m]\n7;1;2;3\n8;4;5;6\n", &["point id"]),
+            ("z [m] x [m] y [m]\n3 1 2\n6 4 5\n", &[]),
+            ("# z, x y\n3 1 2\n6 4 5\n", &[]),
+            ("Northing,Easting,Elevation\n2,1,3\n5,4,6\n", &[]),
+            ("\"1\",\"2\",\"3\"\n\"4\",\"5\",\"6\"\n", &[]),
         ] {
             let c = read(text).unwrap();
             assert_eq!((&c.positions[..], c.normals), (&at[..], None), "{text}");
