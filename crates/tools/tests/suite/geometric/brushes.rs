@@ -237,7 +237,14 @@ fn a_box_grows_on_all_sides_for_what_swells() {
     let ball = |p: DVec3| SLOPE * (3.0 - p.distance(middle)) + ISO;
     let ball = HierarchicalSpline::schoenberg(lattice, SLOPE, ball).unwrap();
     let large = done(&ball, "inflate = { along = [[4, 4, 4]], radius = 16, by = 3 }");
-    for way in [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z] {
+    for way in [
+        DVec3::X,
+        DVec3::NEG_X,
+        DVec3::Y,
+        DVec3::NEG_Y,
+        DVec3::Z,
+        DVec3::NEG_Z,
+    ] {
         let off = (large.value(middle + 6.0 * way) - ISO) / SLOPE;
         assert!(off.abs() < 0.05, "{way}: {off}");
     }
