@@ -8,6 +8,9 @@ use crate::force::ForceError;
 use crate::geometric::GeometricError;
 use crate::tool::ToolError;
 
+/// How often a box grows for one stroke: to about twice its length. Further away is a slip of the pen.
+pub const MOST_GROWTHS: usize = 6;
+
 /// Share of the cells along an axis by which a box grows at once.
 const SHARE: u32 = 8;
 
@@ -34,13 +37,6 @@ impl Canvas {
         let cells = u64::from(self.field.lattice().cells[face.axis] + self.step(face));
         let can_grow = cells << finest <= MOST_CELLS && !face.cuts(&self.field, self.iso);
         can_grow.then_some(face)
-    }
-
-    /// Whether the box may grow beyond a face in a stroke that began with `given`: by its length then, about. Further away is a slip of the pen.
-    pub fn may_grow(&self, face: Face, given: &Self) -> bool {
-        let begun = given.field.lattice();
-        let added = begun.growth_to(self.field.lattice());
-        added.is_some_and(|added| added[usize::from(face.is_last)][face.axis] < begun.cells[face.axis])
     }
 
     /// What is left to say of a box that was another one before.

@@ -15,6 +15,7 @@ use crate::material::Material;
 use crate::number::{Numbers, Positive};
 use crate::paint::Paint;
 use crate::place::Place;
+use crate::room::MOST_GROWTHS;
 use crate::surface::Surface;
 use crate::symmetry::Symmetry;
 use crate::tool::{Tool, ToolError};
@@ -209,18 +210,20 @@ impl Stroke {
     pub fn apply(&self, canvas: Canvas, control: &mut Control) -> Result<(Canvas, Vec<String>), ToolError> {
         let stroke = self.of(canvas.material);
         let mut grown = canvas.clone();
-        loop {
+        for growths in 0..=MOST_GROWTHS {
             match stroke.in_box(grown.clone(), control) {
-                Err(why) => {
-                    let face = grown.face_for(&why).filter(|face| grown.may_grow(*face, &canvas));
-                    grown = face.and_then(|face| grown.grown(face)).ok_or(why)?;
+                Err(why) if growths < MOST_GROWTHS => {
+                    let larger = grown.face_for(&why).and_then(|face| grown.grown(face));
+                    grown = larger.ok_or(why)?;
                 }
+                Err(why) => return Err(why),
                 Ok((left, mut notes)) => {
                     notes.extend(left.growth_since(&canvas));
                     return Ok((left, notes));
                 }
             }
         }
+        unreachable!("the last round ends")
     }
 
     /// The stroke on an object of a material, which counts where the stroke says nothing else.

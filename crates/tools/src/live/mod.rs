@@ -18,6 +18,7 @@ use glam::DVec3;
 
 use crate::canvas::Canvas;
 use crate::paint::Paint;
+use crate::room::MOST_GROWTHS;
 use crate::session::{During, Stroke};
 use crate::tool::ToolError;
 
@@ -83,6 +84,7 @@ pub struct LiveStroke {
     /// As it was given, and in the box that it has by now.
     given: Canvas,
     before: Canvas,
+    growths: usize,
     work: Work,
     first: Option<Pose>,
     /// Of solids, how they are turned all the way, if that was said.
@@ -135,6 +137,7 @@ impl LiveStroke {
             seen: canvas.field.clone(),
             given: canvas.clone(),
             before: canvas,
+            growths: 0,
             first: None,
             turn,
             force,
@@ -164,12 +167,13 @@ impl LiveStroke {
             (None, Some(turn)) => Pose { turn, ..pose },
             (None, None) => pose,
         };
-        let before = self.before.clone();
+        let (before, growths) = (self.before.clone(), self.growths);
         let force = loop {
             match self.stepped(first, pose, control) {
                 Err(why) if self.grow(&why, control)? => {}
-                Err(why) if self.before.field.lattice() != before.field.lattice() => {
+                Err(why) if self.growths > growths => {
                     // No box is large enough, so it stays as it was.
+                    self.growths = growths;
                     self.begin_anew(before, control)?;
                     return Err(why);
                 }
@@ -199,14 +203,14 @@ impl LiveStroke {
     /// on what is there.
     fn grow(&mut self, why: &ToolError, control: &mut Control) -> Result<bool, ToolError> {
         let needs_none = matches!(why, ToolError::Force(_)) && self.stroke.pull.is_none();
-        if needs_none {
+        if needs_none || self.growths == MOST_GROWTHS {
             return Ok(false);
         }
         let face = self.before.face_for(why);
-        let face = face.filter(|face| self.before.may_grow(*face, &self.given));
         let Some(grown) = face.and_then(|face| self.before.grown(face)) else {
             return Ok(false);
         };
+        self.growths += 1;
         match self.begin_anew(grown, control) {
             Err(why) if !self.grow(&why, control)? => Err(why),
             _ => Ok(true),
@@ -294,6 +298,7 @@ impl LiveStroke {
             given,
             before,
             work,
+            growths,
             ..
         } = self;
         let made = work.ended(&stroke, &before, control);
@@ -303,11 +308,7 @@ impl LiveStroke {
                 (left, notes)
             }
             // The end of the stroke, or its other side, needs more room still.
-            Err(why)
-                if before
-                    .face_for(&why)
-                    .is_some_and(|face| before.may_grow(face, &given)) =>
-            {
+            Err(why) if growths < MOST_GROWTHS && before.face_for(&why).is_some() => {
                 stroke.apply(given, control)?
             }
             Err(why) => return Err(why),
