@@ -130,7 +130,7 @@ fn refuse_file_name(output: &Path) -> Outcome {
         return Ok(());
     }
     Err(Failure::usage(format!(
-        "-o {}: a DICOM series is written into a directory; name a new one, without .{ending}, which convert makes a file of",
+        "-o {}: a DICOM series is written into a directory; leave .{ending} out of its name, and make a file of it by isoclay convert",
         output.display()
     )))
 }
