@@ -55,12 +55,8 @@ pub fn cut(text: &[u8], at_commas: bool) -> impl Iterator<Item = &[u8]> + Clone 
 }
 
 fn unquoted(word: &[u8]) -> &[u8] {
-    let inner = |word: &'_ [u8]| word.strip_prefix(b"\"").is_some_and(|w| w.ends_with(b"\""));
-    if inner(word) {
-        &word[1..word.len() - 1]
-    } else {
-        word
-    }
+    let inner = word.strip_prefix(b"\"").and_then(|w| w.strip_suffix(b"\""));
+    inner.unwrap_or(word)
 }
 
 /// The names of columns, empty ones among them where separators tell that there is one; blanks may be part of those between other separators.

@@ -89,9 +89,9 @@ fn on_scan(scan: &HierarchicalSpline<f32>, text: &str) -> HierarchicalSpline<f32
     left.unwrap_or_else(|e| panic!("{text}: {e}")).0.field
 }
 
-/// Values on every other knot of a cube about a place.
+/// Values of a cube about a place, one apart.
 fn values(field: &HierarchicalSpline<f32>, at: DVec3, half: f64) -> Vec<f64> {
-    let side = |n: usize| (n as f64 - half).clamp(-half, half);
+    let side = |n: usize| n as f64 - half;
     let count = 2 * half as usize + 1;
     let places = (0..count * count * count)
         .map(|n| at + DVec3::new(side(n / count / count), side(n / count % count), side(n % count)));
